@@ -2,7 +2,7 @@
 //! Mask R-CNN and that of the ONNX model zoo do. It runs in ONNX Runtime: tract has no `RoiAlign`.
 //!
 //! ```text
-//!   image   float [3, 800, 1280] or [1, 3, 800, 1280], red, green and blue, 0 to 1
+//!   image   float [3, 800, 1280] or [1, 3, 800, 1280], as `MaskRcnnInput` says
 //!     ▼
 //!   boxes   float [n, 4]: left, top, right, bottom (px)      labels  int64 [n]
 //!   scores  float [n]: 0 to 1                                masks   float [n, 1, height, width], 0 to 1
@@ -19,6 +19,7 @@ use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
 use super::classifier::{Backend, ClassifierError, environment, open_session};
 use super::image::{CHANNELS, Image};
 use super::instance::{Instance, Mask};
+use super::mask_rcnn_config::MaskRcnnInput;
 use super::pinhole::{HEIGHT_PX, WIDTH_PX};
 use super::sampling::Sampling;
 use super::vector_registers::clear_upper_parts;
@@ -69,6 +70,7 @@ pub struct InstanceDetector {
     outputs: [String; 4],
     sampling: Sampling,
     labels: LabelMap,
+    colours: MaskRcnnInput,
     /// The image: three planes. What the network does not read stays 0.
     planes: Vec<f32>,
 }
@@ -112,7 +114,14 @@ impl InstanceDetector {
                 ));
             }
         };
-        Ok(Self { session, input, outputs, sampling, labels, planes: vec![0.0; PLANE * CHANNELS] })
+        let (colours, planes) = (MaskRcnnInput::Rgb, vec![0.0; PLANE * CHANNELS]);
+        Ok(Self { session, input, outputs, sampling, labels, colours, planes })
+    }
+
+    /// Returns the same network, which takes these values for the colours of a pixel. [`MaskRcnnInput::Rgb`] is usual.
+    #[must_use]
+    pub fn with_input(self, colours: MaskRcnnInput) -> Self {
+        Self { colours, ..self }
     }
 
     /// Returns the columns and rows of the image that the network reads.
@@ -132,7 +141,8 @@ impl InstanceDetector {
                 #[expect(clippy::cast_sign_loss, reason = "columns and rows lie in the image")]
                 let at = *row as usize * usize::from(WIDTH_PX) + *column as usize;
                 for (channel, value) in rgb.iter().enumerate() {
-                    self.planes[channel * PLANE + at] = f32::from(*value) / 255.0;
+                    let (plane, value) = self.colours.place(channel, *value);
+                    self.planes[plane * PLANE + at] = value;
                 }
             }
         }

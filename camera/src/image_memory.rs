@@ -123,7 +123,7 @@ mod tests {
     use closecall_traffic::{CONTROL_STEP, VehicleClass};
 
     use super::*;
-    use closecall_tracking::Extent;
+    use closecall_tracking::{Extent, SeenBy};
 
     fn at(face_x_m: f64, face_y_m: f64) -> Detection {
         Detection {
@@ -138,6 +138,7 @@ mod tests {
             width_m: 1.8,
             width: Extent::Seen,
             top_m: 1.5,
+            seen_by: SeenBy::Lidar,
             points: 50,
             is_centred: false,
             class: ClassScores::UNKNOWN,

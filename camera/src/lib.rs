@@ -52,7 +52,7 @@ pub use hash::mix;
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use image_memory::ImageMemory;
 pub use instance::{Instance, MASK_THRESHOLD, Mask, overlap};
-pub use mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
+pub use mask_rcnn_config::{MaskRcnn, MaskRcnnConfig, MaskRcnnInput, SHIPPED_MIN_SHOWN_PX, SHIPPED_MISSED};
 pub use network::Network;
 pub use optics::{LensConfig, Optics};
 pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};

@@ -165,7 +165,7 @@ mod tests {
 
     use super::*;
     use crate::CameraConfig;
-    use closecall_tracking::Extent;
+    use closecall_tracking::{Extent, SeenBy};
 
     fn vehicle(class: VehicleClass, s_m: f64) -> SceneVehicle {
         let state = VehicleState { s_m, d_m: -5.6, speed_mps: 30.0, ..VehicleState::default() };
@@ -185,6 +185,7 @@ mod tests {
             width_m,
             width: Extent::Seen,
             top_m,
+            seen_by: SeenBy::Lidar,
             points: 50,
             is_centred: false,
             class: ClassScores::UNKNOWN,

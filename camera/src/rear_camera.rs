@@ -91,6 +91,7 @@ mod tests {
 
     use super::super::CameraConfig;
     use super::super::image::{CROP_PX, sample_positions};
+    use super::super::pinhole::WIDTH_PX;
     use super::*;
 
     fn rear_camera() -> RearCamera {
@@ -142,6 +143,43 @@ mod tests {
             vehicle(VehicleClass::Motorcycle, 480.0, -1.9),
         ];
         (road, environment, others)
+    }
+
+    /// Returns the pixels in the middle of the cells between knots, which lie at these cells and pixels, as `training/mask_rcnn_sampling.py`
+    /// chooses those of the Mask R-CNN.
+    fn between(knots: [(f64, f64); 6]) -> Vec<i32> {
+        let cells = (0..).map(|cell| f64::from(cell) + 0.5).take_while(|cell| *cell < knots[5].0);
+        let pixel = |cell: f64| {
+            let pair = knots.windows(2).find(|pair| cell < pair[1].0).unwrap();
+            let [(from, low), (to, high)] = [pair[0], pair[1]];
+            (low + (high - low) * (cell - from) / (to - from)).floor() as i32
+        };
+        cells.map(pixel).collect()
+    }
+
+    #[test]
+    fn the_pixels_that_the_mask_rcnn_reads_are_those_of_the_whole_image() {
+        let columns = between([(0., 0.), (48., 320.), (96., 512.), (224., 768.), (272., 960.), (320., 1280.)]);
+        let rows = between([(0., 0.), (17., 250.), (29., 310.), (89., 430.), (112., 522.), (144., 800.)]);
+        assert_eq!((columns.len(), rows.len()), (320, 144));
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        for (camera, light) in
+            [(rear_camera(), Light::Day), (rear_camera(), Light::Night), (real_camera(), Light::Dusk)]
+        {
+            let (road, environment, others) = varied_scene(light);
+            let scene =
+                Scene { time: Time::from_ms(880), road: &road, environment: &environment, ego, others: &others };
+            let whole = camera.render_image(&scene, ExposureKey(42)).image;
+            let mut frame = Frame::new(camera.camera(), &scene, ExposureKey(42), &[PixelRect::IMAGE]);
+            let sampled = frame.sampled(&columns, &rows).image;
+            let expected = rows.iter().flat_map(|y| {
+                columns.iter().flat_map(|x| {
+                    let at = 3 * (*y as usize * usize::from(WIDTH_PX) + *x as usize);
+                    whole.rgb[at..at + 3].to_vec()
+                })
+            });
+            assert!(sampled.rgb.iter().copied().eq(expected), "{light:?}");
+        }
     }
 
     fn assert_crops_match(camera: &RearCamera, light: Light, windows: &[PixelRect]) {

@@ -2,7 +2,7 @@
 //! returns the instances.
 
 use closecall_tracking::Detection;
-use closecall_traffic::{Check, Choice, Num, Parameters, Scene, SceneVehicle};
+use closecall_traffic::{Check, Parameters, Scene, SceneVehicle};
 
 use super::classifier::{Backend, ClassifierError};
 use super::detector::{InstanceDetector, LabelMap, SHIPPED_MASK_RCNN};
@@ -11,7 +11,7 @@ use super::instance::Instance;
 use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 use super::pinhole::{FOCAL_PX, HEIGHT_PX, Lens, WIDTH_PX};
 use super::pipeline::ground_box;
-use super::{Camera, CameraConfig, ExposureKey, Frame, FrameBuffers, Pipeline, PixelRect, RearCamera};
+use super::{Camera, CameraConfig, ExposureKey, Frame, FrameBuffers, PixelRect, RearCamera};
 
 /// The camera and the instance detector of one worker thread.
 #[derive(Debug)]
@@ -22,15 +22,14 @@ pub struct WholeImageDetector {
 }
 
 impl CameraConfig {
-    /// Loads the Mask R-CNN if this configuration has that pipeline, so that what is missing or wrong is reported before any work is done.
+    /// Loads the Mask R-CNN that this configuration names, so that what is missing or wrong is reported before any work is done.
     ///
     /// # Errors
     /// As [`MaskRcnn::detector`]; a configuration that cannot be checked is no error here.
     pub fn check_network(&self, backend: &Backend) -> Result<(), ClassifierError> {
-        if self.pipeline != Choice::Fixed(Pipeline::MaskRcnn) {
-            return Ok(());
-        }
-        let own = MaskRcnnConfig { rate_hz: Num::Fixed(5.0), latency_s: Num::Fixed(0.0), ..self.mask_rcnn.clone() };
+        // Only what names the network: a number may be a parameter, whose value is not known yet.
+        let MaskRcnnConfig { model, labels, input, .. } = self.mask_rcnn.clone();
+        let own = MaskRcnnConfig { model, labels, input, ..MaskRcnnConfig::default() };
         own.check(&Parameters::default()).map_or(Ok(()), |checked| checked.detector(backend).map(|_| ()))
     }
 }
@@ -42,16 +41,19 @@ impl MaskRcnn {
     /// [`ClassifierError`] if the model's file cannot be read, and as [`InstanceDetector::new`].
     pub fn detector(&self, backend: &Backend) -> Result<InstanceDetector, ClassifierError> {
         let labels = self.labels.and_then(|text| LabelMap::parse(text).ok());
-        let Some(path) = self.model else { return InstanceDetector::new(SHIPPED_MASK_RCNN, labels.as_ref(), backend) };
+        let Some(path) = self.model else {
+            return Ok(InstanceDetector::new(SHIPPED_MASK_RCNN, labels.as_ref(), backend)?.with_input(self.input));
+        };
         let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
         let bytes = std::fs::read(path).map_err(|error| at(error.to_string()))?;
-        InstanceDetector::new(&bytes, labels.as_ref(), backend).map_err(|error| match error {
+        let detector = InstanceDetector::new(&bytes, labels.as_ref(), backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
             ClassifierError::Layout { found, wanted } => {
                 ClassifierError::Layout { found: format!("{path}: {found}"), wanted }
             }
             other => other,
-        })
+        });
+        Ok(detector?.with_input(self.input))
     }
 }
 

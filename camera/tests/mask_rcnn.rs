@@ -2,9 +2,12 @@
 //!
 //! Needs the shared library of the `onnxruntime` wheel. Python was given whole images, and Rust the pixels that the network reads.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use closecall_camera::{Backend, Image, Instance, InstanceDetector, LabelMap, Mask, SHIPPED_MODEL};
+use closecall_camera::{
+    Backend, HEIGHT_PX, Image, Instance, InstanceDetector, LabelMap, Mask, MaskRcnnInput, SHIPPED_MODEL, WIDTH_PX,
+};
+use closecall_traffic::VehicleClass;
 
 /// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of two masks.
 const BOX_PX: f64 = 0.5;
@@ -80,6 +83,58 @@ fn a_network_with_another_layout_is_refused_with_what_it_has_and_what_is_wanted(
     }
     let error = InstanceDetector::new(b"no network", None, &backend).unwrap_err().to_string();
     assert!(error.starts_with("failed to read the classifier's network"), "{error}");
+}
+
+/// The first pixel of the picture for other networks: red, green and blue.
+const FIRST_PIXEL: [u8; 3] = [51, 102, 204];
+
+/// Returns what a network of `training/mask_rcnn_layouts.py` finds in a black picture whose first pixel is [`FIRST_PIXEL`].
+fn found_by(file: &str, input: MaskRcnnInput, backend: &Backend) -> Vec<Instance> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mask_rcnn_layouts");
+    let bytes = std::fs::read(folder.join(file)).unwrap();
+    let labels = LabelMap::parse("3=car 8=truck 4=motorcycle").unwrap();
+    let mut detector = InstanceDetector::new(&bytes, Some(&labels), backend).unwrap().with_input(input);
+    let [width, height] = [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
+    let mut rgb = vec![0; width * height * 3];
+    rgb[..3].copy_from_slice(&FIRST_PIXEL);
+    detector.detect(&Image { width: width as u32, height: height as u32, rgb }).unwrap()
+}
+
+fn assert_found(found: &[Instance], scores: [f64; 3]) {
+    let classes = [VehicleClass::Car, VehicleClass::Truck, VehicleClass::Motorcycle];
+    assert_eq!(found.iter().map(|instance| instance.class).collect::<Vec<_>>(), classes);
+    for (instance, score) in found.iter().zip(scores) {
+        assert!((instance.score - score).abs() < 1e-4, "{} instead of {score}", instance.score);
+    }
+    assert_eq!(found[1].box_px, [700.0, 380.0, 800.0, 480.0]);
+}
+
+#[test]
+fn the_layout_of_the_model_zoo_is_read_and_gets_blue_green_and_red_less_their_means() {
+    let Some(backend) = backend() else { return };
+    let found = found_by("model-zoo.onnx", MaskRcnnInput::BgrMean, &backend);
+    // The network adds the means again.
+    assert_found(&found, [0.8, 0.4, 0.2]);
+    let inside = found[1].mask.pixels().iter().filter(|inside| **inside).count();
+    assert_eq!(inside, 100 * 100, "cells of 28 x 28 fill the box");
+    let wrong = found_by("model-zoo.onnx", MaskRcnnInput::Rgb, &backend);
+    assert!((wrong[0].score - 0.8).abs() > 0.1, "the input matters");
+}
+
+#[test]
+fn the_layout_of_torchvision_is_read_with_a_batch_and_with_masks_of_the_size_of_the_image() {
+    let Some(backend) = backend() else { return };
+    let found = found_by("torchvision.onnx", MaskRcnnInput::Rgb, &backend);
+    assert_found(&found, [0.2, 0.4, 0.8]);
+    assert_eq!(found[0].mask.extent_px(), Some([0.0, 0.0, 1280.0, 800.0]));
+}
+
+#[test]
+fn a_network_without_labels_is_refused() {
+    let Some(backend) = backend() else { return };
+    let bytes = include_bytes!("mask_rcnn_layouts/model-zoo.onnx");
+    let error = InstanceDetector::new(bytes, None, &backend).unwrap_err().to_string();
+    assert!(error.contains("3=car 4=motorcycle 8=truck"), "{error}");
 }
 
 #[test]

@@ -15,7 +15,6 @@ use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::native::NativeError;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
-use closecall_traffic::Choice;
 
 use crate::execution::Campaign;
 use crate::fingerprint::Fingerprint;
@@ -162,18 +161,15 @@ impl Plan {
 
     /// Returns true if some sample may need the rear camera's network.
     pub fn uses_classifier(&self) -> bool {
-        let may_be_full = |file: &ScenarioFile| match (self.sensors, &file.config().sensors.mode) {
-            (Some(mode), _) => mode == SensorMode::Full,
-            (None, Choice::Fixed(mode)) => *mode == SensorMode::Full,
-            (None, Choice::Parameter(_)) => true,
-        };
-        self.scenarios.iter().any(may_be_full)
+        self.scenarios.iter().any(|file| file.may_have_mode(SensorMode::Full, self.sensors))
     }
 
-    /// Returns the rear cameras of the scenarios in which some sample may need the camera's network.
-    pub fn cameras(&self) -> impl Iterator<Item = &CameraConfig> {
-        let files = self.scenarios.iter().filter(|_| self.uses_classifier());
-        files.map(|file| &file.config().sensors.rear_camera)
+    /// Returns the rear cameras whose Mask R-CNN some sample may need.
+    pub fn mask_rcnn_cameras(&self) -> impl Iterator<Item = &CameraConfig> {
+        let may_need = |file: &&ScenarioFile| {
+            file.may_have_mode(SensorMode::Full, self.sensors) && file.may_have_pipeline(Pipeline::MaskRcnn)
+        };
+        self.scenarios.iter().filter(may_need).map(|file| &file.config().sensors.rear_camera)
     }
 
     /// Returns the networks that some sample may need.
@@ -183,7 +179,7 @@ impl Plan {
         }
         let classifier = rear_classifier()?;
         let mut models = Vec::new();
-        for camera in self.cameras().filter(|camera| camera.pipeline == Choice::Fixed(Pipeline::MaskRcnn)) {
+        for camera in self.mask_rcnn_cameras() {
             let (name, blake3) = match &camera.mask_rcnn.model {
                 None => ("rear-mask-rcnn".to_owned(), blake3::hash(SHIPPED_MASK_RCNN).to_string()),
                 Some(path) => {

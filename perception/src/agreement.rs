@@ -55,7 +55,8 @@ pub struct Agreement {
 }
 
 impl Verdict {
-    fn of(outcome: &Outcome) -> Self {
+    /// Returns what a run showed.
+    pub fn of(outcome: &Outcome) -> Self {
         let mis = outcome.mis.as_ref().ok();
         Self {
             has_collided: outcome.ego_collided(),
@@ -74,27 +75,32 @@ impl Pair {
 
     /// Returns the first difference of the two runs that is large enough to matter.
     pub fn reason(&self) -> String {
-        let differ = |name: &str, object: Option<f64>, full: Option<f64>| match (object, full) {
-            (Some(object), Some(full)) if (object - full).abs() > DIFFERENT_S => Some(format!(
-                "the system {name} {:.2} s {} with the object-level sensors",
-                (object - full).abs(),
-                if object < full { "earlier" } else { "later" }
-            )),
-            (Some(_), None) => Some(format!("the system {name} only with the object-level sensors")),
-            (None, Some(_)) => Some(format!("the system {name} only with the full chain")),
-            _ => None,
-        };
-        let Self { object, full, .. } = self;
-        differ("engages", object.engaged_at_s, full.engaged_at_s)
-            .or_else(|| differ("releases", object.released_at_s, full.released_at_s))
-            .unwrap_or_else(|| {
-                let missed = if object.has_collided { full } else { object };
-                let gap = missed
-                    .min_gap_rear_m
-                    .map_or_else(String::new, |gap_m| format!(": the other run passes by {gap_m:.2} m"));
-                format!("engaged and released within {DIFFERENT_S} s of each other, on the edge of a contact{gap}")
-            })
+        reason([&self.object, &self.full], ["the object-level sensors", "the full chain"])
     }
+}
+
+/// Returns the first difference of two runs of a sample that is large enough to matter. `names` says what each run had.
+pub fn reason([one, other]: [&Verdict; 2], names: [&str; 2]) -> String {
+    let differ = |what: &str, first: Option<f64>, second: Option<f64>| match (first, second) {
+        (Some(first), Some(second)) if (first - second).abs() > DIFFERENT_S => Some(format!(
+            "the system {what} {:.2} s {} with {}",
+            (first - second).abs(),
+            if first < second { "earlier" } else { "later" },
+            names[0]
+        )),
+        (Some(_), None) => Some(format!("the system {what} only with {}", names[0])),
+        (None, Some(_)) => Some(format!("the system {what} only with {}", names[1])),
+        _ => None,
+    };
+    differ("engages", one.engaged_at_s, other.engaged_at_s)
+        .or_else(|| differ("releases", one.released_at_s, other.released_at_s))
+        .unwrap_or_else(|| {
+            let missed = if one.has_collided { other } else { one };
+            let gap = missed
+                .min_gap_rear_m
+                .map_or_else(String::new, |gap_m| format!(": the other run passes by {gap_m:.2} m"));
+            format!("engaged and released within {DIFFERENT_S} s of each other, on the edge of a contact{gap}")
+        })
 }
 
 impl Agreement {

@@ -10,7 +10,7 @@ use closecall_camera::{FOCAL_PX, Instance, RearCamera, is_beside_road, overlap};
 use closecall_tracking::LaneGeometry;
 use closecall_traffic::{ClassScores, Time};
 
-use crate::{Detection, Extent, Scene, SceneVehicle};
+use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy};
 
 /// Share of the smaller of two boxes that both have in common, from which an instance and a detection belong together (assumption:
 /// a cluster may be a part of the vehicle, and the length of its box is often assumed).
@@ -21,10 +21,6 @@ const TOUCHING: f64 = 0.2;
 const SAME_INSTANCE: f64 = 0.5;
 /// Score from which an instance that no cluster belongs to counts as a vehicle: more likely than not.
 const MIN_ALONE_SCORE: f64 = 0.5;
-/// Width in the image from which the network would find a vehicle (px): that of the targets in its model card.
-const MIN_SHOWN_PX: f64 = 20.0;
-/// Share of the vehicles of this width that the network misses: that of the held-out renders of all lights and weathers, model card.
-const MISSED: f64 = 0.074;
 /// Share of a detection's box in the image that the boxes of nearer ones may cover, if the image shows it (assumption).
 const MAX_HIDDEN: f64 = 0.3;
 /// Range of plausible widths of a vehicle from its mask (m).
@@ -65,6 +61,7 @@ pub(crate) fn associate(
     detections: &[Detection],
 ) -> ImageResult {
     let lane = LaneGeometry::from_scene(scene);
+    let network = camera.camera().mask_rcnn;
     let bounds: Vec<Option<[f64; 4]>> =
         detections.iter().map(|detection| camera.detection_bounds(&scene.ego, detection)).collect();
     let evidence = detections.iter().enumerate().map(|(index, detection)| {
@@ -74,7 +71,9 @@ pub(crate) fn associate(
                 scores: scores(instances, found),
                 width_m: width_m(camera, &scene.ego, found, detection),
             }),
-            None if is_shown(index, &own, detections, &bounds) => Some(Evidence { scores: MISS, width_m: None }),
+            None if own[2] - own[0] >= network.min_shown_px && !is_hidden(index, &own, detections, &bounds) => {
+                missed_scores(network.missed).map(|scores| Evidence { scores, width_m: None })
+            }
             None => None,
         }
     });
@@ -87,11 +86,12 @@ pub(crate) fn associate(
     ImageResult { evidence, alone: alone.collect() }
 }
 
-/// The scores of a detection that the image would show as a vehicle, and does not.
-const MISS: ClassScores = {
-    let vehicle = MISSED / (3.0 * MISSED + 1.0);
-    ClassScores([vehicle, vehicle, vehicle, 1.0 / (3.0 * MISSED + 1.0)])
-};
+/// Returns the scores of a detection that the image would show as a vehicle, and does not, if the network misses this share of the vehicles.
+/// Returns `None` if it may miss all.
+fn missed_scores(missed: f64) -> Option<ClassScores> {
+    let vehicle = missed / (3.0 * missed + 1.0);
+    (missed < 1.0).then_some(ClassScores([vehicle, vehicle, vehicle, 1.0 / (3.0 * missed + 1.0)]))
+}
 
 /// Returns the instance that a box in the image belongs to: that of the largest intersection over union.
 fn best<'a>(instances: &'a [Instance], own: &[f64; 4]) -> Option<&'a Instance> {
@@ -119,17 +119,16 @@ fn scores(instances: &[Instance], found: &Instance) -> ClassScores {
     ClassScores(scores.map(|score| score / total))
 }
 
-/// Returns whether the image would show a vehicle at a detection: it is wide enough, and no nearer one hides it.
-fn is_shown(index: usize, own: &[f64; 4], detections: &[Detection], bounds: &[Option<[f64; 4]>]) -> bool {
+/// Returns whether nearer detections hide the box of one in the image.
+fn is_hidden(index: usize, own: &[f64; 4], detections: &[Detection], bounds: &[Option<[f64; 4]>]) -> bool {
     let area = |[left, top, right, bottom]: &[f64; 4]| (right - left) * (bottom - top);
     let distance = |at: usize| detections[at].face_x_m.hypot(detections[at].face_y_m);
-    let is_hidden = bounds.iter().enumerate().any(|(other, bounds)| {
+    bounds.iter().enumerate().any(|(other, bounds)| {
         other != index
             && distance(other) < distance(index)
             && bounds
                 .is_some_and(|bounds| overlap(&bounds, own) * area(&bounds).min(area(own)) > MAX_HIDDEN * area(own))
-    });
-    own[2] - own[0] >= MIN_SHOWN_PX && !is_hidden
+    })
 }
 
 /// Returns the width of a vehicle from its mask (m), if the image does not cut it off and the width is plausible.
@@ -176,6 +175,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         width_m: if WIDTHS_M.contains(&width_m) { width_m } else { typical.width_m },
         width: Extent::Assumed,
         top_m: typical.height_m,
+        seen_by: SeenBy::CameraAlone,
         points: ALONE_POINTS,
         is_centred: false,
         class: ClassScores(scores),

@@ -30,7 +30,7 @@ mod worker_classifier;
 
 pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
-pub use closecall_tracking::{Detection, Extent, TrackerConfig, TrackerModel};
+pub use closecall_tracking::{Detection, Extent, SeenBy, TrackerConfig, TrackerModel};
 pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception, MAX_ADDITIONAL_LIDARS};

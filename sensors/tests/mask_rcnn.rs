@@ -73,6 +73,91 @@ fn follow(mut perception: Box<dyn Perception>) -> (Vec<Vec<Detection>>, Health) 
     (detections, perception.health().rear)
 }
 
+/// Runs `steps` control steps. `others` returns the vehicles of each, from the time (s). Returns the LiDAR's detections of each step, to which
+/// those of the camera alone belong.
+fn run(sensors: &str, lidar: &str, steps: i64, others: impl Fn(f64) -> Vec<SceneVehicle>) -> Vec<Vec<Detection>> {
+    let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+    let mut perception = perception(sensors, faults("", lidar));
+    let step = |step: i64| {
+        let time = CONTROL_STEP * step;
+        let (ego, others) = (vehicle(0, VehicleClass::Car, 500.0 + 30.0 * time.s()), others(time.s()));
+        let scene = Scene { time, road: &road, environment: &environment, ego, others: &others };
+        perception.step(&scene).expect("valid settings and scenes");
+        perception.rear_lidar().map(|lidar| lidar.detections.to_vec()).unwrap_or_default()
+    };
+    (0..steps).map(step).collect()
+}
+
+/// Returns a vehicle whose front is `gap_m` behind the middle of the ego after `time_s`, at a lateral position of `y_m` from the ego.
+fn behind(class: VehicleClass, time_s: f64, [gap_m, y_m]: [f64; 2], closing_mps: f64) -> SceneVehicle {
+    let mut other = vehicle(class as usize + 1, class, 500.0 + 30.0 * time_s - gap_m);
+    other.state.s_m -= 0.5 * other.vehicle.dimensions.length_m;
+    (other.state.d_m, other.state.speed_mps) = (other.state.d_m + y_m, 30.0 + closing_mps);
+    other
+}
+
+/// Returns the detection nearest to a lateral position (m), which is one metre away at most.
+fn at_side(detections: &[Detection], y_m: f64) -> &Detection {
+    let off_m = |seen: &&Detection| (seen.face_y_m - y_m).abs();
+    let nearest = detections.iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)));
+    nearest.filter(|seen| off_m(seen) < 1.0).expect("a detection there")
+}
+
+#[test]
+fn a_late_result_applies_to_the_vehicles_and_not_to_their_places() {
+    if !has_backend() {
+        return;
+    }
+    // A truck takes the place that a car had at the exposure, while both change lanes and close in. The result arrives after 0.6 s.
+    let arrives = 15;
+    let changed_m = |time_s: f64| 3.75 * (time_s / 0.6).min(1.0);
+    let others = |time_s: f64| {
+        let gap_m = 28.0 - 8.0 * time_s;
+        let at = |class, y_m: f64| behind(class, time_s, [gap_m, y_m - changed_m(time_s)], 8.0);
+        vec![at(VehicleClass::Truck, 3.75), at(VehicleClass::Car, 0.0)]
+    };
+    let off = "mode = 'full'\nrear-camera = { pipeline = 'off' }\n";
+    let slow =
+        "mode = 'full'\nrear-camera = { pipeline = 'mask-rcnn', mask-rcnn = { rate-hz = 1.0, latency-s = 0.6 } }\n";
+    let [without, with] = [off, slow].map(|sensors| run(sensors, "", 20, others));
+    assert_eq!(with[..arrives], without[..arrives], "no result has arrived");
+    for step in arrives..20 {
+        for (class, y_m) in [(VehicleClass::Truck, 0.0), (VehicleClass::Car, -3.75)] {
+            let [shape, fused] = [&without, &with].map(|run| at_side(&run[step], y_m).class);
+            let (shape, fused) = (shape.0[class as usize], fused.0[class as usize]);
+            assert!(
+                fused > 0.9 && fused > shape,
+                "step {step}, {class:?}: {shape} by the shape, {fused} with the image"
+            );
+        }
+    }
+}
+
+#[test]
+fn without_lidar_a_closing_vehicle_stands_where_it_was_at_the_exposure() {
+    if !has_backend() {
+        return;
+    }
+    let (rate_steps, latency_steps) = (5, 5);
+    let gap_m = |step: usize| 34.0 - 14.0 * CONTROL_STEP.s() * step as f64;
+    let others = |time_s: f64| vec![behind(VehicleClass::Truck, time_s, [34.0 - 14.0 * time_s, 0.0], 14.0)];
+    // Nearer than 20 m, the lowest cell of a truck's mask is coarser than the tolerance.
+    let seen = run(SENSORS, "dead = true", 33, others);
+    let mut images = 0;
+    for step in (latency_steps..seen.len()).step_by(rate_steps) {
+        let [alone] = &seen[step][..] else { panic!("step {step}: {:?}", seen[step]) };
+        let exposed = step - latency_steps;
+        assert_eq!(alone.time, CONTROL_STEP * exposed as i64);
+        // The ego has driven on by 6 m since then. An image of the arrival would show the vehicle 2.8 m nearer, and its place without the
+        // ego's motion would be 6 m off.
+        let expected_m = -(gap_m(exposed) + 30.0 * CONTROL_STEP.s() * latency_steps as f64);
+        let off_m = alone.face_x_m - expected_m;
+        assert!(off_m.abs() < 3.0, "step {step}: {off_m} m off: {alone:?}");
+        images += 1;
+    }
+    assert_eq!(images, 6);
+}
+
 fn truck_score(detections: &[Detection]) -> f64 {
     detections.iter().map(|seen| seen.class.0[VehicleClass::Truck as usize]).fold(0.0, f64::max)
 }
@@ -132,7 +217,7 @@ fn without_lidar_the_camera_sees_the_vehicle_alone_and_five_times_per_second() {
     for step in steps {
         let [alone] = &seen[step][..] else { panic!("{:?}", seen[step]) };
         // The ego has moved on by 6 m since the exposure, and the spot on the road has not.
-        assert!((alone.face_x_m + 36.0).abs() < 2.0 * alone.range_sd_m, "{alone:?}");
+        assert!((alone.face_x_m + 36.0).abs() < 3.0, "{alone:?}");
         assert!(alone.face_y_m.abs() < 1.0 && alone.class.0[VehicleClass::Truck as usize] > 0.5, "{alone:?}");
     }
 }

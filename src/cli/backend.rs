@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use closecall_camera::{Backend, CameraConfig, Classifier, Pipeline};
+use closecall_camera::{Backend, Camera, CameraConfig, Classifier, Pipeline};
 use closecall_sensors::{SensorMode, inference_backend, set_inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::scenario::Scenario;
@@ -23,7 +23,7 @@ pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Loads the Mask R-CNN of each camera that has that pipeline.
+/// Loads the Mask R-CNN of each camera.
 pub(super) fn check_cameras<'a>(cameras: impl IntoIterator<Item = &'a CameraConfig>) -> Result<(), CliError> {
     cameras.into_iter().try_for_each(|camera| Ok(camera.check_network(inference_backend())?))
 }
@@ -31,9 +31,17 @@ pub(super) fn check_cameras<'a>(cameras: impl IntoIterator<Item = &'a CameraConf
 /// Works like [`check_backend`], for runs of a scenario.
 pub(super) fn check_backend_of(scenario: &Scenario, arms: &[Arm]) -> Result<(), CliError> {
     let is_full = |arm: &Arm| arm.sensors.unwrap_or(scenario.sensors.mode()) == SensorMode::Full;
-    let (camera, is_used) = (scenario.sensors.camera(), arms.iter().any(is_full));
-    if is_used && camera.pipeline == Pipeline::MaskRcnn {
-        camera.mask_rcnn.detector(inference_backend())?;
+    let is_used = arms.iter().any(is_full);
+    if is_used {
+        check_camera(scenario.sensors.camera())?;
     }
     check_backend(is_used)
+}
+
+/// Loads the Mask R-CNN of a camera that has that pipeline.
+pub(super) fn check_camera(camera: &Camera) -> Result<(), CliError> {
+    if camera.pipeline == Pipeline::MaskRcnn {
+        camera.mask_rcnn.detector(inference_backend())?;
+    }
+    Ok(())
 }

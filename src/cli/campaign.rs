@@ -128,7 +128,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
-    check_cameras(plan.cameras())?;
+    check_cameras(plan.mask_rcnn_cameras())?;
     let (mut campaign, manifest) = (plan.campaign(), plan.manifest(session::arguments())?);
     campaign.remote = connect(args.ray.as_deref(), &manifest).map_err(CampaignError::from)?;
     let locked = match &args.out {

@@ -9,7 +9,7 @@ use closecall_perception::{Extent, Study};
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
-use super::backend::{check_backend, check_cameras};
+use super::backend::{check_backend, check_camera};
 use super::output::{out, outln, print_written};
 use crate::exit_code::ExitCode;
 
@@ -50,7 +50,12 @@ pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
     let extent = args.approaches.map_or(if args.quick { Extent::Quick } else { Extent::Full }, Extent::Runs);
     let study = |path: &PathBuf| -> Result<Study, CliError> {
         let file = args.set.load(path)?;
-        check_cameras((choice == SensorsChoice::Full).then_some(&file.config().sensors.rear_camera))?;
+        // A nominal sample that cannot be built is an error of the study.
+        if choice == SensorsChoice::Full
+            && let Ok(nominal) = file.concrete(&file.space().nominal())
+        {
+            check_camera(nominal.sensors.camera())?;
+        }
         Ok(Study::of(&file, Some(choice.mode()), args.seed, extent)?)
     };
     let studies: Result<Vec<Study>, CliError> =

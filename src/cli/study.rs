@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_camera::Pipeline;
 use closecall_campaign::arguments::count;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};
@@ -13,13 +14,14 @@ use closecall_campaign::stop::StopFlag;
 use closecall_campaign::workers::Workers;
 use closecall_report::study::{Study, write_study};
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::ScenarioFile;
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
 use super::arms::ControllerArgs;
-use super::backend::check_backend;
+use super::backend::{check_backend, check_cameras};
 use super::campaign::progress_bar;
 use super::output::{heartbeat, out, outln, print_written};
 use crate::exit_code::ExitCode;
@@ -91,8 +93,13 @@ pub(super) struct FrontierArgs {
 
 impl StudyArgs {
     fn file(&self) -> Result<ScenarioFile, CliError> {
-        check_backend(self.sensors == Some(SensorsChoice::Full))?;
-        Ok(self.set.load(&self.scenario)?)
+        let file = self.set.load(&self.scenario)?;
+        let is_full = file.may_have_mode(SensorMode::Full, self.sensors.map(SensorsChoice::mode));
+        check_backend(is_full)?;
+        if is_full && file.may_have_pipeline(Pipeline::MaskRcnn) {
+            check_cameras([&file.config().sensors.rear_camera])?;
+        }
+        Ok(file)
     }
 
     /// Returns the baseline, unless the controller under test is the baseline itself, and the controller under test.

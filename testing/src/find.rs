@@ -50,6 +50,22 @@ pub fn has_python() -> bool {
     found(runs("python3", "--version"), Need::Python, "python3 is not installed").is_some()
 }
 
+/// Returns a Python interpreter that has the packages `onnxruntime` and `numpy`: that of the environment in which the shared library of
+/// ONNX Runtime lies.
+///
+/// # Panics
+/// As [`skip`].
+pub fn python_with_onnxruntime() -> Option<PathBuf> {
+    let library = onnxruntime()?;
+    let mut programs = library.ancestors().map(|folder| folder.join("bin/python")).filter(|path| path.is_file());
+    let has_packages = |python: &PathBuf| {
+        let output = Command::new(python).args(["-c", "import numpy, onnxruntime"]).output();
+        output.is_ok_and(|output| output.status.success())
+    };
+    let reason = "CLOSECALL_ONNXRUNTIME does not lie in a Python environment with onnxruntime and numpy";
+    found(programs.find(has_packages), Need::Python, reason)
+}
+
 /// Returns the program of a web browser.
 ///
 /// # Panics

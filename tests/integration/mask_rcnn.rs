@@ -36,6 +36,41 @@ fn without_onnx_runtime_it_says_how_to_get_it() {
     assert!(!out.exists(), "nothing is written");
 }
 
+/// Writes a scenario in which a parameter gives the pipeline, which is the crop classifier nearly always.
+fn sampled_pipeline(folder: &Path) -> String {
+    let path = folder.join("sampled-pipeline.toml");
+    let text = "base = \"low-thw-overtake\"\nname = \"sampled-pipeline\"\n\
+                [parameters]\ncamera = { choice = { crop-classifier = 0.99, mask-rcnn = 0.01 } }\n\
+                [sensors.rear-camera]\npipeline = \"$camera\"\n";
+    std::fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_pipeline_that_a_parameter_can_give_needs_onnx_runtime_and_is_in_the_manifest() {
+    let folder = folder();
+    let (scenario, out) = (sampled_pipeline(folder.path()), folder.path().join("out"));
+    let out_text = out.to_str().unwrap();
+    let campaign = |mode: &str, more: &[&str]| {
+        let usual = ["campaign", &scenario, "-n", "1", "--sensors", mode, "--no-gate", "--no-validity-checks"];
+        let set = ["--set", "duration-s=2", "--out", out_text];
+        closecall(usual.iter().chain(&set).chain(more))
+    };
+    let output = campaign("full", &[]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let text = stderr(&output);
+    assert!(text.contains("pip install onnxruntime") && !out.exists(), "{text}");
+    // A mode without images needs no network.
+    let output = campaign("object", &[]);
+    assert!(out.join("manifest.json").exists(), "{}", stderr(&output));
+    std::fs::remove_dir_all(&out).unwrap();
+    let Some(library_file) = closecall_testing::onnxruntime() else { return };
+    let output = campaign("full", &["--onnxruntime", library_file.to_str().unwrap()]);
+    assert!(out.join("manifest.json").exists(), "{}", stderr(&output));
+    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(manifest.contains("\"rear-mask-rcnn\""), "{manifest}");
+}
+
 #[test]
 fn a_network_with_another_layout_is_refused_before_any_work() {
     let Some(library_file) = closecall_testing::onnxruntime() else { return };

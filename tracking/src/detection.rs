@@ -18,6 +18,16 @@ pub enum Extent {
     Assumed,
 }
 
+/// The sensor that found a detection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SeenBy {
+    /// The LiDAR, whose clusters confirm tracks.
+    Lidar,
+    /// The camera without the LiDAR. Such a detection keeps a track and corrects it, but counts towards no confirmation: its distance
+    /// rests on a flat road.
+    CameraAlone,
+}
+
 /// A box fitted to one cluster, in the ego's vehicle frame at the end of the scan.
 ///
 /// The box shows where the target was at `time`, relative to where the ego is at the end of the scan.
@@ -45,6 +55,8 @@ pub struct Detection {
     pub width: Extent,
     /// Height of the highest point above the ground (m).
     pub top_m: f64,
+    /// The sensor that found it.
+    pub seen_by: SeenBy,
     /// Number of points in the cluster.
     pub points: usize,
     /// Whether the seen parts are symmetric about the middle of the vehicle, as a plate or both headlamps are. Otherwise, a few points

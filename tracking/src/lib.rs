@@ -31,7 +31,7 @@ mod tracker;
 mod view;
 
 pub use config::{MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
-pub use detection::{Detection, Extent, SIDE_PROTRUSION_M};
+pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy};
 pub use gaussian::Gaussian;
 pub use lane::LaneGeometry;
 pub use track_list::TrackList;

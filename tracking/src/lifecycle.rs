@@ -49,9 +49,20 @@ impl Lifecycle {
     /// Creates the lifecycle of a track at its first detection.
     #[inline]
     pub fn first_hit(rules: &LifecycleRules) -> Self {
-        let mut lifecycle = Self { history: 0, misses: 0, confirmed: false, log_odds: INITIAL_LOG_ODDS };
+        let mut lifecycle = Self::new();
         lifecycle.hit(rules, true);
         lifecycle
+    }
+
+    /// Creates the lifecycle of a track that a sensor has found which confirms nothing.
+    pub fn first_kept(rules: &LifecycleRules) -> Self {
+        let mut lifecycle = Self::new();
+        lifecycle.keep(rules);
+        lifecycle
+    }
+
+    fn new() -> Self {
+        Self { history: 0, misses: 0, confirmed: false, log_odds: INITIAL_LOG_ODDS }
     }
 
     /// Adds a scan that detected the track. The scan can confirm the track only if `is_settled`.
@@ -61,6 +72,19 @@ impl Lifecycle {
         self.misses = 0;
         self.confirmed |= is_settled && self.hits_in_window(rules) >= rules.confirm_hits;
         self.add_evidence((rules.detection_probability / rules.clutter_probability).ln());
+    }
+
+    /// Adds a scan in which only a sensor that confirms nothing has detected the track. It ends coasting, and is no hit in the window.
+    pub fn keep(&mut self, rules: &LifecycleRules) {
+        self.history <<= 1;
+        self.misses = 0;
+        self.add_evidence((rules.detection_probability / rules.clutter_probability).ln());
+    }
+
+    /// Makes the latest scan, which [`Self::keep`] has added, a hit: a sensor that confirms has detected the track at the same time.
+    pub fn count_kept_as_hit(&mut self, rules: &LifecycleRules, is_settled: bool) {
+        self.history |= 1;
+        self.confirmed |= is_settled && self.hits_in_window(rules) >= rules.confirm_hits;
     }
 
     /// Adds a scan that did not detect the track, although it was in view.
@@ -163,6 +187,26 @@ mod tests {
         let seen = track.existence();
         track.skip();
         assert_eq!(track.existence().to_bits(), seen.to_bits());
+    }
+
+    #[test]
+    fn what_only_keeps_a_track_counts_towards_no_confirmation() {
+        let mut track = Lifecycle::first_kept(&RULES);
+        for _ in 0..20 {
+            track.keep(&RULES);
+            assert!(track.status() == TrackStatus::Tentative && !track.should_delete(&RULES));
+        }
+        for _ in 0..2 {
+            track.hit(&RULES, true);
+            assert_eq!(track.status(), TrackStatus::Tentative);
+        }
+        track.keep(&RULES);
+        assert_eq!(track.status(), TrackStatus::Tentative, "two hits and a scan that keeps it");
+        track.count_kept_as_hit(&RULES, true);
+        assert_eq!(track.status(), TrackStatus::Confirmed);
+        (0..3).for_each(|_| track.miss(&RULES));
+        track.keep(&RULES);
+        assert_eq!(track.status(), TrackStatus::Confirmed, "it ends coasting");
     }
 
     #[test]

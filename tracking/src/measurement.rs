@@ -77,7 +77,7 @@ mod tests {
     use closecall_traffic::{ClassScores, Road, VehicleState};
 
     use super::*;
-    use crate::Extent;
+    use crate::{Extent, SeenBy};
 
     /// Returns the standard deviation of the measured position across the road for a box 40 m behind the ego (m).
     fn across_sd_m(width_m: f64, points: usize, class: VehicleClass) -> f64 {
@@ -95,6 +95,7 @@ mod tests {
             width_m,
             width: Extent::Seen,
             top_m: 1.5,
+            seen_by: SeenBy::Lidar,
             points,
             is_centred: false,
             class: ClassScores(scores),

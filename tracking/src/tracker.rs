@@ -14,7 +14,7 @@ use super::measurement::measurement;
 use super::motion::EgoRear;
 use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
 use super::view::{Face, RearView};
-use crate::{Detection, SIDE_PROTRUSION_M};
+use crate::{Detection, SIDE_PROTRUSION_M, SeenBy};
 use closecall_traffic::ego_frame::EgoFrame;
 
 /// Speed difference below which a track inside another track's box is a part of the same vehicle (m/s).
@@ -66,7 +66,9 @@ enum Seen {
     NotScanned,
     /// A sensor could see it, and none did.
     Missed,
-    /// A sensor detected it.
+    /// Only a sensor that confirms nothing detected it.
+    Kept,
+    /// A sensor that confirms detected it.
     Hit,
 }
 
@@ -158,7 +160,7 @@ impl Tracker {
             match track.seen {
                 Seen::OutOfView => track.lifecycle.skip(),
                 Seen::Missed => track.lifecycle.miss(&self.model.rules),
-                Seen::NotScanned | Seen::Hit => {}
+                Seen::NotScanned | Seen::Kept | Seen::Hit => {}
             }
         }
         self.delete_tracks();
@@ -213,11 +215,15 @@ impl Tracker {
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
         let [along, _] = track.filter.estimate();
-        if track.seen != Seen::Hit {
-            let is_settled = along.speed_variance_m2ps2.sqrt() <= self.model.settled_speed_sd_mps;
-            track.lifecycle.hit(&self.model.rules, is_settled);
-            track.seen = Seen::Hit;
+        let is_settled = along.speed_variance_m2ps2.sqrt() <= self.model.settled_speed_sd_mps;
+        let rules = &self.model.rules;
+        match (detection.seen_by, track.seen) {
+            (_, Seen::Hit) | (SeenBy::CameraAlone, Seen::Kept) => {}
+            (SeenBy::CameraAlone, _) => track.lifecycle.keep(rules),
+            (SeenBy::Lidar, Seen::Kept) => track.lifecycle.count_kept_as_hit(rules, is_settled),
+            (SeenBy::Lidar, _) => track.lifecycle.hit(rules, is_settled),
         }
+        track.seen = track.seen.max(seen_in(detection));
         track.lifecycle.add_evidence(vehicle_log_likelihood_ratio(&detection.class, detection.points));
     }
 
@@ -251,10 +257,13 @@ impl Tracker {
             let mut track = TrackState {
                 id: list.new_id(),
                 filter: RoadFilter::new(measurement, ego_mps),
-                lifecycle: Lifecycle::first_hit(&self.model.rules),
+                lifecycle: match detection.seen_by {
+                    SeenBy::Lidar => Lifecycle::first_hit(&self.model.rules),
+                    SeenBy::CameraAlone => Lifecycle::first_kept(&self.model.rules),
+                },
                 class: FusedClass::unknown(),
                 extent: TrackExtent::default(),
-                seen: Seen::Hit,
+                seen: seen_in(detection),
             };
             track.extent.update(detection);
             track.class.update(&detection.class, detection.points);
@@ -282,6 +291,14 @@ impl Tracker {
                 track_index += 1;
             }
         }
+    }
+}
+
+/// Returns what a scan shows of a track that this detection belongs to.
+fn seen_in(detection: &Detection) -> Seen {
+    match detection.seen_by {
+        SeenBy::Lidar => Seen::Hit,
+        SeenBy::CameraAlone => Seen::Kept,
     }
 }
 

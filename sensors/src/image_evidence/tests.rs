@@ -1,9 +1,9 @@
 //! The association on instances that are made from the true boxes of vehicles.
 
-use closecall_camera::{CameraConfig, Mask, Pipeline};
+use closecall_camera::{CameraConfig, Mask, Pipeline, fuse};
 use closecall_tracking::{RearView, TrackList, Tracker, TrackerConfig, TrackerScan};
 use closecall_traffic::{
-    CONTROL_STEP, Check, Choice, Environment, Parameters, Road, TrackStatus, VehicleClass, ego_frame::EgoFrame,
+    CONTROL_STEP, Check, Choice, Environment, Parameters, Road, Track, TrackStatus, VehicleClass, ego_frame::EgoFrame,
 };
 
 use super::*;
@@ -35,6 +35,7 @@ fn detection(class: VehicleClass, face_x_m: f64, face_y_m: f64) -> Detection {
         width_m: size.width_m,
         width: Extent::Assumed,
         top_m: size.height_m,
+        seen_by: SeenBy::Lidar,
         points: 50,
         is_centred: false,
         class: ClassScores::UNKNOWN,
@@ -98,12 +99,28 @@ fn the_image_speaks_against_what_only_the_lidar_sees_if_it_would_show_it() {
 }
 
 #[test]
+fn a_network_of_which_nothing_is_known_says_nothing_about_what_it_does_not_show() {
+    let near = detection(VehicleClass::Car, -30.0, 0.0);
+    let evidence = |network: &str| {
+        let text = format!("pipeline = 'mask-rcnn'\nmask-rcnn = {{ {network} }}\n");
+        let config: CameraConfig = toml::from_str(&text).unwrap();
+        let camera = RearCamera::new(config.check(&Parameters::default()).unwrap());
+        with_scene(|scene| associate(&camera, scene, &[], std::slice::from_ref(&near))).evidence[0]
+    };
+    assert_eq!(evidence("model = 'other.onnx'"), None);
+    let [shipped, other] = ["", "model = 'other.onnx', missed = 0.5"].map(|network| evidence(network).unwrap().scores);
+    assert!(shipped.vehicle() < other.vehicle() && other.vehicle() < 0.75, "{shipped:?}, {other:?}");
+    // A car at 30 m is some 80 px wide.
+    assert!(evidence("min-shown-px = 60").is_some() && evidence("min-shown-px = 200").is_none());
+}
+
+#[test]
 fn what_nearer_vehicles_hide_is_not_expected_in_the_image() {
     let (near, hidden) = (detection(VehicleClass::Truck, -20.0, 0.0), detection(VehicleClass::Car, -60.0, 0.0));
     let bounds: Vec<_> = [&near, &hidden].map(|seen| camera().detection_bounds(&ego(), seen)).into();
     let detections = [near, hidden];
-    assert!(!is_shown(1, &bounds[1].unwrap(), &detections, &bounds));
-    assert!(is_shown(0, &bounds[0].unwrap(), &detections, &bounds));
+    assert!(is_hidden(1, &bounds[1].unwrap(), &detections, &bounds));
+    assert!(!is_hidden(0, &bounds[0].unwrap(), &detections, &bounds));
 }
 
 #[test]
@@ -137,24 +154,16 @@ fn what_the_camera_alone_sees_is_moved_with_the_ego() {
     });
 }
 
-/// Returns whether a vehicle has a confirmed track after 4 s, if the LiDAR sees it in the first `lidar_scans` scans and the camera alone in every
-/// fifth one of the rest.
-fn is_confirmed(lidar_scans: usize, has_camera: bool) -> bool {
+/// Returns the confirmed track of a vehicle after `steps` scans, of which each has the detections that `seen` returns.
+fn tracked(steps: usize, seen: impl Fn(usize) -> Vec<Detection>) -> Option<Track> {
     let (mut tracker, mut list) =
         (Tracker::new(TrackerConfig::default().check(&Parameters::default()).unwrap()), TrackList::default());
-    let lidar = detection(VehicleClass::Car, -30.0, 0.0);
-    let camera = associated(&[instance(&lidar, VehicleClass::Car, 0.9)], &[]).alone;
     let road = Road::straight(3);
     let mut state = ego().state;
-    let mut confirmed = false;
-    for step in 0..100 {
+    for step in 0..steps {
         let time = CONTROL_STEP * step as i64;
         state.s_m = EGO_S_M + 30.0 * time.s();
-        let mut detections = match step {
-            _ if step < lidar_scans => vec![lidar.clone()],
-            _ if has_camera && step % 5 == 0 => camera.clone(),
-            _ => Vec::new(),
-        };
+        let mut detections = seen(step);
         detections.iter_mut().for_each(|seen| seen.time = time);
         let view =
             RearView { half_angle_tan: 1.0, range_m: 150.0, sensor_x_m: -2.0, sensor_y_m: 0.0, axis_azimuth_rad: 0.0 };
@@ -164,14 +173,54 @@ fn is_confirmed(lidar_scans: usize, has_camera: bool) -> bool {
         );
         list.tracks.clear();
         tracker.report(time, &EgoFrame::new(&road, &state), &mut list);
-        confirmed = list.tracks.iter().any(|track| track.status != TrackStatus::Tentative);
     }
-    confirmed
+    list.tracks.into_iter().find(|track| track.status != TrackStatus::Tentative)
+}
+
+/// Returns whether a vehicle has a confirmed track after 4 s, if the LiDAR sees it in the first `lidar_scans` scans, and the camera alone in
+/// every `camera_every`-th scan of the rest.
+fn is_confirmed(lidar_scans: usize, camera_every: Option<usize>) -> bool {
+    let lidar = detection(VehicleClass::Car, -30.0, 0.0);
+    let camera = associated(&[instance(&lidar, VehicleClass::Car, 0.9)], &[]).alone;
+    let seen = |step| match camera_every {
+        _ if step < lidar_scans => vec![lidar.clone()],
+        Some(every) if step % every == 0 => camera.clone(),
+        _ => Vec::new(),
+    };
+    tracked(100, seen).is_some()
 }
 
 #[test]
-fn the_camera_alone_keeps_a_confirmed_track_and_confirms_none() {
-    assert!(is_confirmed(25, true), "the camera keeps what the LiDAR has confirmed");
-    assert!(!is_confirmed(25, false), "without it, the track ends");
-    assert!(!is_confirmed(0, true), "the distance from the image alone is too uncertain to react to");
+fn the_camera_alone_keeps_a_confirmed_track_and_confirms_none_at_any_rate() {
+    assert!(!is_confirmed(25, None), "without the camera, the track ends");
+    // From 5 to 25 images per second.
+    for every in 1..=5 {
+        assert!(is_confirmed(25, Some(every)), "{every}: the camera keeps what the LiDAR has confirmed");
+        assert!(
+            !is_confirmed(0, Some(every)),
+            "{every}: the distance from the image alone is too uncertain to react to"
+        );
+        assert!(!is_confirmed(2, Some(every)), "{every}: two scans of the LiDAR are too few");
+    }
+}
+
+#[test]
+fn an_image_that_keeps_denying_a_cluster_makes_it_background_until_it_shows_a_vehicle() {
+    let mut seen = detection(VehicleClass::Car, -30.0, 0.0);
+    // The shape of a cluster says little.
+    seen.class = ClassScores([0.5, 0.1, 0.1, 0.3]);
+    let with = |instances: &[Instance]| {
+        let evidence = associated(instances, std::slice::from_ref(&seen)).evidence[0].unwrap();
+        vec![Detection { class: fuse(&seen.class, &evidence.scores), ..seen.clone() }]
+    };
+    let (denied, shown) = (with(&[]), with(&[instance(&seen, VehicleClass::Car, 0.9)]));
+    let [by_lidar, by_denial] =
+        [vec![seen.clone()], denied.clone()].map(|scan| tracked(100, |_| scan.clone()).unwrap());
+    assert!(by_lidar.class.is_vehicle(), "without images, the shape decides: {:?}", by_lidar.class);
+    let background = |track: &Track| track.class.0[ClassScores::BACKGROUND];
+    assert!(!by_denial.class.is_vehicle() && background(&by_denial) > 0.9, "{:?}", by_denial.class);
+    // The LiDAR keeps hitting it: something is there, and it stays confirmed.
+    assert!(by_denial.existence > 0.9 && by_denial.existence < by_lidar.existence, "{}", by_denial.existence);
+    let back = tracked(125, |step| if step < 100 { denied.clone() } else { shown.clone() }).unwrap();
+    assert!(back.class.0[VehicleClass::Car as usize] > 0.9, "a second of images that show a car: {:?}", back.class);
 }

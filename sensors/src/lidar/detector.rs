@@ -10,7 +10,7 @@ use super::parts::{join_lamps, plate_middle};
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
 use closecall_tracking::SIDE_PROTRUSION_M;
 
-use crate::{Detection, Extent, SensorError};
+use crate::{Detection, Extent, SeenBy, SensorError};
 
 /// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
 const OCCLUSION_COLUMNS: f64 = 3.0;
@@ -295,6 +295,7 @@ fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, la
         width_m: across.width_m,
         width: across.extent,
         top_m: fit.top_m,
+        seen_by: SeenBy::Lidar,
         points: fit.points,
         is_centred: is_pair || across.is_by_plate,
         class,

@@ -11,7 +11,7 @@ use rand_distr::StandardNormal;
 use crate::lidar::FACE_SD_M;
 use crate::surroundings::transform_scene;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
-use crate::{Detection, Extent, Scene, SceneVehicle, TrackAudit, TrackerConfig};
+use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, TrackAudit, TrackerConfig};
 use closecall_tracking::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
 use closecall_tracking::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
@@ -158,6 +158,7 @@ impl Bench {
                 width_m: truth.width_m,
                 width: Extent::Seen,
                 top_m: 1.5,
+                seen_by: SeenBy::Lidar,
                 points: 20,
                 is_centred: false,
                 class: ClassScores([0.6, 0.1, 0.1, 0.2]),

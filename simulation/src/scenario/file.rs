@@ -4,8 +4,10 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use closecall_camera::Pipeline;
 use closecall_scenarios::parameters::ParameterSpace;
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
 use closecall_traffic::suggest::hint;
 use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
 use toml_edit::DocumentMut;
@@ -221,6 +223,22 @@ impl ScenarioFile {
     /// Returns the distributions of the parameters.
     pub fn space(&self) -> &ParameterSpace {
         &self.space
+    }
+
+    /// Returns whether some sample may have this pipeline of the rear camera: the file names it, or a parameter can.
+    pub fn may_have_pipeline(&self, pipeline: Pipeline) -> bool {
+        let choice = &self.config.sensors.rear_camera.pipeline;
+        let words = self.space.extremes().into_iter().map(|parameters| parameters.word(choice, "pipeline"));
+        words.into_iter().any(|word| word == Ok(pipeline))
+    }
+
+    /// Returns whether some sample may have this mode of the sensors, unless a command asks for the mode `asked`.
+    pub fn may_have_mode(&self, mode: SensorMode, asked: Option<SensorMode>) -> bool {
+        let choice = &self.config.sensors.mode;
+        asked.map_or_else(
+            || self.space.extremes().into_iter().any(|parameters| parameters.word(choice, "mode") == Ok(mode)),
+            |asked| asked == mode,
+        )
     }
 
     /// Returns the parameters that no value of the file uses, which is most likely a mistake.

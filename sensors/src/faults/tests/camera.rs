@@ -26,6 +26,7 @@ fn score(fault: &str, environment: Environment, gaps_m: &[f64]) -> f64 {
             width_m: size.width_m,
             width: Extent::Seen,
             top_m: size.height_m,
+            seen_by: crate::SeenBy::Lidar,
             points: 20,
             is_centred: false,
             class: ClassScores::UNKNOWN,
