@@ -6,29 +6,39 @@ use super::Frame;
 use super::body::{MOMENTS, texture_factor};
 use super::frame::{Bounds, touches};
 use super::glow::{self, Glow};
-use super::ground::Patch;
+use super::ground::{GroundLight, Patch};
 use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
+use super::line::Line;
 use super::mesh::{Texture, Vec3, dot, each};
 use super::pinhole::{HEIGHT_PX, PixelRect, WIDTH_PX};
-use super::raster::{Lattice, SUBPIXEL_STEPS};
+use super::raster::Lattice;
 use super::sky;
 use super::spray::Cloud;
 
 /// Distance at which the ground ends in woods (m).
-const GROUND_TO_M: f32 = 350.0;
+pub(super) const GROUND_TO_M: f32 = 350.0;
 
-/// The shadows, beams, spray clouds and glows that can affect the pixels that are being rendered.
+/// The shadows, beams, spray clouds and glows that can affect the pixels that are being rendered, with their bounds in the image.
 #[derive(Default)]
 pub(super) struct Effects {
-    patches: Vec<Patch>,
-    clouds: Vec<Cloud>,
-    glows: Vec<Glow>,
+    patches: Vec<(Bounds, Patch)>,
+    clouds: Vec<(Bounds, Cloud)>,
+    glows: Vec<(Bounds, Glow)>,
 }
 
-/// Replaces `kept` by those of `all` whose bounds touch these.
-fn keep_touching<T: Copy>(kept: &mut Vec<T>, all: &[(Bounds, T)], bounds: &Bounds) {
+impl Effects {
+    /// Keeps those of `all` that touch these pixels.
+    pub(super) fn select(&mut self, all: &Self, pixels: &Bounds) {
+        keep(&mut self.patches, &all.patches, pixels);
+        keep(&mut self.clouds, &all.clouds, pixels);
+        keep(&mut self.glows, &all.glows, pixels);
+    }
+}
+
+/// Replaces `kept` by those of `all` that touch these pixels.
+fn keep<T: Copy>(kept: &mut Vec<(Bounds, T)>, all: &[(Bounds, T)], pixels: &Bounds) {
     kept.clear();
-    kept.extend(all.iter().filter(|(own, _)| touches(own, bounds)).map(|(_, one)| *one));
+    kept.extend(all.iter().filter(|(own, _)| touches(own, pixels)));
 }
 
 impl Frame {
@@ -118,47 +128,61 @@ impl Frame {
                     .draw(&self.lists.triangles[moment][object.triangles[moment].clone()], &lattice);
             }
         }
-        let mut effects = std::mem::take(&mut self.lists.effects);
-        keep_touching(&mut effects.patches, &self.lists.patches, &bounds);
-        keep_touching(&mut effects.clouds, &self.lists.clouds, &bounds);
-        keep_touching(&mut effects.glows, &self.lists.glows, &bounds);
-        for (sample, out) in rgb.chunks_exact_mut(CHANNELS).enumerate() {
-            let pixel = [columns[sample % columns.len()], rows[sample / columns.len()]];
-            out.copy_from_slice(&self.pixel(sample, pixel, &effects));
+        let mut of_tile = std::mem::take(&mut self.lists.effects);
+        keep(&mut of_tile.patches, &self.lists.patches, &bounds);
+        keep(&mut of_tile.clouds, &self.lists.clouds, &bounds);
+        keep(&mut of_tile.glows, &self.lists.glows, &bounds);
+        let mut line = Line::new(self, columns, std::mem::take(&mut self.lists.line));
+        let width = columns.len();
+        for (index, (row, out)) in rows.iter().zip(rgb.chunks_exact_mut(width * CHANNELS)).enumerate() {
+            line.begin(self, *row, &of_tile);
+            for (place, out) in out.chunks_exact_mut(CHANNELS).enumerate() {
+                out.copy_from_slice(&self.pixel(index * width + place, place, &mut line));
+            }
         }
-        self.lists.effects = effects;
+        self.lists.line = line.into_memory();
+        self.lists.effects = of_tile;
     }
 
-    fn pixel(&self, sample: usize, pixel: [i32; 2], effects: &Effects) -> [u8; 3] {
-        let (centre, length) = self.ray(pixel, [SUBPIXEL_STEPS / 2; 2]);
+    /// Renders one pixel of a row. `sample` is its index in the lattice, and `place` that in the row.
+    fn pixel(&self, sample: usize, place: usize, line: &mut Line<'_>) -> [u8; 3] {
+        let pixel = [line.columns[place], line.row];
+        let left_px = pixel[0] as f32;
+        let (centre, length) = line.centre(self, place);
         let mut sum = [0.0; 3];
         let mut nearness = 0.0;
         for moment in 0..MOMENTS {
-            let (radiance, inverse_depth) = self.sample(sample, moment, pixel, length, &effects.patches);
+            let (radiance, inverse_depth) = self.sample((sample, place), moment, length, line);
             nearness += inverse_depth;
             for (sum, part) in sum.iter_mut().zip(radiance) {
                 *sum += part;
             }
         }
         let mut light = sum.map(|part| part / MOMENTS as f32);
-        let direction = self.lens.ray_in_ground(centre).map(|part| part / length);
-        let mut thickness = 0.0;
-        for cloud in &effects.clouds {
-            thickness += cloud.optical_depth(direction, length * MOMENTS as f32 / nearness.max(1e-3));
-        }
-        if thickness > 0.0 {
-            let left = 1.0 / (1.0 + thickness * (1.0 + 0.5 * thickness));
-            let air = each(|i| 0.92 * self.light.ambient[i].max(self.light.horizon[i] * 0.8));
-            light = each(|i| air[i] + (light[i] - air[i]) * left);
+        let reaches = |own: &Bounds| left_px <= own[2] && own[0] <= left_px + 1.0;
+        let has_sun = self.light.sun[0] > 0.0;
+        let mut glare = [0.0; 3];
+        let mut direction = [0.0; 3];
+        if has_sun || !line.effects.clouds.is_empty() || !self.lists.veils.is_empty() {
+            direction = self.lens.ray_in_ground(centre).map(|part| part / length);
+            let mut thickness = 0.0;
+            for (_, cloud) in line.effects.clouds.iter().filter(|(own, _)| reaches(own)) {
+                thickness += cloud.optical_depth(direction, length * MOMENTS as f32 / nearness.max(1e-3));
+            }
+            if thickness > 0.0 {
+                let left = 1.0 / (1.0 + thickness * (1.0 + 0.5 * thickness));
+                let air = each(|i| 0.92 * self.light.ambient[i].max(self.light.horizon[i] * 0.8));
+                light = each(|i| air[i] + (light[i] - air[i]) * left);
+            }
+            glare = glow::sun(direction, &self.light);
         }
         let at = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
-        for glow in &effects.glows {
+        for (_, glow) in line.effects.glows.iter().filter(|(own, _)| reaches(own)) {
             glow.add_to(at, &mut light);
         }
         for veil in &self.lists.veils {
             veil.add_to(direction, &mut light);
         }
-        let glare = glow::sun(direction, &self.light);
         let mut radiance = self.window.transmitted(pixel, each(|i| light[i] + glare[i]), &self.light);
         if self.lens.optics.vignetting > 0.0 {
             let kept = self.lens.optics.transmitted(length);
@@ -167,25 +191,10 @@ impl Frame {
         self.window.encode(pixel, radiance, &self.light)
     }
 
-    /// Returns the ray through a point within a pixel, in camera axes with depth 1: its (x, y), and its length.
-    fn ray(&self, pixel: [i32; 2], subpixel: [i32; 2]) -> ([f32; 2], f32) {
-        let steps = SUBPIXEL_STEPS as f32;
-        let focal = self.lens.focal_px as f32;
-        let part = |axis: usize, extent: u16| {
-            let position = (pixel[axis] * SUBPIXEL_STEPS + subpixel[axis]) as f32 / steps;
-            (position - f32::from(extent) / 2.0) / focal
-        };
-        let mut at = [part(0, WIDTH_PX), part(1, HEIGHT_PX)];
-        if !self.lens.optics.is_straight() {
-            at = self.lens.optics.undistorted(at.map(f64::from)).map(|part| part as f32);
-        }
-        let [x, y] = at;
-        ([x, y], (x * x + y * y + 1.0).sqrt())
-    }
-
-    /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky.
-    fn sample(&self, sample: usize, moment: usize, pixel: [i32; 2], length: f32, patches: &[Patch]) -> (Vec3, f32) {
-        let (ray, _) = self.ray(pixel, self.subpixel[moment]);
+    /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky. The sample is given by its index in the
+    /// lattice and in the row, and `length` is that of the ray through the middle of the pixel.
+    fn sample(&self, (sample, place): (usize, usize), moment: usize, length: f32, line: &mut Line<'_>) -> (Vec3, f32) {
+        let ray = line.ray(self, place, moment);
         let inverse_depth = self.lists.visibility[moment].inverse_depth[sample];
         if inverse_depth > 0.0 {
             let depth = 1.0 / inverse_depth;
@@ -200,21 +209,23 @@ impl Frame {
             return (self.through_air(radiance, depth * length), inverse_depth);
         }
         let direction = self.lens.ray_in_ground(ray);
-        let run = (direction[0] * direction[0] + direction[1] * direction[1]).sqrt();
-        let slope = direction[2] / run;
         let height = self.lens.height_m as f32;
-        if slope * GROUND_TO_M < -height {
-            let depth = -height / direction[2];
+        let slope = || direction[2] / (direction[0] * direction[0] + direction[1] * direction[1]).sqrt();
+        if line.is_ground[moment] || slope() * GROUND_TO_M < -height {
+            let depth = if line.is_ground[moment] { line.ground_depth_m[moment] } else { -height / direction[2] };
             let at = [direction[0] * depth, direction[1] * depth];
-            let travelled_m = self.travelled_m[moment] + self.travelled_at(pixel[1]);
-            let radiance = self.ground.radiance(at, travelled_m, &self.light, patches);
+            let lit =
+                GroundLight { light: &self.light, patches: &line.effects.patches, left_px: line.columns[place] as f32 };
+            let noise = &mut line.noise[moment].0;
+            let radiance = self.ground.radiance(at, line.travelled_m[moment], &lit, noise);
             return (self.through_air(radiance, depth * length), 1.0 / depth);
         }
-        (sky::radiance(slope, -direction[1] / direction[0] + self.ego_yaw_rad, &self.light), 0.0)
+        let bearing = -direction[1] / direction[0] + self.ego_yaw_rad;
+        (sky::radiance(slope(), bearing, &self.light, &mut line.noise[moment].1), 0.0)
     }
 
     /// Returns the distance that the ego has moved when a row of the image is read, relative to the middle row (m).
-    fn travelled_at(&self, row: i32) -> f32 {
+    pub(super) fn travelled_at(&self, row: i32) -> f32 {
         (self.ego_speed_mps * self.lens.read_after_s(f64::from(row) + 0.5)) as f32
     }
 

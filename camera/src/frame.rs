@@ -18,6 +18,7 @@ use super::glow::Glow;
 use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
 use super::hash::{mix, normal3};
 use super::light::Illumination;
+use super::line::LineMemory;
 use super::mesh::{Emission, Mesh, Vec3};
 use super::pinhole::{GroundBox, Lens, PixelRect};
 use super::raster::{SUBPIXEL_STEPS, ScreenTriangle, Visibility};
@@ -81,6 +82,8 @@ pub struct FrameBuffers {
     pub(super) visibility: [Visibility; MOMENTS],
     /// What may affect the pixels that are being rendered.
     pub(super) effects: Effects,
+    /// Memory of the row that is being rendered.
+    pub(super) line: LineMemory,
     /// The body that is being added, and its corners in the frame of the ground or of the camera.
     mesh: Mesh,
     corners: Vec<Vec3>,

@@ -5,7 +5,8 @@
 
 use closecall_traffic::Road;
 
-use super::hash::{noise_2d, split};
+use super::frame::Bounds;
+use super::hash::{PlaneNoise, split};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
 
@@ -69,6 +70,24 @@ pub(crate) const LONGEST_SHADOW_M: f32 = 8.0;
 /// Range of the headlamps on the road, and their maximum reach to each side (m).
 pub(crate) const BEAM_M: [f32; 2] = [45.0, 8.0];
 
+/// The noise of grass and asphalt, with its latest cells.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct GroundNoise {
+    grass: PlaneNoise,
+    grain: PlaneNoise,
+    wear: PlaneNoise,
+}
+
+/// The light that may reach the ground that a pixel shows.
+#[derive(Clone, Copy)]
+pub(crate) struct GroundLight<'a> {
+    pub(crate) light: &'a Illumination,
+    /// Shadows and beams of the pixel's row, with their bounds in the image. They have no effect outside of these.
+    pub(crate) patches: &'a [(Bounds, Patch)],
+    /// Left edge of the pixel (px).
+    pub(crate) left_px: f32,
+}
+
 /// The combined effect of all patches on one point of the ground: the visible shares of sky and sun, and the added
 /// light of headlamps.
 struct PatchLight {
@@ -102,6 +121,10 @@ impl Ground {
         let along = self.cos * x - self.sin * y;
         let across = self.d_m + self.sin * x + self.cos * y;
         let k = self.curvature_per_m;
+        if k == 0.0 {
+            // What follows then gives the same bits.
+            return (self.s_m + along, across);
+        }
         let q = k * (along * along + across * across) - 2.0 * across;
         let d = -q / (1.0 + (1.0 + k * q).max(0.0).sqrt());
         let tangent = along / (1.0 - k * across);
@@ -111,12 +134,19 @@ impl Ground {
 
     /// Returns the radiance of the ground at the point (x, y) of the ground frame, after the ego has moved by
     /// `travelled_m` along s.
-    pub(crate) fn radiance(&self, [x, y]: [f32; 2], travelled_m: f32, light: &Illumination, patches: &[Patch]) -> Vec3 {
+    pub(crate) fn radiance(
+        &self,
+        [x, y]: [f32; 2],
+        travelled_m: f32,
+        lit: &GroundLight<'_>,
+        noise: &mut GroundNoise,
+    ) -> Vec3 {
+        let light = lit.light;
         let (s, d) = self.road_position(x, y);
         let s = s + travelled_m;
         let run = -x;
-        let (albedo, gloss) = self.albedo(s, d, run, light.wetness);
-        let cast = patch_light(patches, [x, y], light);
+        let (albedo, gloss) = self.albedo([s, d], run, light.wetness, noise);
+        let cast = patch_light(lit, [x, y]);
         let up = light.to_sun[2].max(0.0);
         let mirrored = light.sky(0.02);
         each(|channel| {
@@ -128,21 +158,24 @@ impl Ground {
 
     /// Returns the reflectance, and the share of the sky's light that a wet surface mirrors. `run` is the horizontal
     /// distance from the lens (m).
-    fn albedo(&self, s: f32, d: f32, run: f32, wetness: f32) -> (Vec3, f32) {
+    fn albedo(&self, [s, d]: [f32; 2], run: f32, wetness: f32, noise: &mut GroundNoise) -> (Vec3, f32) {
         let right = -self.lanes * self.lane_width_m;
         // The texture fades with distance, as a pixel spans more than one of its cells.
         let detail = 1.0 / (1.0 + run * run / 400.0);
         if d > SHOULDER_M[0] || d < right - SHOULDER_M[1] {
-            let shade = 0.75 + 0.5 * noise_2d(GRASS_KEY, 0.7 * s, 1.3 * d) * (0.3 + 0.7 * detail);
+            let shade = 0.75 + 0.5 * noise.grass.at(GRASS_KEY, 0.7 * s, 1.3 * d) * (0.3 + 0.7 * detail);
             return (GRASS.map(|value| value * shade), 0.0);
         }
         // A wet surface is darker, and reflects the sky at grazing angles.
         let gloss = wetness * (run / (run + 25.0)) * 0.55;
         let dark = 1.0 - 0.45 * wetness;
         let painted = self.paint_share(s, d, run);
-        let grain =
-            if run < GRAIN_TO_M { 1.0 + 0.35 * (noise_2d(ASPHALT_KEY, 9.0 * s, 9.0 * d) - 0.5) * detail } else { 1.0 };
-        let wear = 1.0 - 0.12 * noise_2d(ASPHALT_KEY, 0.05 * s, 0.8 * d);
+        let grain = if run < GRAIN_TO_M {
+            1.0 + 0.35 * (noise.grain.at(ASPHALT_KEY, 9.0 * s, 9.0 * d) - 0.5) * detail
+        } else {
+            1.0
+        };
+        let wear = 1.0 - 0.12 * noise.wear.at(ASPHALT_KEY, 0.05 * s, 0.8 * d);
         let albedo = each(|i| (ASPHALT[i] + (PAINT[i] - ASPHALT[i]) * painted) * grain * wear * dark);
         (albedo, gloss)
     }
@@ -165,9 +198,13 @@ impl Ground {
     }
 }
 
-fn patch_light(patches: &[Patch], at: [f32; 2], light: &Illumination) -> PatchLight {
+fn patch_light(lit: &GroundLight<'_>, at: [f32; 2]) -> PatchLight {
+    let light = lit.light;
     let mut cast = PatchLight { sky: 1.0, sun: 1.0, beam: 0.0 };
-    for patch in patches {
+    for (bounds, patch) in lit.patches {
+        if lit.left_px > bounds[2] || lit.left_px + 1.0 < bounds[0] {
+            continue;
+        }
         let [cos, sin] = patch.turn;
         let (dx, dy) = (at[0] - patch.at[0], at[1] - patch.at[1]);
         let (along, left) = (cos * dx + sin * dy, cos * dy - sin * dx);

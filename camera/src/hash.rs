@@ -58,23 +58,51 @@ fn smoothstep(x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// Value noise along a line, with cells of size 1. The values lie between 0 (inclusive) and 1 (exclusive).
-pub(crate) fn noise_1d(key: u64, x: f32) -> f32 {
-    let (cell, within) = split(x);
-    let (low, high) = (unit(mix_at(key, cell, 0)), unit(mix_at(key, cell.wrapping_add(1), 0)));
-    low + (high - low) * smoothstep(within)
+/// Value noise along a line, with cells of size 1, which remembers its latest cell.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LineNoise {
+    cell: Option<i32>,
+    ends: [f32; 2],
 }
 
-/// Value noise in a plane, with cells of size 1. The values lie between 0 (inclusive) and 1 (exclusive).
-#[inline]
-pub(crate) fn noise_2d(key: u64, x: f32, y: f32) -> f32 {
-    let ((i, fx), (j, fy)) = (split(x), split(y));
-    let (i1, j1) = (i.wrapping_add(1), j.wrapping_add(1));
-    let corner = |i, j| unit(mix_at(key, i, j));
-    let across = smoothstep(fx);
-    let near = corner(i, j) + (corner(i1, j) - corner(i, j)) * across;
-    let far = corner(i, j1) + (corner(i1, j1) - corner(i, j1)) * across;
-    near + (far - near) * smoothstep(fy)
+impl LineNoise {
+    /// Returns the noise of `key` at `x`, from 0 (inclusive) to 1 (exclusive). The key must be the same in all calls.
+    #[inline]
+    pub(crate) fn at(&mut self, key: u64, x: f32) -> f32 {
+        let (cell, within) = split(x);
+        if self.cell != Some(cell) {
+            self.cell = Some(cell);
+            self.ends = [unit(mix_at(key, cell, 0)), unit(mix_at(key, cell.wrapping_add(1), 0))];
+        }
+        let [low, high] = self.ends;
+        low + (high - low) * smoothstep(within)
+    }
+}
+
+/// Value noise in a plane, with cells of size 1, which remembers the corners of its latest cell: neighbouring samples often share
+/// it, and hashing its corners takes most of the time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PlaneNoise {
+    cell: Option<[i32; 2]>,
+    corners: [f32; 4],
+}
+
+impl PlaneNoise {
+    /// Returns the noise of `key` at (x, y), from 0 (inclusive) to 1 (exclusive). The key must be the same in all calls.
+    #[inline]
+    pub(crate) fn at(&mut self, key: u64, x: f32, y: f32) -> f32 {
+        let ((i, fx), (j, fy)) = (split(x), split(y));
+        if self.cell != Some([i, j]) {
+            let (i1, j1) = (i.wrapping_add(1), j.wrapping_add(1));
+            self.cell = Some([i, j]);
+            self.corners = [(i, j), (i1, j), (i, j1), (i1, j1)].map(|(i, j)| unit(mix_at(key, i, j)));
+        }
+        let [low, high, far_low, far_high] = self.corners;
+        let across = smoothstep(fx);
+        let near = low + (high - low) * across;
+        let far = far_low + (far_high - far_low) * across;
+        near + (far - near) * smoothstep(fy)
+    }
 }
 
 #[cfg(test)]
@@ -95,8 +123,21 @@ mod tests {
     fn noise_is_continuous_across_cells() {
         for cell in -3_i16..3 {
             let edge = f32::from(cell);
-            assert!((noise_1d(7, edge - 1e-4) - noise_1d(7, edge + 1e-4)).abs() < 1e-3);
-            assert!((noise_2d(7, edge - 1e-4, 0.3) - noise_2d(7, edge + 1e-4, 0.3)).abs() < 1e-3);
+            let (mut line, mut plane) = (LineNoise::default(), PlaneNoise::default());
+            assert!((line.at(7, edge - 1e-4) - line.at(7, edge + 1e-4)).abs() < 1e-3);
+            assert!((plane.at(7, edge - 1e-4, 0.3) - plane.at(7, edge + 1e-4, 0.3)).abs() < 1e-3);
         }
+    }
+
+    #[test]
+    fn what_was_asked_before_does_not_change_the_noise() {
+        let (mut line, mut plane) = (LineNoise::default(), PlaneNoise::default());
+        for step in 0_u16..2_000 {
+            let (x, y) = (0.37 * f32::from(step % 50) - 9.0, 0.29 * f32::from(step / 50) - 5.0);
+            assert_eq!(line.at(7, x).to_bits(), LineNoise::default().at(7, x).to_bits());
+            assert_eq!(plane.at(7, x, y).to_bits(), PlaneNoise::default().at(7, x, y).to_bits());
+        }
+        assert_ne!(plane.at(7, 0.5, 1.5), plane.at(7, 0.5, 2.5));
+        assert_ne!(plane.at(7, 0.5, 1.5), plane.at(7, 1.5, 1.5));
     }
 }

@@ -25,6 +25,7 @@ mod image;
 mod image_memory;
 mod instance;
 mod light;
+mod line;
 mod mask_rcnn_config;
 mod mesh;
 mod network;

@@ -63,6 +63,16 @@ impl Visibility {
     fn draw_one(&mut self, triangle: &ScreenTriangle, lattice: &Lattice<'_>) {
         let [left, right, top, bottom] = triangle.bounds;
         let [subpixel_x, subpixel_y] = lattice.subpixel;
+        let misses = |positions: &[i32], subpixel: i32, low: i32, high: i32| match (positions.first(), positions.last())
+        {
+            (Some(first), Some(last)) => {
+                last * SUBPIXEL_STEPS + subpixel < low || first * SUBPIXEL_STEPS + subpixel > high
+            }
+            _ => true,
+        };
+        if misses(lattice.rows, subpixel_y, top, bottom) || misses(lattice.columns, subpixel_x, left, right) {
+            return;
+        }
         let covered = |positions: &[i32], subpixel: i32, low: i32, high: i32| {
             let from = positions.partition_point(|position| position * SUBPIXEL_STEPS + subpixel < low);
             let to = positions.partition_point(|position| position * SUBPIXEL_STEPS + subpixel <= high);

@@ -12,7 +12,7 @@ use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
 use crate::perception::{FieldOfView, MountedLidar};
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::{Alterations, Detection, Health, Perception, Scene, SensorError, SensorHealth};
+use crate::{Alterations, Detection, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
 
 /// A classifier that assigns class scores to detections from the measurements of another sensor.
 pub trait DetectionClassifier: Send {
@@ -25,6 +25,11 @@ pub trait DetectionClassifier: Send {
     /// Returns what that sensor alone has seen, as of the latest scan. Usually nothing.
     fn seen_alone(&self) -> &[Detection] {
         &[]
+    }
+
+    /// Returns the latest image that a network has evaluated as a whole. Usually none.
+    fn rear_image(&self) -> Option<&RearImage> {
+        None
     }
 
     /// Returns the health of that sensor.
@@ -161,6 +166,10 @@ impl Perception for FullPerception {
 
     fn lidars(&self) -> Vec<MountedLidar<'_>> {
         self.front_lidar.iter().flat_map(FrontLidar::lidar).chain(self.rear.lidars()).collect()
+    }
+
+    fn rear_image(&self) -> Option<&RearImage> {
+        self.classifier.as_ref().and_then(|classifier| classifier.rear_image())
     }
 
     fn rear_fields(&self) -> Vec<FieldOfView> {

@@ -20,7 +20,7 @@ use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
 use crate::full::DetectionClassifier;
 use crate::image_evidence::{Evidence, Exposed, ImageResult, associate, moved};
 use crate::worker_classifier::{CHANNEL, HeldImage, inference_backend};
-use crate::{Detection, Extent, Health, NoiseKey, Scene, SensorError};
+use crate::{Detection, Extent, Health, NoiseKey, RearImage, Scene, SensorError};
 
 /// Distance along and across the ego's axis by which an object may move between two scans that detect it (m), as in the memory of
 /// the crop classifier: a closing speed of 50 m/s over one control step, and a lane change over two.
@@ -70,6 +70,8 @@ pub(crate) struct ImageDetector {
     ids: Vec<u64>,
     /// Whether a detection of the latest scan has been linked to each object of the earlier ones.
     is_taken: Vec<bool>,
+    /// The latest image with its instances.
+    latest: Option<RearImage>,
 }
 
 impl ImageDetector {
@@ -88,6 +90,7 @@ impl ImageDetector {
             alone: Vec::new(),
             ids: Vec::new(),
             is_taken: Vec::new(),
+            latest: None,
         }
     }
 
@@ -129,14 +132,15 @@ impl ImageDetector {
         let held = self.held.as_ref().map(|held| (held.scene(), held.key));
         let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
         let failed = |error: closecall_camera::ClassifierError| SensorError::Classifier { reason: error.to_string() };
-        let result = NETWORK.with_borrow_mut(|slot| {
+        let (result, instances) = NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
                 *slot = Some((self.camera, WholeImageDetector::new(self.camera, inference_backend()).map_err(failed)?));
             }
-            let Some((_, network)) = slot else { return Ok(ImageResult::default()) };
+            let Some((_, network)) = slot else { return Ok((ImageResult::default(), Vec::new())) };
             let instances = network.detect(imaged, key, fault).map_err(failed)?;
-            Ok(associate(network.camera(), scene, &instances, detections))
+            Ok((associate(network.camera(), scene, &instances, detections), instances))
         })?;
+        self.latest = Some(RearImage { time: scene.time, shown_time: imaged.time, instances });
         let due = scene.time + seconds(self.camera.mask_rcnn.latency_s);
         let exposed = Exposed { time: scene.time, ego: scene.ego };
         self.pending.push_back(Pending { due, exposed, ids: self.ids.clone(), result });
@@ -188,6 +192,10 @@ impl DetectionClassifier for ImageDetector {
 
     fn seen_alone(&self) -> &[Detection] {
         &self.alone
+    }
+
+    fn rear_image(&self) -> Option<&RearImage> {
+        self.latest.as_ref()
     }
 
     fn health(&self) -> Health {

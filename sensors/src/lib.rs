@@ -39,5 +39,5 @@ pub use object::{
     ByClass, Chain, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Origin,
     RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
-pub use perception::{FieldOfView, Health, MountedLidar, Perception, SensorError, SensorHealth};
+pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorError, SensorHealth};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

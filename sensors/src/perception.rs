@@ -1,5 +1,6 @@
 //! The interface between the sensors and the simulation loop.
 
+use closecall_camera::Instance;
 use closecall_tracking::RearView;
 use closecall_traffic::{Time, Track};
 
@@ -77,6 +78,17 @@ pub struct MountedLidar<'a> {
     pub detections: &'a [Detection],
 }
 
+/// The latest image that a network has evaluated as a whole, for display.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RearImage {
+    /// Time of the exposure.
+    pub time: Time,
+    /// Time of the scene that the image shows: that of the exposure, unless the camera is frozen.
+    pub shown_time: Time,
+    /// What the network has found, in its order.
+    pub instances: Vec<Instance>,
+}
+
 /// All of the ego's sensors with their processing, from the scene to the tracks.
 ///
 /// The loop calls [`Perception::step`] once in each control step, in order of time.
@@ -99,6 +111,11 @@ pub trait Perception: Send {
     /// Returns the first of the rear LiDARs. Returns `None` if none is simulated.
     fn rear_lidar(&self) -> Option<MountedLidar<'_>> {
         self.lidars().into_iter().find(|lidar| !lidar.looks_ahead)
+    }
+
+    /// Returns the latest image of the rear camera that a network has evaluated as a whole. Returns `None` if no network does.
+    fn rear_image(&self) -> Option<&RearImage> {
+        None
     }
 
     /// Returns the fields of view of the rear sensors. Returns none if their limits are not simulated.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use closecall_camera::Camera;
 use closecall_controllers::EgoCommand;
-use closecall_sensors::{FieldOfView, NoiseKey, Scene, SceneVehicle};
+use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState};
@@ -97,6 +97,8 @@ pub struct Frame {
     pub(in crate::run) scan: Option<Scan>,
     /// Scans of the other LiDARs with their names, likewise.
     pub(in crate::run) other_scans: Vec<(&'static str, Scan)>,
+    /// Image of the rear camera that a network has evaluated as a whole, in the frames in which one was taken; none below [`Level::Full`].
+    pub(in crate::run) rear_image: Option<RearImage>,
 }
 
 /// A reference level of a plotted quantity.

@@ -190,6 +190,7 @@ fn limits(scenario: &Scenario, arm: &Arm) -> Vec<Limit> {
 impl Observer for FilmRecorder {
     fn step(&mut self, view: &StepView<'_>) {
         let keeps_objects = self.film.level >= Level::Objects;
+        let keeps_images = self.film.level >= Level::Full;
         let (scan, other_scans) = self.scans(view);
         let ego_length_m = self.film.actors[self.film.ego].vehicle.dimensions.length_m;
         self.film.frames.push(Frame {
@@ -204,6 +205,7 @@ impl Observer for FilmRecorder {
             rear_fields: if keeps_objects { view.perception.rear_fields() } else { Vec::new() },
             scan,
             other_scans,
+            rear_image: view.perception.rear_image().filter(|image| keeps_images && image.time == view.time).cloned(),
         });
     }
 

@@ -181,6 +181,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         phase: None,
         rear_fields: Vec::new(),
         other_scans: Vec::new(),
+        rear_image: None,
         scan: None,
     }
 }

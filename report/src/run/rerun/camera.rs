@@ -1,18 +1,27 @@
-//! Images of the rear camera, with the windows that the classifier evaluates and the class that it finds in each.
+//! Images of the rear camera with what its network says: the windows that the crop classifier evaluates, or the instances of the
+//! Mask R-CNN.
 //!
 //! The closed loop never renders a whole camera image. This module renders it afterwards, from the same scene and the
 //! same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected instants, since an image costs as much as
-//! a hundred control steps. An image and its windows stay visible until the next image.
+//! a hundred control steps. An image and its marks stay visible until the next image. Faults of the camera do not appear in the images.
+//!
+//! The instances are those that the network found in the loop, at the moment of the exposure. An image of the Mask R-CNN is therefore
+//! one that was evaluated.
 
 use crate::run::rerun::sdk::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
-use closecall_camera::{Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
-use closecall_sensors::{Detection, rear_exposures};
+use closecall_camera::{
+    Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
+};
+use closecall_sensors::rear_exposures;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::{Film, Frame};
+
+mod instances;
+mod windows;
 
 /// Distance between two rendered pixels, in both directions (px).
 const PIXEL_STEP: u16 = 5;
@@ -52,33 +61,60 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingE
     let Some((camera, key)) = &film.camera else { return Ok(false) };
     write_pinhole(writer, film, camera)?;
     let camera = RearCamera::new(*camera);
+    let is_whole = camera.camera().pipeline == Pipeline::MaskRcnn;
     let windows_entity = format!("{ENTITY}/windows");
-    let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
-    writer.write_static(&windows_entity, &fixed)?;
+    if is_whole {
+        instances::write_fixed(writer)?;
+    } else {
+        writer.write_static(&windows_entity, &fixed_marks())?;
+    }
     let mut lists = FrameBuffers::default();
     let (mut images, mut marks) = (Vec::new(), Vec::new());
-    for (frame, exposure) in frames_to_render(film, rear_exposures(key)) {
+    let keyed: Vec<(&Frame, ExposureKey)> = film.frames.iter().zip(rear_exposures(key)).collect();
+    let shown = frames_to_show(film, is_whole);
+    for &row in &shown {
         let image;
-        (image, lists) = render(film, &camera, frame, (exposure, lists));
-        images.push((frame.time, image));
-        marks.push((frame.time, windows(film, &camera, frame)));
+        (image, lists) = render(film, &camera, keyed[shown_row(film, row)], lists);
+        images.push((film.frames[row].time, image));
     }
     let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
-    let marks: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, boxes)| (*time, boxes as _)).collect();
     writer.write_each(ENTITY, &images)?;
-    writer.write_each(&windows_entity, &marks)?;
+    if is_whole {
+        instances::write(writer, shown.iter().map(|row| &film.frames[*row]))?;
+    } else {
+        marks.extend(shown.iter().map(|row| {
+            let frame = &film.frames[*row];
+            (frame.time, windows::windows(film, &camera, frame))
+        }));
+        let marks: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, boxes)| (*time, boxes as _)).collect();
+        writer.write_each(&windows_entity, &marks)?;
+    }
     Ok(!images.is_empty())
 }
 
-/// Returns the frames to render with the keys of their noise: for each selected instant, the latest frame with a scan.
-fn frames_to_render(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec<(&Frame, ExposureKey)> {
+/// Returns what all boxes in the image have in common.
+fn fixed_marks() -> Boxes2D {
+    Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true)
+}
+
+/// Returns the row of the frame that the image taken in a row shows: an earlier one if the camera is frozen.
+fn shown_row(film: &Film, row: usize) -> usize {
+    let time = film.frames[row].rear_image.as_ref().map_or(film.frames[row].time, |image| image.shown_time);
+    film.frames[..row].partition_point(|frame| frame.time < time)
+}
+
+/// Returns the rows of the frames whose images are shown: for each selected instant, the latest frame with a scan or, if the network
+/// reads whole images, with an image.
+fn frames_to_show(film: &Film, is_whole: bool) -> Vec<usize> {
     let critical = film.critical_moment();
     let instants =
         TIMES_BEFORE.iter().map(|&before| critical - before).chain(film.moments().iter().map(|noted| noted.time));
-    let rows_with_scan: Vec<usize> = (0..film.frames.len()).filter(|&row| film.frames[row].scan.is_some()).collect();
-    let latest = |time: Time| rows_with_scan.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
-    let mut selected: Vec<usize> = instants.filter_map(latest).chain(rows_with_scan.first().copied()).collect();
+    let has_marks = |frame: &Frame| if is_whole { frame.rear_image.is_some() } else { frame.scan.is_some() };
+    let rows: Vec<usize> = (0..film.frames.len()).filter(|&row| has_marks(&film.frames[row])).collect();
+    let latest = |time: Time| rows.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
+    let mut selected: Vec<usize> = instants.filter_map(latest).chain(rows.first().copied()).collect();
     selected.sort_unstable();
+    selected.dedup();
     let shown = latest(critical);
     let mut last: Option<Time> = None;
     selected.retain(|&row| {
@@ -87,16 +123,15 @@ fn frames_to_render(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec
         last = if is_kept { Some(time) } else { last };
         is_kept
     });
-    let frames = film.frames.iter().zip(keys).enumerate();
-    frames.filter(|(row, _)| selected.binary_search(row).is_ok()).map(|(_, frame_and_key)| frame_and_key).collect()
+    selected
 }
 
 /// Renders the image of a frame. The buffers `lists` are passed on to the next image.
 fn render(
     film: &Film,
     camera: &RearCamera,
-    frame: &Frame,
-    (key, lists): (ExposureKey, FrameBuffers),
+    (frame, key): (&Frame, ExposureKey),
+    lists: FrameBuffers,
 ) -> (Image, FrameBuffers) {
     let (ego, others) = film.scene_vehicles(frame);
     let scene = film.scene(frame, ego, &others);
@@ -106,46 +141,23 @@ fn render(
     (image, exposure.into_buffers())
 }
 
-/// Returns the windows of the detections of a frame with their classes.
-fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {
-    let (ego, _) = film.scene_vehicles(frame);
-    let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
-    let in_image: Vec<(&Detection, PixelRect)> =
-        boxes.iter().filter_map(|found| Some((found, camera.detection_window(&ego, found)?))).collect();
-    // A window that reaches beyond the image is cut off: the viewer would make the image smaller until the window fits.
+/// Returns the least corner and the size in the shown picture of a box in the image: left, top, right, bottom (px).
+///
+/// A box that reaches beyond the picture is cut off: the viewer would make the picture smaller until the box fits.
+fn in_picture([left, top, right, bottom]: [f32; 4]) -> ([f32; 2], [f32; 2]) {
     let scale = 1.0 / f32::from(PIXEL_STEP);
+    let first_row = f32::from(PIXEL_ROWS.start);
     let size_px = [PixelRect::IMAGE.width as f32, f32::from(PIXEL_ROWS.end - PIXEL_ROWS.start)];
-    let ends = |window: &PixelRect| {
-        let start = [window.left as f32, window.top as f32 - f32::from(PIXEL_ROWS.start)];
-        let extent = [window.width as f32, window.height as f32];
-        [0, 1].map(|axis| [start[axis], start[axis] + extent[axis]].map(|end| scale * end.clamp(0.0, size_px[axis])))
-    };
-    let corner = |window: &PixelRect| ends(window).map(|[low, _]| low);
-    let size = |window: &PixelRect| ends(window).map(|[low, high]| high - low);
-    Boxes2D::from_mins_and_sizes(
-        in_image.iter().map(|(_, window)| corner(window)),
-        in_image.iter().map(|(_, window)| size(window)),
-    )
-    .with_colors(in_image.iter().map(|(found, _)| colour(found)))
-    .with_labels(in_image.iter().map(|(found, _)| label(found)))
+    let inside = |at: [f32; 2]| [0, 1].map(|axis| scale * at[axis].clamp(0.0, size_px[axis]));
+    let (low, high) = (inside([left, top - first_row]), inside([right, bottom - first_row]));
+    (low, [0, 1].map(|axis| high[axis] - low[axis]))
 }
 
-fn colour(found: &Detection) -> Rgba {
-    match (found.class.vehicle() >= 0.5, found.class.best_vehicle_class()) {
-        (false, _) => palette::QUIET,
-        (true, VehicleClass::Car) => palette::TRACK,
-        (true, VehicleClass::Truck) => palette::WARNING,
-        (true, VehicleClass::Motorcycle) => palette::SAFE,
+/// Returns the colour of what the camera takes for a vehicle of this class.
+fn class_colour(class: VehicleClass) -> Rgba {
+    match class {
+        VehicleClass::Car => palette::TRACK,
+        VehicleClass::Truck => palette::WARNING,
+        VehicleClass::Motorcycle => palette::SAFE,
     }
-}
-
-/// Returns the most likely class with its score. What is no vehicle has no label, so that the image stays visible.
-fn label(found: &Detection) -> String {
-    if found.class.vehicle() < 0.5 {
-        return String::new();
-    }
-    let [car, truck, motorcycle, background] = found.class.0;
-    let all = [("car", car), ("truck", truck), ("motorcycle", motorcycle), ("background", background)];
-    let best = all.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    best.map_or(String::new(), |(name, score)| format!("{name} {score:.2}"))
 }

@@ -9,4 +9,4 @@ pub(super) use re_sdk::{
 };
 pub(super) use re_sdk_types::archetypes::*;
 pub(super) use re_sdk_types::components::{FillMode, MediaType, TextLogLevel};
-pub(super) use re_sdk_types::datatypes::Quaternion;
+pub(super) use re_sdk_types::datatypes::{ChannelDatatype, ImageFormat, Quaternion, Rgba32};

@@ -27,6 +27,8 @@ use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
 use closecall_simulation::trajectories::TrafficRecorder;
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 
+mod whole_image;
+
 fn library(name: &str) -> ScenarioFile {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
     ScenarioFile::load(&folder.join(format!("{name}.toml")), &[]).unwrap()

@@ -1,0 +1,103 @@
+//! The instances that the Mask R-CNN found in an image: boxes with class and score, and masks.
+
+use closecall_camera::{Instance, MASK_THRESHOLD, PixelRect};
+use closecall_traffic::{Time, VehicleClass};
+
+use super::{ENTITY, PIXEL_ROWS, PIXEL_STEP, class_colour, fixed_marks, in_picture};
+use crate::run::film::Frame;
+use crate::run::rerun::RecordingError;
+use crate::run::rerun::palette::{self, Rgba};
+use crate::run::rerun::sdk::{
+    AnnotationContext, AsComponents, Boxes2D, ChannelDatatype, ImageFormat, Rgba32, SegmentationImage,
+};
+use crate::run::rerun::stream::Writer;
+
+/// Score from which an instance is more likely right than not: it has the colour of its class, and its mask is shown.
+const LIKELY: f64 = 0.5;
+/// Opacity of the masks (0 to 1), which leaves the vehicles visible.
+const MASK_OPACITY: f32 = 0.4;
+
+fn boxes_entity() -> String {
+    format!("{ENTITY}/instances")
+}
+
+fn masks_entity() -> String {
+    format!("{ENTITY}/masks")
+}
+
+/// Writes what holds for all images: the classes of the masks, and how boxes look.
+pub(super) fn write_fixed(writer: &Writer<'_>) -> Result<(), RecordingError> {
+    writer.write_static(&boxes_entity(), &fixed_marks())?;
+    let class = |class: VehicleClass| (mask_class(class).into(), class.name(), colour_of(class_colour(class)));
+    let background = (0_u16, "background", colour_of([0; 4]));
+    writer.write_static(
+        &masks_entity(),
+        &AnnotationContext::new(std::iter::once(background).chain(VehicleClass::ALL.map(class)).collect::<Vec<_>>()),
+    )
+}
+
+/// Writes the instances of the images that were taken in these frames.
+pub(super) fn write<'a>(writer: &Writer<'_>, frames: impl Iterator<Item = &'a Frame>) -> Result<(), RecordingError> {
+    let images: Vec<(Time, &[Instance])> =
+        frames.filter_map(|frame| frame.rear_image.as_ref().map(|image| (frame.time, &image.instances[..]))).collect();
+    let boxes: Vec<(Time, Boxes2D)> = images.iter().map(|(time, found)| (*time, boxes(found))).collect();
+    let masks: Vec<(Time, SegmentationImage)> = images.iter().map(|(time, found)| (*time, masks(found))).collect();
+    writer.write_each(&boxes_entity(), &rows(&boxes))?;
+    writer.write_each(&masks_entity(), &rows(&masks))
+}
+
+fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> {
+    whats.iter().map(|(time, what)| (*time, what as _)).collect()
+}
+
+/// Returns the boxes of the instances with class and score, as far as they reach into the shown picture.
+fn boxes(found: &[Instance]) -> Boxes2D {
+    let ends = |instance: &Instance| in_picture(instance.box_px.map(|side| side as f32));
+    let is_shown = |instance: &&Instance| ends(instance).1.iter().all(|side| *side > 0.0);
+    let shown: Vec<&Instance> = found.iter().filter(is_shown).collect();
+    let colour = |instance: &&Instance| match instance.score >= LIKELY {
+        true => class_colour(instance.class),
+        false => palette::QUIET,
+    };
+    Boxes2D::from_mins_and_sizes(
+        shown.iter().map(|instance| ends(instance).0),
+        shown.iter().map(|instance| ends(instance).1),
+    )
+    .with_colors(shown.iter().map(colour))
+    .with_labels(shown.iter().map(|instance| label(instance)))
+    .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))))
+}
+
+/// Returns class and score. What is rather no vehicle has no label, so that the image stays visible.
+fn label(instance: &Instance) -> String {
+    if instance.score < LIKELY {
+        return String::new();
+    }
+    format!("{} {:.2}", instance.class.name(), instance.score)
+}
+
+/// Returns the class of each pixel of the shown picture: that of the likeliest instance whose mask covers it, or 0.
+fn masks(found: &[Instance]) -> SegmentationImage {
+    let mut likely: Vec<&Instance> = found.iter().filter(|instance| instance.score >= LIKELY).collect();
+    likely.sort_by(|one, other| other.score.total_cmp(&one.score));
+    let step = usize::from(PIXEL_STEP);
+    let middle = |pixel: u32| f64::from(pixel) + 0.5 * f64::from(PIXEL_STEP);
+    let columns = (0..PixelRect::IMAGE.width).step_by(step).map(middle);
+    let rows = PIXEL_ROWS.step_by(step).map(|row| middle(row.into()));
+    let class_at = |at: [f64; 2]| {
+        let covers = |instance: &&&Instance| instance.mask.at(at) >= MASK_THRESHOLD;
+        likely.iter().find(covers).map_or(0, |instance| mask_class(instance.class))
+    };
+    let size = [columns.len(), rows.len()].map(|count| count as u32);
+    let pixels: Vec<u8> = rows.flat_map(|v| columns.clone().map(move |u| [u, v])).map(class_at).collect();
+    SegmentationImage::new(pixels, ImageFormat::segmentation(size, ChannelDatatype::U8)).with_opacity(MASK_OPACITY)
+}
+
+/// Returns the number of a class in the masks, in which 0 is background.
+fn mask_class(class: VehicleClass) -> u8 {
+    class as u8 + 1
+}
+
+fn colour_of([red, green, blue, opacity]: Rgba) -> Rgba32 {
+    Rgba32::from_unmultiplied_rgba(red, green, blue, opacity)
+}

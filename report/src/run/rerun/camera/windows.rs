@@ -1,0 +1,45 @@
+//! The windows of the image that the crop classifier evaluates, with the class that it finds in each.
+
+use closecall_camera::{PixelRect, RearCamera};
+use closecall_sensors::Detection;
+
+use super::{class_colour, in_picture};
+use crate::run::film::{Film, Frame};
+use crate::run::rerun::palette::{self, Rgba};
+use crate::run::rerun::sdk::Boxes2D;
+
+/// Returns the windows of the detections of a frame with their classes.
+pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {
+    let (ego, _) = film.scene_vehicles(frame);
+    let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
+    let in_image: Vec<(&Detection, PixelRect)> =
+        boxes.iter().filter_map(|found| Some((found, camera.detection_window(&ego, found)?))).collect();
+    let ends = |window: &PixelRect| {
+        let [left, top] = [window.left, window.top].map(|start| start as f32);
+        in_picture([left, top, left + window.width as f32, top + window.height as f32])
+    };
+    Boxes2D::from_mins_and_sizes(
+        in_image.iter().map(|(_, window)| ends(window).0),
+        in_image.iter().map(|(_, window)| ends(window).1),
+    )
+    .with_colors(in_image.iter().map(|(found, _)| colour(found)))
+    .with_labels(in_image.iter().map(|(found, _)| label(found)))
+}
+
+fn colour(found: &Detection) -> Rgba {
+    match (found.class.vehicle() >= 0.5, found.class.best_vehicle_class()) {
+        (false, _) => palette::QUIET,
+        (true, class) => class_colour(class),
+    }
+}
+
+/// Returns the most likely class with its score. What is no vehicle has no label, so that the image stays visible.
+fn label(found: &Detection) -> String {
+    if found.class.vehicle() < 0.5 {
+        return String::new();
+    }
+    let [car, truck, motorcycle, background] = found.class.0;
+    let all = [("car", car), ("truck", truck), ("motorcycle", motorcycle), ("background", background)];
+    let best = all.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(String::new(), |(name, score)| format!("{name} {score:.2}"))
+}
