@@ -132,7 +132,8 @@ impl Frame {
         keep(&mut of_tile.patches, &self.lists.patches, &bounds);
         keep(&mut of_tile.clouds, &self.lists.clouds, &bounds);
         keep(&mut of_tile.glows, &self.lists.glows, &bounds);
-        let mut line = Line::new(self, columns, std::mem::take(&mut self.lists.line));
+        let memory = std::mem::take(&mut self.lists.line);
+        let mut line = Line::new(self, columns, memory);
         let width = columns.len();
         for (index, (row, out)) in rows.iter().zip(rgb.chunks_exact_mut(width * CHANNELS)).enumerate() {
             line.begin(self, *row, &of_tile);
