@@ -2,8 +2,13 @@
 //!
 //! ```sh
 //! cargo build --release && cargo run --release --example validate_memory -- [MAX_SAMPLES] [FILE.svg]
+//! cargo build --release && cargo run --release --example validate_memory -- modes
 //! ```
 //!
+//! The second command runs short paired campaigns in each mode, with one and with two threads, with and without recordings. The program is read
+//! once before, so that the kernel has all of it at hand: that is the worst case, as it then maps the surroundings of each page that is used.
+//!
+//! The first command measures the growth with the samples.
 //! The scenario is `low-thw-overtake` with object-level sensors, cut to 2 s, so that a million samples take minutes. The
 //! memory that a campaign needs for a sample does not depend on the sample's duration. The campaign writes all files of its
 //! folder; within 2 s hardly anything happens, so that there is nothing to record, and the campaign says that the encounter did not happen.
@@ -12,7 +17,7 @@
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -21,10 +26,16 @@ use plotters::prelude::*;
 /// Largest allowed peak memory (MB).
 const LIMIT_MB: f64 = 40.0;
 const MB_PER_KIB: f64 = 1.024e-3;
+/// The modes, with numbers of samples that take a few seconds.
+const MODES: [(&str, u64); 3] = [("ground-truth", 100), ("object", 100), ("full", 8)];
+/// Numbers of threads.
+const JOBS: [u32; 2] = [1, 2];
+/// Recordings: none, and those that a campaign makes if nothing else is asked for.
+const RECORDINGS: [&str; 2] = ["failures:0", "failures:3"];
 /// Exit code of a campaign in which the encounter did not happen.
 const DID_NOT_HAPPEN: i32 = 7;
 /// Interval at which the kernel's value is read.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const LOOK_EVERY: Duration = Duration::from_millis(5);
 const SIZE: (u32, u32) = (760, 360);
 
 /// Returns the peak so far (MB), or `None` if the program has ended.
@@ -35,14 +46,18 @@ fn peak_mb(process: u32) -> Option<f64> {
     Some(kib * MB_PER_KIB)
 }
 
-/// Runs a campaign and returns its peak memory (MB).
-fn measure(samples: u64) -> Result<f64, Box<dyn Error>> {
+/// Returns the program.
+fn program() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("target/release/closecall")
+}
+
+/// Runs a campaign and returns its peak memory (MB). It must end with the given exit code.
+fn measure(arguments: &[&str], code: i32) -> Result<f64, Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir()?;
-    let mut command = Command::new(root.join("target/release/closecall"));
-    command.arg("campaign").arg(root.join("scenarios/library/low-thw-overtake.toml"));
-    command.args(["-n", &samples.to_string(), "--seed", "1", "--sensors", "object", "--set", "duration-s=2", "--out"]);
-    command.arg(folder.path().join("out")).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut command = Command::new(program());
+    command.arg("campaign").arg(root.join("scenarios/library/low-thw-overtake.toml")).args(arguments);
+    command.arg("--out").arg(folder.path().join("out")).stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = command.spawn()?;
     let mut peak = 0.0_f64;
     let status = loop {
@@ -54,7 +69,25 @@ fn measure(samples: u64) -> Result<f64, Box<dyn Error>> {
         }
         std::thread::sleep(LOOK_EVERY);
     };
-    if status.code() == Some(DID_NOT_HAPPEN) { Ok(peak) } else { Err(format!("{samples} samples: {status}").into()) }
+    if status.code() == Some(code) { Ok(peak) } else { Err(format!("{}: {status}", arguments.join(" ")).into()) }
+}
+
+/// Measures every mode. Fails if one needs too much.
+fn measure_modes() -> Result<(), Box<dyn Error>> {
+    std::io::copy(&mut std::fs::File::open(program())?, &mut std::io::sink())?;
+    let mut most = 0.0_f64;
+    for (mode, samples) in MODES {
+        let samples = samples.to_string();
+        for (jobs, recordings) in
+            JOBS.iter().flat_map(|jobs| RECORDINGS.map(|recordings| (jobs.to_string(), recordings)))
+        {
+            let campaign = ["-n", &samples, "--seed", "5", "--paired", "--no-gate", "--sensors", mode];
+            let mb = measure(&[&campaign[..], &["--jobs", &jobs, "--record", recordings]].concat(), 0)?;
+            println!("{mode}, --jobs {jobs}, --record {recordings}: {mb:.1} MB");
+            most = most.max(mb);
+        }
+    }
+    if most < LIMIT_MB { Ok(()) } else { Err(format!("{most:.1} MB, {LIMIT_MB} MB allowed").into()) }
 }
 
 /// Draws the peak memory (MB) over the number of samples.
@@ -85,7 +118,10 @@ fn draw(path: &Path, points: &[(u64, f64)]) -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut args = std::env::args().skip(1);
+    let mut args = std::env::args().skip(1).peekable();
+    if args.peek().is_some_and(|argument| argument == "modes") {
+        return measure_modes();
+    }
     let most: u64 = args.next().map_or(Ok(1_000_000), |most| most.parse())?;
     let mut points = Vec::new();
     let mut samples = 100;
@@ -96,7 +132,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     points.push(most);
     let mut measured = Vec::with_capacity(points.len());
     for samples in points {
-        let mb = measure(samples)?;
+        let samples_text = samples.to_string();
+        let campaign = ["-n", &samples_text, "--seed", "1", "--sensors", "object", "--set", "duration-s=2"];
+        let mb = measure(&campaign, DID_NOT_HAPPEN)?;
         println!("{samples:>9} samples: {mb:.1} MB");
         measured.push((samples, mb));
     }

@@ -9,7 +9,8 @@
 //! take turns, so that other programs on the machine disturb all of them alike, and time is that of this thread alone
 //! (`/proc/thread-self/schedstat`; wall time where there is none). Before each mode a fixed loop is timed:
 //! `per_calibration` is the number of simulated seconds in the time of that loop, which makes figures of different machines
-//! comparable. No validity check is run; a campaign's checks come on top.
+//! comparable. Where Callgrind is installed, the lines have the instructions of the counted modes. The last line has the time of each stage. No
+//! validity check is run; a campaign's checks come on top.
 //!
 //! The second command counts instructions with Callgrind (Debian's package `valgrind`), see [`instructions`].
 
@@ -57,7 +58,8 @@ impl Timing {
         Ok(())
     }
 
-    fn print(&self, rounds: u32) {
+    /// Prints the figures. `millions` are the counted instructions per simulated second, in millions.
+    fn print(&self, rounds: u32, millions: Option<f64>) {
         let speed = self.simulated_s / self.cpu_s;
         let calibration_s = self.calibration_s / f64::from(rounds);
         let line = json!({
@@ -70,6 +72,7 @@ impl Timing {
             "simulated_s_per_cpu_s": speed,
             "calibration_s": calibration_s,
             "per_calibration": speed * calibration_s,
+            "million_instructions_per_simulated_s": millions,
         });
         println!("{line}");
     }
@@ -99,9 +102,31 @@ fn calibrate() {
     std::hint::black_box(sum);
 }
 
+/// Prints the time of each stage of the headline (ms per simulated second): what a mode takes beyond the one with a stage less. The modes run
+/// the same samples.
+fn print_stages(timings: &[Timing]) {
+    let of = |name: &str| {
+        let timing = timings.iter().find(|timing| timing.mode.name == name);
+        timing.map(|timing| 1e3 * timing.cpu_s / timing.simulated_s)
+    };
+    let beyond = |name, less| Some(of(name)? - of(less)?);
+    let line = json!({
+        "stages_ms_per_simulated_s": {
+            "drivers, ego stack and physics": of("ground-truth"),
+            "object-level sensors": beyond("object", "ground-truth"),
+            "rear LiDAR, clustering and tracking": beyond("lidar", "ground-truth"),
+            "rear camera and network": beyond("full", "lidar"),
+            "guard rails": beyond("full, guard rails", "full"),
+            "spray and wet road": beyond("full, wet road", "full"),
+            "fog": beyond("full, fog", "full"),
+        },
+    });
+    println!("{line}");
+}
+
 /// Times all modes.
 fn time(rounds: u32) -> Result<(), Box<dyn Error>> {
-    let mut timings = modes()?.into_iter().map(Timing::new).collect::<Result<Vec<_>, _>>()?;
+    let mut timings = modes(|_| true)?.into_iter().map(Timing::new).collect::<Result<Vec<_>, _>>()?;
     // The first run of a thread loads the network.
     if let Some(full) = timings.iter().find(|timing| timing.mode.name == "full") {
         full.mode.run(&full.scenarios[0], 0)?;
@@ -111,9 +136,12 @@ fn time(rounds: u32) -> Result<(), Box<dyn Error>> {
             timing.measure()?;
         }
     }
+    // Without Callgrind there are no counts.
+    let counts = instructions::count_all().unwrap_or_default();
     for timing in &timings {
-        timing.print(rounds);
+        timing.print(rounds, counts.get(&timing.mode.name).copied());
     }
+    print_stages(&timings);
     Ok(())
 }
 
@@ -123,7 +151,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         [] => time(ROUNDS),
         ["instructions"] => instructions::check(),
         ["instructions", "write"] => instructions::write(),
-        [instructions::RUN, mode, samples] => instructions::run(mode, samples.parse()?),
+        [instructions::RUN, mode, samples] => instructions::run(mode, samples.parse()?, None),
+        [instructions::RUN, mode, samples, duration_s] => {
+            instructions::run(mode, samples.parse()?, Some(duration_s.parse()?))
+        }
         [rounds] => time(rounds.parse()?),
         _ => Err("allowed: a number of rounds, `instructions`, or `instructions write`".into()),
     }

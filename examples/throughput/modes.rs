@@ -17,6 +17,8 @@ const SEED: u64 = 9;
 const TRAFFIC_S: f64 = 10.0;
 /// Distance between two vehicles of a lane in dense traffic (m): a time headway of 1.8 s at 30 m/s, bumper to bumper.
 const SPACING_M: f64 = 60.0;
+/// Settings of a wet road in rain.
+const WET: [&str; 3] = ["environment.water-film-mm=1", "environment.rain-mm-per-h=5", "environment.friction=0.6"];
 /// Numbers of vehicles in dense traffic.
 const VEHICLES: [usize; 5] = [3, 10, 30, 60, 100];
 
@@ -31,8 +33,11 @@ pub(crate) struct Mode {
 }
 
 impl Mode {
-    fn new(name: &str, sensors: SensorMode, file: &ScenarioFile, samples: u64) -> Self {
-        Self { name: name.to_owned(), sensors, file: file.clone(), samples }
+    /// Returns the same mode with runs that end after `duration_s` (s).
+    pub(crate) fn cut(mut self, duration_s: f64) -> Result<Self, Box<dyn Error>> {
+        let setting: Setting = format!("duration-s={duration_s}").parse()?;
+        self.file = ScenarioFile::parse(self.file.path(), self.file.text(), &[setting])?;
+        Ok(self)
     }
 
     /// Returns the concrete scenarios of the first `samples` samples.
@@ -74,35 +79,59 @@ fn traffic(vehicles: usize) -> String {
     text
 }
 
-/// Returns the modes that are measured.
-pub(crate) fn modes() -> Result<Vec<Mode>, Box<dyn Error>> {
-    let headline = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library/low-thw-overtake.toml");
-    let load = |settings: &[&str]| -> Result<ScenarioFile, Box<dyn Error>> {
-        let settings = settings.iter().map(|setting| setting.parse()).collect::<Result<Vec<Setting>, _>>()?;
-        Ok(ScenarioFile::load(&headline, &settings)?)
-    };
-    let plain = load(&[])?;
-    let wet = ["environment.water-film-mm=1", "environment.rain-mm-per-h=5", "environment.friction=0.6"];
-    let mut modes = vec![
-        Mode::new("ground-truth", SensorMode::GroundTruth, &plain, 40),
-        Mode::new("object", SensorMode::Object, &plain, 40),
-        Mode::new("lidar", SensorMode::Full, &load(&["sensors.rear-camera.pipeline=off"])?, 6),
-        Mode::new("full", SensorMode::Full, &plain, 6),
-        Mode::new("full, guard rails", SensorMode::Full, &load(&["road.guard-rails=true"])?, 6),
-        Mode::new("full, wet road", SensorMode::Full, &load(&wet)?, 6),
-        Mode::new("full, fog", SensorMode::Full, &load(&["environment.visibility-m=200"])?, 4),
-    ];
+/// Modes of which some are wanted.
+struct Chosen<W> {
+    is_wanted: W,
+    modes: Vec<Mode>,
+}
+
+impl<W: Fn(&str) -> bool> Chosen<W> {
+    /// Adds a mode if it is wanted. Its scenario is read then only: all of them take 200 million instructions.
+    fn add(
+        &mut self,
+        name: &str,
+        sensors: SensorMode,
+        samples: u64,
+        file: impl FnOnce() -> Result<ScenarioFile, Box<dyn Error>>,
+    ) -> Result<(), Box<dyn Error>> {
+        if (self.is_wanted)(name) {
+            self.modes.push(Mode { name: name.to_owned(), sensors, file: file()?, samples });
+        }
+        Ok(())
+    }
+}
+
+/// Returns a scenario of the library with settings.
+fn library(name: &str, settings: &[&str]) -> Result<ScenarioFile, Box<dyn Error>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library").join(name);
+    let settings = settings.iter().map(|setting| setting.parse()).collect::<Result<Vec<Setting>, _>>()?;
+    Ok(ScenarioFile::load(&path, &settings)?)
+}
+
+/// Returns the modes that are measured, as far as they are wanted by their names.
+pub(crate) fn modes(is_wanted: impl Fn(&str) -> bool) -> Result<Vec<Mode>, Box<dyn Error>> {
+    use SensorMode::{Full, GroundTruth, Object};
+    let mut chosen = Chosen { is_wanted, modes: Vec::new() };
+    let headline = |settings: &'static [&'static str]| move || library("low-thw-overtake.toml", settings);
+    let busy = || library("traffic/busy-overtake.toml", &[]);
+    chosen.add("ground-truth", GroundTruth, 40, headline(&[]))?;
+    chosen.add("object", Object, 40, headline(&[]))?;
+    chosen.add("lidar", Full, 6, headline(&["sensors.rear-camera.pipeline=off"]))?;
+    chosen.add("full", Full, 6, headline(&[]))?;
+    chosen.add("full, guard rails", Full, 6, headline(&["road.guard-rails=true"]))?;
+    chosen.add("full, wet road", Full, 6, headline(&WET))?;
+    chosen.add("full, fog", Full, 4, headline(&["environment.visibility-m=200"]))?;
+    chosen.add("object, busy-overtake", Object, 6, busy)?;
+    chosen.add("full, busy-overtake", Full, 1, busy)?;
     for vehicles in VEHICLES {
-        let file = ScenarioFile::parse(Path::new("traffic.toml"), &traffic(vehicles), &[])?;
+        let file = || Ok(ScenarioFile::parse(Path::new("traffic.toml"), &traffic(vehicles), &[])?);
         // The clock counts in steps of milliseconds: runs with few vehicles are repeated.
         let light = 10 * (100 / vehicles as u64);
-        for (name, sensors, samples) in [
-            ("ground-truth", SensorMode::GroundTruth, light),
-            ("object", SensorMode::Object, light),
-            ("full", SensorMode::Full, 1),
-        ] {
-            modes.push(Mode::new(&format!("{name}, {vehicles} vehicles"), sensors, &file, samples));
+        for (name, sensors, samples) in
+            [("ground-truth", GroundTruth, light), ("object", Object, light), ("full", Full, 1)]
+        {
+            chosen.add(&format!("{name}, {vehicles} vehicles"), sensors, samples, file)?;
         }
     }
-    Ok(modes)
+    Ok(chosen.modes)
 }

@@ -26,6 +26,7 @@ mod gate;
 mod hidden_lead;
 mod inputs;
 mod inspect;
+mod instruction_sets;
 mod library;
 mod library_faults;
 mod looking;
