@@ -32,7 +32,6 @@ mod library_faults;
 mod looking;
 mod malformed;
 mod mask_rcnn;
-mod mask_rcnn_agreement;
 mod mis_page;
 mod native_controllers;
 mod nothing_checked;

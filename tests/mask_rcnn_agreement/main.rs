@@ -1,6 +1,9 @@
 //! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in images that are rendered for the test.
 //!
-//! Python reads the whole image. Rust reads the pixels of it that the network samples.
+//! Python reads the whole image. Rust reads the pixels of it that the network samples. The test is a program of its own, because a process
+//! has one inference backend.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +11,8 @@ use std::process::Command;
 use closecall_camera::{Backend, CHANNELS, HEIGHT_PX, Image, Instance, InstanceDetector, Mask, Sampling, WIDTH_PX};
 use serde_json::Value;
 
-use crate::support::{ROOT, closecall, code, folder, stderr};
+/// Folder of the repository.
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of two masks.
 const BOX_PX: f64 = 0.5;
@@ -63,10 +67,10 @@ fn picture(rgb: &[u8], sampling: &Sampling) -> Image {
 
 /// Returns what Python finds in images whose bytes these files have.
 fn answers(python: &Path, files: &[PathBuf]) -> Vec<Answer> {
-    let script = Path::new(ROOT).join("tests/integration/mask_rcnn_python.py");
+    let script = Path::new(ROOT).join("tests/mask_rcnn_agreement/infer.py");
     let model = Path::new(ROOT).join("camera/models/rear-mask-rcnn.onnx");
     let output = Command::new(python).arg(script).arg(model).args(files).output().unwrap();
-    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines().map(answer).collect()
 }
@@ -98,11 +102,14 @@ fn assert_same(found: &[Instance], answer: &Answer, image: &Path) {
 fn rust_and_python_find_the_same_in_fresh_renders() {
     let Some(library) = closecall_testing::onnxruntime() else { return };
     let Some(python) = closecall_testing::python_with_onnxruntime() else { return };
-    let folder = folder();
+    let folder = tempfile::tempdir().unwrap();
     let images = folder.path().join("images");
-    let output =
-        closecall(["render", "-n", "8", "--seed", "24112026", "--set", "held-out", "-o", images.to_str().unwrap()]);
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let output = Command::new(env!("CARGO_BIN_EXE_closecall"))
+        .args(["render", "-n", "8", "--seed", "24112026", "--set", "held-out", "-o"])
+        .arg(&images)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let entries = std::fs::read_dir(&images).unwrap().map(|entry| entry.unwrap().path());
     let mut images: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|end| end == "png")).collect();
     images.sort();
