@@ -1,5 +1,7 @@
 //! Every scenario of `scenarios/library/faults`, at its shipped magnitude: what its fault does to perception.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 mod effects;
 mod watch;
 

@@ -133,9 +133,15 @@ pub(crate) struct Pair {
 /// Drives with the sensors of a scenario without its faults, and with them: from their start to their end if `is_timed`, and else for
 /// the whole drive.
 pub(crate) fn pair(name: &str, of: Of, (car, steps): (Option<Car>, i64), is_timed: bool) -> Pair {
-    let needs_camera = of == Of::RearCamera;
-    let without_camera = ["sensors.rear-camera.pipeline=\"off\""];
-    let scenario = load(name, if needs_camera { &[] } else { &without_camera });
+    let without_camera = "sensors.rear-camera.pipeline=\"off\"";
+    // False points are then those of the fault.
+    let settings: &[&str] = match of {
+        Of::RearCamera => &[],
+        Of::RearLidar => &[without_camera, "sensors.rear-lidar.false-alarm-rate=0.0"],
+        Of::FrontLidar => &[without_camera, "sensors.front-lidar.false-alarm-rate=0.0"],
+        _ => &[without_camera],
+    };
+    let scenario = load(name, settings);
     let sensors = scenario.sensors;
     let faults = *sensors.faults();
     assert_ne!(faults, Faults::default(), "{name} has no fault");

@@ -93,7 +93,7 @@ struct Drive<'a> {
 impl Default for Drive<'_> {
     fn default() -> Self {
         Self {
-            sensors: "mode = \"full\"\nrear-camera.pipeline = \"off\"",
+            sensors: "mode = \"full\"\nrear-camera.pipeline = \"off\"\nrear-lidar.false-alarm-rate = 0.0",
             faults: "",
             environment: Environment::CLEAR_DAY,
             has_rails: false,

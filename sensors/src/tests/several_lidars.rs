@@ -82,8 +82,9 @@ fn the_points_of_a_turned_sensor_lie_on_the_vehicle_that_it_sees() {
         (1.5, 0.3, 70.0, 2.0, -0.03, 0.02),
     ] {
         let config = LidarConfig { levelling_sd_rad: closecall_traffic::Num::Fixed(0.0), ..LidarConfig::default() };
-        let text =
-            format!("inset-m = {inset_m}\nleft-m = {left_m}\nazimuth-deg = {azimuth_deg}\nroll-deg = {roll_deg}");
+        let text = format!(
+            "inset-m = {inset_m}\nleft-m = {left_m}\nazimuth-deg = {azimuth_deg}\nroll-deg = {roll_deg}\nfalse-alarm-rate = 0.0"
+        );
         let mounted: LidarConfig = toml::from_str(&text).unwrap();
         let mounted = LidarConfig { tilt_rad: closecall_traffic::Num::Fixed(tilt_rad), ..mounted };
         let mounted = LidarConfig { levelling_sd_rad: config.levelling_sd_rad, ..mounted };
