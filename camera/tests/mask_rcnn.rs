@@ -2,6 +2,8 @@
 //!
 //! Needs the shared library of the `onnxruntime` wheel. Python was given whole images, and Rust the pixels that the network reads.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::path::{Path, PathBuf};
 
 use closecall_camera::{
