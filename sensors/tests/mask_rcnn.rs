@@ -2,7 +2,7 @@
 //!
 //! Needs the shared library of the `onnxruntime` wheel.
 
-use closecall_camera::Backend;
+use closecall_camera::{Backend, ExposureKey, WholeImageDetector};
 use closecall_sensors::faults::{CameraFaultConfig, FaultEntries, Faults, LidarFaultConfig};
 use closecall_sensors::{
     Detection, Health, NoiseKey, Perception, Scene, SceneVehicle, SensorsConfig, set_inference_backend,
@@ -101,6 +101,38 @@ fn at_side(detections: &[Detection], y_m: f64) -> &Detection {
     let off_m = |seen: &&Detection| (seen.face_y_m - y_m).abs();
     let nearest = detections.iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)));
     nearest.filter(|seen| off_m(seen) < 1.0).expect("a detection there")
+}
+
+#[test]
+fn the_image_that_is_shown_has_what_the_detector_finds_in_the_scene() {
+    let Some(library) = closecall_testing::onnxruntime() else { return };
+    set_inference_backend(Backend::OnnxRuntime(library.clone()));
+    let config: SensorsConfig = toml::from_str(SENSORS).expect("valid settings and scenes");
+    let camera = *config.check(&Parameters::default()).expect("valid settings and scenes").camera();
+    let mut detector = WholeImageDetector::new(camera, &Backend::OnnxRuntime(library)).expect("the shipped network");
+    let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+    let ego = vehicle(0, VehicleClass::Car, 500.0);
+    let others =
+        [behind(VehicleClass::Truck, 0.0, [30.0, 0.0], 0.0), behind(VehicleClass::Car, 0.0, [18.0, 3.75], 0.0)];
+    let scene = Scene { time: CONTROL_STEP, road: &road, environment: &environment, ego, others: &others };
+    let mut perception = perception(SENSORS, faults("", ""));
+    perception.step(&Scene { time: CONTROL_STEP * 0, ..scene }).expect("valid settings and scenes");
+    let shown = perception.rear_image().expect("an image at the first step");
+    assert_eq!((shown.time, shown.shown_time), (CONTROL_STEP * 0, CONTROL_STEP * 0));
+    // The noise is another, so that boxes differ by little.
+    let scene = Scene { time: CONTROL_STEP * 0, ..scene };
+    let found = detector.detect(&scene, ExposureKey(7), None).expect("an image that can be evaluated");
+    let sure = found.iter().filter(|instance| instance.score > 0.9);
+    let mut compared = 0;
+    for instance in sure {
+        let off_px = |other: &closecall_camera::Instance| {
+            instance.box_px.iter().zip(other.box_px).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+        };
+        let same = |other: &&closecall_camera::Instance| other.class == instance.class && off_px(other) < 4.0;
+        assert!(shown.instances.iter().any(|other| same(&other)), "{instance:?} is not among {:?}", shown.instances);
+        compared += 1;
+    }
+    assert!(compared >= 2, "{found:?}");
 }
 
 #[test]
