@@ -8,7 +8,7 @@ use closecall_sensors::{
     Detection, Health, NoiseKey, Perception, Scene, SceneVehicle, SensorsConfig, set_inference_backend,
 };
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Vehicle, VehicleClass, VehicleState,
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState,
 };
 
 /// A network whose result arrives five control steps after the exposure.
@@ -116,11 +116,11 @@ fn the_image_that_is_shown_has_what_the_detector_finds_in_the_scene() {
         [behind(VehicleClass::Truck, 0.0, [30.0, 0.0], 0.0), behind(VehicleClass::Car, 0.0, [18.0, 3.75], 0.0)];
     let scene = Scene { time: CONTROL_STEP, road: &road, environment: &environment, ego, others: &others };
     let mut perception = perception(SENSORS, faults("", ""));
-    perception.step(&Scene { time: CONTROL_STEP * 0, ..scene }).expect("valid settings and scenes");
+    perception.step(&Scene { time: Time::ZERO, ..scene }).expect("valid settings and scenes");
     let shown = perception.rear_image().expect("an image at the first step");
-    assert_eq!((shown.time, shown.shown_time), (CONTROL_STEP * 0, CONTROL_STEP * 0));
+    assert_eq!((shown.time, shown.shown_time), (Time::ZERO, Time::ZERO));
     // The noise is another, so that boxes differ by little.
-    let scene = Scene { time: CONTROL_STEP * 0, ..scene };
+    let scene = Scene { time: Time::ZERO, ..scene };
     let found = detector.detect(&scene, ExposureKey(7), None).expect("an image that can be evaluated");
     let sure = found.iter().filter(|instance| instance.score > 0.9);
     let mut compared = 0;
