@@ -3,6 +3,7 @@
 //! Each pixel is a function of (scene, pixel, key) alone, and does not depend on what was rendered before.
 
 use super::Frame;
+use super::background::Background;
 use super::body::{MOMENTS, texture_factor};
 use super::frame::{Bounds, touches};
 use super::glow::{self, Glow};
@@ -150,21 +151,14 @@ impl Frame {
         let pixel = [line.columns[place], line.row];
         let left_px = pixel[0] as f32;
         let (centre, length) = line.centre(self, place);
-        let mut sum = [0.0; 3];
-        let mut nearness = 0.0;
-        for moment in 0..MOMENTS {
-            let (radiance, inverse_depth) = self.sample((sample, place), moment, length, line);
-            nearness += inverse_depth;
-            for (sum, part) in sum.iter_mut().zip(radiance) {
-                *sum += part;
-            }
-        }
-        let mut light = sum.map(|part| part / MOMENTS as f32);
+        let (mut light, nearness) = match self.unobstructed((sample, place), length, line) {
+            Some(found) => found,
+            None => self.moment_by_moment((sample, place), length, line),
+        };
         let reaches = |own: &Bounds| left_px <= own[2] && own[0] <= left_px + 1.0;
-        let has_sun = self.light.sun[0] > 0.0;
         let mut glare = [0.0; 3];
         let mut direction = [0.0; 3];
-        if has_sun || !line.effects.clouds.is_empty() || !self.lists.veils.is_empty() {
+        if self.may_see_glare(centre, length) || !line.effects.clouds.is_empty() || !self.lists.veils.is_empty() {
             direction = self.lens.ray_in_ground(centre).map(|part| part / length);
             let mut thickness = 0.0;
             for (_, cloud) in line.effects.clouds.iter().filter(|(own, _)| reaches(own)) {
@@ -190,6 +184,40 @@ impl Frame {
             radiance = radiance.map(|part| part * kept);
         }
         self.window.encode(pixel, radiance, &self.light)
+    }
+
+    /// Returns whether the sun can be so near to a ray in camera axes that its glare shows.
+    #[inline]
+    fn may_see_glare(&self, ray: [f32; 2], length: f32) -> bool {
+        let towards_sun = dot(self.lens.ray_in_ground(ray), self.light.to_sun);
+        self.light.sun[0] > 0.0 && towards_sun > glow::NO_GLARE_TO_COSINE * length
+    }
+
+    /// Returns the mean radiance of a pixel that shows nothing but background of one kind, and the sum of 1/depth over its moments (1/m).
+    /// Returns `None` for other pixels.
+    #[inline]
+    fn unobstructed(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> Option<(Vec3, f32)> {
+        if self.lists.visibility.iter().any(|of_moment| of_moment.inverse_depth[sample] > 0.0) {
+            return None;
+        }
+        let x = (!matches!(line.background, Background::Mixed)).then(|| line.x(place))?;
+        let lit =
+            GroundLight { light: &self.light, patches: &line.effects.patches, left_px: line.columns[place] as f32 };
+        self.background(&line.background, (x, length), &lit, &mut line.background_noise)
+    }
+
+    /// Returns the mean radiance of a pixel, and the sum of 1/depth over its moments (1/m).
+    fn moment_by_moment(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> (Vec3, f32) {
+        let mut sum = [0.0; 3];
+        let mut nearness = 0.0;
+        for moment in 0..MOMENTS {
+            let (radiance, inverse_depth) = self.sample((sample, place), moment, length, line);
+            nearness += inverse_depth;
+            for (sum, part) in sum.iter_mut().zip(radiance) {
+                *sum += part;
+            }
+        }
+        (sum.map(|part| part / MOMENTS as f32), nearness)
     }
 
     /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky. The sample is given by its index in the
@@ -235,3 +263,6 @@ impl Frame {
         each(|i| self.light.horizon[i] + (radiance[i] - self.light.horizon[i]) * left)
     }
 }
+
+#[cfg(test)]
+mod tests;

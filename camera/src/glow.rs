@@ -10,6 +10,8 @@ use super::pinhole::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
 
 /// Cosine of the angle to the sun within which glare is visible: about 53°.
 const GLARE_FROM_COSINE: f32 = 0.6;
+/// Cosine of an angle that is a little larger, which no rounding can mistake for the other one.
+pub(crate) const NO_GLARE_TO_COSINE: f32 = GLARE_FROM_COSINE - 0.001;
 
 /// Places of the ghosts, as a multiple of the source's distance to the middle of the image, and their radii (px): an assumption,
 /// because each lens has its own. Ghosts are the sharper the nearer the second reflection is to a focus.

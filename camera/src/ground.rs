@@ -10,6 +10,9 @@ use super::hash::{PlaneNoise, split};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
 
+mod lanes;
+pub(crate) use lanes::{GroundNoise as GroundNoiseLanes, GroundRow};
+
 const EDGE_LINE_HALF_M: f32 = 0.15;
 const LANE_LINE_HALF_M: f32 = 0.075;
 const DASH_M: f32 = 6.0;
@@ -26,6 +29,12 @@ const PAINT: Vec3 = [0.62, 0.62, 0.60];
 const GRASS: Vec3 = [0.075, 0.11, 0.035];
 const GRASS_KEY: u64 = 0x0067_7261_7373;
 const ASPHALT_KEY: u64 = 0x6173_7068;
+/// Slope above the horizon of the part of the sky that a wet road mirrors (-).
+const MIRRORED_SLOPE: f32 = 0.02;
+/// Share of the sky's light under a vehicle (-).
+const DARKEST: f32 = 0.12;
+/// Least vertical part of the direction to the sun, which bounds the length of shadows (-).
+const LEAST_SUN: f32 = 0.05;
 
 /// The road surface as seen from one position of the lens.
 #[derive(Clone, Copy, Debug)]
@@ -148,7 +157,7 @@ impl Ground {
         let (albedo, gloss) = self.albedo([s, d], run, light.wetness, noise);
         let cast = patch_light(lit, [x, y]);
         let up = light.to_sun[2].max(0.0);
-        let mirrored = light.sky(0.02);
+        let mirrored = light.sky(MIRRORED_SLOPE);
         each(|channel| {
             let illumination =
                 light.ambient[channel] * cast.sky + light.sun[channel] * up * cast.sun + light.beam * cast.beam;
@@ -223,7 +232,6 @@ fn patch_light(lit: &GroundLight<'_>, at: [f32; 2]) -> PatchLight {
 
 /// Returns the share of the sky's light that reaches the ground under and beside a vehicle.
 fn contact(patch: &Patch, along: f32, left: f32) -> f32 {
-    const DARKEST: f32 = 0.12;
     let outside = (along.abs() - patch.extent[0]).max(left.abs() - patch.extent[1]).max(0.0);
     let open = (outside / CONTACT_SHADOW_M).min(1.0);
     DARKEST + (1.0 - DARKEST) * open * (2.0 - open)
@@ -231,17 +239,23 @@ fn contact(patch: &Patch, along: f32, left: f32) -> f32 {
 
 /// Returns `true` if the line from the ground to the sun passes through the vehicle's box.
 fn in_sun_shadow(patch: &Patch, [along, left]: [f32; 2], to_sun: Vec3) -> bool {
-    let reach = (patch.extent[2] / to_sun[2].max(0.05)).min(LONGEST_SHADOW_M);
-    let [cos, sin] = patch.turn;
-    let way = [cos * to_sun[0] + sin * to_sun[1], cos * to_sun[1] - sin * to_sun[0]];
+    let reach = (patch.extent[2] / to_sun[2].max(LEAST_SUN)).min(LONGEST_SHADOW_M);
     let (mut from, mut to) = (0.0_f32, reach);
-    for (start, rate, half) in [(along, way[0], patch.extent[0]), (left, way[1], 0.92 * patch.extent[1])] {
-        let rate = if rate.abs() < 1e-6 { 1e-6 } else { rate };
+    for (start, (rate, half)) in [along, left].into_iter().zip(ways(patch, to_sun)) {
         let (a, b) = ((-half - start) / rate, (half - start) / rate);
         from = from.max(a.min(b));
         to = to.min(a.max(b));
     }
     from < to
+}
+
+/// Returns for the axes along and across a vehicle how fast the way to the sun leads along it, never 0, and half the extent that
+/// casts a shadow (m).
+fn ways(patch: &Patch, to_sun: Vec3) -> [(f32, f32); 2] {
+    let [cos, sin] = patch.turn;
+    let way = [cos * to_sun[0] + sin * to_sun[1], cos * to_sun[1] - sin * to_sun[0]];
+    let [along, across] = way.map(|rate| if rate.abs() < 1e-6 { 1e-6 } else { rate });
+    [(along, patch.extent[0]), (across, 0.92 * patch.extent[1])]
 }
 
 /// Returns the light of a pair of dipped headlamps on the road, `ahead` of them and to their `left` (m), in units of

@@ -11,6 +11,7 @@
 //! A simulated run renders only the pixels that a network reads. Each pixel of a crop is
 //! identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
 
+mod background;
 mod body;
 mod classifier;
 mod config;
@@ -24,6 +25,7 @@ mod hash;
 mod image;
 mod image_memory;
 mod instance;
+mod lanes;
 mod light;
 mod line;
 mod mask_rcnn_config;

@@ -119,6 +119,9 @@ const NIGHT: LightLevel = LightLevel {
 const BRAKE_LIGHT: f32 = 3.0;
 
 impl Illumination {
+    /// Slope at which the colour of the sky is half way from the horizon to the zenith (-).
+    pub(crate) const HALF_WAY_SLOPE: f32 = 0.35;
+
     /// Derives the illumination from the environment, for a camera in the vehicle `ego`, whose yaw in the plane is
     /// `yaw_rad`.
     pub(crate) fn new(environment: &Environment, camera: &Camera, ego: &VehicleState, yaw_rad: f64) -> Self {
@@ -204,7 +207,7 @@ impl Illumination {
 
     /// Returns the radiance of the sky, without clouds, at a slope (rise over run) above the horizon.
     pub(crate) fn sky(&self, slope: f32) -> Vec3 {
-        let high = slope / (slope + 0.35);
+        let high = slope / (slope + Self::HALF_WAY_SLOPE);
         each(|channel| self.horizon[channel] + (self.zenith[channel] - self.horizon[channel]) * high)
     }
 }

@@ -3,7 +3,10 @@
 //! Everything has the bits that a single sample would compute. The noise of the textures is remembered for each moment, because the
 //! samples of one moment follow a line on the road.
 
+use wide::f32x4;
+
 use super::Frame;
+use super::background::{Background, BackgroundNoise};
 use super::body::MOMENTS;
 use super::draw::{Effects, GROUND_TO_M};
 use super::ground::GroundNoise;
@@ -36,6 +39,9 @@ pub(super) struct Line<'a> {
     /// Distance that the ego has moved along s, relative to the middle of the exposure (m).
     pub(super) travelled_m: [f32; MOMENTS],
     pub(super) noise: [(GroundNoise, SkyNoise); MOMENTS],
+    /// What lies behind the vehicles, and the noise of its textures.
+    pub(super) background: Background,
+    pub(super) background_noise: BackgroundNoise,
     /// Whether a column of the image has one x and a row one y, which a distorted lens does not give.
     is_straight: bool,
     /// The x of the rays through the columns: for each column that of each moment, and that of its middle.
@@ -67,6 +73,8 @@ impl<'a> Line<'a> {
             ground_depth_m: [0.0; MOMENTS],
             travelled_m: [0.0; MOMENTS],
             noise: Default::default(),
+            background: Background::Mixed,
+            background_noise: BackgroundNoise::default(),
             is_straight,
             x,
             y: [0.0; MOMENTS + 1],
@@ -90,6 +98,8 @@ impl<'a> Line<'a> {
         if !self.is_straight {
             return;
         }
+        let [y @ .., _] = self.y;
+        self.background = Background::new(frame, y, self.widest, self.travelled_m);
         let height = frame.lens.height_m as f32;
         for moment in 0..MOMENTS {
             // Rounding is monotone, so that the outermost sample has the smallest slope: if it meets the ground, all do.
@@ -108,6 +118,13 @@ impl<'a> Line<'a> {
         }
         let x = coordinate(frame, [self.columns[place], WIDTH_PX.into()], subpixel(frame, moment)[0]);
         frame.lens.optics.undistorted([x, self.y[moment]].map(f64::from)).map(|part| part as f32)
+    }
+
+    /// Returns the x of the rays through a pixel of the row, by moment. The lens must be straight.
+    #[inline]
+    pub(super) fn x(&self, place: usize) -> f32x4 {
+        let [x @ .., _] = self.x[place];
+        x.into()
     }
 
     /// Returns the ray through the middle of a pixel: its (x, y), and its length.

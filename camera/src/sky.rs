@@ -4,6 +4,9 @@ use super::hash::{LineNoise, PlaneNoise};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
 
+mod lanes;
+pub(crate) use lanes::{SkyNoise as SkyNoiseLanes, radiances};
+
 /// Distance of the woods, which determines how much the air attenuates their light (m).
 const WOODS_M: f32 = 350.0;
 /// Maximum slope (rise over run) of the treetops, seen from the lens.

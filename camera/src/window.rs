@@ -3,6 +3,8 @@
 //!
 //! Every effect depends only on the pixel and on random keys, never on neighbouring pixels.
 
+use wide::f32x4;
+
 use super::hash::{mix_at, normal3, unit};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
@@ -84,13 +86,15 @@ impl RearWindow {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0 … 255 before the cast")]
     pub(crate) fn encode(&self, [u, v]: [i32; 2], light_in: Vec3, light: &Illumination) -> [u8; 3] {
         const DARK: f32 = 0.1;
-        let noise = normal3(mix_at(self.noise_key, u, v));
-        each(|i| {
-            let encoded = (light_in[i] * light.gain).max(0.0).sqrt();
-            let deviation = light.noise[0] + light.noise[1] / (encoded + DARK);
-            let value = encoded.min(1.0) + deviation * noise[i];
-            (value * 255.0 + 0.5).clamp(0.0, 255.0) as u8
-        })
+        let splat = f32x4::splat;
+        // The three colours share a vector.
+        let colours = |[red, green, blue]: Vec3| f32x4::new([red, green, blue, 0.0]);
+        let noise = colours(normal3(mix_at(self.noise_key, u, v)));
+        let encoded = (colours(light_in) * splat(light.gain)).max(splat(0.0)).sqrt();
+        let deviation = splat(light.noise[0]) + splat(light.noise[1]) / (encoded + splat(DARK));
+        let value = encoded.min(splat(1.0)) + deviation * noise;
+        let [red, green, blue, _] = (value * splat(255.0) + splat(0.5)).max(splat(0.0)).min(splat(255.0)).to_array();
+        [red, green, blue].map(|value| value as u8)
     }
 }
 
