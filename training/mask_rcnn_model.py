@@ -6,6 +6,7 @@ cells of the feature maps, RoIAlign without half-pixel shift, and the masks agre
 
 from collections import OrderedDict
 
+import numpy as np
 import torch
 from torch import nn
 from torchvision.models.detection import MaskRCNN
@@ -165,7 +166,8 @@ def decode(anchors, shifts, weights):
 class Exported(nn.Module):
     """The network from the image to boxes, labels, scores and masks, in torchvision's layout.
 
-    The input is the image [3, 800, 1280], red, green and blue from 0 to 1, of which it reads the sampled pixels. Boxes are in px of
+    The input is the image [3, 800, 1280], red, green and blue from 0 to 1, of which it reads the sampled pixels. The exported file also
+    takes these pixels alone (`take_sampled`). Boxes are in px of
     the image; masks have 28 × 28 cells that divide the box evenly, as in the ONNX model zoo.
     """
 
@@ -244,6 +246,47 @@ class Exported(nn.Module):
         return torch.stack([x[:, 0], y[:, 0], x[:, 1], y[:, 1]], 1), labels, scores, masks
 
 
+def take_sampled(model):
+    """Lets a graph that begins with the selection of the sampled pixels also take a picture [3, 144, 320] of these pixels alone.
+
+    Reading them from the whole image, 12 MB that no cache holds, takes a third of the time of the network.
+    """
+    import onnx
+    from onnx import TensorProto, helper
+
+    graph, size = model.graph, [3, sampling.ROWS, sampling.COLUMNS]
+    first, second = [node for node in graph.node if node.op_type == "Gather"][:2]
+    assert first.input[0] == graph.input[0].name and second.input[0] == first.output[0]
+    indices = [node for node in graph.node if node.output[0] in (first.input[1], second.input[1])]
+    for node in (*indices, first, second):
+        graph.node.remove(node)
+    picture, second.output[0] = second.output[0], "selected"
+    selected = helper.make_tensor_value_info("selected", TensorProto.FLOAT, size)
+    given = helper.make_tensor_value_info("given", TensorProto.FLOAT, None)
+    image = first.input[0]
+    choice = {
+        "then_branch": helper.make_graph([helper.make_node("Identity", [image], ["given"])], "take", [], [given]),
+        "else_branch": helper.make_graph([*indices, first, second], "select", [], [selected]),
+    }
+
+    def constant(name, values):
+        return helper.make_node("Constant", [], [name], value=onnx.numpy_helper.from_array(np.array(values, np.int64)))
+
+    nodes = [
+        helper.make_node("Shape", [image], ["rows_of_image"], start=1, end=2),
+        constant("rows_of_sampled", [sampling.ROWS]),
+        helper.make_node("Equal", ["rows_of_image", "rows_of_sampled"], ["are_sampled"]),
+        helper.make_node("Squeeze", ["are_sampled"], ["is_sampled"]),
+        helper.make_node("If", ["is_sampled"], ["either"], **choice),
+        constant("size_of_sampled", size),
+        helper.make_node("Reshape", ["either", "size_of_sampled"], [picture]),
+    ]
+    for node in reversed(nodes):
+        graph.node.insert(0, node)
+    for side, name in zip(graph.input[0].type.tensor_type.shape.dim[1:], ("rows", "columns")):
+        side.dim_param = name
+
+
 def export(network, temperature, path):
     """Writes the ONNX file, with the sampled pixels and the names of the labels as its metadata."""
     import onnx
@@ -259,7 +302,9 @@ def export(network, temperature, path):
         dynamic_axes={name: {0: "detections"} for name in ("boxes", "labels", "scores", "masks")},
     )
     model = onnx.load(path)
+    take_sampled(model)
     words = {
+        "closecall.takes-sampled": "yes",
         "closecall.columns": sampling.words(sampling.COLUMN_KNOTS),
         "closecall.rows": sampling.words(sampling.ROW_KNOTS),
         "closecall.labels": " ".join(f"{label}={name}" for label, name in enumerate(CLASSES, 1)),

@@ -169,4 +169,17 @@ mod tests {
         let [one, other] = [0, 1].map(|_| check("model = 'a.onnx'").unwrap().model.unwrap());
         assert!(std::ptr::eq(one, other), "a name is kept once");
     }
+
+    #[test]
+    fn the_model_card_is_that_of_the_shipped_network() {
+        use sha2::{Digest, Sha256};
+        let card = include_str!("../models/MASK_RCNN_CARD.md");
+        let bytes = crate::detector::SHIPPED_MASK_RCNN;
+        let hash: String = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        assert!(card.contains(&hash), "the card has not the hash {hash}");
+        assert!(card.contains(&format!("{} bytes", bytes.len())));
+        let missed =
+            format!("**Misses** {:.1} % of the vehicles from {SHIPPED_MIN_SHOWN_PX} px on", 100.0 * SHIPPED_MISSED);
+        assert!(card.contains(&missed), "the card does not say {missed:?}");
+    }
 }
