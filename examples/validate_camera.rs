@@ -14,7 +14,7 @@ use std::error::Error;
 use std::path::Path;
 
 use closecall_camera::{Backend, CHANNELS, CROP_PX, Classifier, Crop, LensConfig, Optics};
-use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, render_dataset};
+use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset};
 use closecall_statistics::interval::clopper_pearson;
 use closecall_traffic::{Check, ClassScores, Num, Parameters};
 
@@ -70,7 +70,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| camera | crops | all (%, 95 %) | vehicles by day | vehicles at night |");
     println!("|---|---|---|---|---|");
     for (name, looks) in cameras()? {
-        let options = DatasetOptions { set: Set::HeldOut, content: Content::Crops, scenes, seed, looks };
+        let options = DatasetOptions {
+            set: Set::HeldOut,
+            content: Content::Crops,
+            scenes,
+            seed,
+            looks,
+            vehicles: USUAL_VEHICLES,
+        };
         render_dataset(&options, folder.path())?;
         let [all, day, night] = tallies(folder.path(), &mut classifier)?;
         println!("| `{name}` | {} | {} | {} | {} |", all.crops, all.share(), day.share(), night.share());

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use closecall_camera::Sampling;
-use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, render_dataset, render_sampled};
+use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset, render_sampled};
 
 const USAGE: &str = "usage: render_dataset crops|images|SAMPLING training|held-out SCENES SEED FOLDER\n\
     SAMPLING: a file with the columns that a network reads in its first line, and the rows in its second";
@@ -31,6 +31,7 @@ fn options(words: &[String]) -> Option<(DatasetOptions, &Path)> {
         scenes: scenes.parse().ok()?,
         seed: seed.parse().ok()?,
         looks: CameraLooks::default(),
+        vehicles: USUAL_VEHICLES,
     };
     Some((options, Path::new(folder)))
 }

@@ -17,5 +17,8 @@ mod render;
 mod sampled;
 mod scenes;
 
-pub use render::{CameraLooks, Content, DatasetError, DatasetOptions, DatasetSummary, Set, render_dataset};
+pub use render::{
+    CameraLooks, Content, DatasetError, DatasetOptions, DatasetSummary, MAX_VEHICLES, Set, USUAL_VEHICLES,
+    render_dataset,
+};
 pub use sampled::render_sampled;

@@ -59,7 +59,15 @@ pub struct DatasetOptions {
     pub seed: u64,
     /// How the cameras differ from the ideal one. The scenes are the same for all of them.
     pub looks: CameraLooks,
+    /// Least and largest number of vehicles in a scene: [`USUAL_VEHICLES`], or what an empty or a crowded road has. A scene without room
+    /// has fewer.
+    pub vehicles: [usize; 2],
 }
+
+/// Least and largest number of vehicles that a scene usually has.
+pub const USUAL_VEHICLES: [usize; 2] = [1, 5];
+/// Largest number of vehicles that may be asked for.
+pub const MAX_VEHICLES: usize = 40;
 
 /// The summary of a written data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -159,7 +167,8 @@ pub(super) fn scene_rng(set: Set, seed: u64, index: u32) -> Result<Stream, Datas
 
 fn random_scene(options: &DatasetOptions, index: u32) -> Result<RandomScene, DatasetError> {
     let mut rng = scene_rng(options.set, options.seed, index)?;
-    let mut scene = RandomScene::draw(options.set, RandomScene::USUAL_VEHICLES, &mut rng)?;
+    let [least, largest] = options.vehicles;
+    let mut scene = RandomScene::draw(options.set, least..=largest.max(least), &mut rng)?;
     let CameraLooks { optics, readout_s, night_sky } = options.looks;
     scene.camera = Camera { optics, readout_s, night_sky, ..scene.camera };
     Ok(scene)
@@ -181,6 +190,7 @@ mod tests {
             scenes: 6,
             seed: 3,
             looks: CameraLooks::default(),
+            vehicles: USUAL_VEHICLES,
         };
         let (first, second) = (folder("a"), folder("b"));
         let summary = render_dataset(&options, &first).unwrap();
@@ -198,6 +208,21 @@ mod tests {
     }
 
     #[test]
+    fn a_road_can_be_empty_or_crowded() {
+        let with = |vehicles| DatasetOptions {
+            set: Set::HeldOut,
+            content: Content::Images,
+            scenes: 4,
+            seed: 2,
+            looks: CameraLooks::default(),
+            vehicles,
+        };
+        let drawn = |options: &DatasetOptions| random_scene(options, 1).unwrap().others.len();
+        assert_eq!(drawn(&with([0, 0])), 0);
+        assert!(drawn(&with([8, 12])) > USUAL_VEHICLES[1]);
+    }
+
+    #[test]
     fn the_masks_of_an_image_fit_their_bounding_boxes() {
         let options = DatasetOptions {
             set: Set::Training,
@@ -205,6 +230,7 @@ mod tests {
             scenes: 1,
             seed: 1,
             looks: CameraLooks::default(),
+            vehicles: USUAL_VEHICLES,
         };
         let folder = folder("images");
         render_dataset(&options, &folder).unwrap();

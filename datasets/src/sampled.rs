@@ -8,7 +8,7 @@ use std::path::Path;
 use closecall_camera::{ExposureKey, Frame, PixelRect, Sampling, mix};
 
 use super::files::Output;
-use super::render::{DatasetError, scene_rng};
+use super::render::{DatasetError, USUAL_VEHICLES, scene_rng};
 use super::scenes::RandomScene;
 use super::{DatasetSummary, Set};
 
@@ -40,7 +40,7 @@ pub fn render_sampled(
         let vehicles = match index % PERIOD {
             0 => 0..=0,
             1 => CROWD,
-            _ => RandomScene::USUAL_VEHICLES,
+            _ => USUAL_VEHICLES[0]..=USUAL_VEHICLES[1],
         };
         let scene = RandomScene::draw(set, vehicles, &mut scene_rng(set, seed, index)?)?;
         let key = ExposureKey(mix(seed ^ u64::from(index)));

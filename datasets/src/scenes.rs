@@ -31,9 +31,6 @@ pub(super) struct RandomScene {
 }
 
 impl RandomScene {
-    /// Numbers of vehicles that a scene usually has.
-    pub(super) const USUAL_VEHICLES: std::ops::RangeInclusive<usize> = 1..=5;
-
     /// Draws a random scene with so many vehicles, or fewer if there is no room.
     pub(super) fn draw(
         set: Set,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_campaign::arguments::scene_count;
-use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, render_dataset};
+use closecall_datasets::{CameraLooks, Content, DatasetOptions, MAX_VEHICLES, Set, render_dataset};
 use closecall_report::json::stamped;
 use serde_json::json;
 
@@ -29,6 +29,9 @@ pub(super) struct RenderArgs {
     /// Body shapes and paints of the vehicles: those for training, or those that are not used for training
     #[arg(long, value_parser = ["training", "held-out"], default_value = "training")]
     set: String,
+    /// Number of vehicles in a scene, or the least and the largest one such as 6..10: 0 for empty roads; fewer where there is no room
+    #[arg(long, value_name = "COUNT", default_value = "1..5", conflicts_with = "aerial", value_parser = vehicles)]
+    vehicles: [usize; 2],
     /// Render oblique aerial images with oriented boxes, in the layout of DOTA, instead of images of the rear camera
     #[arg(long, conflicts_with = "crops")]
     aerial: bool,
@@ -38,6 +41,15 @@ pub(super) struct RenderArgs {
     /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
+}
+
+/// Parses a number of vehicles, or the least and the largest one.
+fn vehicles(text: &str) -> Result<[usize; 2], String> {
+    let (least, largest) = text.split_once("..").unwrap_or((text, text));
+    match (least.parse(), largest.parse()) {
+        (Ok(least), Ok(largest)) if least <= largest && largest <= MAX_VEHICLES => Ok([least, largest]),
+        _ => Err(format!("`{text}` is neither a number from 0 to {MAX_VEHICLES} nor two of them such as 6..10")),
+    }
 }
 
 pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
@@ -52,7 +64,7 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
         return Ok(ExitCode::Pass);
     }
     let content = if args.crops { Content::Crops } else { Content::Images };
-    let options = DatasetOptions { set, content, scenes, seed, looks: CameraLooks::default() };
+    let options = DatasetOptions { set, content, scenes, seed, looks: CameraLooks::default(), vehicles: args.vehicles };
     let summary = render_dataset(&options, &args.output)?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),
