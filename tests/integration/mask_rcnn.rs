@@ -107,3 +107,25 @@ fn one_and_three_jobs_give_the_same_bits() {
     assert_eq!(one.0, three.0);
     assert!(one.1 == three.1, "the outcomes differ");
 }
+
+#[test]
+fn the_study_characterises_it() {
+    let Some(library_file) = closecall_testing::onnxruntime() else { return };
+    let scenario = library("low-thw-overtake");
+    let folder = folder();
+    let out = folder.path().join("study");
+    let (library_file, out_text) = (library_file.to_str().unwrap(), out.to_str().unwrap());
+    let rare = ["--set", "sensors.rear-camera.mask-rcnn.rate-hz=1"];
+    let args = ["sensors", scenario.to_str().unwrap(), "-n", "1", "--onnxruntime", library_file, "--out", out_text];
+    let output = closecall(args.iter().chain(&PIPELINE).chain(&rare));
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let study: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("sensors.json")).unwrap()).unwrap();
+    let accuracy = |name: &str| {
+        let of_case = |case: &&serde_json::Value| case["case"].as_str().is_some_and(|case| case.starts_with(name));
+        let case = study["cases"].as_array().unwrap().iter().find(of_case).unwrap();
+        case["class_accuracy"]["value"].as_f64().unwrap()
+    };
+    assert!(accuracy("usual") > 0.9 && accuracy("truck") > 0.9 && accuracy("motorcycle") > 0.9);
+    // The LiDAR confirms a track in fog before the image shows a vehicle there.
+    assert!(accuracy("fog, visibility 100 m") < accuracy("usual") - 0.1);
+}
