@@ -5,7 +5,9 @@
 
 use std::hint::black_box;
 
-use closecall_camera::{Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, RearCamera};
+use closecall_camera::{
+    Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, HEIGHT_PX, PixelRect, RearCamera, WIDTH_PX,
+};
 use closecall_sensors::{Scene, SceneVehicle};
 use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -28,6 +30,9 @@ fn crops(criterion: &mut Criterion) {
     let ego = SceneVehicle { state: VehicleState { s_m: 500.0, ..others[0].state }, ..others[0] };
     let found = GroundBox { x_m: -35.0, y_m: 0.0, heading_rad: 0.0, length_m: 4.6, width_m: 1.85, height_m: 1.5 };
     let window = camera.project(&ego, &found).expect("in view");
+    // As many pixels as the Mask R-CNN reads, but evenly spread over the image.
+    let [columns, rows] = [(320, WIDTH_PX), (144, HEIGHT_PX)]
+        .map(|(count, extent)| (0..count).map(|place| place * i32::from(extent) / count).collect::<Vec<i32>>());
     let rain = Environment { rain_mm_per_h: 5.0, water_film_mm: 0.5, ..Environment::CLEAR_DAY };
     let night = Environment { light: Light::Night, ..Environment::CLEAR_DAY };
     for (name, environment) in [("day", Environment::CLEAR_DAY), ("rain", rain), ("night", night)] {
@@ -40,6 +45,10 @@ fn crops(criterion: &mut Criterion) {
         let (mut frame, mut crop) = (prepared(window), Crop::default());
         criterion.bench_function(&format!("camera/{name}/crop"), |bencher| {
             bencher.iter(|| frame.crop(black_box(window), &mut crop))
+        });
+        let mut frame = prepared(PixelRect::IMAGE);
+        criterion.bench_function(&format!("camera/{name}/picture of 320 x 144 px"), |bencher| {
+            bencher.iter(|| frame.sampled(black_box(&columns), black_box(&rows)))
         });
     }
 }
