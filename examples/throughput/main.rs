@@ -1,7 +1,7 @@
 //! Measures the speed of the whole loop for each depth of the sensor simulation, kind of road and number of vehicles.
 //!
 //! ```sh
-//! cargo run --release --example throughput -- [ROUNDS]
+//! cargo run --release --example throughput -- [ROUNDS [MODE]...]
 //! cargo run --release --example throughput -- instructions
 //! ```
 //!
@@ -9,8 +9,8 @@
 //! take turns, so that other programs on the machine disturb all of them alike, and time is that of this thread alone
 //! (`/proc/thread-self/schedstat`; wall time where there is none). Before each mode a fixed loop is timed:
 //! `per_calibration` is the number of simulated seconds in the time of that loop, which makes figures of different machines
-//! comparable. Where Callgrind is installed, the lines have the instructions of the counted modes. The last line has the time of each stage. No
-//! validity check is run; a campaign's checks come on top.
+//! comparable. Where Callgrind is installed, the lines have the instructions of the counted modes. A second line for each
+//! mode has the wall time of each stage, see [`stages`]. If modes are named, only these are timed, without instructions. No validity check is run; a campaign's checks come on top.
 //!
 //! The second command counts instructions with Callgrind (Debian's package `valgrind`), see [`instructions`].
 
@@ -18,7 +18,10 @@
 
 mod instructions;
 mod modes;
+mod stages;
+mod traffic;
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::time::Instant;
 
@@ -102,31 +105,36 @@ fn calibrate() {
     std::hint::black_box(sum);
 }
 
-/// Prints the time of each stage of the headline (ms per simulated second): what a mode takes beyond the one with a stage less. The modes run
-/// the same samples.
-fn print_stages(timings: &[Timing]) {
-    let of = |name: &str| {
-        let timing = timings.iter().find(|timing| timing.mode.name == name);
-        timing.map(|timing| 1e3 * timing.cpu_s / timing.simulated_s)
-    };
-    let beyond = |name, less| Some(of(name)? - of(less)?);
+/// Prints the time of each stage of a mode (µs of wall time per simulated second).
+fn print_stages(timing: &Timing) -> Result<(), Box<dyn Error>> {
+    let stages = timing.mode.stages(&timing.scenarios)?;
+    let per_s = |time_s: f64| (1e8 * time_s / stages.simulated_s).round() / 1e2;
     let line = json!({
-        "stages_ms_per_simulated_s": {
-            "drivers, ego stack and physics": of("ground-truth"),
-            "object-level sensors": beyond("object", "ground-truth"),
-            "rear LiDAR, clustering and tracking": beyond("lidar", "ground-truth"),
-            "rear camera and network": beyond("full", "lidar"),
-            "guard rails": beyond("full, guard rails", "full"),
-            "spray and wet road": beyond("full, wet road", "full"),
-            "fog": beyond("full, fog", "full"),
+        "stages_of": timing.mode.name,
+        "control_steps": stages.control_steps,
+        "physics_steps": stages.physics_steps,
+        "us_per_simulated_s": {
+            "before the first step": per_s(stages.start_s),
+            "neighbours and margins": per_s(stages.neighbours_s),
+            "sensors and trackers": per_s(stages.sensors_s),
+            "ego stack": per_s(stages.stack_s),
+            "report of the step": per_s(stages.report_s),
+            "drivers, motion and contacts": per_s(stages.motion_s),
         },
     });
     println!("{line}");
+    Ok(())
 }
 
-/// Times all modes.
-fn time(rounds: u32) -> Result<(), Box<dyn Error>> {
-    let mut timings = modes(|_| true)?.into_iter().map(Timing::new).collect::<Result<Vec<_>, _>>()?;
+/// Times the modes of these names, or all modes with their instructions if there are none.
+fn time(rounds: u32, names: &[&str]) -> Result<(), Box<dyn Error>> {
+    let mut timings = modes(|name| names.is_empty() || names.contains(&name))?
+        .into_iter()
+        .map(Timing::new)
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(unknown) = names.iter().find(|name| timings.iter().all(|timing| timing.mode.name != **name)) {
+        return Err(format!("no mode is called `{unknown}`").into());
+    }
     // The first run of a thread loads the network.
     if let Some(full) = timings.iter().find(|timing| timing.mode.name == "full") {
         full.mode.run(&full.scenarios[0], 0)?;
@@ -137,25 +145,23 @@ fn time(rounds: u32) -> Result<(), Box<dyn Error>> {
         }
     }
     // Without Callgrind there are no counts.
-    let counts = instructions::count_all().unwrap_or_default();
+    let counts = if names.is_empty() { instructions::count_all().unwrap_or_default() } else { BTreeMap::new() };
     for timing in &timings {
         timing.print(rounds, counts.get(&timing.mode.name).copied());
     }
-    print_stages(&timings);
-    Ok(())
+    timings.iter().try_for_each(print_stages)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        [] => time(ROUNDS),
+        [] => time(ROUNDS, &[]),
         ["instructions"] => instructions::check(),
         ["instructions", "write"] => instructions::write(),
         [instructions::RUN, mode, samples] => instructions::run(mode, samples.parse()?, None),
         [instructions::RUN, mode, samples, duration_s] => {
             instructions::run(mode, samples.parse()?, Some(duration_s.parse()?))
         }
-        [rounds] => time(rounds.parse()?),
-        _ => Err("allowed: a number of rounds, `instructions`, or `instructions write`".into()),
+        [rounds, names @ ..] => time(rounds.parse()?, names),
     }
 }

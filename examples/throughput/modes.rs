@@ -1,7 +1,6 @@
 //! The modes of the loop that are measured: depth of the sensor simulation, kind of road, and number of vehicles.
 
 use std::error::Error;
-use std::fmt::Write;
 use std::path::Path;
 
 use closecall_campaign::runner::{Sampling, concrete};
@@ -11,12 +10,11 @@ use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
 
+use crate::stages::{Stages, stages};
+use crate::traffic::traffic;
+
 /// Seed of all samples.
 const SEED: u64 = 9;
-/// Duration of the runs in dense traffic (s).
-const TRAFFIC_S: f64 = 10.0;
-/// Distance between two vehicles of a lane in dense traffic (m): a time headway of 1.8 s at 30 m/s, bumper to bumper.
-const SPACING_M: f64 = 60.0;
 /// Settings of a wet road in rain.
 const WET: [&str; 3] = ["environment.water-film-mm=1", "environment.rain-mm-per-h=5", "environment.friction=0.6"];
 /// Numbers of vehicles in dense traffic.
@@ -48,35 +46,18 @@ impl Mode {
 
     /// Runs a sample and returns its simulated time (s).
     pub(crate) fn run(&self, scenario: &Scenario, sample: u64) -> Result<f64, Box<dyn Error>> {
-        let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(self.sensors) };
-        Ok(simulate(scenario, RunKey { seed: SEED, sample }, &arm, &mut NoObserver)?.duration.s())
+        Ok(simulate(scenario, RunKey { seed: SEED, sample }, &self.arm(), &mut NoObserver)?.duration.s())
     }
-}
 
-/// Returns the text of a scenario with `vehicles` vehicles in three lanes, the ego in their middle.
-fn traffic(vehicles: usize) -> String {
-    let mut text = format!(
-        "schema-version = 1\nname = \"traffic-{vehicles}\"\nduration-s = {TRAFFIC_S:.1}\n\
-         road = {{ lanes = 3, lane-width-m = 3.75, curvature-per-m = 0.0, speed-limit-mps = 36.1, overtaking-side = \"left\" }}\n\
-         [sensors]\nmode = \"full\"\n"
-    );
-    for index in 0..vehicles {
-        let (lane, row) = (index % 3 + 1, index / 3);
-        let s_m = 500.0 + SPACING_M * row as f64 + 10.0 * lane as f64;
-        let is_ego = index == vehicles / 6 * 3 + 1;
-        let id = if is_ego { "ego".to_owned() } else { format!("v{index:03}") };
-        let driver = if is_ego {
-            "{ ego-stack = { acc = { time-gap-s = 1.5 }, aeb = {}, mis = {} } }"
-        } else {
-            "{ wiedemann99 = {} }"
-        };
-        let _ = write!(
-            text,
-            "[[actor]]\nid = \"{id}\"\nvehicle = {{ class = \"car\" }}\n\
-             start = {{ absolute = {{ lane = {lane}, s-m = {s_m:.1}, speed-mps = 30.0 }} }}\ndriver = {driver}\n"
-        );
+    /// Runs the samples and returns the time of each stage.
+    pub(crate) fn stages(&self, scenarios: &[Scenario]) -> Result<Stages, Box<dyn Error>> {
+        let runs = (0..).zip(scenarios).map(|(sample, scenario)| (scenario, RunKey { seed: SEED, sample }));
+        Ok(stages(runs, &self.arm())?)
     }
-    text
+
+    fn arm(&self) -> Arm {
+        Arm { controller: BuiltIn::Mis.factory(), sensors: Some(self.sensors) }
+    }
 }
 
 /// Modes of which some are wanted.
@@ -123,6 +104,11 @@ pub(crate) fn modes(is_wanted: impl Fn(&str) -> bool) -> Result<Vec<Mode>, Box<d
     chosen.add("full, fog", Full, 4, headline(&["environment.visibility-m=200"]))?;
     chosen.add("object, busy-overtake", Object, 6, busy)?;
     chosen.add("full, busy-overtake", Full, 1, busy)?;
+    let railed = || {
+        let settings = ["road.guard-rails=true".parse()?];
+        Ok(ScenarioFile::parse(Path::new("traffic.toml"), &traffic(10), &settings)?)
+    };
+    chosen.add("full, guard rails, 10 vehicles", Full, 1, railed)?;
     for vehicles in VEHICLES {
         let file = || Ok(ScenarioFile::parse(Path::new("traffic.toml"), &traffic(vehicles), &[])?);
         // The clock counts in steps of milliseconds: runs with few vehicles are repeated.

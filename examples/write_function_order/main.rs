@@ -32,10 +32,11 @@ const AS_RELEASED: [&str; 4] = ["build", "--release", "--bin", "closecall"];
 /// Scenario of the campaigns.
 const SCENARIO: &str = "scenarios/library/low-thw-overtake.toml";
 /// The campaigns: their arguments, and whether they have a folder. They are short, as a second call of a function says nothing new.
-const CAMPAIGNS: [(&[&str], bool); 5] = [
+const CAMPAIGNS: [(&[&str], bool); 6] = [
     (&["-n", "20", "--paired", "--jobs", "2", "--sensors", "ground-truth"], true),
     (&["-n", "20", "--paired", "--jobs", "2", "--sensors", "object"], true),
     (&["-n", "2", "--paired", "--jobs", "2", "--sensors", "full"], true),
+    (&["-n", "1", "--paired", "--jobs", "1", "--sensors", "full", "--record", "random:1"], true),
     (&["-n", "4", "--sensors", "object"], false),
     (
         &["-n", "1", "--sensors", "full", "--set", "environment.rain-mm-per-h=5", "--set", "road.guard-rails=true"],

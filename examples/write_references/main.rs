@@ -1,4 +1,4 @@
-//! Writes `docs/scenario.md`, the reference of the scenario file.
+//! Writes `docs/scenario.md`, the reference of the scenario file, and `docs/determinism.json`, the digests of the library's outcomes.
 //!
 //! ```sh
 //! cargo run --release --example write_references
@@ -7,8 +7,9 @@
 //! The tables, keys, types and descriptions come from the JSON Schema of the scenario file, and so from the doc comments
 //! of the configuration structs. The allowed ranges come from the checks themselves: `probe` sets each key of
 //! `docs/scenario/every-key.toml` to a value that cannot be right and reads what the check says is needed. The examples
-//! are the values of that file. A test fails if the committed page is not the one that this program writes.
+//! are the values of that file. Tests fail if the committed files are not the ones that this program writes.
 
+mod digests;
 mod files;
 mod page;
 mod probe;
@@ -19,5 +20,8 @@ mod text;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(files::at_root(files::PAGE), page::scenario_page()?)?;
     println!("written: {}", files::PAGE);
+    let digests = digests::digests()?;
+    std::fs::write(files::at_root(digests::DIGESTS), serde_json::to_string_pretty(&digests)? + "\n")?;
+    println!("written: {}", digests::DIGESTS);
     Ok(())
 }

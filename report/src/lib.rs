@@ -22,6 +22,7 @@ pub mod page {
 }
 pub mod heartbeat;
 pub mod json;
+mod memory;
 pub mod run;
 pub mod study;
 pub mod traffic;

@@ -12,6 +12,7 @@ mod changed_controller;
 mod commands;
 mod comparison;
 mod determinism;
+mod digests;
 mod drift;
 mod drivers;
 mod durability;

@@ -11,9 +11,10 @@ use closecall_simulation::scenario::ScenarioFile;
 use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
+use crate::memory::return_free_memory;
 use crate::run::figure::{scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
-use crate::run::rerun::write_recording;
+use crate::run::rerun::write_recording_of;
 
 /// The folder of the recordings within a campaign's folder.
 pub(super) const RECORDINGS: &str = "recordings";
@@ -66,14 +67,17 @@ fn choose(saved: &SavedCampaign, scenario: &ScenarioFile, selection: Selection) 
 
 fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<IndexEntry, ReportError> {
     let sample = chosen.sample;
+    // Of the samples of the campaign, and of the recording before.
+    return_free_memory();
     let (concrete, key) = saved.sample(Some(scenario), sample)?;
     let films = film_arms(&concrete, key, &saved.manifest().arms(), Level::Full)
         .map_err(|source| ReportError::Sample { sample, source })?;
+    // Of the sensors of this sample.
+    return_free_memory();
     let settings = saved.manifest().settings();
     let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
     let films: Vec<Film> = films.into_iter().map(named).collect();
     let file = format!("{scenario}-{sample}.rrd");
-    write_recording(&saved.folder().file(&format!("{RECORDINGS}/{file}")), &films)?;
     let paired = if films.len() > 1 { " --paired" } else { "" };
     let replay = format!(
         "closecall replay {} {sample} --scenario {scenario}{paired} --record {file}",
@@ -83,18 +87,20 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
         let arm = film.arm_label();
         [Some(film.headline()), film.mis_summary()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
     });
-    Ok(IndexEntry {
+    let entry = IndexEntry {
         scenario: scenario.to_owned(),
         sample,
         reasons: chosen.reasons.clone(),
-        file,
+        file: file.clone(),
         replay,
         story: story.collect(),
         still: films.last().map_or(String::new(), still),
         scrubber: scrubber(&films),
         verdict: Film::verdict_word(&films),
         outcomes: films.iter().filter_map(|film| film.outcome().cloned()).collect(),
-    })
+    };
+    write_recording_of(&saved.folder().file(&format!("{RECORDINGS}/{file}")), films)?;
+    Ok(entry)
 }
 
 /// Returns a path as one word of a command.

@@ -27,6 +27,11 @@ use re_span::Span;
 
 use super::RecordingError;
 use super::chunks::{Chunks, tuid};
+use crate::memory::return_free_memory;
+
+/// Size of the written chunks whose memory is returned to the system together (B): some ten times for a recording, as each time takes a
+/// fraction of a millisecond.
+const RETURNED_AT_ONCE: u64 = 1 << 20;
 
 /// The contents of a recording file.
 pub(super) struct Recording {
@@ -95,14 +100,15 @@ impl<'a> File<'a> {
         let mut stream = StreamWriter::try_new(Vec::new(), columns.schema_ref()).map_err(RecordingError::encode)?;
         stream.write(columns).map_err(RecordingError::encode)?;
         let bytes = stream.into_inner().map_err(RecordingError::encode)?;
-        let uncompressed_size = bytes.len() as u64;
+        let (uncompressed_size, payload) = (bytes.len() as u64, lz4_flex::block::compress(&bytes));
+        drop(bytes);
         self.push(&Msg::ArrowMsg(ArrowMsg {
             store_id: Some(id.clone().into()),
             chunk_id: Some(chunk.id().as_tuid().into()),
             compression: CompressionCode::Lz4 as i32,
             uncompressed_size,
             encoding: Encoding::ArrowIpc as i32,
-            payload: lz4_flex::block::compress(&bytes).into(),
+            payload: payload.into(),
             is_static: Some(chunk.is_static()),
         }))?;
         Ok(uncompressed_size)
@@ -113,13 +119,22 @@ impl<'a> File<'a> {
         let info = StoreInfo::new(id.clone(), StoreSource::Other("closecall".to_owned()));
         self.message(&LogMsg::SetStoreInfo(SetStoreInfo { row_id: tuid(chunks.len()), info }))?;
         let mut index = RrdManifestBuilder::default();
+        let mut freed = 0;
         for chunk in chunks {
             let columns = chunk.to_chunk_batch().map_err(RecordingError::encode)?;
             let start = self.len + MessageHeader::ENCODED_SIZE_BYTES as u64;
             let uncompressed = self.columns(id, &chunk, &columns)?;
             let span = Span { start, len: self.len - start };
             index.append(&columns, span, uncompressed).map_err(RecordingError::encode)?;
+            freed += uncompressed;
+            if freed >= RETURNED_AT_ONCE {
+                drop((chunk, columns));
+                return_free_memory();
+                freed = 0;
+            }
         }
+        // The index takes several megabytes while it is built.
+        return_free_memory();
         let index = index.build(id.clone()).map_err(RecordingError::encode)?;
         let mut fields = index.sorbet_schema.fields().to_vec();
         fields.sort();

@@ -32,4 +32,5 @@ mod truth;
 mod vehicles;
 mod write;
 
+pub(crate) use write::write_recording_of;
 pub use write::{RecordingError, check_recording_possible, write_recording, write_recording_unchecked};

@@ -14,6 +14,7 @@ use super::stream::Writer;
 use super::{
     bird, camera, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth, vehicles,
 };
+use crate::memory::return_free_memory;
 use crate::run::film::{Film, Level};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_atomically};
 
@@ -63,7 +64,22 @@ pub fn check_recording_possible(path: &Path) -> Result<(), RecordingError> {
 /// # Errors
 /// [`RecordingError`] if the file cannot be written completely.
 pub fn write_recording_unchecked(path: &Path, films: &[Film]) -> Result<(), RecordingError> {
-    let recording = record(films)?;
+    write(path, record(films)?)
+}
+
+/// Writes films like [`write_recording`], and drops them before the recording is encoded, so that never both are in memory.
+///
+/// # Errors
+/// [`RecordingError`] if the file cannot be written completely.
+pub(crate) fn write_recording_of(path: &Path, films: Vec<Film>) -> Result<(), RecordingError> {
+    check_recording_possible(path)?;
+    let recording = record(&films)?;
+    drop(films);
+    return_free_memory();
+    write(path, recording)
+}
+
+fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
     write_atomically(path, |file| recording.encode(file)).map_err(|error| match error {
         RecordingError::Output(source) => WriteError::new(path, source).into(),
         other => other,

@@ -1,0 +1,54 @@
+//! Outcomes have the bits that `docs/determinism.json` states, in every scenario of the library: no change moves one unnoticed.
+
+use std::path::Path;
+
+use closecall::sensors::SensorMode;
+use closecall::simulation::scenario::ScenarioFile;
+use closecall_testing::{Need, skip};
+
+use crate::support::{ROOT, library};
+
+#[path = "../../examples/write_references/digests.rs"]
+mod generator;
+
+use generator::{DIGESTS, Digests, SEED};
+
+/// The smallest number of scenarios that have digests.
+const LEAST_SCENARIOS: usize = 90;
+
+/// Returns the committed digests.
+fn committed() -> Digests {
+    serde_json::from_str(&std::fs::read_to_string(Path::new(ROOT).join(DIGESTS)).unwrap()).unwrap()
+}
+
+#[test]
+fn outcomes_of_the_library_have_the_stated_bits() {
+    let stated = committed();
+    assert!(stated.outcomes.len() >= LEAST_SCENARIOS, "{}", stated.outcomes.len());
+    let functions = generator::functions();
+    if functions != stated.functions {
+        let reason = format!(
+            "the C library's functions have the digest {functions}, and {DIGESTS} holds for {}",
+            stated.functions
+        );
+        return skip(Need::Mathematics, &reason);
+    }
+    let now = generator::digests().unwrap();
+    let changed: Vec<&String> =
+        now.outcomes.iter().filter(|(name, of)| stated.outcomes.get(*name) != Some(of)).map(|(name, _)| name).collect();
+    assert!(
+        changed.is_empty() && now == stated,
+        "other outcomes than before: {changed:?}. If that is meant, `cargo run --release --example write_references` writes {DIGESTS}; \
+         say in the change log what changes"
+    );
+}
+
+#[test]
+fn a_digest_tells_modes_and_seeds_apart() {
+    let file = ScenarioFile::load(&library("low-thw-overtake"), &[]).unwrap();
+    let of = |mode, seed| generator::outcomes(&file, mode, seed).unwrap();
+    let object = of(SensorMode::Object, SEED);
+    assert_eq!(object, of(SensorMode::Object, SEED));
+    assert_ne!(object, of(SensorMode::Object, SEED + 1));
+    assert_ne!(object, of(SensorMode::GroundTruth, SEED));
+}
