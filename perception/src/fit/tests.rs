@@ -18,7 +18,8 @@ fn known_errors_and_losses_are_found_again() {
     let file = file(&[]);
     let plan = FitPlan { file: &file, seed: 0, approaches: 24, command: String::new(), version: String::new() };
     let mut fitter = Fitter::new(&plan).unwrap();
-    let sensors = fitter.scenario.sensors.with_mode(SensorMode::Object);
+    let scenario = file.concrete(&file.space().nominal()).unwrap();
+    let sensors = scenario.sensors.with_mode(SensorMode::Object);
     // Not those that a fit begins with, and each axis with errors of its own.
     let known = FittedErrors {
         white_sd_m: [0.08, 0.02],
@@ -29,16 +30,20 @@ fn known_errors_and_losses_are_found_again() {
     };
     fitter.lidar = sensors.with_rear_errors(known);
     let found = fitter.errors_at(&Case::usual(), &sensors).unwrap().unwrap();
-    let near = |found: f64, known: f64, share: f64| {
-        assert!((found / known - 1.0).abs() < share, "{found} instead of {known}");
+    let near = |of: &str, found: f64, known: f64, share: f64| {
+        assert!((found / known - 1.0).abs() < share, "{of}: {found} instead of {known}");
     };
-    for axis in 0..2 {
-        near(found.white_sd_m[axis], known.white_sd_m[axis], 0.3);
-        near(found.slow_sd_m[axis], known.slow_sd_m[axis], 0.2);
-        near(found.slow_time_s[axis], known.slow_time_s[axis], 0.5);
+    near("slow along", found.slow_sd_m[0], known.slow_sd_m[0], 0.2);
+    near("slow across", found.slow_sd_m[1], known.slow_sd_m[1], 0.2);
+    near("all scans", found.all_scans_share, known.all_scans_share, 0.05);
+    near("lost", found.lost_share, known.lost_share, 0.05);
+    // The fit asks for equal tracks, which other white errors can give, too. Under other noise than that of the fit, they are equal.
+    let tracks = |errors| {
+        tracks(&scenario.sensors.with_mode(SensorMode::Object).with_rear_errors(errors), &scenario, &Case::usual())
+    };
+    for (figure, (found, known)) in tracks(found).into_iter().zip(tracks(known)).enumerate() {
+        near(&format!("figure {figure}"), found, known, if figure < 4 { 0.2 } else { 0.5 });
     }
-    near(found.all_scans_share, known.all_scans_share, 0.05);
-    near(found.lost_share, known.lost_share, 0.05);
 }
 
 #[test]
@@ -53,13 +58,17 @@ fn losses_begin_where_scans_are_lost() {
     assert_eq!(losses(&[none])[1], 0.0);
 }
 
+/// Returns the figures of the tracks of a case.
+fn tracks(sensors: &Sensors, scenario: &Scenario, case: &Case) -> [f64; 6] {
+    let one = |run| steps(case, sensors, &scenario.road, Address { seed: 5, run }, 20.0).unwrap();
+    figures(&(0..24).map(one).collect::<Vec<_>>()).unwrap()
+}
+
 /// Returns the figures of the tracks of a car at object level, of a paint (-) in fog of a visibility (m).
 fn car(file: &ScenarioFile, paint: f64, visibility_m: f64) -> [f64; 6] {
     let scenario = file.concrete(&file.space().nominal()).unwrap();
-    let sensors = scenario.sensors.with_mode(SensorMode::Object);
     let case = Fitter::case(VehicleClass::Car, paint, Plate::Clean, visibility_m);
-    let one = |run| steps(&case, &sensors, &scenario.road, Address { seed: 5, run }, 20.0).unwrap();
-    figures(&(0..24).map(one).collect::<Vec<_>>()).unwrap()
+    tracks(&scenario.sensors.with_mode(SensorMode::Object), &scenario, &case)
 }
 
 #[test]

@@ -301,7 +301,7 @@ mod tests {
             wrong.check().unwrap_err()
         };
         for (message, key) in [
-            (refused(|it| drop(it.truck.slow_along_m[1].pop())), "errors.truck.slow-along-m"),
+            (refused(|it| it.truck.slow_along_m[1].truncate(1)), "errors.truck.slow-along-m"),
             (refused(|it| it.car.white_across_m[0][0] = 0.0), "errors.car.white-across-m"),
             (refused(|it| it.car.slow_across_time_s[0][1] = f64::NAN), "errors.car.slow-across-time-s"),
             (refused(|it| it.motorcycle.lost_share[0][0] = 1.5), "errors.motorcycle.lost-share"),
