@@ -19,7 +19,7 @@ use closecall_traffic::{ActorId, Side, Stream, stream};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::errors::TargetErrors;
+use super::config::ObjectSensorModel;
 
 /// The key of the random streams of the ego's sensors, apart from the channel name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,9 +89,9 @@ impl MeasurementErrors {
 impl TargetNoise {
     /// Creates the error process for the vehicle with the index `actor`; the drift starts in its stationary
     /// distribution.
-    pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize, errors: &TargetErrors) -> Self {
+    pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize, model: &ObjectSensorModel) -> Self {
         let mut rng = key.stream_about(channel, actor);
-        let drift_m = errors.slow_sd_m.map(|sd_m| sd_m * normal(&mut rng));
+        let drift_m = [(); 2].map(|()| model.drift_sd_m * normal(&mut rng));
         Self { rng, drift_m, skipped: 0 }
     }
 
@@ -100,43 +100,25 @@ impl TargetNoise {
         self.skipped += 1;
     }
 
-    /// Changes the size of the errors, as the weather does. Those of scans that were passed over keep theirs.
-    pub(super) fn change(&mut self, from: &TargetErrors, to: &TargetErrors) {
-        self.draw_skipped(from);
-        for (axis, drift_m) in self.drift_m.iter_mut().enumerate() {
-            let [from_m, to_m] = [from, to].map(|errors| errors.slow_sd_m[axis]);
-            if from_m > 0.0 && from_m != to_m {
-                *drift_m *= to_m / from_m;
-            }
-        }
-    }
-
-    /// Returns the errors of the next scan, which is lost with the probability `lost`. The measured speed has the deviation
-    /// `speed_sd_mps` (m/s).
-    pub(super) fn draw(&mut self, errors: &TargetErrors, lost: f64, speed_sd_mps: f64) -> MeasurementErrors {
-        self.draw_skipped(errors);
-        let position_m = self.draw_position_m(errors);
-        let speed_mps = speed_sd_mps * normal(&mut self.rng);
-        let is_lost = self.rng.random::<f64>() < lost;
-        MeasurementErrors { position_m, speed_mps, is_lost }
-    }
-
-    fn draw_skipped(&mut self, errors: &TargetErrors) {
+    /// Returns the errors of the next scan.
+    pub(super) fn draw(&mut self, model: &ObjectSensorModel) -> MeasurementErrors {
         for _ in 0..std::mem::take(&mut self.skipped) {
-            self.draw_position_m(errors);
-            normal(&mut self.rng);
-            self.rng.random::<f64>();
+            self.draw_next(model);
         }
+        self.draw_next(model)
     }
 
-    fn draw_position_m(&mut self, errors: &TargetErrors) -> [f64; 2] {
-        std::array::from_fn(|axis| {
-            let decay = errors.slow_decay[axis];
-            let increment_sd_m = errors.slow_sd_m[axis] * (1.0 - decay * decay).sqrt();
-            let drift_m = &mut self.drift_m[axis];
+    fn draw_next(&mut self, model: &ObjectSensorModel) -> MeasurementErrors {
+        let decay = model.drift_decay;
+        let increment_sd_m = model.drift_sd_m * (1.0 - decay * decay).sqrt();
+        let mut position_m = [0.0; 2];
+        for ((error_m, drift_m), white_sd_m) in position_m.iter_mut().zip(&mut self.drift_m).zip(model.white_sd_m) {
             *drift_m = decay * *drift_m + increment_sd_m * normal(&mut self.rng);
-            *drift_m + errors.white_sd_m[axis] * normal(&mut self.rng)
-        })
+            *error_m = *drift_m + white_sd_m * normal(&mut self.rng);
+        }
+        let speed_mps = model.speed_sd_mps.unwrap_or(0.0) * normal(&mut self.rng);
+        let is_lost = self.rng.random::<f64>() < model.dropout;
+        MeasurementErrors { position_m, speed_mps, is_lost }
     }
 }
 
@@ -146,62 +128,27 @@ fn normal(rng: &mut Stream) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::errors::{Losses, decay};
+    use closecall_traffic::Parameters;
+
+    use super::super::config::ObjectSensorConfig;
     use super::*;
-
-    const ERRORS: TargetErrors = TargetErrors {
-        white_sd_m: [0.01, 0.02],
-        slow_sd_m: [0.05, 0.1],
-        slow_decay: [0.99, 0.9],
-        losses: Losses::Even(0.1),
-    };
-
-    fn key() -> NoiseKey {
-        NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: Arc::from([]) }
-    }
 
     #[test]
     fn scans_that_are_passed_over_change_no_later_error() {
-        let mut drawn = TargetNoise::new(&key(), "rear-object", 1, &ERRORS);
+        let model = ObjectSensorConfig::default().check_rear_object(&Parameters::default()).unwrap();
+        let key = NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: Arc::from([]) };
+        let mut drawn = TargetNoise::new(&key, "rear-object", 1, &model);
         let mut lazy = drawn.clone();
         for scan in 0..200 {
-            let errors = drawn.draw(&ERRORS, 0.1, 0.0);
+            let errors = drawn.draw(&model);
             // In view now and then: for one scan, for several, and after a long time.
             if matches!(scan, 0 | 7 | 8 | 9 | 150..) {
-                let late = lazy.draw(&ERRORS, 0.1, 0.0);
+                let late = lazy.draw(&model);
                 assert_eq!(errors.position_m.map(f64::to_bits), late.position_m.map(f64::to_bits), "scan {scan}");
                 assert_eq!(errors.is_lost, late.is_lost);
             } else {
                 lazy.skip();
             }
         }
-    }
-    #[test]
-    fn errors_have_the_deviation_and_the_correlation_time_of_each_axis() {
-        let mut noise = TargetNoise::new(&key(), "rear-object", 1, &ERRORS);
-        let slow_only = TargetErrors { white_sd_m: [0.0; 2], slow_decay: [0.4, 2.0].map(decay), ..ERRORS };
-        let drawn: Vec<[f64; 2]> = (0..200_000).map(|_| noise.draw(&slow_only, 0.0, 0.0).position_m).collect();
-        for (axis, time_s) in [0.4, 2.0].into_iter().enumerate() {
-            let lag = |steps: usize| drawn.iter().zip(&drawn[steps..]).map(|(a, b)| a[axis] * b[axis]).sum::<f64>();
-            let sd_m = (lag(0) / drawn.len() as f64).sqrt();
-            assert!((sd_m / slow_only.slow_sd_m[axis] - 1.0).abs() < 0.05, "{sd_m}");
-            let after_time = lag((time_s / 0.04) as usize) / lag(0);
-            assert!((after_time - (-1.0_f64).exp()).abs() < 0.05, "{after_time}");
-        }
-    }
-
-    #[test]
-    fn errors_grow_with_the_weather_from_one_scan_to_the_next() {
-        let larger = TargetErrors { slow_sd_m: [0.5, 0.1], white_sd_m: [0.0; 2], ..ERRORS };
-        let mut noise = TargetNoise::new(&key(), "rear-object", 1, &ERRORS);
-        let mut skipping = noise.clone();
-        let before_m = (0..50).map(|_| noise.draw(&ERRORS, 0.0, 0.0)).last().unwrap();
-        (0..50).for_each(|_| skipping.skip());
-        assert!(before_m.position_m[0].abs() < 0.3);
-        for noise in [&mut noise, &mut skipping] {
-            noise.change(&ERRORS, &larger);
-        }
-        let [drawn, skipped] = [noise, skipping].map(|mut noise| noise.draw(&larger, 0.0, 0.0).position_m);
-        assert_eq!(drawn.map(f64::to_bits), skipped.map(f64::to_bits), "scans before the change had the former errors");
     }
 }
