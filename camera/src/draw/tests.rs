@@ -41,13 +41,13 @@ fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize;
         frame.draw(&columns, &[row], &mut rgb);
         let mut line = Line::new(&frame, &columns, super::super::line::LineMemory::default());
         line.begin(&frame, row, &effects);
-        for place in 0..columns.len() {
+        for (place, column) in columns.iter().enumerate() {
             let (_, length) = line.centre(&frame, place);
             let singly = frame.moment_by_moment((place, place), length, &mut line);
             counts[1] += 1;
             if let Some(at_once) = frame.unobstructed((place, place), length, &mut line) {
                 counts[0] += 1;
-                assert_eq!(bits(at_once), bits(singly), "row {row}, column {}", columns[place]);
+                assert_eq!(bits(at_once), bits(singly), "row {row}, column {column}");
             }
         }
     }

@@ -171,12 +171,12 @@ fn patch_light(lit: &GroundLight<'_>, at: [f32x4; 2]) -> PatchLight {
         let (along, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
         match patch.kind {
             PatchKind::Shadow => {
-                cast.sky = cast.sky * contact(patch, along, left);
+                cast.sky *= contact(patch, along, left);
                 if light.sun[0] > 0.0 {
                     cast.sun = in_sun_shadow(patch, [along, left], light.to_sun).select(splat(0.0), cast.sun);
                 }
             }
-            PatchKind::Beam => cast.beam = cast.beam + headlamp_beam(along - splat(patch.extent[0]), left),
+            PatchKind::Beam => cast.beam += headlamp_beam(along - splat(patch.extent[0]), left),
         }
     }
     cast
