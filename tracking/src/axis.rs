@@ -192,6 +192,16 @@ impl AxisFilter {
         AxisFit { squared_distance, cost: -2.0 * likelihood.ln(), log_variance: variance.ln() }
     }
 
+    /// Forgets the slow error: the next measurement has another one.
+    pub(crate) fn renew_slow_error(&mut self) {
+        for estimate in &mut self.estimates[..self.modes.len()] {
+            estimate.state[3] = 0.0;
+            estimate.covariance.row_mut(3).fill(0.0);
+            estimate.covariance.column_mut(3).fill(0.0);
+            estimate.covariance[(3, 3)] = 1.0;
+        }
+    }
+
     /// Corrects the filter with a measured position.
     #[inline]
     pub fn measure_position(&mut self, measurement: &AxisMeasurement) {

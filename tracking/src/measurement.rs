@@ -30,6 +30,9 @@ const ALONG_SLOW_SHARE: f64 = 0.9;
 const MIN_WHITE_SHARE: f64 = 0.02;
 /// Number of points below which a box may be one lamp or the plate of a dark car.
 const MIN_WHOLE_FACE_POINTS: usize = 6;
+/// Standard deviation of the distance from the vehicle's middle beyond which a box is a part of it, rather than its face (m): that of
+/// a box half as wide as a car.
+const PART_SD_M: f64 = 0.2;
 /// Maximum distance of a lamp or a plate from the middle of a car or truck (m). Nothing else is seen of a vehicle with
 /// dark paint or in fog.
 const MAX_PART_OFFSET_M: f64 = 0.8;
@@ -63,6 +66,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
     Measurement {
         along: axis(s_m, detection.range_sd_m, along_slow_m2),
         across: axis(d_m, lateral_sd_m, ACROSS_SLOW_SHARE * lateral_sd_m * lateral_sd_m),
+        is_part: part_offset_sd_m > PART_SD_M,
     }
 }
 

@@ -19,6 +19,9 @@ pub const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 pub const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
 pub const POSITION_PRIOR_SD_M: f64 = 1_000.0;
+/// Time for which the middle of a face that was seen says more about the vehicle's place across the road than a part that is seen (s).
+/// A driver who weaves with 0.12 m/s moves by a tenth of a metre meanwhile, while a part is up to 0.8 m off the middle.
+const MIDDLE_KNOWN_S: f64 = 1.0;
 /// Correlation time of the slow measurement error (s).
 pub const SLOW_TIME_S: f64 = 5.0;
 /// Correlation length of the slow measurement error (m). The error also changes with the distance to the ego, as the
@@ -38,6 +41,8 @@ pub const HEADING_SPEED_MPS: f64 = 3.0;
 pub(crate) struct Measurement {
     pub(crate) along: AxisMeasurement,
     pub(crate) across: AxisMeasurement,
+    /// Whether a part of the face was seen, such as a lamp, whose place on the vehicle is unknown.
+    pub(crate) is_part: bool,
 }
 
 impl Measurement {
@@ -74,8 +79,12 @@ pub(crate) struct RoadFilter {
     across: AxisFilter,
     /// Variance of the slow error along and across the road, as it is smoothed over the measurements (m²).
     slow_m2: [f64; 2],
-    /// Share of the slow error that remains since the latest measurement.
-    slow_share: f64,
+    /// Share of the slow error along and across the road that remains since the latest measurement.
+    slow_share: [f64; 2],
+    /// Time since the middle of the face was last seen (s); infinite if only parts have been.
+    since_middle_s: f64,
+    /// Whether the slow error across the road is that of a part.
+    is_of_part: bool,
 }
 
 impl RoadFilter {
@@ -88,7 +97,9 @@ impl RoadFilter {
             along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), along_mps),
             across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), across_mps),
             slow_m2: measurement.slow_m2(),
-            slow_share: 1.0,
+            slow_share: [1.0; 2],
+            since_middle_s: f64::INFINITY,
+            is_of_part: measurement.is_part,
         };
         filter.correct(measurement, 0.0);
         filter
@@ -104,33 +115,61 @@ impl RoadFilter {
             Situation::of(&RearVehicle { front_s_m, d_m: across.position_m, speed_mps: along.speed_mps }, ego);
         self.along.predict(step_s, slow_share, situation);
         self.across.predict(step_s, slow_share, situation);
-        self.slow_share *= slow_share;
+        self.slow_share = self.slow_share.map(|share| share * slow_share);
+        self.since_middle_s += step_s;
     }
 
     /// Corrects the filter with a measurement of the face, which lies half a length of `half_length_m` ahead of the
     /// centre.
+    ///
+    /// A part says nothing across the road for a while after the middle has been seen: one side of the mirror may see the plate, and
+    /// the other always the same lamp, whose distance from the middle never averages out.
     pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64) {
-        let new_share = 1.0 - self.slow_share;
-        for (smoothed, latest) in self.slow_m2.iter_mut().zip(measurement.slow_m2()) {
-            *smoothed += new_share * (latest - *smoothed);
+        let estimate = self.estimate();
+        self.smooth(0, measurement);
+        self.along.measure_position(&self.smoothed(measurement).along);
+        if measurement.is_part && self.since_middle_s <= MIDDLE_KNOWN_S {
+            return;
         }
-        self.slow_share = 1.0;
-        let measurement = self.smoothed(measurement);
-        let across = measurement.across_for(half_length_m, &self.estimate());
-        self.along.measure_position(&measurement.along);
-        self.across.measure_position(&across);
+        if measurement.is_part == self.is_of_part {
+            self.smooth(1, measurement);
+        } else {
+            self.across.renew_slow_error();
+            self.slow_m2[1] = measurement.slow_m2()[1];
+            (self.slow_share[1], self.is_of_part) = (1.0, measurement.is_part);
+        }
+        if !measurement.is_part {
+            self.since_middle_s = 0.0;
+        }
+        self.across.measure_position(&self.smoothed(measurement).across_for(half_length_m, &estimate));
+    }
+
+    /// Smooths the variance of the slow error along or across the road with that of the latest measurement.
+    fn smooth(&mut self, axis: usize, measurement: &Measurement) {
+        let new_share = 1.0 - std::mem::replace(&mut self.slow_share[axis], 1.0);
+        self.slow_m2[axis] += new_share * (measurement.slow_m2()[axis] - self.slow_m2[axis]);
     }
 
     /// Returns the measurement with the smoothed standard deviations of the slow error.
     ///
     /// The slow error is part of the state in units of its standard deviation, and stays the same while the two sides of the
     /// mirror alternate. Their boxes have different standard deviations. With these, the filter would take the difference
-    /// between the two sides for information on the slow error.
+    /// between the two sides for information on the slow error. The slow error of a part is another one than that of the face, and a
+    /// new one to a filter that has seen only the other.
     fn smoothed(&self, measurement: &Measurement) -> Measurement {
         let with = |axis: AxisMeasurement, slow_m2: f64| AxisMeasurement { slow_sd_m: slow_m2.sqrt(), ..axis };
+        let new = |axis: AxisMeasurement| AxisMeasurement {
+            white_sd_m: axis.white_sd_m.hypot(axis.slow_sd_m),
+            slow_sd_m: 0.0,
+            ..axis
+        };
         Measurement {
             along: with(measurement.along, self.slow_m2[0]),
-            across: with(measurement.across, self.slow_m2[1]),
+            across: match measurement.is_part == self.is_of_part {
+                true => with(measurement.across, self.slow_m2[1]),
+                false => new(measurement.across),
+            },
+            ..*measurement
         }
     }
 
@@ -183,5 +222,71 @@ pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -
         state: Vector4::new(point.x_m, point.y_m, velocity_mps.x, velocity_mps.y),
         covariance,
         heading_rad: if moves { velocity_mps.y.atan2(velocity_mps.x) } else { point.road_yaw_rad },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EGO: EgoRear = EgoRear { s_m: 80.0, d_m: 0.0, speed_mps: 30.0, half_lane_m: 1.875 };
+    const SCAN_S: f64 = 0.04;
+
+    /// Returns a measured place across the road: that of the middle, known to 4 cm, or that of a part.
+    fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
+        let axis = |position_m, sd_m: f64| AxisMeasurement {
+            position_m,
+            white_sd_m: 0.5 * sd_m,
+            slow_sd_m: 0.8 * sd_m,
+            time_offset_s: 0.0,
+        };
+        let s_m = 30.0 * SCAN_S * f64::from(step);
+        Measurement { along: axis(s_m, 0.04), across: axis(d_m, if is_part { 0.46 } else { 0.04 }), is_part }
+    }
+
+    /// Returns the estimate across the road after these measurements, of which the first is that of step 0.
+    fn across(all: impl IntoIterator<Item = Option<Measurement>>) -> AxisEstimate {
+        let mut all = all.into_iter().flatten();
+        let mut filter = RoadFilter::new(&all.next().unwrap(), 30.0);
+        let mut at_s = 0.0;
+        for measurement in all {
+            let to_s = measurement.along.position_m / 30.0;
+            filter.predict(to_s - at_s, &EGO);
+            at_s = to_s;
+            filter.correct(&measurement, 2.3);
+        }
+        filter.estimate()[1]
+    }
+
+    #[test]
+    fn a_lamp_between_plates_does_not_move_the_track() {
+        for lamp_m in [-0.7, 0.7] {
+            let found = across((0..400).map(|step| {
+                let is_part = step % 2 == 1;
+                Some(seen(step, if is_part { lamp_m } else { 0.0 }, is_part))
+            }));
+            assert!(found.position_m.abs() < 0.01, "{found:?}");
+            // Nor does one that came first.
+            let found = across((0..400).map(|step| {
+                let is_part = step % 2 == 0;
+                Some(seen(step, if is_part { lamp_m } else { 0.0 }, is_part))
+            }));
+            assert!(found.position_m.abs() < 0.02, "{found:?}");
+            assert!(found.position_variance_m2.sqrt() < 0.05, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_lamp_counts_once_the_middle_has_not_been_seen_for_a_second() {
+        // The vehicle moves by two metres while only a lamp is seen.
+        let parts = |seconds: f64| {
+            let until = 100 + (seconds / SCAN_S) as u32;
+            across((0..until).map(|step| Some(seen(step, if step < 100 { 0.0 } else { 2.0 }, step >= 100))))
+        };
+        assert!(parts(0.9).position_m.abs() < 0.05);
+        let found = parts(4.0);
+        assert!((found.position_m - 2.0).abs() < 0.5, "{found:?}");
+        // Where the lamp is on the vehicle remains unknown.
+        assert!((0.15..0.6).contains(&found.position_variance_m2.sqrt()), "{found:?}");
     }
 }
