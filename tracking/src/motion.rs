@@ -11,10 +11,10 @@
 //! | along | holds its speed | 0.2 m/s² for 6.5 s: unsteady pedal control in free driving (Herman et al. 1959: 0.1 m/s² and more) | 33 s |
 //! | along | drives | 0.8 m/s² for 1 s: accelerating and coasting in traffic | 4 s |
 //! | along | brakes | 4 m/s² for 1.5 s: up to emergency braking | 2 s |
-//! | across | keeps its lane | 0.215 m/s² for 0.2 s, and the lateral speed decays within a second: weaving with 0.1 m/s, as for an SDLP of 0.2 m | 60 s |
+//! | across | keeps its lane | 0.46 m/s² for 0.36 s, and the lateral speed decays in the same time: weaving with 0.12 m/s, as drivers with an SDLP of 0.2 m do at 33 m/s whose steering has the lags of those on US-101 (4.1, 0.4 and 0.4 s at 30 m/s) | 60 s |
 //! | across | changes lanes | 1.1 m/s² for 2 s: 3.75 m on a quintic within 3.4 to 8 s (the 5 to 95 % of lane changes on US-101) reach 1.9 to 0.3 m/s² | 1 s |
 //!
-//! White acceleration is added: 0.0001 to 0.1 m²/s³ along, 0.001 and 0.002 m²/s³ across.
+//! White acceleration is added: 0.0001 to 0.1 m²/s³ along, 0.001 m²/s³ across.
 //!
 //! The rates depend on the [`Situation`]. A vehicle that approaches the ego in the ego's lane has to brake or to change
 //! lanes, the sooner the nearer it is. A vehicle with a free lane ahead has no reason to. The rates rise with 1/TTC
@@ -171,10 +171,10 @@ pub const ALONG_MODES: &[Mode] = &[
 /// The modes across the road: keeps its lane, changes lanes.
 pub const ACROSS_MODES: &[Mode] = &[
     Mode {
-        white_density_m2ps3: 0.002,
-        acceleration_sd_mps2: 0.215,
-        persistence_s: 0.22,
-        speed_decay_s: 0.9,
+        white_density_m2ps3: 0.001,
+        acceleration_sd_mps2: 0.46,
+        persistence_s: 0.36,
+        speed_decay_s: 0.36,
         switch_rates_per_s: [0.0, 0.016, 0.0],
         urgency_gains: [0.0, 4.0, 0.0],
         prior_probability: 0.9,
