@@ -2,10 +2,11 @@
 //!
 //!     cargo run --release --example fit_object_sensors                  # sensors/data/rear-object.toml
 //!     cargo run --release --example fit_object_sensors -- -n 2 -o own.toml
-//!     cargo run --release --example fit_object_sensors -- --validate -n 6
+//!     cargo run --release --example fit_object_sensors -- --errors      # the errors alone, with the ranges as built
+//!     cargo run --release --example fit_object_sensors -- --validate --seed 1
 //!
 //! A fit takes some minutes. The sensor has its figures after the next build. With `--validate`, the errors, delays and misses of the
-//! sensor as built are measured beside those of the full chain, written into the file as `[validation]`, and every difference that
+//! sensor are measured beside those of the full chain, written into the file as `[validation]`, and every difference that
 //! matters is printed. The results depend on the seed and on the number of approaches, and not on the number of threads.
 
 #![expect(clippy::print_stdout, reason = "a command prints its result")]
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use closecall::simulation::scenario::source;
-use closecall_perception::fit::{FitPlan, at_bounds, fit};
+use closecall_perception::fit::{FitPlan, at_bounds, fit, fit_errors};
 use closecall_perception::validation::{Measured, differences, measure, table};
 use closecall_sensors::{Chain, RearFit};
 
@@ -34,6 +35,12 @@ struct Args {
     /// The file to write
     #[arg(short, long, default_value = "sensors/data/rear-object.toml")]
     output: PathBuf,
+    /// The fit to validate, or whose ranges stay, in place of the one that is built in
+    #[arg(long)]
+    fit: Option<PathBuf>,
+    /// Fit the errors and losses alone; the ranges stay as they are
+    #[arg(long, conflicts_with = "validate")]
+    errors: bool,
     /// Measure the sensor as built beside the full chain, in place of a fit
     #[arg(long)]
     validate: bool,
@@ -48,22 +55,34 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         approaches: args.approaches,
         command: format!(
             "cargo run --release --example fit_object_sensors -- {}-n {} --seed {}",
-            if args.validate { "--validate " } else { "" },
+            match (args.validate, args.errors) {
+                (true, _) => "--validate ",
+                (_, true) => "--errors ",
+                _ => "",
+            },
             args.approaches,
             args.seed
         ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let found = if args.validate { validated(&plan)? } else { fit(&plan)? };
-    at_bounds(&found.errors).iter().for_each(|warning| println!("warning: {warning}"));
+    let known = match &args.fit {
+        Some(path) => RearFit::parse(&std::fs::read_to_string(path)?)?,
+        None => RearFit::shipped()?.clone(),
+    };
+    let found = match (args.validate, args.errors) {
+        (true, _) => validated(&plan, known)?,
+        (_, true) => fit_errors(&plan, &known)?,
+        _ => fit(&plan)?,
+    };
+    at_bounds(&found).iter().for_each(|warning| println!("warning: {warning}"));
     std::fs::write(&args.output, format!("{HEAD}{}", toml::to_string(&found)?))?;
     println!("written: {}", args.output.display());
     Ok(())
 }
 
-/// Returns the fit as built, with its tracks measured beside those of the full chain.
-fn validated(plan: &FitPlan<'_>) -> Result<RearFit, Box<dyn std::error::Error>> {
-    let measured = measure(plan, |_, _, _| true)?;
+/// Returns the fit with its tracks measured beside those of the full chain.
+fn validated(plan: &FitPlan<'_>, fit: RearFit) -> Result<RearFit, Box<dyn std::error::Error>> {
+    let measured = measure(plan, Some(&fit), |_, _, _| true)?;
     let table = table(plan, &measured);
     print(&measured);
     for it in differences(&table) {
@@ -77,7 +96,7 @@ fn validated(plan: &FitPlan<'_>) -> Result<RearFit, Box<dyn std::error::Error>> 
             it.object
         );
     }
-    Ok(RearFit { validation: Some(table), ..RearFit::shipped()?.clone() })
+    Ok(RearFit { validation: Some(table), ..fit })
 }
 
 /// Prints what was measured: root mean square errors along (m), across (m) and of the speed (m/s) up to 50 m and beyond, their

@@ -202,15 +202,6 @@ fn observe(
     Ok(found)
 }
 
-/// What the tracks of a vehicle show while it is at certain gaps.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Watched {
-    /// Errors along (m), across (m) and of the speed (m/s), step by step.
-    pub(crate) errors: Vec<[f64; 3]>,
-    /// Scores of the true class.
-    pub(crate) scores: Vec<f64>,
-}
-
 /// Drives an approach, and calls `see` with the gap (m), the confirmed track, and the traffic in each step, until it is false.
 fn follow(
     (case, sensors, road, at): (&Case, &Sensors, &Road, Address),
@@ -264,27 +255,24 @@ pub(crate) fn firsts(case: &Case, sensors: &Sensors, road: &Road, at: Address) -
     Ok(firsts)
 }
 
-/// Returns what the tracks show between two gaps (m).
+/// Returns the scores of the true class between two gaps (m).
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
-pub(crate) fn watch(
+pub(crate) fn scores(
     case: &Case,
     sensors: &Sensors,
     road: &Road,
     at: Address,
     [near_m, far_m]: [f64; 2],
-) -> Result<Watched, SensorError> {
-    let mut watched = Watched::default();
+) -> Result<Vec<f64>, SensorError> {
+    let mut scores = Vec::new();
     // The track has settled when the vehicle reaches the gaps.
-    follow((case, sensors, road, at), far_m + 20.0, |gap_m, track, traffic| {
-        let Some(track) = track.filter(|_| gap_m <= far_m) else { return gap_m >= near_m };
-        let found = errors(track, traffic.truths_m()[0], &traffic.others[0]);
-        watched.errors.push([found.position_m[0], found.position_m[1], found.speed_mps]);
-        watched.scores.push(track.class.0[case.class as usize]);
+    follow((case, sensors, road, at), far_m + 20.0, |gap_m, track, _| {
+        scores.extend(track.filter(|_| gap_m <= far_m).map(|track| track.class.0[case.class as usize]));
         gap_m >= near_m
     })?;
-    Ok(watched)
+    Ok(scores)
 }
 
 /// Returns the time until a vehicle that appears at [`APPEARS_AT_M`] has a confirmed track (s).

@@ -101,12 +101,12 @@ impl Behaviour {
 }
 
 /// Returns the errors of all steps with a track at these gaps (m).
-fn errors_between(series: &[Vec<Step>], [near_m, far_m]: [f64; 2]) -> Vec<[f64; 3]> {
+fn errors_between(series: &[Vec<Step>], [near_m, far_m]: [f64; 2]) -> Vec<[f64; 4]> {
     let within = series.iter().flatten().filter(|step| step.gap_m >= near_m && step.gap_m <= far_m);
     within.filter_map(|step| step.seen.map(|seen| seen.errors)).collect()
 }
 
-fn root_mean_squares(errors: &[[f64; 3]]) -> [f64; 3] {
+fn root_mean_squares(errors: &[[f64; 4]]) -> [f64; 3] {
     [0, 1, 2].map(|axis| {
         let sum: f64 = errors.iter().map(|it| it[axis] * it[axis]).sum();
         (sum / errors.len().max(1) as f64).sqrt()

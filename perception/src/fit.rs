@@ -3,7 +3,7 @@
 //! ```text
 //!  scenario ─▶ full chain ─┬▶ distances of the first confirmed track and of the first one that is classified as a vehicle,
 //!                          │  over class, paint, plate, shape, extinction ─▶ ranges
-//!                          ├▶ errors of the tracks of a usual car ─▶ errors of the measurements
+//!                          ├▶ errors and losses of the tracks over class, paint, extinction ─▶ those of the measurements
 //!                          └▶ scores of the true class ─▶ confidence
 //! ```
 //!
@@ -11,19 +11,24 @@
 //! confirmed track, plus the distance that the object-level sensor itself needs to confirm a vehicle. A class range is the mean
 //! distance at which a confirmed track is first classified as a vehicle, plus the distance that the latency costs. It is a distance
 //! and no time, because the full chain recognises a vehicle in fog at nearly the same distance at all closing speeds. The errors of the
-//! measurements are those with which the errors of its tracks have the root mean squares of the full chain's; their correlation
-//! time is that of the full chain's errors along the road.
+//! measurements are those with which its tracks err as the full chain's do ([`errors`]).
 
 use std::collections::BTreeMap;
 
 use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
 use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
-use closecall_traffic::{BodyShape, CONTROL_STEP, Environment, Plate, VehicleClass};
+use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass};
 use rayon::prelude::*;
 
-use crate::approach::{Address, Firsts, Watched, firsts, watch};
+use crate::approach::{Address, Firsts, firsts, scores};
 use crate::cases::Case;
 use crate::study::StudyError;
+
+mod errors;
+#[cfg(test)]
+mod tests;
+
+pub use errors::at_bounds;
 
 /// Reflectivities of the paint of the grid (-).
 const PAINTS: [f64; 6] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.8];
@@ -34,18 +39,11 @@ const KOSCHMIEDER: f64 = 3.912;
 /// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid.
 const SHAPE_PAINTS: [f64; 2] = [0.1, 0.4];
 const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
-/// Gaps between which the errors of tracks are compared (m).
+/// Gaps between which the class scores of tracks are taken (m).
 const GAPS_M: [f64; 2] = [20.0, 80.0];
 /// Ranges at which the object-level sensor's own time to confirm, and to report a class, are measured (m).
 const TEST_RANGE_M: f64 = 100.0;
 const TEST_CLASS_RANGE_M: f64 = 60.0;
-/// Number of steps in which the errors are adapted; each scales them by the ratio of the root mean squares.
-const ITERATIONS: usize = 6;
-/// Lag at which the correlation of the errors is taken (control steps): 1 s.
-const LAG_STEPS: usize = 25;
-/// Bounds of the fitted standard deviations (m), and of the correlation time (s): those of the sensor's configuration.
-const SD_BOUNDS_M: [f64; 2] = [0.01, 1.0];
-const TIME_BOUNDS_S: [f64; 2] = [0.2, 10.0];
 
 /// What a fit is made of.
 #[derive(Clone, Debug)]
@@ -78,11 +76,11 @@ struct Fitter<'a> {
 /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
 pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
     let fitter = Fitter::new(plan)?;
-    let errors = fitter.errors()?;
-    let (range, range_spread) = fitter.ranges(&errors)?;
-    Ok(RearFit {
+    let usual = fitter.usual_errors()?;
+    let (range, range_spread) = fitter.ranges(&usual)?;
+    let ranges = RearFit {
         origin: plan.origin(),
-        errors,
+        errors: fitter.same_errors(&usual),
         class_confidence: fitter.class_confidence()?,
         range_spread,
         paints: PAINTS.to_vec(),
@@ -90,7 +88,16 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
         range,
         shapes: fitter.shapes()?,
         validation: None,
-    })
+    };
+    Ok(RearFit { errors: fitter.error_grids(&ranges)?, ..ranges })
+}
+
+/// Fits the errors alone to the full chain, with the ranges of another fit.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_errors(plan: &FitPlan<'_>, ranges: &RearFit) -> Result<RearFit, StudyError> {
+    Ok(RearFit { errors: Fitter::new(plan)?.error_grids(ranges)?, ..ranges.clone() })
 }
 
 impl FitPlan<'_> {
@@ -99,25 +106,6 @@ impl FitPlan<'_> {
         let FitPlan { seed, approaches, command, version, file } = self.clone();
         Origin { command, version, scenario: file.config().name.clone(), seed, approaches }
     }
-}
-
-/// Returns the fitted errors that lie on a bound, each with what that means.
-pub fn at_bounds(errors: &FittedErrors) -> Vec<String> {
-    let FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s } = *errors;
-    let on = |key: &str, value: f64, [low, high]: [f64; 2]| {
-        let which = if value <= low { "lower" } else { "upper" };
-        let is_on = value <= low || value >= high;
-        is_on.then(|| {
-            format!("`errors.{key}` is {value}, its {which} bound: the full chain may ask for a value beyond it")
-        })
-    };
-    let found = [
-        on("range-sd-m", range_sd_m, SD_BOUNDS_M),
-        on("lateral-sd-m", lateral_sd_m, SD_BOUNDS_M),
-        on("drift-sd-m", drift_sd_m, SD_BOUNDS_M),
-        on("drift-time-s", drift_time_s, TIME_BOUNDS_S),
-    ];
-    found.into_iter().flatten().collect()
 }
 
 fn with_settings(file: &ScenarioFile, settings: &[String]) -> Result<ScenarioFile, StudyError> {
@@ -135,17 +123,6 @@ fn rounded(value: f64, per_unit: f64) -> f64 {
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
-}
-
-/// Returns the settings of the object-level sensor that give its measurements these errors.
-fn settings_of(errors: &FittedErrors) -> [String; 4] {
-    let FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s } = errors;
-    [
-        format!("sensors.rear-object.range-sd-m={range_sd_m:?}"),
-        format!("sensors.rear-object.lateral-sd-m={lateral_sd_m:?}"),
-        format!("sensors.rear-object.drift-sd-m={drift_sd_m:?}"),
-        format!("sensors.rear-object.drift-time-s={drift_time_s:?}"),
-    ]
 }
 
 /// Returns the mean distances at which tracks are confirmed and classified (m).
@@ -181,19 +158,11 @@ impl Fitter<'_> {
 
     /// Returns the distances that the object-level sensor with these errors needs to confirm a vehicle, and to report its class (m).
     fn own_delays_m(&self, errors: &FittedErrors) -> Result<[f64; 2], StudyError> {
-        let mut settings = settings_of(errors).to_vec();
-        settings.push(format!("sensors.rear-object.range-m={TEST_RANGE_M:?}"));
-        let sensors = self.object(&settings, TEST_CLASS_RANGE_M)?;
+        let file = with_settings(self.plan.file, &[format!("sensors.rear-object.range-m={TEST_RANGE_M:?}")])?;
+        let sensors = file.concrete(&file.space().nominal())?.sensors.with_mode(SensorMode::Object);
+        let sensors = sensors.without_range_fit(TEST_CLASS_RANGE_M).with_rear_errors(*errors);
         let [confirmed_m, classified_m] = means_m(&self.firsts(&Case::usual(), &sensors)?);
         Ok([TEST_RANGE_M - confirmed_m, TEST_CLASS_RANGE_M - classified_m])
-    }
-
-    /// Returns the object-level sensors with one range for all vehicles, whose classes they know up to `class_range_m` (m), and
-    /// these settings.
-    fn object(&self, settings: &[String], class_range_m: f64) -> Result<Sensors, StudyError> {
-        let file = with_settings(self.plan.file, settings)?;
-        let sensors = file.concrete(&file.space().nominal())?.sensors;
-        Ok(sensors.with_mode(SensorMode::Object).without_range_fit(class_range_m))
     }
 
     /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's range.
@@ -262,44 +231,17 @@ impl Fitter<'_> {
         Ok(ShapeRatios { paints: SHAPE_PAINTS.to_vec(), extinctions_per_m, range, class_range })
     }
 
-    /// Returns what the tracks of a case show in all approaches.
-    fn watched(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Watched>, StudyError> {
-        let one = |run| {
-            watch(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run }, GAPS_M)
-                .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
-        };
-        (0..self.plan.approaches).into_par_iter().map(one).collect()
-    }
-
-    /// Returns the errors of the measurements with which the tracks have the errors of the full chain.
-    fn errors(&self) -> Result<FittedErrors, StudyError> {
-        let usual = Case::usual();
-        let full = self.watched(&usual, &self.lidar)?;
-        let goal = root_mean_squares(&full);
-        let correlation = correlation(&full).clamp(1e-3, 0.999);
-        let lag_s = LAG_STEPS as f64 * CONTROL_STEP.s();
-        let drift_time_s = rounded((-lag_s / correlation.ln()).clamp(TIME_BOUNDS_S[0], TIME_BOUNDS_S[1]), 1e2);
-        // Errors of the speed follow from the white error along the road, those of the position from the slow one.
-        let [mut range_sd_m, mut lateral_sd_m, mut drift_sd_m] = [0.1; 3];
-        for _ in 0..ITERATIONS {
-            let errors = FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s };
-            let sensors = self.object(&settings_of(&errors), f64::INFINITY)?;
-            let own = root_mean_squares(&self.watched(&usual, &sensors)?);
-            let scaled = |sd_m: f64, axis: usize| {
-                rounded((sd_m * goal[axis] / own[axis]).clamp(SD_BOUNDS_M[0], SD_BOUNDS_M[1]), 1e4)
-            };
-            (drift_sd_m, lateral_sd_m, range_sd_m) =
-                (scaled(drift_sd_m, 0), scaled(lateral_sd_m, 1), scaled(range_sd_m, 2));
-        }
-        Ok(FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s })
-    }
-
     /// Returns the mean score of the true class, of each class.
     fn class_confidence(&self) -> Result<ByClass, StudyError> {
         let of = |class| {
-            let watched = self.watched(&Case { class, ..Case::usual() }, &self.full)?;
-            let scores: Vec<f64> = watched.iter().flat_map(|one| one.scores.iter().copied()).collect();
-            Ok::<f64, StudyError>(rounded(mean(&scores).clamp(0.25, 1.0), 1e4))
+            let case = Case { class, ..Case::usual() };
+            let one = |run| {
+                scores(&case, &self.full, &self.scenario.road, Address { seed: self.plan.seed, run }, GAPS_M)
+                    .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
+            };
+            let scores: Result<Vec<Vec<f64>>, StudyError> =
+                (0..self.plan.approaches).into_par_iter().map(one).collect();
+            Ok::<f64, StudyError>(rounded(mean(&scores?.concat()).clamp(0.25, 1.0), 1e4))
         };
         Ok(ByClass {
             car: of(VehicleClass::Car)?,
@@ -307,25 +249,4 @@ impl Fitter<'_> {
             motorcycle: of(VehicleClass::Motorcycle)?,
         })
     }
-}
-
-/// Returns the root mean squares of the errors along (m), across (m) and of the speed (m/s).
-fn root_mean_squares(watched: &[Watched]) -> [f64; 3] {
-    std::array::from_fn(|axis| {
-        let squares: Vec<f64> =
-            watched.iter().flat_map(|one| one.errors.iter().map(|it| it[axis] * it[axis])).collect();
-        mean(&squares).sqrt()
-    })
-}
-
-/// Returns the correlation of the errors along the road with those a second later.
-fn correlation(watched: &[Watched]) -> f64 {
-    let (mut product, mut square) = (0.0, 0.0);
-    for one in watched {
-        for pair in one.errors.windows(LAG_STEPS + 1) {
-            product += pair[0][0] * pair[LAG_STEPS][0];
-            square += 0.5 * (pair[0][0].powi(2) + pair[LAG_STEPS][0].powi(2));
-        }
-    }
-    product / square
 }

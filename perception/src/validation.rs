@@ -3,7 +3,7 @@
 //! The criteria of [`Difference`] were stated before the first comparison. They ask what matters to a function that acts on the
 //! tracks, and not whether a difference can be told from chance.
 
-use closecall_sensors::{Chain, SensorMode, Validation, ValidationFigures};
+use closecall_sensors::{Chain, RearFit, SensorMode, Validation, ValidationFigures};
 use closecall_traffic::{Environment, VehicleClass};
 
 use crate::behaviour::Behaviour;
@@ -56,15 +56,19 @@ pub struct Measured {
     pub object: Behaviour,
 }
 
-/// Measures both sensors of the scenario over the grid, or over the part of it that `is_asked` names.
+/// Measures both sensors of the scenario over the grid, or over the part of it that `is_asked` names. The object-level sensor has the
+/// fit that ships, or another one.
 ///
 /// # Errors
 /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
 pub fn measure(
     plan: &FitPlan<'_>,
+    fit: Option<&RearFit>,
     is_asked: impl Fn(VehicleClass, f64, [f64; 2]) -> bool,
 ) -> Result<Vec<Measured>, StudyError> {
     let scenario = plan.file.concrete(&plan.file.space().nominal())?;
+    // A sensor refers to its fit for as long as the program runs, and a program validates few fits.
+    let fit: Option<&'static RearFit> = fit.map(|fit| &*Box::leak(Box::new(fit.clone())));
     let mut measured = Vec::new();
     for class in VehicleClass::ALL {
         for paint in PAINTS {
@@ -72,6 +76,7 @@ pub fn measure(
                 let case = case(class, paint, weather);
                 let of = |mode| {
                     let sensors = scenario.sensors.with_mode(mode);
+                    let sensors = fit.map_or(sensors, |fit| sensors.with_rear_fit(fit));
                     Behaviour::measure(&case, &sensors, &scenario.road, [plan.seed, plan.approaches])
                 };
                 let (full, object) = (of(SensorMode::Full)?, of(SensorMode::Object)?);
@@ -185,7 +190,7 @@ fn is_material(figure: &str, full: f64, object: f64) -> bool {
 mod tests {
     use std::path::Path;
 
-    use closecall_sensors::{Origin, RearFit};
+    use closecall_sensors::Origin;
     use closecall_simulation::scenario::source;
 
     use super::*;
@@ -216,7 +221,7 @@ mod tests {
         let plan = FitPlan { file: &file, seed, approaches, command, version };
         // The nearest of the ranges, so that the measurement is short.
         let at = (VehicleClass::Motorcycle, PAINTS[0], WEATHERS[3]);
-        let measured = measure(&plan, |class, paint, weather| (class, paint, weather) == at).unwrap();
+        let measured = measure(&plan, None, |class, paint, weather| (class, paint, weather) == at).unwrap();
         let table = table(&plan, &measured);
         for chain in [Chain::Full, Chain::Object] {
             let of = |table: &Validation| {

@@ -10,8 +10,8 @@ use crate::image_detector::ImageDetector;
 use crate::lidar::{FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
-    Alterations, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey, ObjectPerception,
-    ObjectSensorConfig, ObjectSensorModel, Perception, SensorError, TrackerConfig,
+    Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
+    ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, SensorError, TrackerConfig,
 };
 use closecall_camera::{Camera, CameraConfig, Pipeline, Sun};
 
@@ -253,6 +253,18 @@ impl Sensors {
     #[must_use]
     pub fn without_range_fit(self, class_range_m: f64) -> Self {
         Self { rear_object: self.rear_object.without_fit(class_range_m), ..self }
+    }
+
+    /// Returns the same sensors with an object-level sensor behind that has these errors for all vehicles.
+    #[must_use]
+    pub fn with_rear_errors(self, errors: FittedErrors) -> Self {
+        Self { rear_object: self.rear_object.with_errors(errors), ..self }
+    }
+
+    /// Returns the same sensors with an object-level sensor behind that has another fit than that which ships.
+    #[must_use]
+    pub fn with_rear_fit(self, fit: &'static RearFit) -> Self {
+        Self { rear_object: self.rear_object.with_fit(fit), ..self }
     }
 
     /// Returns the errors of the ego's odometry and map.

@@ -85,7 +85,7 @@ pub const MAX_LATENCY_STEPS: usize = 10;
 const MAX_LATENCY_S: f64 = 0.4;
 /// Probability that a scan detects a vehicle in view: between one in two scans (distant low vehicle) and every scan
 /// (near).
-const DETECTION_PROBABILITY: f64 = 0.75;
+pub const DETECTION_PROBABILITY: f64 = 0.75;
 /// Probability that clutter gives a detection inside the gate of a false track in one scan.
 const CLUTTER_PROBABILITY: f64 = 0.1;
 

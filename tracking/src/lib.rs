@@ -30,7 +30,7 @@ mod track_list;
 mod tracker;
 mod view;
 
-pub use config::{MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
+pub use config::{DETECTION_PROBABILITY, MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
 pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy};
 pub use gaussian::Gaussian;
 pub use lane::LaneGeometry;

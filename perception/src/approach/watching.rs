@@ -37,8 +37,8 @@ pub(crate) struct Step {
 /// A confirmed track in one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Errors along (m), across (m) and of the speed (m/s).
-    pub(crate) errors: [f64; 3],
+    /// Errors along (m), across (m), of the speed along the road (m/s), and of that across it (m/s).
+    pub(crate) errors: [f64; 4],
     /// Whether the latest scan has not detected the vehicle.
     pub(crate) is_coasting: bool,
 }
@@ -75,7 +75,8 @@ pub(crate) fn steps(
 fn seen(track: &Track, traffic: &Traffic) -> Seen {
     let found = errors(track, traffic.truths_m()[0], &traffic.others[0]);
     Seen {
-        errors: [found.position_m[0], found.position_m[1], found.speed_mps],
+        // The vehicle has no speed across the road, except while it changes lanes.
+        errors: [found.position_m[0], found.position_m[1], found.speed_mps, track.vy_mps()],
         is_coasting: track.status == TrackStatus::Coasting,
     }
 }

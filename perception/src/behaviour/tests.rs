@@ -32,7 +32,7 @@ fn approach(rng: &mut Stream) -> Vec<Step> {
                 errors[axis] = decays[axis] * errors[axis] + fresh * rng.sample::<f64, _>(StandardNormal);
             }
             let gap_m = GAPS_M[2] - (GAPS_M[2] - GAPS_M[0]) * step as f64 / STEPS as f64;
-            Step { gap_m, seen: Some(Seen { errors, is_coasting: false }) }
+            Step { gap_m, seen: Some(Seen { errors: [errors[0], errors[1], errors[2], 0.0], is_coasting: false }) }
         })
         .collect()
 }
@@ -68,7 +68,7 @@ fn errors_count_where_the_vehicle_is() {
         for step in steps.iter_mut().filter(|step| step.gap_m > 50.0) {
             step.seen.as_mut().unwrap().errors[1] *= 2.0;
         }
-        let far = Seen { errors: [100.0; 3], is_coasting: false };
+        let far = Seen { errors: [100.0; 4], is_coasting: false };
         steps.insert(0, Step { gap_m: 90.0, seen: Some(far) });
     });
     let [near, far] = found.near_far_sd.map(|sd| sd[1]);

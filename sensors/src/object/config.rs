@@ -6,20 +6,21 @@
 //! |---|---|---|---|
 //! | `range-m` | 150 | 14 (b) | 133.9 (c) |
 //! | `half-angle-deg` | 45 (a) | all directions | 66.5 (c) |
-//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.01 (c) |
-//! | `lateral-sd-m` | 0.3 | 0.15 | 0.01 (c) |
-//! | `drift-sd-m` | 0.1 | 0.05 | 0.0499 (c) |
-//! | `drift-time-s` | 1.0 | 1.0 | 8.34 (c) |
+//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | by vehicle (c) |
+//! | `lateral-sd-m` | 0.3 | 0.15 | by vehicle (c) |
+//! | `drift-sd-m` | 0.1 | 0.05 | by vehicle (c) |
+//! | `drift-time-s` | 1.0 | 1.0 | by vehicle (c) |
 //! | `speed-sd-mps` | 0.1 (a) | not measured | not measured |
 //! | `latency-s` | 0.08 (a) | 0.04 | 0.08 |
-//! | `dropout` | 0.02 | 0.02 | 0.05 |
+//! | `dropout` | 0.02 | 0.02 | by vehicle (c) |
 //!
 //! - (a) Of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle; the half-angle is that
 //!   of its near scan.
 //! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m, taken
 //!   as two standard deviations.
 //! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The rest is that of
-//!   the fit to the full chain ([`RearFit`]); the range is that of a usual car.
+//!   the fit to the full chain ([`RearFit`]); the range is that of a usual car, and each vehicle has the
+//!   errors of its class and paint in this weather.
 //!
 //! All other values are assumptions.
 
@@ -27,9 +28,12 @@ use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Ran
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::errors::{Given, decay};
 use super::fit::{ByClass, RearFit};
+use super::{ErrorGrids, FittedErrors};
 use crate::Alterations;
 use crate::lidar::HALF_FIELD_DEG;
+use closecall_tracking::DETECTION_PROBABILITY;
 use closecall_tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
 /// Maximum latency in control steps: 0.4 s.
@@ -48,20 +52,24 @@ pub struct ObjectSensorConfig {
     pub range_m: Option<Num>,
     /// Half of the horizontal field of view (deg); not allowed for the surround sensors, which see in all directions.
     pub half_angle_deg: Option<Num>,
-    /// Standard deviation of the white error of each measured position along the road (m).
+    /// Standard deviation of the white error of each measured position along the road (m). Behind the ego, an absent key stands for the
+    /// errors of the fit, by class, paint and weather.
     pub range_sd_m: Option<Num>,
-    /// Standard deviation of the white error of each measured position across the road (m).
+    /// Standard deviation of the white error of each measured position across the road (m). Behind the ego, an absent key stands for
+    /// those of the fit.
     pub lateral_sd_m: Option<Num>,
-    /// Standard deviation of the slowly varying part of the position error, along and across the road (m).
+    /// Standard deviation of the slowly varying part of the position error, along and across the road (m). Behind the ego, an absent
+    /// key stands for those of the fit.
     pub drift_sd_m: Option<Num>,
-    /// Correlation time of the slowly varying part of the position error (s).
+    /// Correlation time of the slowly varying part of the position error (s). Behind the ego, an absent key stands for those of the fit.
     pub drift_time_s: Option<Num>,
     /// Standard deviation of each measured speed along the road (m/s). If absent, the front radar has 0.1, and the
     /// other sensors do not measure speed.
     pub speed_sd_mps: Option<Num>,
     /// Age of a measurement when the controller receives it (s), rounded to whole control steps of 40 ms.
     pub latency_s: Option<Num>,
-    /// Probability that a measurement of a visible vehicle is lost.
+    /// Probability that a measurement of a visible vehicle is lost. Behind the ego, an absent key stands for the losses of the fit, which
+    /// depend on the distance.
     pub dropout: Option<Num>,
     /// Number of measurements in the latest `confirm-window` scans that confirm a track.
     pub confirm_hits: Option<u8>,
@@ -88,6 +96,10 @@ pub struct ObjectSensorModel {
     pub(super) speed_sd_mps: Option<f64>,
     pub(super) latency_steps: usize,
     pub(super) dropout: f64,
+    /// Which of the errors above hold for all vehicles, in place of those of the fit.
+    pub(super) given: Given,
+    /// Errors of all vehicles, in place of those of the fit.
+    pub(super) fixed_errors: Option<FittedErrors>,
     pub(super) rules: LifecycleRules,
     /// Score of the true class.
     pub(super) class_confidence: ByClass,
@@ -121,6 +133,22 @@ impl ObjectSensorModel {
     /// are known up to `class_range_m` (m).
     pub(crate) fn without_fit(self, class_range_m: f64) -> Self {
         Self { fit: None, class_range_m: Some(class_range_m), ..self }
+    }
+
+    /// Returns the same sensor with these errors for all vehicles, in place of those of the fit.
+    pub(crate) fn with_errors(self, errors: FittedErrors) -> Self {
+        Self { fixed_errors: Some(errors), ..self }
+    }
+
+    /// Returns the same sensor with another fit, from which its ranges and class scores come, and its errors as far as the scenario
+    /// does not give them.
+    pub(crate) fn with_fit(self, fit: &'static RearFit) -> Self {
+        Self { range_m: fit.usual_m(), class_confidence: fit.class_confidence, fit: Some(fit), ..self }
+    }
+
+    /// Returns the errors of a vehicle that the scenario does not give: those of the fit, or those of all vehicles.
+    pub(super) fn fitted_errors(&self, at: impl FnOnce(&ErrorGrids) -> FittedErrors) -> Option<FittedErrors> {
+        self.fixed_errors.or_else(|| self.fit.map(|fit| at(&fit.errors)))
     }
 
     /// Returns the same sensor with the altered latency and, if it looks back, the altered class.
@@ -199,18 +227,21 @@ const SURROUND: Defaults = Defaults {
     fit: None,
 };
 
-/// Returns the default values of the sensor that replaces the rear LiDAR and camera: what the fit to them gives.
+/// Returns the default values of the sensor that replaces the rear LiDAR and camera: what the fit to them gives, and for the errors of
+/// all vehicles those of a usual car on a clear day.
 fn rear_object(fit: &'static RearFit) -> Defaults {
+    let usual = fit.usual_errors();
     Defaults {
         range_m: fit.usual_m(),
         half_angle_deg: Some(HALF_FIELD_DEG),
-        range_sd_m: fit.errors.range_sd_m,
-        lateral_sd_m: fit.errors.lateral_sd_m,
-        drift_sd_m: fit.errors.drift_sd_m,
-        drift_time_s: fit.errors.drift_time_s,
+        range_sd_m: usual.white_sd_m[0],
+        lateral_sd_m: usual.white_sd_m[1],
+        drift_sd_m: usual.slow_sd_m[0],
+        drift_time_s: usual.slow_time_s[0],
         speed_sd_mps: None,
         latency_s: 0.08,
-        dropout: 0.05,
+        // The existence of a track counts hits and misses as in the tracker of the full chain.
+        dropout: 1.0 - DETECTION_PROBABILITY,
         confirm: Confirmation { hits: 3, window: 5 },
         coast_s: 1.0,
         class_confidence: fit.class_confidence,
@@ -287,10 +318,21 @@ impl ObjectSensorConfig {
                 number(&self.lateral_sd_m, defaults.lateral_sd_m, "lateral-sd-m", white_sd)?,
             ],
             drift_sd_m: number(&self.drift_sd_m, defaults.drift_sd_m, "drift-sd-m", Range::closed(0.0, 10.0))?,
-            drift_decay: (-CONTROL_STEP.s() / drift_time_s).exp(),
+            drift_decay: decay(drift_time_s),
             speed_sd_mps,
             latency_steps: steps(latency_s),
             dropout,
+            given: match defaults.fit {
+                // Without a fit, there is nothing to replace.
+                None => Given::default(),
+                Some(_) => Given {
+                    white: [self.range_sd_m.is_some(), self.lateral_sd_m.is_some()],
+                    slow: self.drift_sd_m.is_some(),
+                    slow_time: self.drift_time_s.is_some(),
+                    dropout: self.dropout.is_some(),
+                },
+            },
+            fixed_errors: None,
             rules: self.rules(defaults, dropout, steps(coast_s))?,
             class_confidence,
             class_range_m: None,

@@ -125,6 +125,7 @@ impl Faulty {
             position_m: [along_m + along_sd_m * along, across_m + across_sd_m * across],
             speed_mps: errors.speed_mps + self.fault.speed_noise_mps * speed,
             is_lost,
+            ..errors
         }
     }
 

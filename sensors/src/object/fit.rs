@@ -8,14 +8,15 @@
 //!
 //! Ranges stand in a grid over paint and extinction, between whose points they are interpolated: linearly in the logarithm of the
 //! paint's reflectivity, and in the extinction. Beyond the grid, its border holds. The ratios of body shapes stand in a coarser grid
-//! of the same kind.
+//! of the same kind, and the errors in further ones ([`ErrorGrids`]).
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use closecall_traffic::{Appearance, Environment, Plate, VehicleClass};
+use closecall_traffic::{Appearance, Environment, Plate, Vehicle, VehicleClass};
 use serde::{Deserialize, Serialize};
 
+use super::errors::{ErrorGrids, FittedErrors};
 use super::validated::Validation;
 use crate::lidar::extinction_per_m;
 
@@ -35,8 +36,6 @@ pub struct FitError(String);
 pub struct RearFit {
     /// Where the fit comes from.
     pub origin: Origin,
-    /// Errors of the measurements.
-    pub errors: FittedErrors,
     /// Score of the true class, by class.
     pub class_confidence: ByClass,
     /// Standard deviation of the logarithm of the range of one vehicle about that of the grid (-).
@@ -49,6 +48,8 @@ pub struct RearFit {
     pub range: Vec<RangeGrid>,
     /// Ranges of body shapes relative to those of their class.
     pub shapes: ShapeRatios,
+    /// Errors and losses of the measurements.
+    pub errors: ErrorGrids,
     /// How the tracks of the sensor compare with those of the full chain, if that was measured. No sensor reads it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub validation: Option<Validation>,
@@ -68,20 +69,6 @@ pub struct Origin {
     pub seed: u64,
     /// Number of approaches of each point of the grid.
     pub approaches: u64,
-}
-
-/// The fitted errors of the measurements.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct FittedErrors {
-    /// Standard deviation of the white error along the road (m).
-    pub range_sd_m: f64,
-    /// Standard deviation of the white error across the road (m).
-    pub lateral_sd_m: f64,
-    /// Standard deviation of the slow error (m).
-    pub drift_sd_m: f64,
-    /// Correlation time of the slow error (s).
-    pub drift_time_s: f64,
 }
 
 /// A value for each class.
@@ -155,11 +142,6 @@ impl RearFit {
     }
 
     fn check(&self) -> Result<(), String> {
-        let FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s } = self.errors;
-        within("errors.range-sd-m", range_sd_m, [0.01, 10.0])?;
-        within("errors.lateral-sd-m", lateral_sd_m, [0.01, 10.0])?;
-        within("errors.drift-sd-m", drift_sd_m, [0.0, 10.0])?;
-        within("errors.drift-time-s", drift_time_s, [0.04, 100.0])?;
         within("range-spread", self.range_spread, [0.0, 1.0])?;
         for class in VehicleClass::ALL {
             within(&format!("class-confidence.{}", class.name()), self.class_confidence.of(class), [0.25, 1.0])?;
@@ -181,6 +163,7 @@ impl RearFit {
                 check_grid(&format!("shapes.{name}.{shape}"), ratios, knots, [0.05, 20.0])?;
             }
         }
+        self.errors.check()?;
         self.validation.as_ref().map_or(Ok(()), Validation::check)
     }
 
@@ -189,6 +172,12 @@ impl RearFit {
         let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
         let [range_m, _] = self.grid_m(VehicleClass::Car, Plate::Clean, [USUAL_PAINT, clear_per_m]);
         (10.0 * range_m).round() / 10.0
+    }
+
+    /// Returns the errors of a usual car on a clear day.
+    pub(super) fn usual_errors(&self) -> FittedErrors {
+        let usual = Vehicle::typical(VehicleClass::Car);
+        self.errors.at(usual.class, &usual.appearance, &Environment::CLEAR_DAY)
     }
 
     /// Returns what the sensors are a fit of, for reports.
@@ -220,7 +209,7 @@ impl RearFit {
 }
 
 /// Returns the value of a grid over paints and extinctions, for each of which it has a row and a column.
-fn interpolated(
+pub(super) fn interpolated(
     [paints, extinctions_per_m]: [&[f64]; 2],
     grid: &[Vec<f64>],
     [paint, extinction_per_m]: [f64; 2],
@@ -263,12 +252,17 @@ fn rising(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), String> {
     Err(format!("`{key}` needs at least two numbers in rising order"))
 }
 
-fn check_knots(of: &str, [paints, extinctions_per_m]: [&[f64]; 2]) -> Result<(), String> {
+pub(super) fn check_knots(of: &str, [paints, extinctions_per_m]: [&[f64]; 2]) -> Result<(), String> {
     rising(&format!("{of}paints"), paints, [0.01, 1.0])?;
     rising(&format!("{of}extinctions-per-m"), extinctions_per_m, [0.0, 1.0])
 }
 
-fn check_grid(key: &str, rows: &[Vec<f64>], [paints, extinctions]: [&[f64]; 2], range: [f64; 2]) -> Result<(), String> {
+pub(super) fn check_grid(
+    key: &str,
+    rows: &[Vec<f64>],
+    [paints, extinctions]: [&[f64]; 2],
+    range: [f64; 2],
+) -> Result<(), String> {
     if rows.len() != paints.len() || rows.iter().any(|row| row.len() != extinctions.len()) {
         return Err(format!("`{key}` needs a row for each of `paints` with a number for each of `extinctions-per-m`"));
     }
@@ -277,7 +271,7 @@ fn check_grid(key: &str, rows: &[Vec<f64>], [paints, extinctions]: [&[f64]; 2], 
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{CONTROL_STEP, Parameters};
+    use closecall_traffic::Parameters;
 
     use super::super::config::ObjectSensorConfig;
     use super::*;
@@ -293,12 +287,14 @@ mod tests {
     fn the_sensor_has_the_figures_of_the_file() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/rear-object.toml");
         let file: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
-        let number = |table: &str, key: &str| file[table][key].as_float().unwrap();
         let model = ObjectSensorConfig::default().check_rear_object(&Parameters::default()).unwrap();
-        assert_eq!(model.white_sd_m, ["range-sd-m", "lateral-sd-m"].map(|key| number("errors", key)));
-        assert_eq!(model.drift_sd_m, number("errors", "drift-sd-m"));
-        assert_eq!(model.drift_decay, (-CONTROL_STEP.s() / number("errors", "drift-time-s")).exp());
-        assert_eq!(model.class_confidence.car, number("class-confidence", "car"));
+        let fit = model.fit.unwrap();
+        let number = |value: &toml::Value| value.as_float().unwrap();
+        assert_eq!(number(&file["errors"]["truck"]["slow-across-m"][1][2]), fit.errors.truck.slow_across_m[1][2]);
+        assert_eq!(number(&file["class-confidence"]["car"]), model.class_confidence.car);
+        let mut other = fit.clone();
+        other.range[0].range_m.iter_mut().for_each(|row| row[0] = 50.0);
+        assert_eq!(model.with_fit(Box::leak(Box::new(other))).range_m, 50.0);
     }
 
     #[test]
@@ -311,7 +307,7 @@ mod tests {
         };
         for (message, key, range) in [
             (refused(&|fit| fit.range_spread = f64::NAN), "range-spread", "0 to 1"),
-            (refused(&|fit| fit.errors.lateral_sd_m = 0.0), "errors.lateral-sd-m", "0.01 to 10"),
+            (refused(&|fit| fit.errors.car.lost_share[0][0] = 2.0), "errors.car.lost-share", "0 to 1"),
             (refused(&|fit| fit.class_confidence.truck = 1.5), "class-confidence.truck", "0.25 to 1"),
             (refused(&|fit| fit.paints.reverse()), "paints", "rising order"),
             (refused(&|fit| fit.range[0].range_m[0][0] = 0.0), "range[0].range-m", "1 to 500"),

@@ -3,7 +3,7 @@
 //! They leave out the physics of the measurement. One sensor looks ahead, one around the ego, and one behind. Each has
 //! a field of view, a range, errors (white and slowly varying), a latency, lost measurements, and a filter whose
 //! covariance follows from the errors. The rear sensor replaces LiDAR and camera in fast campaigns. Its ranges and errors
-//! are fitted to theirs ([`RearFit`]), so that dark paint, fog and rain shorten its range, too. In fog, the LiDAR sees the plate or
+//! are fitted to theirs ([`RearFit`]), so that dark paint, fog and rain shorten its range and enlarge its errors, too. In fog, the LiDAR sees the plate or
 //! the lamps of a vehicle that the camera does not recognise yet: its track is confirmed, and classified as background
 //! until the vehicle has come within the distance at which the full chain classifies it as a vehicle. The other two sensors are part
 //! of the full chain.
@@ -19,6 +19,7 @@
 
 mod arrivals;
 mod config;
+mod errors;
 mod faulty;
 mod fit;
 mod noise;
@@ -34,7 +35,8 @@ mod visibility;
 mod weather;
 
 pub use config::{ObjectSensorConfig, ObjectSensorModel};
-pub use fit::{ByClass, FitError, FittedErrors, Origin, RangeGrid, RearFit, ShapeRatios};
+pub use errors::{ErrorGrid, ErrorGrids, FittedErrors};
+pub use fit::{ByClass, FitError, Origin, RangeGrid, RearFit, ShapeRatios};
 pub use noise::NoiseKey;
 pub use perception::ObjectPerception;
 pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanInput};

@@ -19,7 +19,7 @@ use closecall_traffic::{ActorId, Side, Stream, stream};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::config::ObjectSensorModel;
+use super::errors::TargetErrors;
 
 /// The key of the random streams of the ego's sensors, apart from the channel name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,7 +56,8 @@ impl NoiseKey {
 #[derive(Clone, Debug)]
 pub(super) struct TargetNoise {
     rng: Stream,
-    drift_m: [f64; 2],
+    /// The slow errors along and across the road, in standard deviations (-).
+    slow: [f64; 2],
     /// Number of scans whose errors have not been drawn yet, because nothing needed them.
     skipped: u64,
 }
@@ -70,6 +71,20 @@ pub(super) struct MeasurementErrors {
     pub(super) speed_mps: f64,
     /// Whether the measurement is lost.
     pub(super) is_lost: bool,
+    /// Standard deviations of the white and of the slow part of the position's errors, along and across the road (m).
+    pub(super) white_sd_m: [f64; 2],
+    pub(super) slow_sd_m: [f64; 2],
+}
+
+/// What the errors of a scan depend on beside the vehicle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Scan {
+    /// Whether the vehicle is far.
+    pub(super) is_far: bool,
+    /// Probability that the scan loses the vehicle (-).
+    pub(super) lost: f64,
+    /// Standard deviation of the measured speed (m/s).
+    pub(super) speed_sd_mps: f64,
 }
 
 impl MeasurementErrors {
@@ -87,12 +102,11 @@ impl MeasurementErrors {
 }
 
 impl TargetNoise {
-    /// Creates the error process for the vehicle with the index `actor`; the drift starts in its stationary
-    /// distribution.
-    pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize, model: &ObjectSensorModel) -> Self {
+    /// Creates the error process for the vehicle with the index `actor`; the slow errors start in their stationary distribution.
+    pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize) -> Self {
         let mut rng = key.stream_about(channel, actor);
-        let drift_m = [(); 2].map(|()| model.drift_sd_m * normal(&mut rng));
-        Self { rng, drift_m, skipped: 0 }
+        let slow = std::array::from_fn(|_| normal(&mut rng));
+        Self { rng, slow, skipped: 0 }
     }
 
     /// Passes over the errors of a scan that does not see the vehicle. They are drawn before the next ones that are needed.
@@ -100,25 +114,33 @@ impl TargetNoise {
         self.skipped += 1;
     }
 
-    /// Returns the errors of the next scan.
-    pub(super) fn draw(&mut self, model: &ObjectSensorModel) -> MeasurementErrors {
-        for _ in 0..std::mem::take(&mut self.skipped) {
-            self.draw_next(model);
-        }
-        self.draw_next(model)
+    /// Returns the errors of the next scan. Those of scans that were passed over have the same correlation times.
+    pub(super) fn draw(&mut self, errors: &TargetErrors, scan: Scan) -> MeasurementErrors {
+        self.draw_skipped(errors);
+        let [white_sd_m, slow_sd_m] = [errors.white_sd_m, errors.slow_sd_m].map(|sd_m| sd_m.of(scan.is_far));
+        let white = self.draw_position(errors);
+        let position_m = std::array::from_fn(|axis| self.slow[axis] * slow_sd_m[axis] + white[axis] * white_sd_m[axis]);
+        let speed_mps = scan.speed_sd_mps * normal(&mut self.rng);
+        let is_lost = self.rng.random::<f64>() < scan.lost;
+        MeasurementErrors { position_m, speed_mps, is_lost, white_sd_m, slow_sd_m }
     }
 
-    fn draw_next(&mut self, model: &ObjectSensorModel) -> MeasurementErrors {
-        let decay = model.drift_decay;
-        let increment_sd_m = model.drift_sd_m * (1.0 - decay * decay).sqrt();
-        let mut position_m = [0.0; 2];
-        for ((error_m, drift_m), white_sd_m) in position_m.iter_mut().zip(&mut self.drift_m).zip(model.white_sd_m) {
-            *drift_m = decay * *drift_m + increment_sd_m * normal(&mut self.rng);
-            *error_m = *drift_m + white_sd_m * normal(&mut self.rng);
+    /// Draws the errors of the scans that were passed over, as their correlation times change.
+    pub(super) fn draw_skipped(&mut self, errors: &TargetErrors) {
+        for _ in 0..std::mem::take(&mut self.skipped) {
+            self.draw_position(errors);
+            normal(&mut self.rng);
+            self.rng.random::<f64>();
         }
-        let speed_mps = model.speed_sd_mps.unwrap_or(0.0) * normal(&mut self.rng);
-        let is_lost = self.rng.random::<f64>() < model.dropout;
-        MeasurementErrors { position_m, speed_mps, is_lost }
+    }
+
+    /// Draws the slow errors of the next scan, and returns its white ones, in standard deviations (-).
+    fn draw_position(&mut self, errors: &TargetErrors) -> [f64; 2] {
+        std::array::from_fn(|axis| {
+            let decay = errors.slow_decay[axis];
+            self.slow[axis] = decay * self.slow[axis] + (1.0 - decay * decay).sqrt() * normal(&mut self.rng);
+            normal(&mut self.rng)
+        })
     }
 }
 
@@ -128,27 +150,93 @@ fn normal(rng: &mut Stream) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::Parameters;
-
-    use super::super::config::ObjectSensorConfig;
+    use super::super::errors::{Losses, NearFar, decay};
     use super::*;
+
+    const ERRORS: TargetErrors = TargetErrors {
+        white_sd_m: NearFar { near: [0.01, 0.02], far: [0.1, 0.2] },
+        far_m: 80.0,
+        slow_sd_m: NearFar { near: [0.05, 0.1], far: [0.15, 0.1] },
+        slow_decay: [0.99, 0.9],
+        losses: Losses::Even(0.1),
+    };
+
+    const SCAN: Scan = Scan { is_far: false, lost: 0.0, speed_sd_mps: 0.0 };
+
+    fn key() -> NoiseKey {
+        NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: Arc::from([]) }
+    }
 
     #[test]
     fn scans_that_are_passed_over_change_no_later_error() {
-        let model = ObjectSensorConfig::default().check_rear_object(&Parameters::default()).unwrap();
-        let key = NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: Arc::from([]) };
-        let mut drawn = TargetNoise::new(&key, "rear-object", 1, &model);
+        let mut drawn = TargetNoise::new(&key(), "rear-object", 1);
         let mut lazy = drawn.clone();
         for scan in 0..200 {
-            let errors = drawn.draw(&model);
+            let scan_of = Scan { is_far: scan < 100, lost: 0.1, ..SCAN };
+            let errors = drawn.draw(&ERRORS, scan_of);
             // In view now and then: for one scan, for several, and after a long time.
             if matches!(scan, 0 | 7 | 8 | 9 | 150..) {
-                let late = lazy.draw(&model);
+                let late = lazy.draw(&ERRORS, scan_of);
                 assert_eq!(errors.position_m.map(f64::to_bits), late.position_m.map(f64::to_bits), "scan {scan}");
                 assert_eq!(errors.is_lost, late.is_lost);
             } else {
                 lazy.skip();
             }
         }
+    }
+
+    #[test]
+    fn white_errors_of_a_far_vehicle_are_its_own() {
+        let white_only = TargetErrors { slow_sd_m: NearFar::same([0.0; 2]), ..ERRORS };
+        let mut noise = TargetNoise::new(&key(), "rear-object", 1);
+        for is_far in [false, true] {
+            let drawn: Vec<_> = (0..20_000).map(|_| noise.draw(&white_only, Scan { is_far, ..SCAN })).collect();
+            for axis in 0..2 {
+                let mean_square = drawn.iter().map(|it| it.position_m[axis].powi(2)).sum::<f64>() / drawn.len() as f64;
+                let sd_m = white_only.white_sd_m.of(is_far)[axis];
+                assert!((mean_square.sqrt() / sd_m - 1.0).abs() < 0.03, "{mean_square}");
+                assert_eq!(drawn[0].white_sd_m[axis], sd_m);
+            }
+        }
+    }
+
+    #[test]
+    fn errors_have_the_deviation_and_the_correlation_time_of_each_axis() {
+        let mut noise = TargetNoise::new(&key(), "rear-object", 1);
+        let white_sd_m = NearFar::same([0.0; 2]);
+        let slow_only = TargetErrors { white_sd_m, slow_decay: [0.4, 2.0].map(decay), ..ERRORS };
+        let drawn: Vec<[f64; 2]> = (0..200_000).map(|_| noise.draw(&slow_only, SCAN).position_m).collect();
+        for (axis, time_s) in [0.4, 2.0].into_iter().enumerate() {
+            let lag = |steps: usize| drawn.iter().zip(&drawn[steps..]).map(|(a, b)| a[axis] * b[axis]).sum::<f64>();
+            let sd_m = (lag(0) / drawn.len() as f64).sqrt();
+            assert!((sd_m / slow_only.slow_sd_m.near[axis] - 1.0).abs() < 0.05, "{sd_m}");
+            let after_time = lag((time_s / 0.04) as usize) / lag(0);
+            assert!((after_time - (-1.0_f64).exp()).abs() < 0.05, "{after_time}");
+        }
+    }
+
+    #[test]
+    fn slow_errors_grow_with_the_distance_and_the_weather_from_one_scan_to_the_next() {
+        let slow_only = TargetErrors { white_sd_m: NearFar::same([0.0; 2]), slow_decay: [1.0; 2], ..ERRORS };
+        let mut noise = TargetNoise::new(&key(), "rear-object", 1);
+        let mut drawn = |errors: &TargetErrors, is_far| noise.draw(errors, Scan { is_far, ..SCAN }).position_m;
+        let [near_m, far_m] = [false, true].map(|is_far| drawn(&slow_only, is_far));
+        assert!((far_m[0] / near_m[0] - 3.0).abs() < 1e-12 && far_m[1] == near_m[1], "{near_m:?} {far_m:?}");
+        let in_fog = TargetErrors { slow_sd_m: NearFar::same([0.5, 0.1]), ..slow_only };
+        assert!((drawn(&in_fog, false)[0] / near_m[0] - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn scans_before_a_change_of_the_weather_keep_their_correlation_time() {
+        let later = TargetErrors { slow_decay: [0.1; 2], ..ERRORS };
+        let mut noise = TargetNoise::new(&key(), "rear-object", 1);
+        let mut skipping = noise.clone();
+        for _ in 0..50 {
+            noise.draw(&ERRORS, SCAN);
+            skipping.skip();
+        }
+        skipping.draw_skipped(&ERRORS);
+        let [drawn, skipped] = [noise, skipping].map(|mut noise| noise.draw(&later, SCAN).position_m);
+        assert_eq!(drawn.map(f64::to_bits), skipped.map(f64::to_bits));
     }
 }

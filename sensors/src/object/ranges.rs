@@ -3,6 +3,7 @@
 use closecall_traffic::{Environment, Vehicle, VehicleClass};
 
 use super::config::ObjectSensorModel;
+use super::errors::TargetErrors;
 use super::weather::range_in_weather_m;
 use crate::surroundings::OtherVehicle;
 
@@ -54,5 +55,12 @@ impl Ranges {
             _ => [self.usual_m, f64::INFINITY],
         };
         [range_m, model.class_range_m.unwrap_or(class_range_m)]
+    }
+
+    /// Returns the errors of one vehicle whose range is `range_m` (m).
+    pub(super) fn errors(&self, model: &ObjectSensorModel, other: &OtherVehicle, range_m: f64) -> TargetErrors {
+        let environment = self.weather.unwrap_or(Environment::CLEAR_DAY);
+        let fitted = model.fitted_errors(|grids| grids.at(other.class, &other.appearance, &environment));
+        TargetErrors::new(model, fitted.as_ref(), range_m)
     }
 }

@@ -15,7 +15,7 @@ use closecall_traffic::{CONTROL_STEP, ClassScores, Source, Track, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::{FaultStreams, Faulty};
-use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
+use super::noise::{MeasurementErrors, NoiseKey, Scan, TargetNoise};
 use super::ranges::Ranges;
 use super::target::{Filters, Report, Target};
 use super::visibility::{Direction, Field, Visibility};
@@ -123,7 +123,7 @@ impl ObjectSensor {
             speed_mps: state.speed_mps,
             half_lane_m: 0.5 * input.scene.road.lane_width_m(),
         };
-        // Fog and rain shorten the range of the rear sensor only, which is optical. Radars are unaffected over these distances.
+        // Fog and rain matter to the rear sensor only, which is optical. Radars are unaffected over these distances.
         if self.direction == Direction::Behind && self.ranges.update(&self.model, input.scene.environment) {
             // Each vehicle gets its own when it is seen next.
             self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
@@ -148,8 +148,7 @@ impl ObjectSensor {
         self.step += 1;
     }
 
-    /// Returns the errors of the measurement of a vehicle at this place in the list; `None` if it is not in view, or the scan does not
-    /// arrive.
+    /// Returns the errors of the measurement of a vehicle at this place in the list; `None` if it is not in view, or no scan arrives.
     fn errors(
         &mut self,
         index: usize,
@@ -166,15 +165,21 @@ impl ObjectSensor {
         };
         let is_seen = self.visibility.sees(&field, position, other, size) && !(has_faults && self.faulty.hides(other));
         let target = &mut self.targets[index];
+        let is_far = !self.visibility.is_within(target.errors.far_m, position);
+        let scan = Scan {
+            is_far,
+            lost: target.errors.losses.probability(self.step, is_far && target.is_confirmed()),
+            speed_sd_mps: self.model.speed_sd_mps.unwrap_or(0.0),
+        };
         if !has_faults {
             if is_seen {
-                return Some(target.noise.draw(&self.model).mirrored_for(side));
+                return Some(target.noise.draw(&target.errors, scan).mirrored_for(side));
             }
             target.noise.skip();
             return None;
         }
         // The errors are drawn whether the vehicle is seen or not: whether a fault draws depends on them.
-        let errors = target.noise.draw(&self.model);
+        let errors = target.noise.draw(&target.errors, scan);
         let errors = self.faulty.spoil(errors, target.fault_streams.as_mut()).mirrored_for(side);
         let mount_m = 0.5 * size.length_m * self.direction.sign();
         let [along_m, across_m] = self.faulty.shift_m(other, mount_m, input);
@@ -224,19 +229,24 @@ impl ObjectSensor {
         let is_at = |target: &Target| target.actor == actor;
         let index = match self.targets.get(position).is_some_and(is_at) {
             true => position,
-            false => self.targets.iter().position(is_at).unwrap_or_else(|| self.add_target(actor)),
+            false => self.targets.iter().position(is_at).unwrap_or_else(|| self.add_target(other)),
         };
         if self.targets[index].range_m.is_nan() {
             let deviation = self.targets[index].range_deviation;
             let [range_m, class_range_m] = self.ranges.of_m(&self.model, other, deviation);
-            (self.targets[index].range_m, self.targets[index].class_range_m) = (range_m, class_range_m);
+            let errors = self.ranges.errors(&self.model, other, range_m);
+            let target = &mut self.targets[index];
+            target.noise.draw_skipped(&target.errors);
+            (target.range_m, target.class_range_m, target.errors) = (range_m, class_range_m, errors);
         }
         index
     }
 
     /// Adds a vehicle, and returns its index in `targets`.
-    fn add_target(&mut self, actor: usize) -> usize {
-        let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
+    fn add_target(&mut self, other: &OtherVehicle) -> usize {
+        let actor = other.actor;
+        let errors = self.ranges.errors(&self.model, other, f64::INFINITY);
+        let noise = TargetNoise::new(&self.key, self.channel, actor);
         let stream = |purpose: &str| self.key.stream_about(&format!("{}-{purpose}", self.channel), actor);
         let has_faults = self.faulty.has_faults();
         let fault_streams = has_faults.then(|| FaultStreams::new(&self.key, self.channel, actor));
@@ -246,6 +256,7 @@ impl ObjectSensor {
             range_deviation,
             range_m: f64::NAN,
             class_range_m: f64::NAN,
+            errors,
             noise,
             filters: None,
             reports: [None; MAX_LATENCY_STEPS + 1],
@@ -272,8 +283,8 @@ impl ObjectSensor {
             let front_s_m = position_m + 0.5 * other.length_m + speed_mps * CONTROL_STEP.s();
             let situation =
                 Situation::of(&RearVehicle { front_s_m, d_m: across.estimate().position_m, speed_mps }, ego);
-            for axis in [along, across] {
-                axis.predict(CONTROL_STEP.s(), model.drift_decay, situation);
+            for (axis, slow_decay) in [along, across].into_iter().zip(target.errors.slow_decay) {
+                axis.predict(CONTROL_STEP.s(), slow_decay, situation);
             }
         }
         if let Some((errors, is_classified)) = seen.filter(|(errors, _)| !errors.is_lost) {
@@ -299,8 +310,8 @@ impl ObjectSensor {
             for (road_axis, axis) in [&mut *along, across].into_iter().enumerate() {
                 axis.measure_position(&AxisMeasurement {
                     position_m: measured_m[road_axis],
-                    white_sd_m: model.white_sd_m[road_axis],
-                    slow_sd_m: model.drift_sd_m,
+                    white_sd_m: errors.white_sd_m[road_axis],
+                    slow_sd_m: errors.slow_sd_m[road_axis],
                     time_offset_s: 0.0,
                 });
             }

@@ -2,9 +2,10 @@
 
 use closecall_tracking::axis::{AxisEstimate, AxisFilter};
 use closecall_tracking::lifecycle::Lifecycle;
-use closecall_traffic::TrackId;
+use closecall_traffic::{TrackId, TrackStatus};
 
 use super::config::MAX_LATENCY_STEPS;
+use super::errors::TargetErrors;
 use super::faulty::FaultStreams;
 use super::noise::TargetNoise;
 
@@ -39,6 +40,8 @@ pub(super) struct Target {
     pub(super) range_m: f64,
     /// Distance in this weather up to which the class of the vehicle is known (m).
     pub(super) class_range_m: f64,
+    /// Its errors in this weather.
+    pub(super) errors: TargetErrors,
     pub(super) noise: TargetNoise,
     /// The track; `None` without one.
     pub(super) filters: Option<Filters>,
@@ -48,4 +51,11 @@ pub(super) struct Target {
     pub(super) history: Vec<Option<Filters>>,
     /// What faults do to the measurements of the vehicle; drawn from in each step if the sensor has faults.
     pub(super) fault_streams: Option<FaultStreams>,
+}
+
+impl Target {
+    /// Returns whether the vehicle has a confirmed track.
+    pub(super) fn is_confirmed(&self) -> bool {
+        self.filters.as_ref().is_some_and(|track| track.lifecycle.status() != TrackStatus::Tentative)
+    }
 }
