@@ -92,12 +92,12 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
     Ok(RearFit { errors: fitter.error_grids(&ranges)?, ..ranges })
 }
 
-/// Fits the errors alone to the full chain, with the ranges of another fit.
+/// Fits the errors alone to the full chain, with the ranges of another fit, whose validation no longer holds.
 ///
 /// # Errors
 /// As [`fit`].
 pub fn fit_errors(plan: &FitPlan<'_>, ranges: &RearFit) -> Result<RearFit, StudyError> {
-    Ok(RearFit { errors: Fitter::new(plan)?.error_grids(ranges)?, ..ranges.clone() })
+    Ok(RearFit { errors: Fitter::new(plan)?.error_grids(ranges)?, validation: None, ..ranges.clone() })
 }
 
 impl FitPlan<'_> {

@@ -78,7 +78,7 @@ mod tests {
 
     fn measurement(s_m: f64, d_m: f64) -> Measurement {
         let axis = |position_m| AxisMeasurement { position_m, white_sd_m: 0.5, slow_sd_m: 0.0, time_offset_s: 0.0 };
-        Measurement { along: axis(s_m), across: axis(d_m), is_part: false }
+        Measurement { along: axis(s_m), across: axis(d_m), is_part: false, knows_middle: true }
     }
 
     fn assignment(tracks: &[RoadFilter], measurements: &[Measurement]) -> Vec<Option<usize>> {

@@ -9,7 +9,7 @@ use closecall_traffic::{Time, VehicleClass};
 
 use super::axis::AxisMeasurement;
 use super::road_filter::Measurement;
-use crate::Detection;
+use crate::{Detection, Extent};
 use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of the slow error along the line of sight, by vehicle class (m).
@@ -31,7 +31,7 @@ const MIN_WHITE_SHARE: f64 = 0.02;
 /// Number of points below which a box may be one lamp or the plate of a dark car.
 const MIN_WHOLE_FACE_POINTS: usize = 6;
 /// Standard deviation of the distance from the vehicle's middle beyond which a box is a part of it, rather than its face (m): that of
-/// a box half as wide as a car.
+/// a box half as wide as a car. Up to the same deviation across the road, a face whose edges or whose plate are seen shows the middle.
 const PART_SD_M: f64 = 0.2;
 /// Maximum distance of a lamp or a plate from the middle of a car or truck (m). Nothing else is seen of a vehicle with
 /// dark paint or in fog.
@@ -67,6 +67,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
         along: axis(s_m, detection.range_sd_m, along_slow_m2),
         across: axis(d_m, lateral_sd_m, ACROSS_SLOW_SHARE * lateral_sd_m * lateral_sd_m),
         is_part: part_offset_sd_m > PART_SD_M,
+        knows_middle: (detection.is_centred || detection.width == Extent::Seen) && lateral_sd_m <= PART_SD_M,
     }
 }
 
@@ -81,10 +82,16 @@ mod tests {
     use closecall_traffic::{ClassScores, Road, VehicleState};
 
     use super::*;
-    use crate::{Extent, SeenBy};
+    use crate::SeenBy;
 
     /// Returns the standard deviation of the measured position across the road for a box 40 m behind the ego (m).
     fn across_sd_m(width_m: f64, points: usize, class: VehicleClass) -> f64 {
+        let Measurement { across, .. } = of_box(width_m, Extent::Seen, points, class);
+        across.white_sd_m.hypot(across.slow_sd_m)
+    }
+
+    /// Returns the measurement of a box 40 m behind the ego.
+    fn of_box(width_m: f64, width: Extent, points: usize, class: VehicleClass) -> Measurement {
         let mut scores = [0.0; 4];
         scores[class as usize] = 1.0;
         let detection = Detection {
@@ -97,7 +104,7 @@ mod tests {
             length_m: 4.6,
             length: Extent::Assumed,
             width_m,
-            width: Extent::Seen,
+            width,
             top_m: 1.5,
             seen_by: SeenBy::Lidar,
             points,
@@ -105,8 +112,20 @@ mod tests {
             class: ClassScores(scores),
         };
         let ego = VehicleState { s_m: 1_000.0, d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
-        let Measurement { across, .. } = measurement(&detection, &EgoFrame::new(&Road::straight(3), &ego), Time::ZERO);
-        across.white_sd_m.hypot(across.slow_sd_m)
+        measurement(&detection, &EgoFrame::new(&Road::straight(3), &ego), Time::ZERO)
+    }
+
+    #[test]
+    fn a_lamp_is_a_part_and_a_face_with_both_edges_shows_the_middle() {
+        let of = |width_m, width, points| {
+            let Measurement { is_part, knows_middle, .. } = of_box(width_m, width, points, VehicleClass::Car);
+            (is_part, knows_middle)
+        };
+        assert_eq!(of(0.4, Extent::Seen, 12), (true, false));
+        assert_eq!(of(1.7, Extent::Seen, 4), (true, false));
+        assert_eq!(of(1.7, Extent::Seen, 12), (false, true));
+        // One edge is hidden: the width is that of the class.
+        assert_eq!(of(1.8, Extent::Assumed, 12), (false, false));
     }
 
     #[test]

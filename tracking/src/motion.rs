@@ -11,8 +11,12 @@
 //! | along | holds its speed | 0.2 m/s² for 6.5 s: unsteady pedal control in free driving (Herman et al. 1959: 0.1 m/s² and more) | 33 s |
 //! | along | drives | 0.8 m/s² for 1 s: accelerating and coasting in traffic | 4 s |
 //! | along | brakes | 4 m/s² for 1.5 s: up to emergency braking | 2 s |
-//! | across | keeps its lane | 0.46 m/s² for 0.36 s, and the lateral speed decays in the same time: weaving with 0.12 m/s, as drivers with an SDLP of 0.2 m do at 33 m/s whose steering has the lags of those on US-101 (4.1, 0.4 and 0.4 s at 30 m/s) | 60 s |
+//! | across | keeps its lane | 0.46 m/s² for 0.36 s drives a lateral speed that decays in the same time: weaving with 0.12 m/s | 60 s |
 //! | across | changes lanes | 1.1 m/s² for 2 s: 3.75 m on a quintic within 3.4 to 8 s (the 5 to 95 % of lane changes on US-101) reach 1.9 to 0.3 m/s² | 1 s |
+//!
+//! A driver with a standard deviation of lateral position (SDLP) of 0.2 m whose steering has the lags of those on US-101 (4.1, 0.4 and 0.4 s
+//! at 30 m/s) weaves with 0.12 m/s and 0.36 m/s² at 33 m/s. The mode that keeps its lane has the last two lags at this speed, and a
+//! driving acceleration that gives this speed.
 //!
 //! White acceleration is added: 0.0001 to 0.1 m²/s³ along, 0.001 m²/s³ across.
 //!

@@ -74,9 +74,10 @@ pub(crate) fn steps(
 
 fn seen(track: &Track, traffic: &Traffic) -> Seen {
     let found = errors(track, traffic.truths_m()[0], &traffic.others[0]);
+    let state = &traffic.others[0].state;
+    let across_mps = state.speed_mps * state.heading_rad.sin();
     Seen {
-        // The vehicle has no speed across the road, except while it changes lanes.
-        errors: [found.position_m[0], found.position_m[1], found.speed_mps, track.vy_mps()],
+        errors: [found.position_m[0], found.position_m[1], found.speed_mps, track.vy_mps() - across_mps],
         is_coasting: track.status == TrackStatus::Coasting,
     }
 }

@@ -14,7 +14,7 @@
 //! A slow error stands for all that lasts longer than a scan: noise, and what the full chain errs in the same way at the same distance.
 
 use closecall_sensors::{ErrorGrid, ErrorGrids, FittedErrors, RearFit, SensorMode, Sensors};
-use closecall_traffic::{CONTROL_STEP, Plate, VehicleClass};
+use closecall_traffic::{Appearance, CONTROL_STEP, Plate, Vehicle, VehicleClass};
 use rayon::prelude::*;
 
 use super::{Fitter, extinctions_per_m, mean, rounded};
@@ -28,9 +28,10 @@ use crate::study::StudyError;
 const PAINTS: [f64; 4] = [0.05, 0.14, 0.3, 0.7];
 const VISIBILITIES_M: [f64; 7] = [10_000.0, 700.0, 400.0, 250.0, 150.0, 80.0, 50.0];
 /// Number of times that the errors of a point are adapted.
-const ITERATIONS: usize = 10;
-/// Number of approaches of the object-level sensor in each of them, which cost next to nothing.
-const OBJECT_APPROACHES: u64 = 16;
+const ITERATIONS: usize = 16;
+/// Number of approaches of the object-level sensor in each of them. A slow error is often one draw in an approach, and a deviation of
+/// 64 draws scatters by 9 %.
+const OBJECT_APPROACHES: u64 = 64;
 /// Least number of steps with a track that tell the errors of a point. With fewer, those in less fog hold.
 const LEAST_STEPS: usize = 100;
 /// Least number of steps with a far track that tell its errors. With fewer, they are those of a near one.
@@ -41,7 +42,7 @@ const TIME_BOUNDS_S: [f64; 2] = [0.2, 20.0];
 /// Largest ratio of the deviation of a measurement's error to the error of the track (-), an assumption: beyond it, the filter takes a
 /// vehicle that changes lanes for noise.
 const MOST_OF_TRACK: f64 = 1.5;
-/// Share of the logarithm of a ratio by which errors are adapted (-), because they depend on each other; and the ratios that count at most.
+/// Share of the logarithm of a ratio by which errors are adapted (-), because they depend on each other; and the bounds of a ratio.
 const ADAPTED_SHARE: f64 = 0.7;
 const RATIO_BOUNDS: [f64; 2] = [0.2, 5.0];
 /// Longest lag at which correlations are taken (control steps): 3 s.
@@ -64,8 +65,8 @@ const START: FittedErrors = FittedErrors {
 /// Errors of tracks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Figures {
-    /// Of near vehicles: root mean squares of those of the position along and across the road (m), and of those of the speed along and
-    /// across it (m/s), and the correlation times of the former two (s).
+    /// Of near vehicles, up to 80 m: root mean squares of those of the position along and across the road (m), and of those of the speed
+    /// along and across it (m/s), and the correlation times of the former two (s), within the bounds of the fit.
     pub(super) near: [f64; 6],
     /// Of far vehicles: the same root mean squares; `None` with too few steps.
     pub(super) far: Option<[f64; 4]>,
@@ -79,7 +80,7 @@ pub fn at_bounds(fit: &RearFit) -> Vec<String> {
             let count = rows.iter().flatten().filter(|value| !(**value > low && **value < high)).count();
             (count > 0).then(|| {
                 format!(
-                    "{count} values of `errors.{class}.{key}` are {low} or {high}, a bound: the full chain may ask for values beyond it"
+                    "`errors.{class}.{key}`: {count} of its values are {low} or {high}, a bound: the full chain may ask for values beyond it"
                 )
             })
         };
@@ -104,7 +105,7 @@ impl Fitter<'_> {
     /// Returns the errors of a usual car, whatever its range.
     pub(super) fn usual_errors(&self) -> Result<FittedErrors, StudyError> {
         let sensors = self.scenario.sensors.with_mode(SensorMode::Object).without_range_fit(f64::INFINITY);
-        Ok(self.errors_at(&Case::usual(), &sensors)?.unwrap_or(START))
+        Ok(self.errors_at(&Case::usual(), &sensors, f64::INFINITY)?.unwrap_or(START))
     }
 
     /// Returns the grids of a sensor with these errors for all vehicles.
@@ -129,16 +130,20 @@ impl Fitter<'_> {
         // A sensor refers to its fit for as long as the program runs, and a program makes few fits.
         let ranges: &'static RearFit = Box::leak(Box::new(ranges.clone()));
         let sensors = self.scenario.sensors.with_mode(SensorMode::Object).with_rear_fit(ranges);
-        let of = |class| self.class_errors(class, &sensors);
+        let of = |class| self.class_errors(class, &sensors, ranges);
         Ok(self.grids([of(VehicleClass::Car)?, of(VehicleClass::Truck)?, of(VehicleClass::Motorcycle)?]))
     }
 
-    fn class_errors(&self, class: VehicleClass, sensors: &Sensors) -> Result<ErrorGrid, StudyError> {
+    fn class_errors(&self, class: VehicleClass, sensors: &Sensors, ranges: &RearFit) -> Result<ErrorGrid, StudyError> {
         let mut rows = Vec::new();
         for paint in PAINTS {
             let mut row: Vec<FittedErrors> = Vec::new();
             for visibility_m in VISIBILITIES_M {
-                let found = self.errors_at(&Self::case(class, paint, Plate::Clean, visibility_m), sensors)?;
+                let case = Self::case(class, paint, Plate::Clean, visibility_m);
+                let appearance =
+                    Appearance { paint_reflectivity: paint, plate: case.plate, ..Vehicle::typical(class).appearance };
+                let range_m = ranges.range_m(class, &appearance, &case.environment);
+                let found = self.errors_at(&case, sensors, range_m)?;
                 row.push(found.or_else(|| row.last().copied()).unwrap_or(START));
             }
             rows.push(row);
@@ -147,10 +152,15 @@ impl Fitter<'_> {
     }
 
     /// Returns the errors and losses of one case, with which the tracks of `sensors`, at object level, err as those of the full chain;
-    /// `None` if the full chain sees the vehicle for too short a time.
-    pub(super) fn errors_at(&self, case: &Case, sensors: &Sensors) -> Result<Option<FittedErrors>, StudyError> {
-        let full = self.steps(case, &self.lidar, self.plan.approaches)?;
-        let Losses { from_m, all_scans_share, lost_share } = losses(&full);
+    /// `None` if the full chain sees the vehicle for too short a time. The vehicle has the range `range_m` (m) at object level.
+    pub(super) fn errors_at(
+        &self,
+        case: &Case,
+        sensors: &Sensors,
+        range_m: f64,
+    ) -> Result<Option<FittedErrors>, StudyError> {
+        let full = self.steps(case, &self.lidar, self.plan.approaches, self.plan.seed)?;
+        let Losses { from_m, lost_share } = losses(&full);
         let Some(goal) = figures(&full, from_m) else { return Ok(None) };
         let [along_m, across_m, _, _, along_s, across_s] = goal.near;
         let [far_along_m, far_across_m, ..] = goal.far.unwrap_or([along_m, across_m, 0.0, 0.0]);
@@ -158,13 +168,13 @@ impl Fitter<'_> {
             slow_sd_m: [along_m, across_m].map(within(SD_BOUNDS_M)),
             far_slow_sd_m: [far_along_m, far_across_m].map(within(SD_BOUNDS_M)),
             slow_time_s: [along_s, across_s].map(within(TIME_BOUNDS_S)),
-            all_scans_share: rounded(all_scans_share, 1e3),
+            all_scans_share: rounded((from_m / range_m).min(1.0), 1e3),
             lost_share: rounded(lost_share, 1e3),
             ..START
         };
         let (mut best, mut least) = (errors, f64::INFINITY);
         for _ in 0..ITERATIONS {
-            let own = self.steps(case, &sensors.with_rear_errors(errors), OBJECT_APPROACHES)?;
+            let own = self.steps(case, &sensors.with_rear_errors(errors), OBJECT_APPROACHES, !self.plan.seed)?;
             let Some(own) = figures(&own, from_m) else { break };
             let ratios = Ratios::of(&goal, &own);
             if ratios.distance() < least {
@@ -179,10 +189,10 @@ impl Fitter<'_> {
         }))
     }
 
-    /// Returns all steps of the first approaches of a case.
-    fn steps(&self, case: &Case, sensors: &Sensors, approaches: u64) -> Result<Vec<Vec<Step>>, StudyError> {
+    /// Returns all steps of the first approaches of a case, with this seed.
+    fn steps(&self, case: &Case, sensors: &Sensors, approaches: u64, seed: u64) -> Result<Vec<Vec<Step>>, StudyError> {
         let one = |run| {
-            steps(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run }, ERROR_GAPS_M[0])
+            steps(case, sensors, &self.scenario.road, Address { seed, run }, ERROR_GAPS_M[0])
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
         (0..approaches).into_par_iter().map(one).collect()
@@ -263,7 +273,8 @@ pub(super) fn figures(series: &[Vec<Step>], from_m: f64) -> Option<Figures> {
         return None;
     }
     let [along_m, across_m, along_mps, across_mps] = root_mean_squares(&all_near);
-    let time_s = |axis| correlation_time_s(&near, axis);
+    // Times beyond the bounds of the fit are all the same to it.
+    let time_s = |axis| within(TIME_BOUNDS_S)(correlation_time_s(&near, axis));
     let far = between([from_m.max(near_m), f64::INFINITY]).concat();
     Some(Figures {
         near: [along_m, across_m, along_mps, across_mps, time_s(0), time_s(1)],
@@ -303,16 +314,12 @@ fn correlation_time_s(errors: &[Vec<[f64; 4]>], axis: usize) -> f64 {
 pub(super) struct Losses {
     /// Gap up to which every scan measures it (m).
     pub(super) from_m: f64,
-    /// The same as a share of the mean gap of the first confirmed track (-).
-    pub(super) all_scans_share: f64,
     /// Share of the scans beyond that lose it (-).
     pub(super) lost_share: f64,
 }
 
 /// Returns the losses that leave the least squared error of what was lost.
 pub(super) fn losses(series: &[Vec<Step>]) -> Losses {
-    let is_seen = |step: &&Step| step.seen.is_some();
-    let firsts_m: Vec<f64> = series.iter().filter_map(|steps| Some(steps.iter().find(is_seen)?.gap_m)).collect();
     let tracked: Vec<(f64, bool)> =
         series.iter().flatten().filter_map(|step| Some((step.gap_m, step.seen?.is_coasting))).collect();
     let all_lost = tracked.iter().filter(|(_, is_lost)| *is_lost).count() as f64;
@@ -326,15 +333,14 @@ pub(super) fn losses(series: &[Vec<Step>]) -> Losses {
         // A scan that is lost nearer counts in full; beyond, the variance of a share remains.
         (all_lost - lost + count * share * (1.0 - share), share)
     };
-    let range_m = mean(&firsts_m);
     let mut least = f64::INFINITY;
-    let mut best = Losses { from_m: f64::INFINITY, all_scans_share: 1.0, lost_share: 0.0 };
+    let mut best = Losses { from_m: f64::INFINITY, lost_share: 0.0 };
     let mut from_m = GAPS_M[0];
     while from_m > 0.0 {
         let (error, share) = beyond(from_m);
         if error < least {
             least = error;
-            best = Losses { from_m, all_scans_share: (from_m / range_m).min(1.0), lost_share: share };
+            best = Losses { from_m, lost_share: share };
         }
         from_m -= LOSS_STEP_M;
     }

@@ -1,8 +1,9 @@
-//! A fit finds the errors of a sensor that it is given in place of the full chain, and the sensor that ships errs as the full chain does.
+//! A fit finds the errors of a sensor that it is given in place of the full chain, and the fit that ships tells weather and paint apart.
 
 use std::path::Path;
 
 use closecall_simulation::scenario::source;
+use closecall_traffic::{Appearance, Vehicle};
 
 use super::errors::{Figures, Losses, figures, losses};
 use super::*;
@@ -31,7 +32,10 @@ fn known_errors_and_losses_are_found_again() {
         lost_share: 0.5,
     };
     fitter.lidar = sensors.with_rear_errors(known);
-    let found = fitter.errors_at(&Case::usual(), &sensors).unwrap().unwrap();
+    let usual = Case::usual();
+    let appearance = Appearance { paint_reflectivity: usual.paint, ..Vehicle::typical(usual.class).appearance };
+    let usual_range_m = RearFit::shipped().unwrap().range_m(usual.class, &appearance, &usual.environment);
+    let found = fitter.errors_at(&Case::usual(), &sensors, usual_range_m).unwrap().unwrap();
     let near = |of: &str, found: f64, known: f64, share: f64| {
         assert!((found / known - 1.0).abs() < share, "{of}: {found} instead of {known}");
     };
@@ -55,7 +59,7 @@ fn known_errors_and_losses_are_found_again() {
     // They are worse beyond, and not only because a scan is lost.
     let without =
         tracks(FittedErrors { far_white_sd_m: known.white_sd_m, far_slow_sd_m: known.slow_sd_m, ..known }).far.unwrap();
-    assert!(of_found.far.unwrap()[2] > 1.5 * without[2], "{of_found:?} {without:?}");
+    assert!(of_found.far.unwrap()[2] > 1.2 * without[2], "{of_found:?} {without:?}");
 }
 
 #[test]
@@ -65,9 +69,8 @@ fn losses_begin_where_scans_are_lost() {
     let gap_m = |index: i32| 100.0 - 0.5 * f64::from(index);
     let series: Vec<Step> = (0..160).map(|index| step(gap_m(index), index < 80 && index % 2 == 1)).collect();
     let none: Vec<Step> = series.iter().map(|it| step(it.gap_m, false)).collect();
-    let found @ Losses { from_m, all_scans_share, lost_share } = losses(&[series]);
-    assert!((all_scans_share - 0.6).abs() < 0.02 && (lost_share - 0.5).abs() < 0.02, "{found:?}");
-    assert!((from_m - 60.0).abs() < 2.0, "{found:?}");
+    let found @ Losses { from_m, lost_share } = losses(&[series]);
+    assert!((from_m - 60.0).abs() < 2.0 && (lost_share - 0.5).abs() < 0.02, "{found:?}");
     assert_eq!(losses(&[none]).lost_share, 0.0);
 }
 
@@ -90,11 +93,12 @@ fn car(file: &ScenarioFile, paint: f64, visibility_m: f64) -> [f64; 6] {
 }
 
 #[test]
-fn a_dark_car_errs_more_across_than_a_light_one_and_a_car_in_fog_more_along() {
+fn a_dark_car_in_fog_errs_more_across_than_a_light_one_and_a_car_in_fog_more_along() {
     let fitted = file(&[]);
-    let [dark, light, fog] = [(0.1, 10_000.0), (0.5, 10_000.0), (0.5, 100.0)].map(|(paint, m)| car(&fitted, paint, m));
+    let [clear, fog, light, dark] =
+        [(0.5, 10_000.0), (0.5, 100.0), (0.5, 300.0), (0.1, 300.0)].map(|(paint, m)| car(&fitted, paint, m));
     assert!(dark[1] > 1.3 * light[1], "across: {dark:?} {light:?}");
-    assert!(fog[0] > 2.0 * light[0], "along: {fog:?} {light:?}");
+    assert!(fog[0] > 2.0 * clear[0], "along: {fog:?} {clear:?}");
     // Errors that the scenario gives hold for all vehicles.
     let given = file(&[
         "sensors.rear-object.range-sd-m=0.05",
@@ -117,5 +121,5 @@ fn errors_on_a_bound_are_warned_about() {
     fit.errors.truck.slow_along_time_s[0][1] = 20.0;
     let found = at_bounds(&fit);
     assert_eq!(found.len(), before.len() + 1);
-    assert!(found.iter().any(|it| it.contains("1 values of `errors.truck.slow-along-time-s`")), "{found:?}");
+    assert!(found.iter().any(|it| it.contains("`errors.truck.slow-along-time-s`: 1 of its values")), "{found:?}");
 }

@@ -24,9 +24,8 @@ use super::config::ObjectSensorModel;
 use super::fit::{Origin, check_grid, check_knots, interpolated};
 use crate::lidar::extinction_per_m;
 
-/// Ranges of a deviation of a white and of a slow error (m), and of a correlation time (s).
-const WHITE_RANGE_M: [f64; 2] = [0.001, 10.0];
-const SLOW_RANGE_M: [f64; 2] = [0.001, 10.0];
+/// Ranges of a deviation (m), and of a correlation time (s).
+const SD_RANGE_M: [f64; 2] = [0.001, 10.0];
 const TIME_RANGE_S: [f64; 2] = [0.04, 100.0];
 
 /// The errors of one vehicle's measurements.
@@ -96,6 +95,9 @@ pub struct ErrorGrid {
     pub lost_share: Vec<Vec<f64>>,
 }
 
+/// Name of a grid, its values, and their range.
+type Named<'a> = (&'static str, &'a [Vec<f64>], [f64; 2]);
+
 impl ErrorGrid {
     /// Returns the grids of points that stand in rows of equal paint.
     pub fn of(rows: &[Vec<FittedErrors>]) -> Self {
@@ -117,16 +119,16 @@ impl ErrorGrid {
     }
 
     /// Returns the grids with their names and the ranges of their values, in the order of the file.
-    fn named(&self) -> [(&'static str, &Vec<Vec<f64>>, [f64; 2]); 12] {
+    fn named(&self) -> [Named<'_>; 12] {
         [
-            ("white-along-m", &self.white_along_m, WHITE_RANGE_M),
-            ("white-across-m", &self.white_across_m, WHITE_RANGE_M),
-            ("far-white-along-m", &self.far_white_along_m, WHITE_RANGE_M),
-            ("far-white-across-m", &self.far_white_across_m, WHITE_RANGE_M),
-            ("slow-along-m", &self.slow_along_m, SLOW_RANGE_M),
-            ("slow-across-m", &self.slow_across_m, SLOW_RANGE_M),
-            ("far-slow-along-m", &self.far_slow_along_m, SLOW_RANGE_M),
-            ("far-slow-across-m", &self.far_slow_across_m, SLOW_RANGE_M),
+            ("white-along-m", &self.white_along_m, SD_RANGE_M),
+            ("white-across-m", &self.white_across_m, SD_RANGE_M),
+            ("far-white-along-m", &self.far_white_along_m, SD_RANGE_M),
+            ("far-white-across-m", &self.far_white_across_m, SD_RANGE_M),
+            ("slow-along-m", &self.slow_along_m, SD_RANGE_M),
+            ("slow-across-m", &self.slow_across_m, SD_RANGE_M),
+            ("far-slow-along-m", &self.far_slow_along_m, SD_RANGE_M),
+            ("far-slow-across-m", &self.far_slow_across_m, SD_RANGE_M),
             ("slow-along-time-s", &self.slow_along_time_s, TIME_RANGE_S),
             ("slow-across-time-s", &self.slow_across_time_s, TIME_RANGE_S),
             ("all-scans-share", &self.all_scans_share, [0.0, 1.0]),
@@ -277,11 +279,11 @@ impl TargetErrors {
 }
 
 impl Losses {
-    /// Returns the probability that the scan of this step loses a vehicle, which is far or not.
-    pub(super) fn probability(&self, step: usize, is_far: bool) -> f64 {
+    /// Returns the probability that the scan of this step loses a vehicle. `may_lose_far` tells whether it is far and has a confirmed track.
+    pub(super) fn probability(&self, step: usize, may_lose_far: bool) -> f64 {
         match *self {
             Self::Even(share) => share,
-            Self::Far(share) if is_far => {
+            Self::Far(share) if may_lose_far => {
                 // The odd scans are lost first.
                 (2.0 * share - if step.is_multiple_of(2) { 1.0 } else { 0.0 }).clamp(0.0, 1.0)
             }

@@ -117,7 +117,9 @@ impl Faulty {
     /// Returns the errors of a measurement with those that the faults add.
     pub(super) fn spoil(&self, errors: MeasurementErrors, streams: Option<&mut FaultStreams>) -> MeasurementErrors {
         let Some(FaultStreams { losses, noise }) = streams else { return errors };
-        let is_lost = errors.is_lost || losses.random::<f64>() < self.fault.dropout;
+        // Drawn in any case: whether the sensor itself loses the scan depends on the distance, which differs between two arms.
+        let drawn: f64 = losses.random();
+        let is_lost = errors.is_lost || drawn < self.fault.dropout;
         let [along, across, speed]: [f64; 3] = std::array::from_fn(|_| noise.sample(StandardNormal));
         let [along_m, across_m] = errors.position_m;
         let [along_sd_m, across_sd_m] = self.fault.noise_m;

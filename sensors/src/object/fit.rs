@@ -186,6 +186,12 @@ impl RearFit {
         format!("fit of {version} to the full chain of {scenario}, seed {seed}, {approaches} approaches of each point")
     }
 
+    /// Returns the distance up to which a vehicle is seen (m).
+    pub fn range_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> f64 {
+        let [range_m, _] = self.ranges_m(class, appearance, environment);
+        range_m
+    }
+
     /// Returns the distances up to which a vehicle is seen, and up to which its class is known (m).
     pub(super) fn ranges_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> [f64; 2] {
         let at = [appearance.paint_reflectivity, extinction_per_m(environment)];

@@ -165,7 +165,7 @@ impl ObjectSensor {
         };
         let is_seen = self.visibility.sees(&field, position, other, size) && !(has_faults && self.faulty.hides(other));
         let target = &mut self.targets[index];
-        let is_far = !self.visibility.is_within(target.errors.far_m, position);
+        let is_far = !self.visibility.is_within(target.errors.far_m * self.faulty.range_share(), position);
         let scan = Scan {
             is_far,
             lost: target.errors.losses.probability(self.step, is_far && target.is_confirmed()),
@@ -178,7 +178,7 @@ impl ObjectSensor {
             target.noise.skip();
             return None;
         }
-        // The errors are drawn whether the vehicle is seen or not: whether a fault draws depends on them.
+        // The errors are drawn whether the vehicle is seen or not, so that the faults' own draws stay in step with the scans.
         let errors = target.noise.draw(&target.errors, scan);
         let errors = self.faulty.spoil(errors, target.fault_streams.as_mut()).mirrored_for(side);
         let mount_m = 0.5 * size.length_m * self.direction.sign();
