@@ -11,7 +11,7 @@
 //! confirmed track, plus the distance that the object-level sensor itself needs to confirm a vehicle. A class range is the mean
 //! distance at which a confirmed track is first classified as a vehicle, plus the distance that the latency costs. It is a distance
 //! and no time, because the full chain recognises a vehicle in fog at nearly the same distance at all closing speeds. The errors of the
-//! measurements are those with which its tracks err as the full chain's do ([`errors`]).
+//! measurements are those with which its tracks err as the full chain's do.
 
 use std::collections::BTreeMap;
 
