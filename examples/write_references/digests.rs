@@ -1,7 +1,7 @@
 //! Digests of the outcomes of every scenario of the library, with true tracks and with object-level sensors.
 //!
-//! They say whether a change moves an outcome by a bit. They hold on machines whose mathematical functions give the same bits; the file
-//! names these functions by a digest of their own, see `docs/determinism.md`.
+//! They say whether a change moves an outcome by a bit. The mathematical functions have a digest of their own, so that it is seen if these
+//! are the cause, see `docs/determinism.md`.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -46,7 +46,7 @@ fn short(hasher: &blake3::Hasher) -> String {
     hasher.finalize().to_hex().chars().take(DIGITS).collect()
 }
 
-/// Returns the digest of the values of the functions that differ between C libraries and processors.
+/// Returns the digest of the values of the functions that would differ between C libraries and processors.
 ///
 /// The arguments cover the sizes at which the simulation calls them: angles, speeds, distances and probabilities.
 pub(crate) fn functions() -> String {

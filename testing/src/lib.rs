@@ -14,7 +14,6 @@
 //! | `data` | `CLOSECALL_DATA` names the folder of trajectory data |
 //! | `python` | `python3` is installed; for a comparison with Python's ONNX Runtime, `CLOSECALL_ONNXRUNTIME` lies in a Python environment that has it |
 //! | `browser` | Chromium or Google Chrome is installed |
-//! | `mathematics` | the C library's functions give the bits that `docs/determinism.json` names |
 //!
 //! ```no_run
 //! let Some(viewer) = closecall_testing::viewer() else { return };

@@ -18,14 +18,12 @@ pub enum Need {
     Python,
     /// A web browser without a window.
     Browser,
-    /// Mathematical functions that give the bits for which outcomes are stated.
-    Mathematics,
 }
 
 impl Need {
     /// All needs.
-    pub const ALL: [Self; 7] =
-        [Self::Viewer, Self::OnnxRuntime, Self::Display, Self::Data, Self::Python, Self::Browser, Self::Mathematics];
+    pub const ALL: [Self; 6] =
+        [Self::Viewer, Self::OnnxRuntime, Self::Display, Self::Data, Self::Python, Self::Browser];
 
     /// The word for this need in `CLOSECALL_REQUIRE` and in messages.
     pub const fn word(self) -> &'static str {
@@ -36,7 +34,6 @@ impl Need {
             Self::Data => "data",
             Self::Python => "python",
             Self::Browser => "browser",
-            Self::Mathematics => "mathematics",
         }
     }
 }

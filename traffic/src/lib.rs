@@ -2,7 +2,7 @@
 //!
 //! This crate defines every type that crosses a boundary between crates: time, identifiers, the road, vehicles and
 //! their states, recorded trajectories, the tracks that a sensor reports, the parameters of a scenario, and seeded
-//! random streams. It depends on none of the other crates.
+//! random streams. It depends on none of the other crates, except for the mathematical functions.
 //!
 //! # Conventions
 //!
@@ -51,6 +51,9 @@
 //! | - | cut-out | - / cut-out | A lane change out of the lane of the ego. UN R157 means the lead vehicle's; here it is mostly the rear vehicle's, to overtake. |
 //! | - | passing lane | - | The lane next to the ego in which a rear vehicle overtakes. |
 //! | - | road frame `s_m`, `d_m` | - | Position along the road, and across it to the left. |
+
+// Every program has the functions of this crate, because every one depends on `traffic`.
+use closecall_mathematics as _;
 
 mod absent;
 mod actor;
