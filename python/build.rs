@@ -5,7 +5,8 @@ use std::env;
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    if env::var("CARGO_CFG_TARGET_OS").is_ok_and(|system| system == "linux") {
-        println!("cargo::rustc-link-arg-cdylib=-Wl,-Bsymbolic-functions");
+    let is_apple = env::var("CARGO_CFG_TARGET_VENDOR").is_ok_and(|vendor| vendor == "apple");
+    if env::var_os("CARGO_CFG_UNIX").is_some() && !is_apple {
+        println!("cargo::rustc-link-arg-cdylib=-Wl,--exclude-libs,ALL");
     }
 }

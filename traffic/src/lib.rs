@@ -52,7 +52,7 @@
 //! | - | passing lane | - | The lane next to the ego in which a rear vehicle overtakes. |
 //! | - | road frame `s_m`, `d_m` | - | Position along the road, and across it to the left. |
 
-// Every program has the functions of this crate, because every one depends on `traffic`.
+// Links the mathematical functions into every program that simulates.
 use closecall_mathematics as _;
 
 mod absent;
