@@ -45,17 +45,13 @@ impl Dbscan {
         self.grid.build(points, radius);
         let mut clusters = 0;
         for (row, &point) in points.iter().enumerate() {
-            if self.labels[row].is_some() || !self.grid.has_within(point, radius, core_points) {
+            if self.labels[row].is_some() || !self.grid.take_if_core(point, radius, core_points, &mut self.reached) {
                 continue;
             }
-            self.grid.take_within(point, radius, &mut self.reached);
             while let Some(row) = self.reached.pop() {
                 // A point within the radius of a core point belongs to the cluster even if it is no core point.
                 self.labels[row as usize] = Some(clusters);
-                let point = points[row as usize];
-                if self.grid.has_within(point, radius, core_points) {
-                    self.grid.take_within(point, radius, &mut self.reached);
-                }
+                self.grid.take_if_core(points[row as usize], radius, core_points, &mut self.reached);
             }
             clusters += 1;
         }
@@ -63,13 +59,17 @@ impl Dbscan {
     }
 }
 
+/// Columns and rows of cells.
+type Span = [RangeInclusive<usize>; 2];
+
 /// A set of points, sorted into the square cells of a uniform grid.
 ///
 /// The search is exact. It is fast if the search range is about the size of a cell.
 #[derive(Clone, Debug, Default)]
 struct Grid {
     low: [f64; 2],
-    cell: f64,
+    /// Number of cells per unit of length.
+    per_unit: f64,
     size: [usize; 2],
     /// Index in `sorted` at which each cell begins, followed by the length of `sorted`.
     starts: Vec<u32>,
@@ -91,7 +91,7 @@ impl Grid {
             }
         }
         let extent = (high[0] - low[0]).max(high[1] - low[1]).max(0.0);
-        (self.low, self.cell, self.size) = (low, cell.max(extent / MAX_CELLS), [1; 2]);
+        (self.low, self.per_unit, self.size) = (low, 1.0 / cell.max(extent / MAX_CELLS), [1; 2]);
         self.size = [0, 1].map(|axis| self.cell_along(high[axis], axis, usize::MAX) + 1);
         self.starts.clear();
         self.starts.resize(self.size[0] * self.size[1] + 1, 0);
@@ -114,7 +114,7 @@ impl Grid {
     /// Returns the index of the cell along one axis, at most `max`.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, NaN gives 0, then clamped")]
     fn cell_along(&self, value: f64, axis: usize, max: usize) -> usize {
-        (((value - self.low[axis]) / self.cell) as usize).min(max)
+        (((value - self.low[axis]) * self.per_unit) as usize).min(max)
     }
 
     /// Returns the index of the cell that contains a point.
@@ -124,20 +124,30 @@ impl Grid {
     }
 
     /// Returns the columns and rows of the cells that may contain points within `range`.
-    fn span(&self, point: [f64; 2], range: f64) -> [RangeInclusive<usize>; 2] {
+    fn span(&self, point: [f64; 2], range: f64) -> Span {
         [0, 1].map(|axis| {
             let max = self.size[axis] - 1;
             self.cell_along(point[axis] - range, axis, max)..=self.cell_along(point[axis] + range, axis, max)
         })
     }
 
+    /// Appends to `taken` the rows of the points within `range` that no earlier call has taken, if there are at least `count` within
+    /// `range`. Returns whether there are.
+    fn take_if_core(&mut self, point: [f64; 2], range: f64, count: usize, taken: &mut Vec<u32>) -> bool {
+        let span = self.span(point, range);
+        let is_core = self.has_within(&span, point, range, count);
+        if is_core {
+            self.take_within(span, point, range, taken);
+        }
+        is_core
+    }
+
     /// Returns true if there are at least `count` points within `range`.
-    fn has_within(&self, point: [f64; 2], range: f64, count: usize) -> bool {
-        let [columns, rows] = self.span(point, range);
+    fn has_within(&self, [columns, rows]: &Span, point: [f64; 2], range: f64, count: usize) -> bool {
         // The own column first: it has most neighbours.
         let own = self.cell_along(point[0], 0, self.size[0] - 1);
         let mut found = 0;
-        for column in std::iter::once(own).chain(columns.filter(|&column| column != own)) {
+        for column in std::iter::once(own).chain(columns.clone().filter(|&column| column != own)) {
             let first = self.starts[column * self.size[1] + rows.start()] as usize;
             let end = self.starts[column * self.size[1] + rows.end() + 1] as usize;
             for (other, _) in &self.sorted[first..end] {
@@ -151,8 +161,7 @@ impl Grid {
     }
 
     /// Appends to `taken` the rows of the points within `range` that no earlier call has taken.
-    fn take_within(&mut self, point: [f64; 2], range: f64, taken: &mut Vec<u32>) {
-        let [columns, rows] = self.span(point, range);
+    fn take_within(&mut self, [columns, rows]: Span, point: [f64; 2], range: f64, taken: &mut Vec<u32>) {
         for column in columns {
             for cell in column * self.size[1] + rows.start()..=column * self.size[1] + rows.end() {
                 let (mut next, mut end) = (self.starts[cell] as usize, self.free_ends[cell]);

@@ -167,8 +167,7 @@ pub(crate) fn cast_ground(
         }
         hits.ground_below = layer + 1;
         if hits.is_tested(layer) {
-            let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevation.tan };
-            hits.intersect(layer, &subrays, GROUND_FACES, targets);
+            hits.intersect(layer, &SubRays::new(column, elevation), GROUND_FACES, targets);
         } else if omitted
             .is_some_and(|bare| bare.is_ground(column.centre[group], elevation.centre, per_distance * elevation.cos[0]))
         {

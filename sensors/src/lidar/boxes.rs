@@ -245,6 +245,10 @@ impl LargestValues {
     /// Inserts a value. `rank` selects the value that is wanted: 0 for the largest, 5 at most.
     fn insert(&mut self, value: f64, rank: usize) {
         self.rank = rank.min(Self::CAPACITY - 1);
+        // Most values are less than all that are kept.
+        if !(value > self.values[self.rank]) {
+            return;
+        }
         let mut value = value;
         for slot in &mut self.values[..=self.rank] {
             if value > *slot {

@@ -1,11 +1,12 @@
 //! The ray cast: finds the face that each sub-ray hits first.
 //!
-//! A face is given by the vector m of [`targets`](super::targets), a direction by the vector d. Within a column the
-//! sub-rays of a group that lie above each other share cos φ and sin φ. The product m·d is then a constant plus
-//! m_z·tan(θ): two operations for each of the eight sub-rays of a beam, which run side by side in vector registers.
+//! A face is given by the vector m of [`targets`](super::targets), a direction by the vector d. The eight sub-rays of a beam lie side by
+//! side in the lanes of vector registers, and the product m·d takes three multiplications and two additions for all of them.
 //!
 //! The columns and layers that can hit a solid follow from its bounds, and only these are tried. `by_brute_force` tries
 //! all of them, and a property test requires the same result to the bit.
+
+use wide::f32x8;
 
 use super::pattern::{Column, Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::targets::{FaceRange, Part, Targets};
@@ -16,7 +17,8 @@ pub(crate) const NO_FACE: u32 = u32::MAX;
 /// The first hits of the sub-rays of a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BeamHits {
-    /// Inverse of the horizontal distance of each hit (1/m), or 0 if the sub-ray hits nothing.
+    /// Inverse of the horizontal distance of each hit (1/m), or 0 if the sub-ray hits nothing. Sub-rays of the same height, whose ranges are
+    /// most alike, have successive indices.
     pub(crate) inverse: [f32; SUBRAYS],
     /// Index of the face that each sub-ray hits, or [`NO_FACE`].
     pub(crate) face: [u32; SUBRAYS],
@@ -73,9 +75,7 @@ impl ColumnHits {
     /// Intersects the beams of a column with a solid.
     pub(crate) fn cast(&mut self, column: &Column, elevations: &[Elevation], part: &Part, targets: &Targets) {
         for layer in part.layers.clone() {
-            let group = elevations[layer].group;
-            let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
-            self.intersect(layer, &subrays, part.faces, targets);
+            self.intersect(layer, &SubRays::new(column, &elevations[layer]), part.faces, targets);
         }
     }
 
@@ -87,62 +87,65 @@ impl ColumnHits {
     }
 }
 
-/// Returns the position (across, upward) of a sub-ray in the footprint. Sub-rays of the same height, whose ranges are
-/// most alike, have successive indices.
-#[inline(always)]
-pub(crate) const fn subray_position(subray: usize) -> (usize, usize) {
-    (subray % SUBRAY_COLUMNS, subray / SUBRAY_COLUMNS)
-}
-
-/// The directions of the sub-rays of a beam.
+/// The directions of the sub-rays of a beam, in the lanes of vector registers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SubRays {
     /// Cosines of the azimuths.
-    pub(crate) cos: [f32; SUBRAY_COLUMNS],
+    cos: f32x8,
     /// Sines of the azimuths.
-    pub(crate) sin: [f32; SUBRAY_COLUMNS],
+    sin: f32x8,
     /// Tangents of the elevations.
-    pub(crate) tan: [f32; SUBRAY_ROWS],
+    tan: f32x8,
+}
+
+/// Spreads the values of the sub-rays' columns over the lanes.
+#[inline(always)]
+fn of_columns([a, b]: [f32; SUBRAY_COLUMNS]) -> f32x8 {
+    f32x8::new([a, b, a, b, a, b, a, b])
+}
+
+/// Spreads the values of the sub-rays' rows over the lanes.
+#[inline(always)]
+pub(crate) fn of_rows([a, b, c, d]: [f32; SUBRAY_ROWS]) -> f32x8 {
+    f32x8::new([a, a, b, b, c, c, d, d])
 }
 
 impl SubRays {
+    /// Returns the directions of the beam of a layer.
+    #[inline(always)]
+    pub(crate) fn new(column: &Column, elevation: &Elevation) -> Self {
+        let group = elevation.group;
+        Self { cos: of_columns(column.cos[group]), sin: of_columns(column.sin[group]), tan: of_rows(elevation.tan) }
+    }
+
     /// Returns the inverse horizontal distance m·d at which each sub-ray meets the plane of a face (1/m).
     #[inline(always)]
-    pub(crate) fn inverse_distances(&self, inverse: [f32; 3]) -> [f32; SUBRAYS] {
-        let horizontal: [f32; SUBRAY_COLUMNS] =
-            std::array::from_fn(|across| inverse[0] * self.cos[across] + inverse[1] * self.sin[across]);
-        std::array::from_fn(|subray| {
-            let (across, upward) = subray_position(subray);
-            horizontal[across] + inverse[2] * self.tan[upward]
-        })
+    fn inverse_distances(&self, [x, y, z]: [f32; 3]) -> f32x8 {
+        f32x8::splat(x) * self.cos + f32x8::splat(y) * self.sin + f32x8::splat(z) * self.tan
     }
 
     /// Replaces the hits of those sub-rays that meet this solid at a shorter distance. At equal distance the earlier
     /// hit stays.
+    ///
+    /// Indices of faces are selected as the bits of floats, by the masks of the distances.
     #[inline(always)]
     fn intersect(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
-        let mut nearest = [f32::INFINITY; SUBRAYS];
-        let mut nearest_face = [NO_FACE; SUBRAYS];
+        let mut nearest = f32x8::splat(f32::INFINITY);
+        let mut nearest_face = f32x8::splat(f32::from_bits(NO_FACE));
         for (face, index) in targets.faces[faces.front_facing()].iter().zip(faces.first..) {
             let planes = self.inverse_distances(face.inverse);
-            for subray in 0..SUBRAYS {
-                nearest_face[subray] = if planes[subray] < nearest[subray] { index } else { nearest_face[subray] };
-                nearest[subray] = if planes[subray] < nearest[subray] { planes[subray] } else { nearest[subray] };
-            }
+            nearest_face = planes.simd_lt(nearest).bitselect(f32x8::splat(f32::from_bits(index)), nearest_face);
+            nearest = planes.fast_min(nearest);
         }
-        let mut entered_after = [0.0_f32; SUBRAYS];
+        let mut entered_after = f32x8::ZERO;
         for face in &targets.faces[faces.back_facing()] {
-            let planes = self.inverse_distances(face.inverse);
-            for subray in 0..SUBRAYS {
-                entered_after[subray] =
-                    if planes[subray] > entered_after[subray] { planes[subray] } else { entered_after[subray] };
-            }
+            entered_after = self.inverse_distances(face.inverse).fast_max(entered_after);
         }
-        for subray in 0..SUBRAYS {
-            let is_nearer = nearest[subray] > entered_after[subray] && nearest[subray] > hits.inverse[subray];
-            hits.inverse[subray] = if is_nearer { nearest[subray] } else { hits.inverse[subray] };
-            hits.face[subray] = if is_nearer { nearest_face[subray] } else { hits.face[subray] };
-        }
+        let earlier = f32x8::new(hits.inverse);
+        let is_hit = nearest.simd_gt(entered_after) & nearest.simd_gt(earlier);
+        hits.inverse = is_hit.bitselect(nearest, earlier).to_array();
+        let face = f32x8::new(hits.face.map(f32::from_bits));
+        hits.face = is_hit.bitselect(nearest_face, face).to_array().map(f32::to_bits);
     }
 }
 

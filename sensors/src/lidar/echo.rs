@@ -3,7 +3,11 @@
 //! Sub-rays that end within the length of one pulse add up to one echo. Its power is the sum of their contributions. A
 //! beam that is split by an edge, or spread over the road at a grazing angle, gives several weaker echoes.
 
-use super::cast::{BeamHits, NO_FACE, subray_position};
+use std::ops::Mul;
+
+use wide::f32x8;
+
+use super::cast::{BeamHits, NO_FACE, of_rows};
 use super::pattern::{Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::power::LinkBudget;
 use super::targets::Face;
@@ -38,51 +42,66 @@ impl Echoes {
         &self.list[..self.count]
     }
 
-    /// Returns the echoes of the faces that the sub-rays hit.
-    pub(crate) fn of(hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &LinkBudget) -> Self {
-        let mut subray_echoes = [Echo::default(); SUBRAYS];
-        let (mut nearest, mut farthest) = (f32::INFINITY, 0.0_f32);
-        for (subray, echo) in subray_echoes.iter_mut().enumerate() {
-            let face = hits.face[subray];
-            if face != NO_FACE {
-                let strength = SHARE * link.gain_m2 * faces[face as usize].strength_m;
-                *echo = subray_echo(hits.inverse[subray] * elevation.cos[subray_position(subray).1], strength, face);
-                nearest = nearest.min(echo.range_m);
-                farthest = farthest.max(echo.range_m);
-            }
-        }
-        let mut echoes = Self::NONE;
-        // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to the sums.
-        if farthest <= nearest + PULSE_M {
-            if farthest > 0.0 {
-                echoes.list[0] = sum(&subray_echoes);
-                echoes.count = 1;
-            }
-            return echoes;
-        }
-        for echo in subray_echoes.into_iter().filter(|echo| echo.range_m > 0.0) {
-            echoes.insert(echo);
-        }
-        echoes.merged()
+    /// Removes all echoes.
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
     }
 
-    /// Returns the echoes of a beam that hits only the road, which is face 0.
+    /// Replaces the echoes by those of the faces that the sub-rays hit.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &LinkBudget) {
+        let gain_m2 = SHARE * link.gain_m2;
+        let mut strength = [0.0; SUBRAYS];
+        for (strength, &face) in strength.iter_mut().zip(&hits.face) {
+            if face != NO_FACE {
+                *strength = gain_m2 * faces[face as usize].strength_m;
+            }
+        }
+        let per_range = f32x8::new(hits.inverse) * of_rows(elevation.cos);
+        let (range_m, power) = (1.0 / per_range, received_power(per_range, f32x8::new(strength)));
+        // A sub-ray that hits nothing has an infinite range, and no power.
+        let reached_m = range_m.simd_lt(f32x8::splat(f32::INFINITY)).bitselect(range_m, f32x8::ZERO);
+        let [range_m, reached_m, power] = [range_m, reached_m, power].map(f32x8::to_array);
+        let nearest_m =
+            range_m.into_iter().fold(f32::INFINITY, |least, range_m| if range_m < least { range_m } else { least });
+        let farthest_m = reached_m.into_iter().fold(0.0, |most, range_m| if range_m > most { range_m } else { most });
+        self.count = 0;
+        // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to the sums.
+        if farthest_m <= nearest_m + PULSE_M {
+            if farthest_m > 0.0 {
+                self.list[0] = sum((0..SUBRAYS).map(|subray| Echo {
+                    range_m: reached_m[subray],
+                    power: power[subray],
+                    face: hits.face[subray],
+                }));
+                self.count = 1;
+            }
+            return;
+        }
+        for subray in (0..SUBRAYS).filter(|&subray| reached_m[subray] > 0.0) {
+            self.insert(Echo { range_m: reached_m[subray], power: power[subray], face: hits.face[subray] });
+        }
+        self.merge();
+    }
+
+    /// Replaces the echoes by those of a beam that hits only the road, which is face 0.
     ///
     /// The two columns of sub-rays count as equal. A higher sub-ray hits the road farther away, so the echoes are
     /// already in order of range.
-    pub(crate) fn of_ground([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &LinkBudget) -> Self {
+    pub(crate) fn set_ground(&mut self, [cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &LinkBudget) {
         let strength = SUBRAY_COLUMNS as f32 * SHARE * link.gain_m2 * ground.strength_m;
         let level = ground.inverse[0] * cos + ground.inverse[1] * sin;
-        let mut met = Self::NONE;
+        self.count = 0;
         for upward in 0..SUBRAY_ROWS {
             let inverse = level + ground.inverse[2] * elevation.tan[upward];
             if !(inverse > 0.0) {
                 break;
             }
-            met.list[upward] = subray_echo(inverse * elevation.cos[upward], strength, 0);
-            met.count = upward + 1;
+            let per_range = inverse * elevation.cos[upward];
+            self.list[upward] = Echo { range_m: 1.0 / per_range, power: received_power(per_range, strength), face: 0 };
+            self.count = upward + 1;
         }
-        met.merged()
+        self.merge();
     }
 
     /// Inserts an echo in order of range. There are at most eight, and they mostly arrive in order.
@@ -99,42 +118,41 @@ impl Echoes {
 
     /// Merges each echo with those that follow it within the length of one pulse.
     #[inline(always)]
-    fn merged(mut self) -> Self {
+    fn merge(&mut self) {
         let (mut from, mut echoes) = (0, 0);
         while from < self.count {
             let end_m = self.list[from].range_m + PULSE_M;
             let within = self.list[from..self.count].iter().take_while(|echo| echo.range_m <= end_m).count();
-            self.list[echoes] = sum(&self.list[from..from + within]);
+            self.list[echoes] = sum(self.list[from..from + within].iter().copied());
             echoes += 1;
             from += within;
         }
         self.count = echoes;
-        self
     }
 }
 
-/// Returns the sum of several echoes as one echo.
+/// Returns the sum of several echoes as one echo. One without a range adds nothing.
 #[inline(always)]
-fn sum(parts: &[Echo]) -> Echo {
+fn sum(parts: impl Iterator<Item = Echo>) -> Echo {
     let (mut power, mut moment, mut strongest) = (0.0, 0.0, Echo::default());
     for part in parts {
         power += part.power;
         moment += part.power * part.range_m;
-        if part.power >= strongest.power && part.range_m > 0.0 {
-            strongest = *part;
+        if (part.power >= strongest.power) & (part.range_m > 0.0) {
+            strongest = part;
         }
     }
     let range_m = if power > 0.0 { moment / power } else { strongest.range_m };
     Echo { range_m, power, face: strongest.face }
 }
 
-/// Returns the echo of a single sub-ray at the inverse range `per_range` (1/m).
+/// Returns the power that is received from sub-rays at the inverse range `per_range` (1/m).
 ///
-/// Its power is `strength` (thresholds · m³) over the third power of the range: two powers for the spreading of the
-/// light, and one because cos γ is the distance of the face's plane over the range.
+/// It is `strength` (thresholds · m³) over the third power of the range: two powers for the spreading of the light, and
+/// one because cos γ is the distance of the face's plane over the range.
 #[inline(always)]
-fn subray_echo(per_range: f32, strength: f32, face: u32) -> Echo {
-    Echo { range_m: 1.0 / per_range, power: strength * per_range * per_range * per_range, face }
+fn received_power<T: Copy + Mul<Output = T>>(per_range: T, strength: T) -> T {
+    strength * per_range * per_range * per_range
 }
 
 #[cfg(test)]
@@ -158,7 +176,8 @@ mod tests {
         let level = Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         // At 10 m each sub-ray contributes 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
-        let found = Echoes::of(&hits, &level, &[face(10.0)], &link);
+        let mut found = Echoes::NONE;
+        found.set(&hits, &level, &[face(10.0)], &link);
         let unit = link.gain_m2 / 100.0;
         found.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
     }

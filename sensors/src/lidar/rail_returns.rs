@@ -14,9 +14,11 @@
 //! A pulse that meets the rail and the road in front of it gives a point between them. The beam must then be higher than the
 //! rail's lower edge, which it is not up to [`narrow_to_m`].
 
+use wide::f32x8;
+
 use super::echo::PULSE_M;
 use super::noise::MAX_NORMAL;
-use super::pattern::{Column, Elevation};
+use super::pattern::{Column, Elevation, GROUPS, SUBRAY_COLUMNS};
 use super::power::LinkBudget;
 use super::receiver::SensorPoseEstimate;
 use super::targets::{Part, Targets};
@@ -113,10 +115,13 @@ fn is_guard_rail(part: &Part, targets: &Targets) -> bool {
 ///
 /// A ray meets a convex solid at the least inverse distance of its front-facing faces, which is not above that of any of them.
 fn greatest_inverse(column: &Column, tans: [f32; 2], part: &Part, targets: &Targets) -> f32 {
-    let azimuths = || column.cos.as_flattened().iter().zip(column.sin.as_flattened());
+    let lanes =
+        |[[a, b], [c, d], [e, f], [g, h]]: [[f32; SUBRAY_COLUMNS]; GROUPS]| f32x8::new([a, b, c, d, e, f, g, h]);
+    let (cos, sin) = (lanes(column.cos), lanes(column.sin));
     let of_face = |[x, y, z]: [f32; 3]| {
         let upward = (z * tans[0]).max(z * tans[1]);
-        azimuths().map(|(cos, sin)| x * cos + y * sin + upward).fold(f32::NEG_INFINITY, f32::max)
+        let inverse = f32x8::splat(x) * cos + f32x8::splat(y) * sin + f32x8::splat(upward);
+        inverse.to_array().into_iter().fold(f32::NEG_INFINITY, f32::max)
     };
     let faces = &targets.faces[part.faces.front_facing()];
     faces.iter().map(|face| of_face(face.inverse)).fold(f32::INFINITY, f32::min).max(0.0)

@@ -150,6 +150,7 @@ impl Receiver<'_> {
     /// Appends the detected returns of this column to the scan and to its ground truth.
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
+        let mut echoes = Echoes::NONE;
         for (layer, elevation) in self.elevations.iter().enumerate() {
             let needs_echoes = hits.needs_echoes(layer);
             let droplets =
@@ -157,23 +158,21 @@ impl Receiver<'_> {
             if !needs_echoes && !droplets.is_some_and(|droplets| droplets.is_detectable()) {
                 continue;
             }
-            let echoes = if hits.is_tested(layer) {
-                Echoes::of(&hits.beams[layer], elevation, &self.targets.faces, self.link)
+            if hits.is_tested(layer) {
+                echoes.set(&hits.beams[layer], elevation, &self.targets.faces, self.link);
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[elevation.group];
-                Echoes::of_ground(centre, elevation, &self.targets.faces[0], self.link)
+                echoes.set_ground(centre, elevation, &self.targets.faces[0], self.link);
             } else {
-                Echoes::NONE
-            };
-            let found = match droplets {
+                echoes.clear();
+            }
+            let into = (&mut *scan, &mut *truth);
+            match droplets {
                 Some(droplets) => {
                     let transmission = |range_m| droplets.transmission(range_m);
-                    self.detect(layer, echoes.as_slice(), transmission, droplets.echo)
+                    self.detect(layer, (echoes.as_slice(), droplets.echo), transmission, into);
                 }
-                None => self.detect(layer, echoes.as_slice(), |_| 1.0, None),
-            };
-            for found in found.into_iter().flatten() {
-                self.append(layer, &found, scan, truth);
+                None => self.detect(layer, (echoes.as_slice(), None), |_| 1.0, into),
             }
         }
     }
@@ -214,16 +213,16 @@ impl Receiver<'_> {
         counts
     }
 
-    /// Returns the first and the last detected return. The second is `None` if there is only one.
+    /// Appends the first and the last detected return of a beam to the scan and to its ground truth.
+    #[inline(always)]
     fn detect(
         &self,
         layer: usize,
-        echoes: &[Echo],
+        (echoes, soft): (&[Echo], Option<SoftEcho>),
         transmission: impl Fn(f32) -> f32,
-        soft: Option<SoftEcho>,
-    ) -> [Option<DetectedReturn>; 2] {
+        (scan, truth): (&mut LidarScan, &mut ScanTruth),
+    ) {
         let beam = self.column_index * self.elevations.len() + layer;
-        let mut found = [None, None];
         let before_hard = |soft: &SoftEcho| echoes.first().is_none_or(|echo| soft.range_m < echo.range_m);
         let soft = soft.filter(before_hard).map(|soft| PotentialReturn {
             range_m: soft.range_m,
@@ -240,16 +239,19 @@ impl Receiver<'_> {
             let power = echo.power * through;
             PotentialReturn { range_m: echo.range_m, power, source: face.source, material: face.material }
         });
+        let (mut is_first, mut last) = (true, None);
         for (index, potential) in soft.into_iter().chain(hard).enumerate() {
-            if let Some(detected) = self.detect_one(index * self.beams + beam, potential) {
-                if found[0].is_none() {
-                    found[0] = Some(detected);
-                } else {
-                    found[1] = Some(detected);
-                }
+            let Some(detected) = self.detect_one(index * self.beams + beam, potential) else { continue };
+            if is_first {
+                self.append(layer, &detected, scan, truth);
+                is_first = false;
+            } else {
+                last = Some(detected);
             }
         }
-        found
+        if let Some(detected) = last {
+            self.append(layer, &detected, scan, truth);
+        }
     }
 
     /// Returns the measurement if the power with noise exceeds the threshold and the return is not dropped.
@@ -258,7 +260,8 @@ impl Receiver<'_> {
             return None;
         }
         let measured_power = potential.power + self.noise.normal(address, Purpose::Detection) / THRESHOLD_OVER_NOISE;
-        if !(measured_power > 1.0) || self.noise.uniform(address, Purpose::Dropout) < self.dropout {
+        let is_dropped = || self.dropout > 0.0 && self.noise.uniform(address, Purpose::Dropout) < self.dropout;
+        if !(measured_power > 1.0) || is_dropped() {
             return None;
         }
         let error = self.link.range_sd_m(measured_power) * self.noise.normal(address, Purpose::Range);

@@ -206,7 +206,7 @@ impl Bounds {
             corners.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
         };
         let [bottom, top] = fold(|corner| corner.z);
-        let far = fold(|corner| corner.x.hypot(corner.y))[1];
+        let far = fold(|corner| corner.x * corner.x + corner.y * corner.y)[1].sqrt();
         let near = (distance_m(solid, pose) * DISTANCE_MARGIN).max(MIN_DISTANCE_M);
         let above = |z: f64, near_m: f64, far_m: f64| (z / if z > 0.0 { near_m } else { far_m }).atan().to_degrees();
         // The azimuth jumps by 360° if the solid crosses the half-plane y = 0, x ≤ 0, which extends forward from the
@@ -215,12 +215,27 @@ impl Bounds {
             let [min_y, max_y] = fold(|corner| corner.y);
             min_y <= 0.0 && max_y >= 0.0
         };
-        let azimuth = if crosses { [-180.0, 180.0] } else { fold(|corner| corner.y.atan2(corner.x).to_degrees()) };
+        let azimuth = if crosses { [-180.0, 180.0] } else { azimuths_deg(&corners) };
         Self {
             azimuth_deg: [azimuth[0] - BOUND_MARGIN_DEG, azimuth[1] + BOUND_MARGIN_DEG],
             elevation_deg: [above(bottom, far, near) - BOUND_MARGIN_DEG, above(top, near, far) + BOUND_MARGIN_DEG],
         }
     }
+}
+
+/// Returns the least and the greatest azimuth of the corners of a box (°), which must lie within a half-plane as seen from the sensor.
+fn azimuths_deg(corners: &[Point3<f64>; 8]) -> [f64; 2] {
+    let [mut least, mut greatest] = [corners[0]; 2];
+    for corner in corners {
+        let turn_from = |of: Point3<f64>| of.x * corner.y - of.y * corner.x;
+        if turn_from(least) < 0.0 {
+            least = *corner;
+        }
+        if turn_from(greatest) > 0.0 {
+            greatest = *corner;
+        }
+    }
+    [least, greatest].map(|corner| corner.y.atan2(corner.x).to_degrees())
 }
 
 fn corners(solid: &Solid) -> [Point3<f64>; 8] {
@@ -235,4 +250,36 @@ fn distance_m(solid: &Solid, pose: &Isometry3<f64>) -> f64 {
     let sensor = pose.inverse() * Point3::origin();
     let beyond = |axis: usize| (solid.low[axis] - sensor[axis]).max(sensor[axis] - solid.high[axis]).max(0.0);
     beyond(0).hypot(beyond(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Translation3, UnitQuaternion};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn the_azimuths_of_a_box_are_those_of_its_outermost_corners(
+            at in prop::array::uniform3(-60.0..60.0), half in prop::array::uniform3(0.05..20.0), yaw_rad in -3.2..3.2,
+        ) {
+            let high: [f64; 3] = half;
+            let solid = Solid::cuboid(high.map(|end| -end), high, Material::Paint);
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+            let pose = Isometry3::from_parts(Translation3::from(at), turn);
+            let corners = corners(&solid).map(|corner| pose * corner);
+            let azimuths = corners.map(|corner| corner.y.atan2(corner.x).to_degrees());
+            let fold = |pick: fn(f64, f64) -> f64| azimuths.into_iter().reduce(pick).unwrap();
+            let ends = [fold(f64::min), fold(f64::max)];
+            // A box around the sensor, or one across the half-plane ahead of it, has all azimuths.
+            let is_around = distance_m(&solid, &pose) == 0.0;
+            if !is_around && ends[1] - ends[0] < 180.0 {
+                let found = azimuths_deg(&corners);
+                prop_assert!((found[0] - ends[0]).abs() < 1e-9 && (found[1] - ends[1]).abs() < 1e-9, "{found:?} {ends:?}");
+            } else if !is_around {
+                prop_assert!(Bounds::of(&solid, &pose).azimuth_deg[1] > 180.0);
+            }
+        }
+    }
 }

@@ -1,6 +1,6 @@
 use super::super::cast::NO_FACE;
 use super::super::cast::by_brute_force;
-use super::super::pattern::{Column, Elevation, SUBRAY_ROWS, SUBRAYS};
+use super::super::pattern::{Column, Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::*;
 
 /// Maximum relative difference between a distance in single and in double precision.
@@ -69,7 +69,7 @@ impl Scanner {
         let hits = &self.hits.beams[layer];
         let mut counts = [0; 2];
         for subray in 0..SUBRAYS {
-            let (across, upward) = super::super::cast::subray_position(subray);
+            let (across, upward) = (subray % SUBRAY_COLUMNS, subray / SUBRAY_COLUMNS);
             assert!(upward < SUBRAY_ROWS);
             let direction = [column.cos[group][across], column.sin[group][across], elevations[layer].tan[upward]];
             let exact = self.nearest_m(direction.map(f64::from));
