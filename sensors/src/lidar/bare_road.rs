@@ -15,6 +15,8 @@
 //! If the nearest possible point counts as ground, all points of the beam do. The noise is addressed by beam, so that
 //! leaving out a beam changes no other one.
 
+use fearless_simd::Simd;
+
 use super::cast::{ColumnHits, SubRays};
 use super::ground::{GROUND_M, GROUND_SLOPE};
 use super::noise::MAX_NORMAL;
@@ -68,6 +70,7 @@ impl BareRoad {
     /// road. False if the uppermost of the tested layers may give a point, too: the layers above it are not tested.
     ///
     /// Written without branches, so that the layers are tested side by side in vector registers.
+    #[inline(always)]
     pub(crate) fn covers(&self, lines: &CentreLines, road: &Road) -> bool {
         if self.pose.is_turned() { self.covers_as::<true>(lines, road) } else { self.covers_as::<false>(lines, road) }
     }
@@ -89,6 +92,7 @@ impl BareRoad {
     }
 
     /// Returns [`BareRoad::counts_as_ground`] for this sensor.
+    #[inline(always)]
     fn is_ground(&self, azimuth: [f32; 2], elevation: [f32; 2], per_range: f32) -> bool {
         match self.pose.is_turned() {
             true => self.counts_as_ground::<true>(azimuth, elevation, per_range),
@@ -151,9 +155,10 @@ impl Road {
 /// The layers are tried from the lowest up to the first whose return would be too weak to be detected. Beams that may
 /// also hit a solid are intersected with the road here. For the others the receiver computes the return directly, since
 /// the road, with nothing below it, occludes nothing; `omitted` decides which of these returns are left out.
-pub(crate) fn cast_ground(
-    column: &Column,
-    elevations: &[Elevation],
+#[inline(always)]
+pub(crate) fn cast_ground<S: Simd>(
+    simd: S,
+    (column, elevations): (&Column, &[Elevation]),
     (targets, road): (&Targets, &Road),
     omitted: Option<&BareRoad>,
     hits: &mut ColumnHits,
@@ -167,7 +172,7 @@ pub(crate) fn cast_ground(
         }
         hits.ground_below = layer + 1;
         if hits.is_tested(layer) {
-            hits.intersect(layer, &SubRays::new(column, elevation), GROUND_FACES, targets);
+            hits.intersect(layer, &SubRays::new(simd, column, elevation), GROUND_FACES, targets);
         } else if omitted
             .is_some_and(|bare| bare.is_ground(column.centre[group], elevation.centre, per_distance * elevation.cos[0]))
         {

@@ -26,6 +26,8 @@ const EDGE_COLUMNS: usize = 4;
 const POINTS_PER_STRAY: usize = 20;
 /// Depth within which points count as lying on the front face (m).
 const FACE_DEPTH_M: f64 = 0.2;
+/// Margin for rounding (m).
+const ROUNDING_M: f64 = 1e-6;
 /// Length of the visible side from which the heading is refined (m).
 const REFINE_LENGTH_M: f64 = 2.5;
 /// Number of points from which the heading is refined.
@@ -96,20 +98,22 @@ pub(crate) struct BoxFit {
 impl BoxFit {
     /// Fits a box to the points of a cluster. `members` are their indices in the scan, at least one.
     pub(crate) fn new(members: &[u32], scan: &LidarScan, lane: &LaneGeometry) -> Self {
-        let mean_x = mean(members, &scan.x_m);
+        let (empty, mean_x) = Self::without_extent(members, scan);
         let road_rad = lane.direction_rad(mean_x);
-        let mut fit = Self::with_heading(road_rad, members, scan);
-        let side_seen = fit.front_u_m - fit.rear_u_m > REFINE_LENGTH_M;
-        if side_seen && members.len() >= REFINE_POINTS {
-            fit = Self::with_heading(refined_heading_rad(road_rad, members, scan), members, scan);
+        let refined = || empty.with_heading(refined_heading_rad(road_rad, members, scan), members, scan);
+        let has_many = members.len() >= REFINE_POINTS;
+        if has_many && has_long_side(road_rad, members, scan) {
+            return refined();
         }
-        fit
+        let fit = empty.with_heading(road_rad, members, scan);
+        let side_seen = fit.front_u_m - fit.rear_u_m > REFINE_LENGTH_M;
+        if side_seen && has_many { refined() } else { fit }
     }
 
-    /// Returns the box with a given heading.
-    fn with_heading(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
+    /// Returns the box with a given heading, from the values that do not depend on it.
+    fn with_heading(self, heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
         let (sin, cos) = heading_rad.sin_cos();
-        let mut fit = Self::without_extent(heading_rad, members, scan);
+        let mut fit = Self { heading_rad, ..self };
         let (sensor_x, sensor_y) = (f64::from(scan.sensor_x_m), f64::from(scan.sensor_y_m));
         let mut nearest = LargestValues::default();
         let (mut far, mut squares) = (f64::INFINITY, f64::INFINITY);
@@ -118,18 +122,18 @@ impl BoxFit {
             let [x, y, z] = point(scan, member);
             let (u, v) = (x * cos + y * sin, y * cos - x * sin);
             nearest.insert(u, members.len() / POINTS_PER_STRAY);
-            far = far.min(u);
-            fit.across_m = [fit.across_m[0].min(v), fit.across_m[1].max(v)];
+            far = lesser(far, u);
+            fit.across_m = [lesser(fit.across_m[0], v), greater(fit.across_m[1], v)];
             if scan.intensity[member as usize] >= MAX_INTENSITY {
                 let [right, left] = fit.plate_m.unwrap_or([v; 2]);
                 fit.plate_m = Some([right.min(v), left.max(v)]);
             }
-            fit.top_m = fit.top_m.max(z);
-            fit.bottom_m = fit.bottom_m.min(z);
+            fit.top_m = greater(fit.top_m, z);
+            fit.bottom_m = lesser(fit.bottom_m, z);
             // All points are behind the sensor, so the slope increases with the azimuth.
             let slope = (y - sensor_y) / (sensor_x - x);
-            slopes = [slopes[0].min(slope), slopes[1].max(slope)];
-            squares = squares.min((sensor_x - x).powi(2) + (y - sensor_y) * (y - sensor_y));
+            slopes = [lesser(slopes[0], slope), greater(slopes[1], slope)];
+            squares = lesser(squares, (sensor_x - x).powi(2) + (y - sensor_y) * (y - sensor_y));
         }
         fit.azimuth_rad = slopes.map(f64::atan);
         fit.rear_u_m = far;
@@ -146,11 +150,20 @@ impl BoxFit {
         fit
     }
 
-    /// Returns a fit whose extents are empty, with the values that do not depend on the heading.
-    fn without_extent(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
-        let offsets = members.iter().map(|&member| f64::from(scan.offset_ns[member as usize]));
-        Self {
-            heading_rad,
+    /// Returns a fit whose extents are empty, with the values that do not depend on the heading, and the mean of x (m).
+    fn without_extent(members: &[u32], scan: &LidarScan) -> (Self, f64) {
+        let (mut x_m, mut intensity, mut offset_ns) = (0.0, 0.0, 0.0);
+        let mut beams = [u16::MAX, 0];
+        for &member in members {
+            let index = member as usize;
+            x_m += f64::from(scan.x_m[index]);
+            intensity += f64::from(scan.intensity[index]);
+            offset_ns += f64::from(scan.offset_ns[index]);
+            beams = [beams[0].min(scan.beam[index]), beams[1].max(scan.beam[index])];
+        }
+        let count = members.len() as f64;
+        let empty = Self {
+            heading_rad: 0.0,
             front_u_m: 0.0,
             rear_u_m: 0.0,
             across_m: [f64::INFINITY, f64::NEG_INFINITY],
@@ -158,10 +171,10 @@ impl BoxFit {
             top_m: f64::NEG_INFINITY,
             bottom_m: f64::INFINITY,
             front_bottom_m: f64::INFINITY,
-            intensity: mean(members, &scan.intensity),
+            intensity: intensity / count,
             points: members.len(),
             front_points: 0,
-            offset_ns: offsets.sum::<f64>() / members.len() as f64,
+            offset_ns: offset_ns / count,
             range_m: 0.0,
             spacing_m: 0.0,
             in_view_m: 0.0,
@@ -169,8 +182,9 @@ impl BoxFit {
             vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad],
             azimuth_rad: [0.0; 2],
             sensor_y_m: scan.sensor_y_m.into(),
-            truncated: truncated_edges(members, scan),
-        }
+            truncated: truncated_edges(beams, scan),
+        };
+        (empty, x_m / count)
     }
 
     /// Sets the front face to the mean position of the points on it.
@@ -217,13 +231,27 @@ impl BoxFit {
     }
 }
 
-/// Returns whether any point comes from the outermost columns on the ego's right, and on its left. The sweep begins on
-/// the left.
-fn truncated_edges(members: &[u32], scan: &LidarScan) -> [bool; 2] {
+/// Returns whether the first and the last of these beams are in the outermost columns: on the ego's right, and on its left. The sweep
+/// begins on the left.
+fn truncated_edges(beams: [u16; 2], scan: &LidarScan) -> [bool; 2] {
     let Resolution { columns: count, layers, .. } = scan.resolution;
-    let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / layers);
-    let (first, last) = columns.fold((count, 0), |(first, last), column| (first.min(column), last.max(column)));
+    let [first, last] = beams.map(|beam| usize::from(beam) / layers);
     [last + EDGE_COLUMNS >= count, first < EDGE_COLUMNS]
+}
+
+/// Returns true if the points surely extend over more than [`REFINE_LENGTH_M`] behind the front face, for this heading. The front
+/// face is at most [`FACE_DEPTH_M`] behind the foremost point that is not taken for noise.
+fn has_long_side(heading_rad: f64, members: &[u32], scan: &LidarScan) -> bool {
+    let (sin, cos) = heading_rad.sin_cos();
+    let mut nearest = LargestValues::default();
+    let mut far = f64::INFINITY;
+    for &member in members {
+        let [x, y, _] = point(scan, member);
+        let u = x * cos + y * sin;
+        nearest.insert(u, members.len() / POINTS_PER_STRAY);
+        far = lesser(far, u);
+    }
+    nearest.value() - FACE_DEPTH_M - far > REFINE_LENGTH_M + ROUNDING_M
 }
 
 /// The largest of the inserted values, which yield a quantile near the maximum.
@@ -278,16 +306,16 @@ fn refined_heading_rad(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 
         for &member in members.iter().step_by(stride) {
             let at = rotated(member);
             for axis in 0..2 {
-                low[axis] = low[axis].min(at[axis]);
-                high[axis] = high[axis].max(at[axis]);
+                low[axis] = lesser(low[axis], at[axis]);
+                high[axis] = greater(high[axis], at[axis]);
             }
         }
         let mut cost = 0.5 * (turned / HEADING_SD_RAD).powi(2);
         for &member in members.iter().step_by(stride) {
             let at = rotated(member);
-            let side = (at[1] - low[1]).min(high[1] - at[1]);
-            let end = (at[0] - low[0]).min(high[0] - at[0]);
-            cost += side.min(end).min(MAX_CLOSENESS_M);
+            let side = lesser(at[1] - low[1], high[1] - at[1]);
+            let end = lesser(at[0] - low[0], high[0] - at[0]);
+            cost += lesser(lesser(side, end), MAX_CLOSENESS_M);
         }
         if cost < best.0 {
             best = (cost, road_rad + turned);
@@ -307,6 +335,14 @@ fn point(scan: &LidarScan, member: u32) -> [f64; 3] {
     [scan.x_m[index].into(), scan.y_m[index].into(), scan.z_m[index].into()]
 }
 
-fn mean(members: &[u32], values: &[f32]) -> f64 {
-    members.iter().map(|&member| f64::from(values[member as usize])).sum::<f64>() / members.len() as f64
+/// Returns the lesser of two numbers. Points are finite, so that NaN, which [`f64::min`] tests for, does not occur.
+#[inline(always)]
+fn lesser(one: f64, other: f64) -> f64 {
+    if other < one { other } else { one }
+}
+
+/// Returns the greater of two numbers that are not NaN.
+#[inline(always)]
+fn greater(one: f64, other: f64) -> f64 {
+    if other > one { other } else { one }
 }

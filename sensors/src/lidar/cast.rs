@@ -6,7 +6,8 @@
 //! The columns and layers that can hit a solid follow from its bounds, and only these are tried. `by_brute_force` tries
 //! all of them, and a property test requires the same result to the bit.
 
-use wide::f32x8;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, u32x8};
 
 use super::pattern::{Column, Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::targets::{FaceRange, Part, Targets};
@@ -73,15 +74,28 @@ impl ColumnHits {
     }
 
     /// Intersects the beams of a column with a solid.
-    pub(crate) fn cast(&mut self, column: &Column, elevations: &[Elevation], part: &Part, targets: &Targets) {
+    #[inline(always)]
+    pub(crate) fn cast<S: Simd>(
+        &mut self,
+        simd: S,
+        (column, elevations): (&Column, &[Elevation]),
+        part: &Part,
+        targets: &Targets,
+    ) {
         for layer in part.layers.clone() {
-            self.intersect(layer, &SubRays::new(column, &elevations[layer]), part.faces, targets);
+            self.intersect(layer, &SubRays::new(simd, column, &elevations[layer]), part.faces, targets);
         }
     }
 
     /// Intersects the beam of a layer with a solid.
-    #[inline]
-    pub(crate) fn intersect(&mut self, layer: usize, subrays: &SubRays, faces: FaceRange, targets: &Targets) {
+    #[inline(always)]
+    pub(crate) fn intersect<S: Simd>(
+        &mut self,
+        layer: usize,
+        subrays: &SubRays<S>,
+        faces: FaceRange,
+        targets: &Targets,
+    ) {
         subrays.intersect(faces, targets, &mut self.beams[layer]);
         self.tested |= 1 << layer;
     }
@@ -89,63 +103,67 @@ impl ColumnHits {
 
 /// The directions of the sub-rays of a beam, in the lanes of vector registers.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SubRays {
+pub(crate) struct SubRays<S: Simd> {
+    simd: S,
     /// Cosines of the azimuths.
-    cos: f32x8,
+    cos: f32x8<S>,
     /// Sines of the azimuths.
-    sin: f32x8,
+    sin: f32x8<S>,
     /// Tangents of the elevations.
-    tan: f32x8,
+    tan: f32x8<S>,
 }
 
 /// Spreads the values of the sub-rays' columns over the lanes.
 #[inline(always)]
-fn of_columns([a, b]: [f32; SUBRAY_COLUMNS]) -> f32x8 {
-    f32x8::new([a, b, a, b, a, b, a, b])
+fn of_columns<S: Simd>(simd: S, [a, b]: [f32; SUBRAY_COLUMNS]) -> f32x8<S> {
+    f32x8::load_array(simd, [a, b, a, b, a, b, a, b])
 }
 
 /// Spreads the values of the sub-rays' rows over the lanes.
 #[inline(always)]
-pub(crate) fn of_rows([a, b, c, d]: [f32; SUBRAY_ROWS]) -> f32x8 {
-    f32x8::new([a, a, b, b, c, c, d, d])
+pub(crate) fn of_rows<S: Simd>(simd: S, [a, b, c, d]: [f32; SUBRAY_ROWS]) -> f32x8<S> {
+    f32x8::load_array(simd, [a, a, b, b, c, c, d, d])
 }
 
-impl SubRays {
+impl<S: Simd> SubRays<S> {
     /// Returns the directions of the beam of a layer.
     #[inline(always)]
-    pub(crate) fn new(column: &Column, elevation: &Elevation) -> Self {
+    pub(crate) fn new(simd: S, column: &Column, elevation: &Elevation) -> Self {
         let group = elevation.group;
-        Self { cos: of_columns(column.cos[group]), sin: of_columns(column.sin[group]), tan: of_rows(elevation.tan) }
+        Self {
+            simd,
+            cos: of_columns(simd, column.cos[group]),
+            sin: of_columns(simd, column.sin[group]),
+            tan: of_rows(simd, elevation.tan),
+        }
     }
 
     /// Returns the inverse horizontal distance m·d at which each sub-ray meets the plane of a face (1/m).
     #[inline(always)]
-    fn inverse_distances(&self, [x, y, z]: [f32; 3]) -> f32x8 {
-        f32x8::splat(x) * self.cos + f32x8::splat(y) * self.sin + f32x8::splat(z) * self.tan
+    fn inverse_distances(&self, [x, y, z]: [f32; 3]) -> f32x8<S> {
+        self.cos * x + self.sin * y + self.tan * z
     }
 
     /// Replaces the hits of those sub-rays that meet this solid at a shorter distance. At equal distance the earlier
     /// hit stays.
-    ///
-    /// Indices of faces are selected as the bits of floats, by the masks of the distances.
     #[inline(always)]
     fn intersect(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
-        let mut nearest = f32x8::splat(f32::INFINITY);
-        let mut nearest_face = f32x8::splat(f32::from_bits(NO_FACE));
+        let mut nearest = f32x8::splat(self.simd, f32::INFINITY);
+        let mut nearest_face = u32x8::splat(self.simd, NO_FACE);
         for (face, index) in targets.faces[faces.front_facing()].iter().zip(faces.first..) {
             let planes = self.inverse_distances(face.inverse);
-            nearest_face = planes.simd_lt(nearest).bitselect(f32x8::splat(f32::from_bits(index)), nearest_face);
-            nearest = planes.fast_min(nearest);
+            nearest_face = planes.simd_lt(nearest).select(u32x8::splat(self.simd, index), nearest_face);
+            nearest = planes.min(nearest);
         }
-        let mut entered_after = f32x8::ZERO;
+        let mut entered_after = f32x8::splat(self.simd, 0.0);
         for face in &targets.faces[faces.back_facing()] {
-            entered_after = self.inverse_distances(face.inverse).fast_max(entered_after);
+            entered_after = self.inverse_distances(face.inverse).max(entered_after);
         }
-        let earlier = f32x8::new(hits.inverse);
+        let earlier = f32x8::load_array_ref(self.simd, &hits.inverse);
         let is_hit = nearest.simd_gt(entered_after) & nearest.simd_gt(earlier);
-        hits.inverse = is_hit.bitselect(nearest, earlier).to_array();
-        let face = f32x8::new(hits.face.map(f32::from_bits));
-        hits.face = is_hit.bitselect(nearest_face, face).to_array().map(f32::to_bits);
+        is_hit.select(nearest, earlier).store_array(&mut hits.inverse);
+        let face = u32x8::load_array_ref(self.simd, &hits.face);
+        is_hit.select(nearest_face, face).store_array(&mut hits.face);
     }
 }
 
@@ -187,7 +205,8 @@ impl ActiveParts {
 pub(crate) fn by_brute_force(column: &Column, elevations: &[Elevation], targets: &Targets) -> ColumnHits {
     let mut hits = ColumnHits::new(elevations.len());
     for part in &targets.parts {
-        hits.cast(column, elevations, &Part { columns: 0..usize::MAX, layers: 0..elevations.len(), ..*part }, targets);
+        let part = Part { columns: 0..usize::MAX, layers: 0..elevations.len(), ..*part };
+        fearless_simd::dispatch!(fearless_simd::Level::baseline(), simd => hits.cast(simd, (column, elevations), &part, targets));
     }
     hits
 }

@@ -5,9 +5,10 @@
 
 use std::ops::Mul;
 
-use wide::f32x8;
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
 
-use super::cast::{BeamHits, NO_FACE, of_rows};
+use super::cast::{BeamHits, of_rows};
 use super::pattern::{Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::power::LinkBudget;
 use super::targets::Face;
@@ -26,6 +27,15 @@ pub(crate) struct Echo {
     pub(crate) power: f32,
     /// Index of the face that contributes the strongest sub-ray.
     pub(crate) face: u32,
+}
+
+impl Echo {
+    /// Returns an echo of this power and moment, the sum of powers times ranges (thresholds · m). The strongest contribution gives the
+    /// face, and the range of an echo without power.
+    #[inline(always)]
+    fn of_sums(power: f32, moment: f32, (strongest_m, face): (f32, u32)) -> Self {
+        Self { range_m: if power > 0.0 { moment / power } else { strongest_m }, power, face }
+    }
 }
 
 /// The echoes of a beam, in order of range.
@@ -49,35 +59,38 @@ impl Echoes {
 
     /// Replaces the echoes by those of the faces that the sub-rays hit.
     #[inline(always)]
-    pub(crate) fn set(&mut self, hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &LinkBudget) {
-        let gain_m2 = SHARE * link.gain_m2;
-        let mut strength = [0.0; SUBRAYS];
-        for (strength, &face) in strength.iter_mut().zip(&hits.face) {
-            if face != NO_FACE {
-                *strength = gain_m2 * faces[face as usize].strength_m;
-            }
-        }
-        let per_range = f32x8::new(hits.inverse) * of_rows(elevation.cos);
-        let (range_m, power) = (1.0 / per_range, received_power(per_range, f32x8::new(strength)));
+    pub(crate) fn set<S: Simd>(
+        &mut self,
+        simd: S,
+        (hits, elevation): (&BeamHits, &Elevation),
+        faces: &[Face],
+        link: &LinkBudget,
+    ) {
+        // A sub-ray that hits nothing has the strength of some face, but no inverse range, and so no power.
+        let last = faces.len() - 1;
+        let strength_m = f32x8::load_array(simd, hits.face.map(|face| faces[last.min(face as usize)].strength_m));
+        let per_range = f32x8::load_array_ref(simd, &hits.inverse) * of_rows(simd, elevation.cos);
+        let range_m = f32x8::splat(simd, 1.0) / per_range;
+        let power = received_power(per_range, strength_m * (SHARE * link.gain_m2));
         // A sub-ray that hits nothing has an infinite range, and no power.
-        let reached_m = range_m.simd_lt(f32x8::splat(f32::INFINITY)).bitselect(range_m, f32x8::ZERO);
-        let [range_m, reached_m, power] = [range_m, reached_m, power].map(f32x8::to_array);
-        let nearest_m =
-            range_m.into_iter().fold(f32::INFINITY, |least, range_m| if range_m < least { range_m } else { least });
-        let farthest_m = reached_m.into_iter().fold(0.0, |most, range_m| if range_m > most { range_m } else { most });
+        let zero = f32x8::splat(simd, 0.0);
+        let reached_m = range_m.simd_lt(f32x8::splat(simd, f32::INFINITY)).select(range_m, zero);
+        let (nearest_m, farthest_m) = (range_m.reduce_min(), reached_m.reduce_max());
         self.count = 0;
         // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to the sums.
         if farthest_m <= nearest_m + PULSE_M {
             if farthest_m > 0.0 {
-                self.list[0] = sum((0..SUBRAYS).map(|subray| Echo {
-                    range_m: reached_m[subray],
-                    power: power[subray],
-                    face: hits.face[subray],
-                }));
+                let is_strongest = power.simd_eq(power.reduce_max()) & reached_m.simd_gt(zero);
+                let strongest = SUBRAYS - 1 - (is_strongest.to_bitmask() as u8).leading_zeros() as usize;
+                let (moment, power) = ((power * reached_m).to_array(), power.to_array());
+                let sum = |of: [f32; SUBRAYS]| of.into_iter().fold(0.0, |sum, one| sum + one);
+                let strongest_m = reached_m.to_array()[strongest];
+                self.list[0] = Echo::of_sums(sum(power), sum(moment), (strongest_m, hits.face[strongest]));
                 self.count = 1;
             }
             return;
         }
+        let (reached_m, power) = (reached_m.to_array(), power.to_array());
         for subray in (0..SUBRAYS).filter(|&subray| reached_m[subray] > 0.0) {
             self.insert(Echo { range_m: reached_m[subray], power: power[subray], face: hits.face[subray] });
         }
@@ -142,8 +155,7 @@ fn sum(parts: impl Iterator<Item = Echo>) -> Echo {
             strongest = part;
         }
     }
-    let range_m = if power > 0.0 { moment / power } else { strongest.range_m };
-    Echo { range_m, power, face: strongest.face }
+    Echo::of_sums(power, moment, (strongest.range_m, strongest.face))
 }
 
 /// Returns the power that is received from sub-rays at the inverse range `per_range` (1/m).
@@ -177,7 +189,7 @@ mod tests {
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         // At 10 m each sub-ray contributes 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
         let mut found = Echoes::NONE;
-        found.set(&hits, &level, &[face(10.0)], &link);
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => found.set(simd, (&hits, &level), &[face(10.0)], &link));
         let unit = link.gain_m2 / 100.0;
         found.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
     }

@@ -14,7 +14,8 @@
 //! A pulse that meets the rail and the road in front of it gives a point between them. The beam must then be higher than the
 //! rail's lower edge, which it is not up to [`narrow_to_m`].
 
-use wide::f32x8;
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
 
 use super::echo::PULSE_M;
 use super::noise::MAX_NORMAL;
@@ -69,8 +70,10 @@ impl RailReturns {
 
     /// Returns true if all parts belong to guard rails, and the detector would discard every point that the column may give of
     /// them. `pose` is the ego's estimate at the time of the column.
-    pub(crate) fn are_discarded(
+    #[inline(always)]
+    pub(crate) fn are_discarded<S: Simd>(
         &self,
+        simd: S,
         (column, elevations): (&Column, &[Elevation]),
         pose: &SensorPoseEstimate,
         parts: &[usize],
@@ -84,26 +87,28 @@ impl RailReturns {
             if !is_guard_rail(part, targets) {
                 return false;
             }
-            inverse = inverse.max(greatest_inverse(column, tans, part, targets));
+            inverse = inverse.max(greatest_inverse(simd, (column, tans), part, targets));
         }
         let plane_m = 1.0 / inverse;
         let pulse_m = if plane_m > self.narrow_to_m { PULSE_M } else { 0.0 };
         let nearest_m = (plane_m - self.max_error_m - pulse_m) * lowest.centre[1].min(highest.centre[1]);
         // The comparisons are false for NaN.
-        inverse == 0.0 || column.centre.iter().all(|&azimuth| self.is_beyond(nearest_m, azimuth, pose))
+        // All groups are tested side by side.
+        inverse == 0.0 || column.centre.map(|azimuth| self.is_beyond(nearest_m, azimuth, pose)) == [true; GROUPS]
     }
 
-    /// Returns true if all points at least `nearest_m` from the sensor, in this direction, are beyond the region of interest.
+    /// Returns true for a sensor that is not turned if all points at least `nearest_m` from the sensor, in this direction, are beyond the region of interest.
+    #[inline(always)]
     fn is_beyond(&self, nearest_m: f32, [cos, sin]: [f32; 2], pose: &SensorPoseEstimate) -> bool {
         let left_m = |level_m: f32| {
-            let [x_m, y_m, _] = pose.ego_frame_point_m([level_m * cos, level_m * sin, 0.0]);
+            let [x_m, y_m, _] = pose.level_point_m([level_m * cos, level_m * sin, 0.0]);
             y_m - self.slope * x_m
         };
         let (near_m, far_m) = (left_m(nearest_m), left_m(nearest_m + STEP_M));
         let [left_end_m, right_end_m] = self.region_m;
-        nearest_m > 0.0
-            && ((near_m > left_end_m + MARGIN_M && far_m > near_m)
-                || (near_m < right_end_m - MARGIN_M && far_m < near_m))
+        (nearest_m > 0.0)
+            & (((near_m > left_end_m + MARGIN_M) & (far_m > near_m))
+                | ((near_m < right_end_m - MARGIN_M) & (far_m < near_m)))
     }
 }
 
@@ -114,14 +119,15 @@ fn is_guard_rail(part: &Part, targets: &Targets) -> bool {
 /// Returns a bound on the inverse distance in the plane at which a sub-ray of a column meets a solid (1/m), or 0 if none does.
 ///
 /// A ray meets a convex solid at the least inverse distance of its front-facing faces, which is not above that of any of them.
-fn greatest_inverse(column: &Column, tans: [f32; 2], part: &Part, targets: &Targets) -> f32 {
-    let lanes =
-        |[[a, b], [c, d], [e, f], [g, h]]: [[f32; SUBRAY_COLUMNS]; GROUPS]| f32x8::new([a, b, c, d, e, f, g, h]);
+#[inline(always)]
+fn greatest_inverse<S: Simd>(simd: S, (column, tans): (&Column, [f32; 2]), part: &Part, targets: &Targets) -> f32 {
+    let lanes = |[[a, b], [c, d], [e, f], [g, h]]: [[f32; SUBRAY_COLUMNS]; GROUPS]| {
+        f32x8::load_array(simd, [a, b, c, d, e, f, g, h])
+    };
     let (cos, sin) = (lanes(column.cos), lanes(column.sin));
     let of_face = |[x, y, z]: [f32; 3]| {
         let upward = (z * tans[0]).max(z * tans[1]);
-        let inverse = f32x8::splat(x) * cos + f32x8::splat(y) * sin + f32x8::splat(upward);
-        inverse.to_array().into_iter().fold(f32::NEG_INFINITY, f32::max)
+        (cos * x + sin * y + upward).reduce_max()
     };
     let faces = &targets.faces[part.faces.front_facing()];
     faces.iter().map(|face| of_face(face.inverse)).fold(f32::INFINITY, f32::min).max(0.0)

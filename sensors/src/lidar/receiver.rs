@@ -3,6 +3,8 @@
 //! The first and the last detected echo of each beam are reported. Their points lie on the *centre* line of the beam,
 //! because the sensor cannot know which part of the footprint returned the light.
 
+use fearless_simd::Simd;
+
 use super::cast::ColumnHits;
 use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
@@ -148,7 +150,8 @@ pub(crate) struct Receiver<'a> {
 
 impl Receiver<'_> {
     /// Appends the detected returns of this column to the scan and to its ground truth.
-    pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
+    #[inline(always)]
+    pub(crate) fn receive<S: Simd>(&self, simd: S, hits: &ColumnHits, (scan, truth): (&mut LidarScan, &mut ScanTruth)) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         let mut echoes = Echoes::NONE;
         for (layer, elevation) in self.elevations.iter().enumerate() {
@@ -159,7 +162,7 @@ impl Receiver<'_> {
                 continue;
             }
             if hits.is_tested(layer) {
-                echoes.set(&hits.beams[layer], elevation, &self.targets.faces, self.link);
+                echoes.set(simd, (&hits.beams[layer], elevation), &self.targets.faces, self.link);
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[elevation.group];
                 echoes.set_ground(centre, elevation, &self.targets.faces[0], self.link);
@@ -255,6 +258,7 @@ impl Receiver<'_> {
     }
 
     /// Returns the measurement if the power with noise exceeds the threshold and the return is not dropped.
+    #[inline(always)]
     fn detect_one(&self, address: usize, potential: PotentialReturn) -> Option<DetectedReturn> {
         if !(potential.power > MIN_POWER) || potential.range_m > self.link.max_range_m {
             return None;
@@ -269,6 +273,7 @@ impl Receiver<'_> {
     }
 
     /// Appends a detected return to the scan and to its ground truth.
+    #[inline(always)]
     fn append(&self, layer: usize, found: &DetectedReturn, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let [tan, cosine] = self.elevations[layer].centre;

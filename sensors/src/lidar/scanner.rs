@@ -5,6 +5,7 @@
 //! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
 use closecall_traffic::{Stream, Time};
+use fearless_simd::{Level, Simd};
 
 use super::bare_road::{BareRoad, Road, cast_ground};
 use super::cast::{ActiveParts, ColumnHits};
@@ -55,6 +56,8 @@ enum Extent {
 pub struct Scanner {
     lidar: Lidar,
     pattern: Pattern,
+    /// The vector registers of the processor.
+    level: Level,
     /// Distance up to which the road may give returns (m).
     ground_reach_m: f32,
     targets: Targets,
@@ -80,6 +83,7 @@ impl Scanner {
         Self {
             lidar,
             pattern: Pattern::new(lidar.kind),
+            level: Level::new(),
             ground_reach_m: ground_reach_m(&lidar),
             targets: Targets::default(),
             plumes: Vec::new(),
@@ -208,6 +212,13 @@ impl Scanner {
 
     /// Sweeps over all columns and appends their returns to the scan.
     fn sweep(&mut self, of: &Sweep, extent: Extent) {
+        fearless_simd::dispatch!(self.level, simd => self.sweep_in(simd, of, extent));
+    }
+
+    /// Does what [`Scanner::sweep`] does in one kind of vector registers. The results have the same bits in all of them, since each
+    /// lane takes the steps of a single sub-ray, and what is summed over lanes is summed in their order.
+    #[inline(always)]
+    fn sweep_in<S: Simd>(&mut self, simd: S, of: &Sweep, extent: Extent) {
         let sweep_s = self.sweep_s();
         #[expect(clippy::cast_possible_truncation, reason = "a bound of a metre, with a margin")]
         let max_shift_m = of.viewpoint.max_shift_m(sweep_s) as f32;
@@ -223,7 +234,8 @@ impl Scanner {
             let before_end_s = sweep_s - f64::from(column.offset_ns) * 1e-9;
             let has_rails_alone = || {
                 let pose = of.pose.deskewed(of.viewpoint.deskew(before_end_s));
-                of.rails.is_some_and(|rails| rails.are_discarded((column, elevations), &pose, parts, &self.targets))
+                of.rails
+                    .is_some_and(|rails| rails.are_discarded(simd, (column, elevations), &pose, parts, &self.targets))
             };
             let is_covered = omitted
                 .is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road))
@@ -253,13 +265,13 @@ impl Scanner {
             }
             self.hits.clear();
             for &part in parts {
-                self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
+                self.hits.cast(simd, (column, elevations), &self.targets.parts[part], &self.targets);
             }
-            cast_ground(column, elevations, (&self.targets, &road), omitted, &mut self.hits);
+            cast_ground(simd, (column, elevations), (&self.targets, &road), omitted, &mut self.hits);
             if !in_air && self.hits.is_bare() {
                 continue;
             }
-            receiver.receive(&self.hits, &mut self.scan, &mut self.truth);
+            receiver.receive(simd, &self.hits, (&mut self.scan, &mut self.truth));
             if extent == Extent::UntilFirst && !self.scan.is_empty() {
                 return;
             }

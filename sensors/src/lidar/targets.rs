@@ -18,7 +18,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::pattern::Pattern;
 use super::silhouette::Silhouette;
-use super::solid::{Solid, SolidFace};
+use super::solid::{MAX_FACES, Solid, SolidFace};
 use super::{Material, MirrorSide, PointSource};
 
 /// Minimum distance of a face's plane from the sensor's centre (m). Nearer planes are moved to it, so that n/w stays
@@ -157,11 +157,16 @@ impl Targets {
     #[expect(clippy::cast_possible_truncation, reason = "4 billion faces do not fit into memory")]
     pub(crate) fn push_faces(&mut self, solid: &Solid, pose: &Isometry3<f64>, surface: Surface<'_>) -> FaceRange {
         let first = self.faces.len() as u32;
-        self.faces
-            .extend(placed_faces(solid, pose).filter(|face| face.1 < 0.0).map(|face| prepare_face(face, surface)));
+        let mut back = [None; MAX_FACES];
+        for (face, back) in placed_faces(solid, pose).zip(&mut back) {
+            if face.1 < 0.0 {
+                self.faces.push(prepare_face(face, surface));
+            } else {
+                *back = Some(face);
+            }
+        }
         let first_back = self.faces.len() as u32;
-        self.faces
-            .extend(placed_faces(solid, pose).filter(|face| face.1 >= 0.0).map(|face| prepare_face(face, surface)));
+        self.faces.extend(back.into_iter().flatten().map(|face| prepare_face(face, surface)));
         FaceRange { first, first_back, end: self.faces.len() as u32 }
     }
 }

@@ -6,7 +6,29 @@ use super::*;
 /// Maximum relative difference between a distance in single and in double precision.
 const PRECISION: f64 = 2e-5;
 
+/// Returns all kinds of vector registers that this processor has.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    #[cfg(target_arch = "x86_64")]
+    let narrower =
+        [best.as_sse2().map(Level::Sse2), best.as_sse4_2().map(Level::Sse4_2), best.as_avx2().map(Level::Avx2)];
+    #[cfg(not(target_arch = "x86_64"))]
+    let narrower = [Some(Level::baseline())];
+    narrower.into_iter().flatten().chain([best]).collect()
+}
+
 impl Scanner {
+    /// Returns the scan of this scene, with its ground truth, in each kind of vector registers that this processor has. All of them draw
+    /// the same number from the stream.
+    pub(crate) fn scans_in_all_registers(&mut self, scene: &Scene<'_>, rng: &Stream) -> Vec<(LidarScan, ScanTruth)> {
+        let of = |level: Level| {
+            self.level = level;
+            self.scan(scene, &mut rng.clone());
+            (self.scan.clone(), self.truth.clone())
+        };
+        levels().into_iter().map(of).collect()
+    }
+
     /// Asserts that three ray casts of a scene agree: the fast one, the one by brute force, and one in double
     /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
     /// differ at edges.
@@ -19,7 +41,8 @@ impl Scanner {
             let elevations = self.pattern.elevations(mirror_side, index);
             self.hits.clear();
             for &part in self.active.advance_to(index, &self.targets) {
-                self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
+                let part = &self.targets.parts[part];
+                fearless_simd::dispatch!(Level::new(), simd => self.hits.cast(simd, (column, elevations), part, &self.targets));
             }
             let brute = by_brute_force(column, elevations, &self.targets);
             assert_eq!(self.hits.beams, brute.beams, "column {index}");
