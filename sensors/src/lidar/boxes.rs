@@ -231,8 +231,8 @@ impl BoxFit {
     }
 }
 
-/// Returns whether the first and the last of these beams are in the outermost columns: on the ego's right, and on its left. The sweep
-/// begins on the left.
+/// Returns whether the last of these beams is in the outermost columns on the ego's right, and the first in those on its left. The
+/// sweep begins on the left.
 fn truncated_edges(beams: [u16; 2], scan: &LidarScan) -> [bool; 2] {
     let Resolution { columns: count, layers, .. } = scan.resolution;
     let [first, last] = beams.map(|beam| usize::from(beam) / layers);

@@ -32,8 +32,6 @@ const BEAM_MARGIN: f64 = 4.0 / 3.0;
 const NARROW_STEP_M: f64 = 10.0;
 /// Margin for rounding, and for the tilt of the sensor's frame (m).
 const MARGIN_M: f32 = 0.03;
-/// Distance by which a point is moved along its beam to learn whether the beam leads away from the road (m).
-const STEP_M: f32 = 10.0;
 
 /// The limits beyond which the points of a guard rail are discarded.
 #[derive(Clone, Copy, Debug)]
@@ -81,34 +79,37 @@ impl RailReturns {
     ) -> bool {
         let (Some(lowest), Some(highest)) = (elevations.first(), elevations.last()) else { return false };
         let tans = [lowest.tan[0], highest.tan[highest.tan.len() - 1]];
-        let mut inverse = 0.0_f32;
+        let azimuths = Azimuths::new(simd, column);
+        let mut inverse = f32x8::splat(simd, 0.0);
         for &part in parts {
             let part = &targets.parts[part];
             if !is_guard_rail(part, targets) {
                 return false;
             }
-            inverse = inverse.max(greatest_inverse(simd, (column, tans), part, targets));
+            inverse = inverse.max(azimuths.greatest_inverses(simd, tans, part, targets));
         }
+        let inverse = inverse.reduce_max();
         let plane_m = 1.0 / inverse;
         let pulse_m = if plane_m > self.narrow_to_m { PULSE_M } else { 0.0 };
         let nearest_m = (plane_m - self.max_error_m - pulse_m) * lowest.centre[1].min(highest.centre[1]);
         // The comparisons are false for NaN.
-        // All groups are tested side by side.
-        inverse == 0.0 || column.centre.map(|azimuth| self.is_beyond(nearest_m, azimuth, pose)) == [true; GROUPS]
+        inverse == 0.0 || nearest_m > 0.0 && self.are_beyond(nearest_m, &column.centre, pose)
     }
 
-    /// Returns true for a sensor that is not turned if all points at least `nearest_m` from the sensor, in this direction, are beyond the region of interest.
+    /// Returns true for a sensor that is not turned if all points at least `nearest_m` from it, in these directions, are beyond the
+    /// region of interest.
     #[inline(always)]
-    fn is_beyond(&self, nearest_m: f32, [cos, sin]: [f32; 2], pose: &SensorPoseEstimate) -> bool {
-        let left_m = |level_m: f32| {
-            let [x_m, y_m, _] = pose.level_point_m([level_m * cos, level_m * sin, 0.0]);
-            y_m - self.slope * x_m
-        };
-        let (near_m, far_m) = (left_m(nearest_m), left_m(nearest_m + STEP_M));
+    fn are_beyond(&self, nearest_m: f32, azimuths: &[[f32; 2]; GROUPS], pose: &SensorPoseEstimate) -> bool {
+        let left_of_road = |[x_m, y_m, _]: [f32; 3]| y_m - self.slope * x_m;
+        let sensor_m = left_of_road(pose.level_point_m([0.0; 3]));
         let [left_end_m, right_end_m] = self.region_m;
-        (nearest_m > 0.0)
-            & (((near_m > left_end_m + MARGIN_M) & (far_m > near_m))
-                | ((near_m < right_end_m - MARGIN_M) & (far_m < near_m)))
+        // All groups are tested side by side.
+        let is_beyond = azimuths.map(|[cos, sin]| {
+            let outward = left_of_road(pose.level_direction([cos, sin, 0.0]));
+            let near_m = sensor_m + nearest_m * outward;
+            ((near_m > left_end_m + MARGIN_M) & (outward > 0.0)) | ((near_m < right_end_m - MARGIN_M) & (outward < 0.0))
+        });
+        is_beyond == [true; GROUPS]
     }
 }
 
@@ -116,19 +117,34 @@ fn is_guard_rail(part: &Part, targets: &Targets) -> bool {
     targets.faces[part.faces.first as usize].source == PointSource::GuardRail
 }
 
-/// Returns a bound on the inverse distance in the plane at which a sub-ray of a column meets a solid (1/m), or 0 if none does.
-///
-/// A ray meets a convex solid at the least inverse distance of its front-facing faces, which is not above that of any of them.
-#[inline(always)]
-fn greatest_inverse<S: Simd>(simd: S, (column, tans): (&Column, [f32; 2]), part: &Part, targets: &Targets) -> f32 {
-    let lanes = |[[a, b], [c, d], [e, f], [g, h]]: [[f32; SUBRAY_COLUMNS]; GROUPS]| {
-        f32x8::load_array(simd, [a, b, c, d, e, f, g, h])
-    };
-    let (cos, sin) = (lanes(column.cos), lanes(column.sin));
-    let of_face = |[x, y, z]: [f32; 3]| {
-        let upward = (z * tans[0]).max(z * tans[1]);
-        (cos * x + sin * y + upward).reduce_max()
-    };
-    let faces = &targets.faces[part.faces.front_facing()];
-    faces.iter().map(|face| of_face(face.inverse)).fold(f32::INFINITY, f32::min).max(0.0)
+/// The azimuths of all sub-rays of a column, in the lanes of vector registers.
+#[derive(Clone, Copy)]
+struct Azimuths<S: Simd> {
+    cos: f32x8<S>,
+    sin: f32x8<S>,
+}
+
+impl<S: Simd> Azimuths<S> {
+    #[inline(always)]
+    fn new(simd: S, column: &Column) -> Self {
+        let lanes = |[[a, b], [c, d], [e, f], [g, h]]: [[f32; SUBRAY_COLUMNS]; GROUPS]| {
+            f32x8::load_array(simd, [a, b, c, d, e, f, g, h])
+        };
+        Self { cos: lanes(column.cos), sin: lanes(column.sin) }
+    }
+
+    /// Returns a bound on the inverse distance in the plane at which the sub-rays of each azimuth meet a solid (1/m); less than 0 if
+    /// none does.
+    ///
+    /// A ray meets a convex solid at the least inverse distance of its front-facing faces.
+    #[inline(always)]
+    fn greatest_inverses(&self, simd: S, tans: [f32; 2], part: &Part, targets: &Targets) -> f32x8<S> {
+        let mut least = f32x8::splat(simd, f32::INFINITY);
+        for face in &targets.faces[part.faces.front_facing()] {
+            let [x, y, z] = face.inverse;
+            let upward = (z * tans[0]).max(z * tans[1]);
+            least = least.min(self.cos * x + self.sin * y + upward);
+        }
+        least
+    }
 }

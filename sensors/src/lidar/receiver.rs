@@ -102,6 +102,14 @@ impl SensorPoseEstimate {
         self.at_end([ahead, left, above])
     }
 
+    /// Turns a direction of a sensor that is not turned from its frame to the ego's frame at the end of the sweep.
+    #[inline(always)]
+    pub(crate) fn level_direction(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let [cos, sin, ..] = self.deskew;
+        let (ahead, above) = (self.sin * z - self.cos * x, self.sin * x + self.cos * z);
+        [cos * ahead + sin * y, sin * ahead - cos * y, above]
+    }
+
     /// Transforms a point from the ego's frame at the time of the column to that at the end of the sweep (m).
     #[inline(always)]
     fn at_end(&self, [ahead, left, above]: [f32; 3]) -> [f32; 3] {
