@@ -27,6 +27,8 @@ pub const SLOW_TIME_S: f64 = 5.0;
 /// Correlation length of the slow measurement error (m). The error also changes with the distance to the ego, as the
 /// beams wander over the vehicle.
 pub const SLOW_DISTANCE_M: f64 = 5.0;
+/// Gate for the squared distance along one axis: the 99.9 % quantile of χ² with one degree of freedom.
+const AXIS_GATE: f64 = 10.8;
 /// Standard deviation of half of a vehicle's length (m).
 ///
 /// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is therefore within ±0.4
@@ -100,7 +102,7 @@ impl RoadFilter {
             slow_share: [1.0; 2],
             since_middle_s: f64::INFINITY,
         };
-        filter.correct(measurement, 0.0);
+        filter.correct(measurement, 0.0, false);
         filter
     }
 
@@ -123,11 +125,18 @@ impl RoadFilter {
     ///
     /// A part says nothing across the road for a while after the middle has been seen: one side of the mirror may see the plate, and
     /// the other always the same lamp, whose distance from the middle never averages out.
-    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64) {
+    ///
+    /// `is_further` tells whether another sensor has corrected the filter at the same time. A measurement that contradicts it then corrects
+    /// nothing: two sensors of which one is mounted askew would pull the track apart in every scan, always in the same order.
+    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, is_further: bool) {
         let estimate = self.estimate();
-        self.smooth(0, measurement);
-        self.along.measure_position(&self.smoothed(measurement).along);
-        if measurement.is_part && self.is_middle_known() {
+        let [along_agrees, across_agrees] =
+            if is_further { self.agrees(measurement, half_length_m) } else { [true; 2] };
+        if along_agrees {
+            self.smooth(0, measurement);
+            self.along.measure_position(&self.smoothed(measurement).along);
+        }
+        if !across_agrees || measurement.is_part && self.is_middle_known() {
             return;
         }
         let is_first_part = measurement.is_part && self.since_middle_s.is_finite();
@@ -145,6 +154,14 @@ impl RoadFilter {
             self.since_middle_s = f64::INFINITY;
         }
         self.across.measure_position(&self.smoothed(measurement).across_for(half_length_m, &estimate));
+    }
+
+    /// Returns whether the measurement of a further sensor agrees with the estimate after that of another at the same time, along and
+    /// across the road.
+    fn agrees(&self, measurement: &Measurement, half_length_m: f64) -> [bool; 2] {
+        let across = measurement.across_for(half_length_m, &self.estimate());
+        [self.along.disagreement(&measurement.along), self.across.disagreement(&across)]
+            .map(|squared| squared <= AXIS_GATE)
     }
 
     /// Returns whether the middle of the face was seen a short time ago.
@@ -266,7 +283,7 @@ mod tests {
             let to_s = measurement.along.position_m / 30.0;
             filter.predict(to_s - at_s, &EGO);
             at_s = to_s;
-            filter.correct(&measurement, 2.3);
+            filter.correct(&measurement, 2.3, false);
         }
         filter.estimate()[1]
     }
@@ -286,6 +303,23 @@ mod tests {
             }));
             assert!(found.position_m.abs() < 0.02, "{found:?}");
             assert!(found.position_variance_m2.sqrt() < 0.05, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_further_sensor_that_contradicts_the_first_does_not_pull_the_track_apart() {
+        for off_m in [0.0, 0.05, 0.3, 0.6, 1.5] {
+            let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0);
+            for step in 1..400 {
+                filter.predict(SCAN_S, &EGO);
+                filter.correct(&seen(step, 0.0, false), 2.3, false);
+                filter.correct(&seen(step, off_m, false), 2.3, true);
+            }
+            let [_, across] = filter.estimate();
+            // Within their errors of 0.04 m, both count.
+            let mean_m = if off_m <= 0.05 { 0.5 * off_m } else { 0.0 };
+            assert!((across.position_m - mean_m).abs() < 0.012, "{off_m}: {across:?}");
+            assert!(across.speed_mps.abs() < 0.05, "{off_m}: {across:?}");
         }
     }
 

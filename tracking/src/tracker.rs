@@ -211,7 +211,8 @@ impl Tracker {
     /// Corrects a track with its detection.
     fn correct(&mut self, track_index: usize, detection_index: usize, detection: &Detection) {
         let track = &mut self.tracks[track_index];
-        track.filter.correct(&self.measurements[detection_index], 0.5 * track.size_m().0);
+        let is_further = track.seen >= Seen::Kept;
+        track.filter.correct(&self.measurements[detection_index], 0.5 * track.size_m().0, is_further);
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
         let [along, _] = track.filter.estimate();

@@ -182,10 +182,17 @@ fn a_fault_hits_the_sensor_that_it_names_or_all() {
     // not, the track is that of the first sensor.
     let y_m = |fault: &str| drive(twins, fault, &others).tracks[99][0].y_m();
     let shift_m = |fault: &str| (y_m(fault) - y_m("")).abs();
-    let (of_one, of_both) = (shift_m("yaw-deg = 0.1\nsensor = \"twin\""), shift_m("yaw-deg = 0.1"));
-    assert!(of_one > 0.2 * of_both && of_one < 0.8 * of_both, "{of_one} {of_both}");
-    let (of_one, of_both) = (shift_m("yaw-deg = 0.4\nsensor = \"twin\""), shift_m("yaw-deg = 0.4"));
-    assert!(of_both > 0.2 && of_one < 0.2 * of_both, "{of_one} {of_both}");
+    for yaw_deg in [0.03, 0.05, 0.07] {
+        let of_both = shift_m(&format!("yaw-deg = {yaw_deg}"));
+        let of_one = shift_m(&format!("yaw-deg = {yaw_deg}\nsensor = \"twin\""));
+        assert!(of_one > 0.2 * of_both && of_one < 0.8 * of_both, "{of_one} {of_both}");
+    }
+    for yaw_deg in [0.4, 0.5, 0.8] {
+        let fault = format!("yaw-deg = {yaw_deg}");
+        let (of_one, of_both) = (shift_m(&format!("{fault}\nsensor = \"twin\"")), shift_m(&fault));
+        assert!(of_both > 0.2 && of_one < 0.1 * of_both, "{yaw_deg}: {of_one} {of_both}");
+        assert_eq!(drive(twins, &format!("{fault}\nsensor = \"twin\""), &others).tracks[99].len(), 1);
+    }
 }
 
 #[test]
