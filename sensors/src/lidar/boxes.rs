@@ -14,6 +14,7 @@
 
 use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
 
+use super::edges::edge_shifts;
 use super::kind::Resolution;
 use super::receiver::MAX_INTENSITY;
 use super::{LaneGeometry, LidarScan};
@@ -44,6 +45,8 @@ const MAX_CLOSENESS_M: f64 = 0.5;
 /// Azimuth from straight behind beyond which a cluster seen by a turned sensor may extend past the selected points (rad): 2° less than
 /// that of the selection.
 const SIDE_EDGE_RAD: f64 = MAX_SIDE_AZIMUTH_RAD - 2.0 * DEGREE;
+/// Spacing of columns up to which the edges need not be found within a column (m): then they are known to a millimetre or two.
+const FINE_SPACING_M: f64 = 0.01;
 /// Maximum number of points that are used to try headings.
 const REFINE_MAX_POINTS: usize = 80;
 
@@ -58,6 +61,8 @@ pub(crate) struct BoxFit {
     pub(crate) rear_u_m: f64,
     /// Least and greatest position v across the box's heading (m).
     pub(crate) across_m: [f64; 2],
+    /// How far outward of its mean position, given the outermost column, each edge lies (columns), if the powers of the beams tell it.
+    pub(crate) edge_shifts: Option<[f64; 2]>,
     /// Least and greatest position v of the points on a retro-reflector (m), which saturate the receiver; `None` if there is none.
     pub(crate) plate_m: Option<[f64; 2]>,
     /// Height of the highest point (m).
@@ -147,6 +152,9 @@ impl BoxFit {
             fit.truncated[1] |= fit.azimuth_rad[1] > SIDE_EDGE_RAD;
         }
         fit.locate_front(nearest.value(), [sin, cos], members, scan);
+        if !sees_side(&fit) && fit.spacing_m > FINE_SPACING_M {
+            fit.edge_shifts = edge_shifts(&fit, [sin, cos], members, scan);
+        }
         fit
     }
 
@@ -167,6 +175,7 @@ impl BoxFit {
             front_u_m: 0.0,
             rear_u_m: 0.0,
             across_m: [f64::INFINITY, f64::NEG_INFINITY],
+            edge_shifts: None,
             plate_m: None,
             top_m: f64::NEG_INFINITY,
             bottom_m: f64::INFINITY,
@@ -179,7 +188,7 @@ impl BoxFit {
             spacing_m: 0.0,
             in_view_m: 0.0,
             point_sd_m: scan.resolution.point_sd_m,
-            vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad],
+            vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad[1]],
             azimuth_rad: [0.0; 2],
             sensor_y_m: scan.sensor_y_m.into(),
             truncated: truncated_edges(beams, scan),
@@ -252,6 +261,11 @@ fn has_long_side(heading_rad: f64, members: &[u32], scan: &LidarScan) -> bool {
         far = lesser(far, u);
     }
     nearest.value() - FACE_DEPTH_M - far > REFINE_LENGTH_M + ROUNDING_M
+}
+
+/// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
+pub(crate) fn sees_side(fit: &BoxFit) -> bool {
+    fit.azimuth_rad[0] > 0.0 || fit.azimuth_rad[1] < 0.0
 }
 
 /// The largest of the inserted values, which yield a quantile near the maximum.
@@ -330,7 +344,7 @@ fn column_step_rad(resolution: &Resolution, azimuth_rad: f64) -> f64 {
     if azimuth_rad.abs() < fine_field_rad { fine_step_rad } else { resolution.step_rad }
 }
 
-fn point(scan: &LidarScan, member: u32) -> [f64; 3] {
+pub(super) fn point(scan: &LidarScan, member: u32) -> [f64; 3] {
     let index = member as usize;
     [scan.x_m[index].into(), scan.y_m[index].into(), scan.z_m[index].into()]
 }

@@ -28,7 +28,7 @@ const USUAL_POWER: f64 = 2.25;
 /// Decimals to which that standard deviation is rounded, as a factor.
 const SD_DECIMALS: f64 = 1e4;
 /// Greatest number of layers.
-const MAX_LAYERS: usize = 64;
+pub(super) const MAX_LAYERS: usize = 64;
 /// Greatest elevation of a layer (°).
 const MAX_ELEVATION_DEG: f64 = 45.0;
 /// Greatest number of beams in a scan: beams are numbered with 16 bits.
@@ -114,8 +114,8 @@ pub(crate) struct Resolution {
     pub(crate) fine_rad: [f64; 2],
     /// Spacing of layers (rad).
     pub(crate) layer_rad: f64,
-    /// Height of a footprint (rad).
-    pub(crate) footprint_rad: f64,
+    /// Width and height of a footprint (rad).
+    pub(crate) footprint_rad: [f64; 2],
     /// Tangent of the elevation up to which both mirror sides see.
     pub(crate) highest_tan: f64,
     /// Standard deviation of the range of a usual point (m).
@@ -124,6 +124,8 @@ pub(crate) struct Resolution {
     pub(crate) mount_height_m: f64,
     /// Distance up to which the road may give returns (m).
     pub(crate) ground_reach_m: f32,
+    /// Intensity at the detection threshold at 1 m (1/m²), by which it grows with the square of the range.
+    pub(crate) threshold_per_m2: f64,
 }
 
 impl Default for Resolution {
@@ -331,12 +333,13 @@ impl Check for LidarKindConfig {
             step_rad: self.azimuth_step_deg * degree,
             fine_rad: [self.fine_half_field_deg.unwrap_or(0.0) * degree, fine_step_deg * degree],
             layer_rad: spacing_deg * degree,
-            footprint_rad: self.beam_height_deg * degree,
+            footprint_rad: [self.beam_width_deg * degree, self.beam_height_deg * degree],
             highest_tan: (highest_deg.to_radians().tan() * HIGHEST_DECIMALS).round() / HIGHEST_DECIMALS,
             point_sd_m: (self.range_sd_m.hypot(self.range_sd_at_threshold_m / USUAL_POWER) * SD_DECIMALS).round()
                 / SD_DECIMALS,
             mount_height_m: MOUNT_HEIGHT_M,
             ground_reach_m: GROUND_REACH_M,
+            threshold_per_m2: 0.0,
         };
         #[expect(clippy::cast_possible_truncation, reason = "ranges need no more than single precision")]
         let single = |value: f64, key, range| number(value, key, range).map(|value| value as f32);

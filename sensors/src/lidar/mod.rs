@@ -17,6 +17,7 @@ mod clustering;
 mod config;
 mod detector;
 mod echo;
+mod edges;
 mod false_alarms;
 mod ground;
 mod kind;

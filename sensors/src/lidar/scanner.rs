@@ -4,7 +4,7 @@
 //! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
 //! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
-use closecall_traffic::{Stream, Time};
+use closecall_traffic::{Environment, Stream, Time};
 use fearless_simd::{Level, Simd};
 
 use super::bare_road::{BareRoad, Road, cast_ground};
@@ -306,7 +306,9 @@ impl Scanner {
         self.stamp(end);
         self.scan.mirror_side = mirror_side;
         let (mount_height_m, ground_reach_m) = (self.lidar.mount_height_m, self.ground_reach_m);
-        self.scan.resolution = Resolution { mount_height_m, ground_reach_m, ..self.pattern.kind().resolution };
+        let threshold_per_m2 = 1.0 / f64::from(LinkBudget::new(&self.lidar, &Environment::CLEAR_DAY).gain_m2);
+        self.scan.resolution =
+            Resolution { mount_height_m, ground_reach_m, threshold_per_m2, ..self.pattern.kind().resolution };
         (self.scan.sensor_x_m, self.scan.sensor_y_m) = (pose.sensor_x_m(), pose.sensor_y_m());
         self.scan.axis_azimuth_rad = self.lidar.azimuth_rad;
     }

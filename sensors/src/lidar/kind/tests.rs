@@ -24,7 +24,7 @@ fn the_scala_keeps_the_numbers_of_the_model() {
     assert_eq!(kind.nominal_range_m.to_bits(), 200.0_f64.to_bits());
     assert_eq!(kind.half_field_tan.to_bits(), 2.2998_f64.to_bits());
     assert_eq!(kind.sweep_ns.to_bits(), (40e6_f64 * 66.5 / 180.0).to_bits());
-    for angle_rad in [kind.resolution.layer_rad, kind.resolution.footprint_rad] {
+    for angle_rad in [kind.resolution.layer_rad, kind.resolution.footprint_rad[1]] {
         assert_eq!(angle_rad.to_bits(), (0.6 * (std::f64::consts::PI / 180.0)).to_bits());
     }
     assert!((0..100).all(|step| kind.is_due(Time::from_ns(step * CONTROL_STEP.ns()))));
