@@ -91,6 +91,7 @@ impl TrackerLoop {
         let s_m = EGO_S_M + SPEED_MPS * self.time.s();
         let ego = VehicleState { s_m, d_m: EGO_D_M, speed_mps: SPEED_MPS, ..VehicleState::default() };
         let scan = TrackerScan {
+            sensor: 0,
             time: self.time,
             road: &self.road,
             ego,

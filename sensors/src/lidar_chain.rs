@@ -148,7 +148,7 @@ impl LidarChain {
         while let Some(time) = self.earliest_due() {
             let mut idle: [Option<RearView>; MAX_LIDARS] = [None; MAX_LIDARS];
             let mut due: [Option<TrackerScan<'_>>; MAX_LIDARS] = [None; MAX_LIDARS];
-            for ((sensor, due), idle) in self.sensors.iter_mut().zip(&mut due).zip(&mut idle) {
+            for (number, ((sensor, due), idle)) in self.sensors.iter_mut().zip(&mut due).zip(&mut idle).enumerate() {
                 let view = sensor.view(rear_x_m);
                 let next = sensor.pending.iter_mut().find(|scan| !scan.is_processed && scan.due_step <= self.step);
                 match next.filter(|scan| scan.time == time) {
@@ -156,6 +156,7 @@ impl LidarChain {
                         scan.is_processed = true;
                         let range_m = if scan.is_missing { 0.0 } else { view.range_m };
                         *due = Some(TrackerScan {
+                            sensor: number,
                             time: scan.time,
                             road: &scan.road,
                             ego: scan.ego,

@@ -93,6 +93,14 @@ pub struct AxisMeasurement {
     pub time_offset_s: f64,
 }
 
+impl AxisMeasurement {
+    /// Returns the measured position at the filter's time (m), for a vehicle of this speed, and its variance (m²).
+    pub(crate) fn position_now(&self, speed_mps: f64) -> [f64; 2] {
+        let variance_m2 = self.white_sd_m * self.white_sd_m + self.slow_sd_m * self.slow_sd_m;
+        [self.position_m - self.time_offset_s * speed_mps, variance_m2]
+    }
+}
+
 /// Position and speed along one axis, with their covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisEstimate {
@@ -184,19 +192,6 @@ impl AxisFilter {
             variance += estimate.probability * variance_m2;
         }
         AxisFit { squared_distance, cost: -2.0 * likelihood.ln(), log_variance: variance.ln() }
-    }
-
-    /// Returns how many standard deviations, squared, the measurement of a further sensor is off that of another at the same time.
-    ///
-    /// There is no manoeuvre between the two, and each sensor has a slow error of its own. The least distance over all modes counts.
-    pub(crate) fn disagreement(&self, measurement: &AxisMeasurement) -> f64 {
-        let white_sd_m = measurement.white_sd_m.hypot(measurement.slow_sd_m);
-        let independent = AxisMeasurement { white_sd_m, slow_sd_m: 0.0, ..*measurement };
-        let squared = |estimate: &ModeEstimate| {
-            let (innovation_m, _, variance_m2) = estimate.innovation(&independent);
-            innovation_m * innovation_m / variance_m2
-        };
-        self.estimates[..self.modes.len()].iter().map(squared).fold(f64::INFINITY, f64::min)
     }
 
     /// Forgets the slow error: the next measurement has another one.

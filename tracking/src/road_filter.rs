@@ -29,6 +29,11 @@ pub const SLOW_TIME_S: f64 = 5.0;
 pub const SLOW_DISTANCE_M: f64 = 5.0;
 /// Gate for the squared distance along one axis: the 99.9 % quantile of χ² with one degree of freedom.
 const AXIS_GATE: f64 = 10.8;
+/// Time without a measurement after which a track follows another sensor (s): a sensor of 10 Hz may lose a scan.
+const FOLLOWED_S: f64 = 0.25;
+/// Acceleration of a manoeuvre that may have begun since the latest measurement of the sensor that a track follows (m/s²): that of the
+/// allowance of the gate.
+const MANOEUVRE_MPS2: f64 = 2.5;
 /// Standard deviation of half of a vehicle's length (m).
 ///
 /// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is therefore within ±0.4
@@ -76,6 +81,17 @@ impl Measurement {
     }
 }
 
+/// The sensor that a filter follows along one axis.
+#[derive(Clone, Copy, Debug)]
+struct Followed {
+    sensor: usize,
+    /// Time since its latest measurement (s).
+    age_s: f64,
+    /// Position and variance of that measurement (m, m²).
+    position_m: f64,
+    variance_m2: f64,
+}
+
 /// The filter for the position and motion of one vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoadFilter {
@@ -87,11 +103,13 @@ pub(crate) struct RoadFilter {
     slow_share: [f64; 2],
     /// Time since the middle of the face was last seen (s); infinite if it has not been, or a part has counted since.
     since_middle_s: f64,
+    /// The sensor that is followed along and across the road.
+    followed: [Followed; 2],
 }
 
 impl RoadFilter {
-    /// Creates a filter at its first measurement. The prior speed along the road is `speed_mps`.
-    pub(crate) fn new(measurement: &Measurement, speed_mps: f64) -> Self {
+    /// Creates a filter at its first measurement, which is one of `sensor`. The prior speed along the road is `speed_mps`.
+    pub(crate) fn new(measurement: &Measurement, speed_mps: f64, sensor: usize) -> Self {
         let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
         let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
         let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
@@ -101,8 +119,9 @@ impl RoadFilter {
             slow_m2: measurement.slow_m2(),
             slow_share: [1.0; 2],
             since_middle_s: f64::INFINITY,
+            followed: [Followed { sensor, age_s: 0.0, position_m: 0.0, variance_m2: 0.0 }; 2],
         };
-        filter.correct(measurement, 0.0, false);
+        filter.correct(measurement, 0.0, sensor);
         filter
     }
 
@@ -118,6 +137,7 @@ impl RoadFilter {
         self.across.predict(step_s, slow_share, situation);
         self.slow_share = self.slow_share.map(|share| share * slow_share);
         self.since_middle_s += step_s;
+        self.followed.iter_mut().for_each(|followed| followed.age_s += step_s);
     }
 
     /// Corrects the filter with a measurement of the face, which lies half a length of `half_length_m` ahead of the
@@ -126,17 +146,17 @@ impl RoadFilter {
     /// A part says nothing across the road for a while after the middle has been seen: one side of the mirror may see the plate, and
     /// the other always the same lamp, whose distance from the middle never averages out.
     ///
-    /// `is_further` tells whether another sensor has corrected the filter at the same time. A measurement that contradicts it then corrects
-    /// nothing: two sensors of which one is mounted askew would pull the track apart in every scan, always in the same order.
-    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, is_further: bool) {
+    /// Along each axis, the filter follows one sensor. What another one measures corrects nothing there if it contradicts that one: two
+    /// sensors of which one is mounted askew would pull the track apart in every scan, always in the same order.
+    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, sensor: usize) {
         let estimate = self.estimate();
-        let [along_agrees, across_agrees] =
-            if is_further { self.agrees(measurement, half_length_m) } else { [true; 2] };
-        if along_agrees {
+        if Self::counts(&mut self.followed[0], &measurement.along, &estimate[0], sensor) {
             self.smooth(0, measurement);
             self.along.measure_position(&self.smoothed(measurement).along);
         }
-        if !across_agrees || measurement.is_part && self.is_middle_known() {
+        let has_silent_part = measurement.is_part && self.is_middle_known();
+        let across = measurement.across_for(half_length_m, &estimate);
+        if has_silent_part || !Self::counts(&mut self.followed[1], &across, &estimate[1], sensor) {
             return;
         }
         let is_first_part = measurement.is_part && self.since_middle_s.is_finite();
@@ -156,12 +176,20 @@ impl RoadFilter {
         self.across.measure_position(&self.smoothed(measurement).across_for(half_length_m, &estimate));
     }
 
-    /// Returns whether the measurement of a further sensor agrees with the estimate after that of another at the same time, along and
-    /// across the road.
-    fn agrees(&self, measurement: &Measurement, half_length_m: f64) -> [bool; 2] {
-        let across = measurement.across_for(half_length_m, &self.estimate());
-        [self.along.disagreement(&measurement.along), self.across.disagreement(&across)]
-            .map(|squared| squared <= AXIS_GATE)
+    /// Returns whether the measurement of a sensor along or across the road counts: if it is the sensor that the axis follows, if that one
+    /// has not measured for a while, and it is followed from now on, or if it agrees with what that one has measured last.
+    /// `estimate` is that of the axis.
+    fn counts(followed: &mut Followed, measurement: &AxisMeasurement, estimate: &AxisEstimate, sensor: usize) -> bool {
+        let [position_m, variance_m2] = measurement.position_now(estimate.speed_mps);
+        if followed.sensor == sensor || followed.age_s > FOLLOWED_S {
+            *followed = Followed { sensor, age_s: 0.0, position_m, variance_m2 };
+            return true;
+        }
+        let age_s = followed.age_s;
+        let off_m = position_m - followed.position_m - estimate.speed_mps * age_s;
+        let manoeuvre_m = 0.5 * MANOEUVRE_MPS2 * age_s * age_s;
+        let motion_m2 = estimate.speed_variance_m2ps2 * age_s * age_s + manoeuvre_m * manoeuvre_m;
+        off_m * off_m <= AXIS_GATE * (variance_m2 + followed.variance_m2 + motion_m2)
     }
 
     /// Returns whether the middle of the face was seen a short time ago.
@@ -277,13 +305,13 @@ mod tests {
     /// Returns the estimate across the road after these measurements, of which the first is that of step 0.
     fn across(all: impl IntoIterator<Item = Measurement>) -> AxisEstimate {
         let mut all = all.into_iter();
-        let mut filter = RoadFilter::new(&all.next().unwrap(), 30.0);
+        let mut filter = RoadFilter::new(&all.next().unwrap(), 30.0, 0);
         let mut at_s = 0.0;
         for measurement in all {
             let to_s = measurement.along.position_m / 30.0;
             filter.predict(to_s - at_s, &EGO);
             at_s = to_s;
-            filter.correct(&measurement, 2.3, false);
+            filter.correct(&measurement, 2.3, 0);
         }
         filter.estimate()[1]
     }
@@ -306,21 +334,53 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_further_sensor_that_contradicts_the_first_does_not_pull_the_track_apart() {
-        for off_m in [0.0, 0.05, 0.3, 0.6, 1.5] {
-            let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0);
-            for step in 1..400 {
-                filter.predict(SCAN_S, &EGO);
-                filter.correct(&seen(step, 0.0, false), 2.3, false);
-                filter.correct(&seen(step, off_m, false), 2.3, true);
+    /// Returns the estimate across the road after 16 s in which sensor 0 measures every `first` and sensor 1 every `second` scan, the
+    /// latter `off_m` to the side, and sensor 0 nothing in every 25th.
+    fn across_of_two([first, second]: [u32; 2], off_m: f64) -> AxisEstimate {
+        let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, 0);
+        for step in 1..400 {
+            filter.predict(SCAN_S, &EGO);
+            if step % first == 0 && step % 25 != 0 {
+                filter.correct(&seen(step, 0.0, false), 2.3, 0);
             }
-            let [_, across] = filter.estimate();
-            // Within their errors of 0.04 m, both count.
-            let mean_m = if off_m <= 0.05 { 0.5 * off_m } else { 0.0 };
-            assert!((across.position_m - mean_m).abs() < 0.012, "{off_m}: {across:?}");
-            assert!(across.speed_mps.abs() < 0.05, "{off_m}: {across:?}");
+            if step % second == 0 {
+                filter.correct(&seen(step, off_m, false), 2.3, 1);
+            }
         }
+        filter.estimate()[1]
+    }
+
+    #[test]
+    fn a_sensor_that_contradicts_the_one_that_is_followed_does_not_pull_the_track_apart() {
+        for scans in [[1, 1], [3, 1], [1, 3], [2, 3]] {
+            for off_m in [0.0, 0.02, 0.3, 0.6, 1.5] {
+                let found = across_of_two(scans, off_m);
+                // Within their errors of 0.04 m, both count.
+                let bounds_m = if off_m <= 0.02 { [0.0, off_m] } else { [0.0; 2] };
+                assert!(
+                    (bounds_m[0] - 0.005..bounds_m[1] + 0.005).contains(&found.position_m),
+                    "{scans:?} {off_m}: {found:?}"
+                );
+                assert!(found.speed_mps.abs() < 0.05, "{scans:?} {off_m}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_track_follows_another_sensor_once_its_own_has_not_measured_for_a_while() {
+        let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, 0);
+        for step in 1..100 {
+            filter.predict(SCAN_S, &EGO);
+            filter.correct(&seen(step, 0.0, false), 2.3, if step < 50 { 0 } else { 1 });
+        }
+        // Sensor 0 is back, and off.
+        for step in 100..150 {
+            filter.predict(SCAN_S, &EGO);
+            filter.correct(&seen(step, 0.5, false), 2.3, 0);
+            filter.correct(&seen(step, 0.0, false), 2.3, 1);
+        }
+        let [_, across] = filter.estimate();
+        assert!(across.position_m.abs() < 0.005, "{across:?}");
     }
 
     #[test]

@@ -30,6 +30,8 @@ const FRONT_MARGIN_M: f64 = 1.0;
 /// The detections of one scan, all in the ego's frame at `time`.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackerScan<'a> {
+    /// Number of the sensor. A track follows the sensor that found it, and others as long as they agree.
+    pub sensor: usize,
     /// Reference time of the scan. [`Detection::time`] is the time at which a box's position holds.
     pub time: Time,
     /// The road from the map.
@@ -193,7 +195,7 @@ impl Tracker {
         self.project_faces(&scan.view, &frame);
         for track_index in 0..self.tracks.len() {
             match self.assigned[track_index] {
-                Some(detection_index) => self.correct(track_index, detection_index, &scan.detections[detection_index]),
+                Some(detection_index) => self.correct(track_index, detection_index, scan),
                 None => self.miss(track_index),
             }
         }
@@ -209,10 +211,10 @@ impl Tracker {
     }
 
     /// Corrects a track with its detection.
-    fn correct(&mut self, track_index: usize, detection_index: usize, detection: &Detection) {
+    fn correct(&mut self, track_index: usize, detection_index: usize, scan: &TrackerScan<'_>) {
+        let detection = &scan.detections[detection_index];
         let track = &mut self.tracks[track_index];
-        let is_further = track.seen >= Seen::Kept;
-        track.filter.correct(&self.measurements[detection_index], 0.5 * track.size_m().0, is_further);
+        track.filter.correct(&self.measurements[detection_index], 0.5 * track.size_m().0, scan.sensor);
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
         let [along, _] = track.filter.estimate();
@@ -257,7 +259,7 @@ impl Tracker {
             }
             let mut track = TrackState {
                 id: list.new_id(),
-                filter: RoadFilter::new(measurement, ego_mps),
+                filter: RoadFilter::new(measurement, ego_mps, scan.sensor),
                 lifecycle: match detection.seen_by {
                     SeenBy::Lidar => Lifecycle::first_hit(&self.model.rules),
                     SeenBy::CameraAlone => Lifecycle::first_kept(&self.model.rules),

@@ -168,7 +168,7 @@ fn tracked(steps: usize, seen: impl Fn(usize) -> Vec<Detection>) -> Option<Track
         let view =
             RearView { half_angle_tan: 1.0, range_m: 150.0, sensor_x_m: -2.0, sensor_y_m: 0.0, axis_azimuth_rad: 0.0 };
         tracker.update(
-            &TrackerScan { time, road: &road, ego: state, view, rear_x_m: -2.0, detections: &detections },
+            &TrackerScan { sensor: 0, time, road: &road, ego: state, view, rear_x_m: -2.0, detections: &detections },
             &mut list,
         );
         list.tracks.clear();

@@ -14,7 +14,7 @@
 
 use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
 
-use super::edges::edge_shifts;
+use super::edges::{Edges, edges};
 use super::kind::Resolution;
 use super::receiver::MAX_INTENSITY;
 use super::{LaneGeometry, LidarScan};
@@ -61,8 +61,8 @@ pub(crate) struct BoxFit {
     pub(crate) rear_u_m: f64,
     /// Least and greatest position v across the box's heading (m).
     pub(crate) across_m: [f64; 2],
-    /// How far outward of its mean position, given the outermost column, each edge lies (columns), if the powers of the beams tell it.
-    pub(crate) edge_shifts: Option<[f64; 2]>,
+    /// Where the edges lie within their columns, if the powers of the beams tell it.
+    pub(crate) edges: Option<Edges>,
     /// Least and greatest position v of the points on a retro-reflector (m), which saturate the receiver; `None` if there is none.
     pub(crate) plate_m: Option<[f64; 2]>,
     /// Height of the highest point (m).
@@ -83,6 +83,8 @@ pub(crate) struct BoxFit {
     pub(crate) range_m: f64,
     /// Spacing of columns at that distance, across the line of sight (m).
     pub(crate) spacing_m: f64,
+    /// Width of a beam's footprint (columns).
+    pub(crate) footprint_columns: f64,
     /// Height up to which the sensor sees at that distance (m).
     pub(crate) in_view_m: f64,
     /// Standard deviation of the range of a usual point (m).
@@ -113,6 +115,11 @@ impl BoxFit {
         let fit = empty.with_heading(road_rad, members, scan);
         let side_seen = fit.front_u_m - fit.rear_u_m > REFINE_LENGTH_M;
         if side_seen && has_many { refined() } else { fit }
+    }
+
+    /// Returns true if a side of the box faces the sensor: its outermost points are then not those of the front.
+    fn shows_flank(&self) -> bool {
+        self.azimuth_rad[0] > -self.heading_rad || self.azimuth_rad[1] < -self.heading_rad
     }
 
     /// Returns the box with a given heading, from the values that do not depend on it.
@@ -152,8 +159,11 @@ impl BoxFit {
             fit.truncated[1] |= fit.azimuth_rad[1] > SIDE_EDGE_RAD;
         }
         fit.locate_front(nearest.value(), [sin, cos], members, scan);
-        if !sees_side(&fit) && fit.spacing_m > FINE_SPACING_M {
-            fit.edge_shifts = edge_shifts(&fit, [sin, cos], members, scan);
+        fit.footprint_columns = scan.resolution.footprint_rad[0] * fit.range_m / fit.spacing_m;
+        let steps =
+            fit.azimuth_rad.map(|azimuth_rad| column_step_rad(&scan.resolution, azimuth_rad - scan.axis_azimuth_rad));
+        if !fit.shows_flank() && steps[0] == steps[1] && fit.spacing_m > FINE_SPACING_M {
+            fit.edges = edges(&fit, [sin, cos], members, scan);
         }
         fit
     }
@@ -175,7 +185,7 @@ impl BoxFit {
             front_u_m: 0.0,
             rear_u_m: 0.0,
             across_m: [f64::INFINITY, f64::NEG_INFINITY],
-            edge_shifts: None,
+            edges: None,
             plate_m: None,
             top_m: f64::NEG_INFINITY,
             bottom_m: f64::INFINITY,
@@ -186,6 +196,7 @@ impl BoxFit {
             offset_ns: offset_ns / count,
             range_m: 0.0,
             spacing_m: 0.0,
+            footprint_columns: 0.0,
             in_view_m: 0.0,
             point_sd_m: scan.resolution.point_sd_m,
             vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad[1]],
@@ -261,11 +272,6 @@ fn has_long_side(heading_rad: f64, members: &[u32], scan: &LidarScan) -> bool {
         far = lesser(far, u);
     }
     nearest.value() - FACE_DEPTH_M - far > REFINE_LENGTH_M + ROUNDING_M
-}
-
-/// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
-pub(crate) fn sees_side(fit: &BoxFit) -> bool {
-    fit.azimuth_rad[0] > 0.0 || fit.azimuth_rad[1] < 0.0
 }
 
 /// The largest of the inserted values, which yield a quantile near the maximum.

@@ -2,7 +2,7 @@
 
 use closecall_traffic::{ClassScores, Time, VehicleClass};
 
-use super::boxes::{BoxFit, sees_side};
+use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
@@ -18,9 +18,6 @@ const OCCLUSION_COLUMNS: f64 = 3.0;
 const OCCLUSION_DEPTH_M: f64 = 1.0;
 /// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the last step, 1/√12 = 0.29.
 const EDGE_SD_COLUMNS: f64 = 0.3;
-/// The same if the powers of the beams tell the half of the step in which the edge lies: half as much. Measured: 0.15, over 14,000 cars
-/// (paint 0.08 to 0.8) at random places within 0.3 m of the middle of the lane, 20 to 100 m behind.
-const RESOLVED_EDGE_SD_COLUMNS: f64 = 0.15;
 /// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate, bonnet edge.
 pub(crate) const FACE_SD_M: f64 = 0.034;
 /// Additional standard deviation of the front if a side is seen too, whose points lie close behind those of the front
@@ -344,16 +341,19 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
     let [right, left] = fit.across_m;
     let seen = left - right;
     let lost_share = LOST_EDGE_GROWTH * (fit.range_m / LOST_EDGE_RANGE_M).powi(2);
-    let edge_sd_of = |columns: f64| columns * fit.spacing_m * (1.0 + lost_share);
-    let edge_sd = edge_sd_of(if fit.edge_shifts.is_some() { RESOLVED_EDGE_SD_COLUMNS } else { EDGE_SD_COLUMNS });
-    let [right_shift, left_shift] = fit.edge_shifts.unwrap_or_default();
-    let (right_m, left_m) = (right - right_shift * fit.spacing_m, left + left_shift * fit.spacing_m);
+    let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m * (1.0 + lost_share);
+    let told_sd = fit.edges.map_or(edge_sd, |edges| edges.sd_share * edge_sd);
+    // An edge lies between the outermost sub-rays that meet the face and the next ones.
+    let mean_columns = 0.5 - 0.25 * fit.footprint_columns.min(1.0);
+    let [right_shift, left_shift] = fit.edges.map_or([0.0; 2], |edges| edges.shifts);
+    let right_m = right - (mean_columns + right_shift) * fit.spacing_m;
+    let left_m = left + (mean_columns + left_shift) * fit.spacing_m;
     let missing = (typical_m - seen).max(0.0);
     let (middle_m, sd_m) = match (right_hidden, left_hidden) {
         // Weak returns may have lost columns on both sides alike.
-        (false, false) => (0.5 * (left_m + right_m), edge_sd / f64::sqrt(2.0)),
-        (true, false) => (left_m - 0.5 * seen.max(typical_m), edge_sd),
-        (false, true) => (right_m + 0.5 * seen.max(typical_m), edge_sd),
+        (false, false) => (0.5 * (left_m + right_m), told_sd / f64::sqrt(2.0)),
+        (true, false) => (left_m - 0.5 * (left_m - right).max(typical_m), told_sd),
+        (false, true) => (right_m + 0.5 * (left - right_m).max(typical_m), told_sd),
         (true, true) => (0.5 * (left + right), edge_sd),
     };
     let lost = missing / f64::sqrt(12.0);
@@ -364,7 +364,7 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
         Extent::Assumed => sd_m.hypot(lost),
     };
     let width_m = match extent {
-        Extent::Seen => left_m - right_m + 0.5 * fit.spacing_m,
+        Extent::Seen => left_m - right_m,
         Extent::Assumed => seen.max(typical_m),
     };
     let side_sd_m = if sees_side(fit) { SIDE_SD_M } else { 0.0 };
@@ -375,8 +375,7 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
     };
     // Both hold: the mean is weighted by the inverse variances.
     // A plate saturates the receiver, however little of it a beam meets.
-    let plate_edge_sd = edge_sd_of(EDGE_SD_COLUMNS);
-    let plate_m2 = 0.5 * plate_edge_sd * plate_edge_sd + plate.offset_sd_m * plate.offset_sd_m;
+    let plate_m2 = 0.5 * edge_sd * edge_sd + plate.offset_sd_m * plate.offset_sd_m;
     let share = sd_m * sd_m / (sd_m * sd_m + plate_m2);
     Across {
         middle_m: middle_m + share * (plate.v_m - middle_m),
@@ -384,6 +383,11 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
         is_by_plate: true,
         ..by_edges
     }
+}
+
+/// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
+fn sees_side(fit: &BoxFit) -> bool {
+    fit.azimuth_rad[0] > 0.0 || fit.azimuth_rad[1] < 0.0
 }
 
 /// Returns true if a side is visible to its end.

@@ -18,27 +18,44 @@ use super::receiver::MAX_INTENSITY;
 /// Least power of the neighbour, in multiples of the detection threshold: half of it exceeds the threshold by 2.5 standard deviations of
 /// the noise. Otherwise the outermost beam may be missed, and the share says nothing.
 const MIN_NEIGHBOUR_POWER: f64 = 3.0;
-/// Least share of a beam that is seen: one with less is taken for the noise of the receiver.
+/// Least share of a beam that is seen. Two sub-rays side by side sample a footprint here: one with less is noise of the receiver.
 const MIN_SHARE: f64 = 0.5;
 /// Shares beyond which the two beams meet different materials, such as paint beside a headlamp (assumption): the noise of the weakest
-/// neighbour changes a share by 0.07.
+/// neighbour, and that of the outer beam, change a share by 0.08 to 0.09.
 const SAME_MATERIAL: std::ops::RangeInclusive<f64> = 0.35..=1.25;
 /// Distance from the outermost point of the face within which a point is in the outermost column of its layer (columns). A halo has the
 /// beams of the plate, and is elsewhere.
 const OUTERMOST: f64 = 0.5;
+/// Share by which a footprint may exceed a column due to rounding.
+const ROUNDING: f64 = 1e-6;
 
-/// Returns how far outward of their mean position, given the outermost columns, the right and the left edge lie (columns), or `None` if
-/// the powers do not tell it of both: a beam on another material at one edge makes the other one doubtful.
+/// Where the two edges of a face lie within the outermost columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Edges {
+    /// How far outward of its mean position, given the outermost column, the right and the left edge lies (columns).
+    pub(crate) shifts: [f64; 2],
+    /// Standard deviation of what remains unknown, relative to that without knowledge of the powers.
+    pub(crate) sd_share: f64,
+}
+
+/// Returns where the edges lie, or `None` if the powers do not tell it of both: a beam on another material at one edge makes the other one
+/// doubtful.
 ///
 /// `heading` has sine and cosine of the heading of the box.
-pub(super) fn edge_shifts(fit: &BoxFit, heading: [f64; 2], members: &[u32], scan: &LidarScan) -> Option<[f64; 2]> {
+pub(super) fn edges(fit: &BoxFit, heading: [f64; 2], members: &[u32], scan: &LidarScan) -> Option<Edges> {
+    // Where footprints overlap, a beam beyond the edge may meet the face.
+    if fit.footprint_columns > 1.0 + ROUNDING {
+        return None;
+    }
     let layers = scan.resolution.layers;
     let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / layers);
     let (first, last) = columns.fold((usize::MAX, 0), |(first, last), one| (first.min(one), last.max(one)));
     // The sweep begins on the left.
     let right = edge_shift(fit, (-fit.across_m[0], -1.0), (heading, members), (last, scan))?;
     let left = edge_shift(fit, (fit.across_m[1], 1.0), (heading, members), (first, scan))?;
-    Some([right, left])
+    // An edge within the outermost beam is known to half of its width; one beyond it lies anywhere before the middle of the next beam.
+    let half = 0.5 * fit.footprint_columns;
+    Some(Edges { shifts: [right, left], sd_share: ((1.0 - half).powi(3) + half.powi(3)).sqrt() })
 }
 
 /// Returns the shift of one edge, whose outermost point is `end_m` outward of the origin, in column `outermost`.
@@ -55,25 +72,28 @@ fn edge_shift(
     for &member in members {
         let beam = usize::from(scan.beam[member as usize]);
         let (inward, layer) = ((beam / layers).abs_diff(outermost), beam % layers);
-        if let Some(power) = powers[layer].get_mut(inward) {
-            *power = power.max(scan.intensity[member as usize]);
-            if inward == 0 {
-                let [x, y, _] = point(scan, member);
-                at[layer] = (outward * (y * cos - x * sin) - end_m) / fit.spacing_m;
-            }
+        let power = scan.intensity[member as usize];
+        match powers[layer].get_mut(inward) {
+            // Of two echoes, the stronger one counts.
+            Some(strongest) if power > *strongest => *strongest = power,
+            _ => continue,
+        }
+        if inward == 0 {
+            let [x, y, _] = point(scan, member);
+            at[layer] = (outward * (y * cos - x * sin) - end_m) / fit.spacing_m;
         }
     }
     let least = MIN_NEIGHBOUR_POWER * scan.resolution.threshold_per_m2 * fit.range_m * fit.range_m;
-    let footprint = (scan.resolution.footprint_rad[0] * fit.range_m / fit.spacing_m).min(1.0);
     let shift = |([outer, neighbour], at): (&[f32; 2], &f64)| {
         let share = f64::from(*outer) / f64::from(*neighbour);
         let is_told = f64::from(*neighbour) >= least
             && neighbour.max(*outer) < MAX_INTENSITY
             && SAME_MATERIAL.contains(&share)
             && *at >= -OUTERMOST;
-        // An edge within the beam is where the share says; one beyond it lies anywhere before the next beam, of which up to half is missed.
-        is_told.then(|| at + share.clamp(MIN_SHARE, 1.0) - 1.0 + 0.25 * footprint)
+        // An edge within the beam is where the share says; one beyond it, on average, half a column outward of the beam.
+        is_told.then(|| at + share.clamp(MIN_SHARE, 1.0) - 1.0 + 0.25 * fit.footprint_columns)
     };
-    // A tyre or a grille is darker than the paint beside it, and a layer that meets it tells too little.
-    powers.iter().zip(&at).filter_map(shift).reduce(f64::max)
+    // A tyre or a grille is darker than the paint beside it, and a layer that meets it tells too little. No edge is inward of the point.
+    let shift_columns = powers.iter().zip(&at).filter_map(shift).reduce(f64::max)?;
+    Some(shift_columns.max(-0.5))
 }

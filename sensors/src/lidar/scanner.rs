@@ -4,7 +4,7 @@
 //! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
 //! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
-use closecall_traffic::{Environment, Stream, Time};
+use closecall_traffic::{Stream, Time};
 use fearless_simd::{Level, Simd};
 
 use super::bare_road::{BareRoad, Road, cast_ground};
@@ -176,8 +176,8 @@ impl Scanner {
         let viewpoint = Viewpoint::new(scene, &actual);
         self.collect_targets(scene, mirror_side, &viewpoint);
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
-        self.begin(scene.time, mirror_side, &pose);
         let link = LinkBudget::new(&actual, scene.environment);
+        self.begin(scene.time, mirror_side, (&pose, &link));
         // With a fault, a point may be elsewhere than its return.
         // The limits hold for a sensor that looks straight back along a straight road, whatever the map says.
         let is_plain = fault.is_none() && !self.lidar.is_turned() && scene.road.curvature_per_m() == 0.0;
@@ -301,12 +301,12 @@ impl Scanner {
     }
 
     /// Clears the scan and sets its times and its mirror side.
-    fn begin(&mut self, end: Time, mirror_side: MirrorSide, pose: &SensorPoseEstimate) {
+    fn begin(&mut self, end: Time, mirror_side: MirrorSide, (pose, link): (&SensorPoseEstimate, &LinkBudget)) {
         self.clear();
         self.stamp(end);
         self.scan.mirror_side = mirror_side;
         let (mount_height_m, ground_reach_m) = (self.lidar.mount_height_m, self.ground_reach_m);
-        let threshold_per_m2 = 1.0 / f64::from(LinkBudget::new(&self.lidar, &Environment::CLEAR_DAY).gain_m2);
+        let threshold_per_m2 = 1.0 / f64::from(link.gain_m2);
         self.scan.resolution =
             Resolution { mount_height_m, ground_reach_m, threshold_per_m2, ..self.pattern.kind().resolution };
         (self.scan.sensor_x_m, self.scan.sensor_y_m) = (pose.sensor_x_m(), pose.sensor_y_m());

@@ -11,7 +11,7 @@ use closecall_traffic::{
 };
 
 use super::tracking::{PERIOD_S, follower};
-use crate::lidar::{Lidar, RearLidar};
+use crate::lidar::{Lidar, LidarConfig, RearLidar};
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::{Scene, TrackAudit, TrackerConfig};
 
@@ -51,7 +51,10 @@ fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
         let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, ..RearView::default() };
         let detections = lidar.detect().unwrap();
         list.tracks.clear();
-        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections }, &mut list);
+        tracker.update(
+            &TrackerScan { sensor: 0, time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections },
+            &mut list,
+        );
         tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut list);
         if scan < 250 {
             continue;
@@ -125,38 +128,77 @@ fn at_every_half_metre_a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     }
 }
 
-#[test]
-fn the_powers_of_the_beams_tell_where_within_a_column_an_edge_lies() {
+/// Errors of the middles of boxes around cars at random places behind a LiDAR.
+struct Boxes {
+    count: f64,
+    /// Root mean square (m; columns of `step_deg`).
+    rms: [f64; 2],
+    /// Mean of the squared errors over their variances.
+    nees: f64,
+}
+
+/// Measures cars with this paint, up to `most_m` behind and up to 0.3 m aside of a LiDAR, 600 scans.
+fn boxes(lidar: &str, step_deg: f64, paint: f64, most_m: f64) -> Boxes {
+    let config: LidarConfig = toml::from_str(lidar).unwrap();
+    let lidar = config.check(&Parameters::default()).unwrap();
     let road = Road::straight(3);
     let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 30.0);
     let mut rng = stream(5, 0, &ActorId::new("ego").unwrap(), "edges");
+    let (mut squares, mut nees, mut count) = ([0.0; 2], 0.0, 0.0);
+    let mut rear = RearLidar::new(lidar.clone());
+    for scan in 0..600 {
+        let (gap_m, off_m) = (20.0 + (most_m - 20.0) * rng.random::<f64>(), 0.6 * rng.random::<f64>() - 0.3);
+        let behind_m = gap_m + ego.vehicle.dimensions.length_m;
+        let mut others = [follower(ego.state.s_m - behind_m, OWN_LANE_M + off_m, 30.0)];
+        others[0].vehicle.appearance.paint_reflectivity = paint;
+        let environment = &Environment::CLEAR_DAY;
+        rear.scan(&Scene { time: CONTROL_STEP * scan, road: &road, environment, ego, others: &others }, &mut rng);
+        let [found] = rear.detect().unwrap() else { continue };
+        let error_m = found.face_y_m - off_m;
+        squares[0] += error_m * error_m;
+        squares[1] += (error_m / (gap_m * step_deg.to_radians())).powi(2);
+        nees += (error_m / found.lateral_sd_m).powi(2);
+        count += 1.0;
+    }
+    Boxes { count, rms: squares.map(|sum: f64| (sum / count).sqrt()), nees: nees / count }
+}
+
+#[test]
+fn the_powers_of_the_beams_tell_where_within_a_column_an_edge_lies() {
     // The paint and the greatest gap with which half a beam exceeds the detection threshold.
     for (paint, most_m) in [(0.2, 45.0), (0.35, 60.0), (0.8, 85.0)] {
-        let mut lidar = RearLidar::new(Lidar::default());
-        let (mut squares, mut nees, mut boxes) = (0.0, 0.0, 0.0);
-        for scan in 0..600 {
-            let (gap_m, off_m) = (20.0 + (most_m - 20.0) * rng.random::<f64>(), 0.6 * rng.random::<f64>() - 0.3);
-            let behind_m = gap_m + ego.vehicle.dimensions.length_m;
-            let mut others = [follower(ego.state.s_m - behind_m, OWN_LANE_M + off_m, 30.0)];
-            others[0].vehicle.appearance.paint_reflectivity = paint;
-            let scene = Scene {
-                time: CONTROL_STEP * scan,
-                road: &road,
-                environment: &Environment::CLEAR_DAY,
-                ego,
-                others: &others,
-            };
-            lidar.scan(&scene, &mut rng);
-            let [found] = lidar.detect().unwrap() else { continue };
-            let error_m = found.face_y_m - off_m;
-            squares += (error_m / (gap_m * 0.125_f64.to_radians())).powi(2);
-            nees += (error_m / found.lateral_sd_m).powi(2);
-            boxes += 1.0;
-        }
-        assert!(boxes > 590.0, "{boxes} boxes with {paint}");
+        let found = boxes("", 0.125, paint, most_m);
+        assert!(found.count > 590.0, "{} boxes with {paint}", found.count);
         // Edges anywhere within a column would give 0.2.
-        assert!((squares / boxes).sqrt() < 0.15, "{} with {paint}", (squares / boxes).sqrt());
-        assert!((0.4..1.6).contains(&(nees / boxes)), "{} with {paint}", nees / boxes);
+        assert!(found.rms[1] < 0.15, "{} with {paint}", found.rms[1]);
+        assert!((0.4..1.6).contains(&found.nees), "{} with {paint}", found.nees);
+    }
+}
+
+#[test]
+fn a_box_is_as_sure_as_the_pattern_of_its_lidar_allows() {
+    // Gaps between footprints, footprints as wide as a step, overlapping ones, and a face across the end of the fine field.
+    let of_width = |deg: &str| {
+        let width = format!("beam-width-deg = {deg}");
+        format!("[pattern]\n{}", include_str!("../../lidars/scala-2.toml").replace("beam-width-deg = 0.125", &width))
+    };
+    let (narrow, wide, very_wide) = (of_width("0.04"), of_width("0.2"), of_width("0.375"));
+    for (lidar, step_deg, most_m) in [
+        ("model = \"os1-64\"", 0.3515625, 35.0),
+        ("model = \"pandar-xt-16\"", 0.18, 30.0),
+        (&narrow, 0.125, 60.0),
+        (&wide, 0.125, 60.0),
+        (&very_wide, 0.125, 60.0),
+        ("azimuth-deg = 15", 0.25, 60.0),
+        ("azimuth-deg = -15", 0.25, 60.0),
+        ("azimuth-deg = 25", 0.25, 60.0),
+        ("window-transmission = 0.6", 0.125, 60.0),
+    ] {
+        for paint in [0.2, 0.5] {
+            let found = boxes(lidar, step_deg, paint, most_m);
+            let text = format!("{lidar} with {paint}: {} {:?} {}", found.count, found.rms, found.nees);
+            assert!(found.count > 590.0 && (0.25..1.6).contains(&found.nees), "{text}");
+        }
     }
 }
 
@@ -179,7 +221,10 @@ fn states_from(first: i64) -> Vec<Vec<[f64; 4]>> {
         let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, ..RearView::default() };
         let detections = lidar.detect().unwrap();
         list.tracks.clear();
-        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections }, &mut list);
+        tracker.update(
+            &TrackerScan { sensor: 0, time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections },
+            &mut list,
+        );
         tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut list);
         states.push(list.tracks.iter().map(|track| track.state.into()).collect());
     }

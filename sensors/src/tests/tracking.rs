@@ -165,7 +165,8 @@ impl Bench {
             });
         }
         let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, ..RearView::default() };
-        let scan = TrackerScan { time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections: &detections };
+        let scan =
+            TrackerScan { sensor: 0, time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections: &detections };
         self.list.tracks.clear();
         self.tracker.update(&scan, &mut self.list);
         self.tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut self.list);
