@@ -9,7 +9,7 @@ use closecall_traffic::{ClassScores, VehicleClass};
 
 use super::LaneGeometry;
 use super::boxes::BoxFit;
-use super::parts::is_plate_alone;
+use super::parts::ends_at_plate;
 use closecall_tracking::Gaussian;
 
 /// The prior and the size distribution of a class.
@@ -82,7 +82,7 @@ pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) 
     let mut logs = [0.0; 4];
     for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
         *log = model.prior.ln()
-            + width_log(fit, model, width_seen && !is_plate_alone(fit))
+            + width_log(fit, model, width_seen && !ends_at_plate(fit))
             + height_log(fit, model)
             + length_log(fit, model);
     }

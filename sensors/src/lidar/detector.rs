@@ -6,7 +6,7 @@ use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
-use super::parts::{join_lamps, plate_middle};
+use super::parts::{ends_at_plate, join_lamps, plate_middle};
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
 use closecall_tracking::SIDE_PROTRUSION_M;
 
@@ -357,7 +357,7 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
         (true, true) => (0.5 * (left + right), edge_sd),
     };
     let lost = missing / f64::sqrt(12.0);
-    let both_seen = !right_hidden && !left_hidden;
+    let both_seen = !right_hidden && !left_hidden && !ends_at_plate(fit);
     let extent = if both_seen && missing < 2.0 * fit.spacing_m + 0.2 { Extent::Seen } else { Extent::Assumed };
     let sd_m = match extent {
         Extent::Seen => sd_m.hypot(0.5 * lost),

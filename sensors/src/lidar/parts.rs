@@ -39,9 +39,11 @@ pub(super) fn plate_middle(fit: &BoxFit) -> Option<Middle> {
     is_plate.then_some(Middle { v_m: 0.5 * (left + right), offset_sd_m: PLATE_OFFSET_SD_M })
 }
 
-/// Returns true if nothing but the plate is seen, so that the width is not that of a vehicle.
-pub(super) fn is_plate_alone(fit: &BoxFit) -> bool {
-    plate_middle(fit).is_some() && fit.width_m() <= PLATE_WIDTH_M + 2.0 * fit.spacing_m
+/// Returns true if nothing is seen beside the plate on one side or both, so that the width is not that of a vehicle.
+pub(super) fn ends_at_plate(fit: &BoxFit) -> bool {
+    let beside_m =
+        fit.plate_m.map_or(f64::INFINITY, |[right, left]| (right - fit.across_m[0]).min(fit.across_m[1] - left));
+    plate_middle(fit).is_some() && beside_m <= 0.5 * fit.spacing_m
 }
 
 /// Returns true if two clusters may be the two headlamps of one vehicle.
