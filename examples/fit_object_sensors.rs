@@ -14,6 +14,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
+use closecall::scenarios::atomic::write_file;
 use closecall::simulation::scenario::source;
 use closecall_perception::fit::{FitPlan, at_bounds, fit, fit_errors};
 use closecall_perception::validation::{Measured, differences, measure, table};
@@ -54,7 +55,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         seed: args.seed,
         approaches: args.approaches,
         command: format!(
-            "cargo run --release --example fit_object_sensors -- {}-n {} --seed {}",
+            "cargo run --release --example fit_object_sensors -- {}{}-n {} --seed {}",
+            args.fit.as_ref().map_or_else(String::new, |path| format!("--fit {} ", path.display())),
             match (args.validate, args.errors) {
                 (true, _) => "--validate ",
                 (_, true) => "--errors ",
@@ -75,7 +77,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         _ => fit(&plan)?,
     };
     at_bounds(&found).iter().for_each(|warning| println!("warning: {warning}"));
-    std::fs::write(&args.output, format!("{HEAD}{}", toml::to_string(&found)?))?;
+    let text = format!("{HEAD}{}", toml::to_string(&found)?);
+    write_file(&args.output, |file| file.write_all(text.as_bytes()))?;
     println!("written: {}", args.output.display());
     Ok(())
 }

@@ -36,8 +36,8 @@ pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception, MAX_ADDITIONAL_LIDARS};
 pub use ground_truth::GroundTruth;
 pub use object::{
-    ByClass, Chain, ErrorGrid, ErrorGrids, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig,
-    ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
+    ByClass, Chain, ErrorGrid, ErrorGrids, FitError, FittedErrors, NamedGrid, NoiseKey, ObjectPerception,
+    ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
 pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorError, SensorHealth};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -13,7 +13,7 @@
 //!
 //! A slow error stands for all that lasts longer than a scan: noise, and what the full chain errs in the same way at the same distance.
 
-use closecall_sensors::{ErrorGrid, ErrorGrids, FittedErrors, RearFit, SensorMode, Sensors};
+use closecall_sensors::{ErrorGrid, ErrorGrids, FittedErrors, NamedGrid, RearFit, SensorMode, Sensors};
 use closecall_traffic::{Appearance, CONTROL_STEP, Plate, Vehicle, VehicleClass};
 use rayon::prelude::*;
 
@@ -76,7 +76,12 @@ pub(super) struct Figures {
 pub fn at_bounds(fit: &RearFit) -> Vec<String> {
     let grids = &fit.errors;
     let of_class = |class: &str, grid: &ErrorGrid| {
-        let on = |key: &str, rows: &[Vec<f64>], [low, high]: [f64; 2]| {
+        let warning = |(key, rows, _): NamedGrid<'_>| {
+            let [low, high] = match key {
+                _ if key.ends_with("-time-s") => TIME_BOUNDS_S,
+                _ if key.ends_with("-m") => SD_BOUNDS_M,
+                _ => return None,
+            };
             let count = rows.iter().flatten().filter(|value| !(**value > low && **value < high)).count();
             (count > 0).then(|| {
                 format!(
@@ -84,21 +89,10 @@ pub fn at_bounds(fit: &RearFit) -> Vec<String> {
                 )
             })
         };
-        [
-            on("white-along-m", &grid.white_along_m, SD_BOUNDS_M),
-            on("white-across-m", &grid.white_across_m, SD_BOUNDS_M),
-            on("far-white-along-m", &grid.far_white_along_m, SD_BOUNDS_M),
-            on("far-white-across-m", &grid.far_white_across_m, SD_BOUNDS_M),
-            on("slow-along-m", &grid.slow_along_m, SD_BOUNDS_M),
-            on("slow-across-m", &grid.slow_across_m, SD_BOUNDS_M),
-            on("far-slow-along-m", &grid.far_slow_along_m, SD_BOUNDS_M),
-            on("far-slow-across-m", &grid.far_slow_across_m, SD_BOUNDS_M),
-            on("slow-along-time-s", &grid.slow_along_time_s, TIME_BOUNDS_S),
-            on("slow-across-time-s", &grid.slow_across_time_s, TIME_BOUNDS_S),
-        ]
+        grid.named().into_iter().filter_map(warning).collect::<Vec<_>>()
     };
     let classes = [("car", &grids.car), ("truck", &grids.truck), ("motorcycle", &grids.motorcycle)];
-    classes.into_iter().flat_map(|(class, grid)| of_class(class, grid)).flatten().collect()
+    classes.into_iter().flat_map(|(class, grid)| of_class(class, grid)).collect()
 }
 
 impl Fitter<'_> {

@@ -95,8 +95,8 @@ pub struct ErrorGrid {
     pub lost_share: Vec<Vec<f64>>,
 }
 
-/// Name of a grid, its values, and their range.
-type Named<'a> = (&'static str, &'a [Vec<f64>], [f64; 2]);
+/// Key of a grid, its values, and their range.
+pub type NamedGrid<'a> = (&'static str, &'a [Vec<f64>], [f64; 2]);
 
 impl ErrorGrid {
     /// Returns the grids of points that stand in rows of equal paint.
@@ -118,8 +118,8 @@ impl ErrorGrid {
         }
     }
 
-    /// Returns the grids with their names and the ranges of their values, in the order of the file.
-    fn named(&self) -> [Named<'_>; 12] {
+    /// Returns the grids with their keys and the ranges of their values, in the order of the file.
+    pub fn named(&self) -> [NamedGrid<'_>; 12] {
         [
             ("white-along-m", &self.white_along_m, SD_RANGE_M),
             ("white-across-m", &self.white_across_m, SD_RANGE_M),

@@ -35,7 +35,7 @@ mod visibility;
 mod weather;
 
 pub use config::{ObjectSensorConfig, ObjectSensorModel};
-pub use errors::{ErrorGrid, ErrorGrids, FittedErrors};
+pub use errors::{ErrorGrid, ErrorGrids, FittedErrors, NamedGrid};
 pub use fit::{ByClass, FitError, Origin, RangeGrid, RearFit, ShapeRatios};
 pub use noise::NoiseKey;
 pub use perception::ObjectPerception;

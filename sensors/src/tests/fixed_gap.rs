@@ -145,7 +145,7 @@ fn boxes(lidar: &str, step_deg: f64, paint: f64, most_m: f64) -> Boxes {
     let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 30.0);
     let mut rng = stream(5, 0, &ActorId::new("ego").unwrap(), "edges");
     let (mut squares, mut nees, mut count) = ([0.0; 2], 0.0, 0.0);
-    let mut rear = RearLidar::new(lidar.clone());
+    let mut rear = RearLidar::new(lidar);
     for scan in 0..600 {
         let (gap_m, off_m) = (20.0 + (most_m - 20.0) * rng.random::<f64>(), 0.6 * rng.random::<f64>() - 0.3);
         let behind_m = gap_m + ego.vehicle.dimensions.length_m;
