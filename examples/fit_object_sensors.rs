@@ -68,7 +68,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let known = match &args.fit {
-        Some(path) => RearFit::parse(&std::fs::read_to_string(path)?)?,
+        Some(path) => std::fs::read_to_string(path)
+            .map_err(|error| error.to_string())
+            .and_then(|text| RearFit::parse(&text).map_err(|error| error.to_string()))
+            .map_err(|error| format!("failed to read {}: {error}", path.display()))?,
         None => RearFit::shipped()?.clone(),
     };
     let found = match (args.validate, args.errors) {

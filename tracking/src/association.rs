@@ -73,7 +73,7 @@ mod tests {
     use crate::axis::AxisMeasurement;
 
     fn track(s_m: f64, d_m: f64) -> RoadFilter {
-        RoadFilter::new(&measurement(s_m, d_m), 0.0, 0)
+        RoadFilter::new(&measurement(s_m, d_m), 0.0, None)
     }
 
     fn measurement(s_m: f64, d_m: f64) -> Measurement {

@@ -29,7 +29,8 @@ pub const SLOW_TIME_S: f64 = 5.0;
 pub const SLOW_DISTANCE_M: f64 = 5.0;
 /// Gate for the squared distance along one axis: the 99.9 % quantile of χ² with one degree of freedom.
 const AXIS_GATE: f64 = 10.8;
-/// Time without a measurement after which a track follows another sensor (s): a sensor of 10 Hz may lose a scan.
+/// Time without a measurement after which a track follows another sensor (s): a sensor of 10 Hz may lose a scan. One of less than 4 Hz is
+/// followed only where no other one measures.
 const FOLLOWED_S: f64 = 0.25;
 /// Acceleration of a manoeuvre that may have begun since the latest measurement of the sensor that a track follows (m/s²): that of the
 /// allowance of the gate.
@@ -109,7 +110,7 @@ pub(crate) struct RoadFilter {
 
 impl RoadFilter {
     /// Creates a filter at its first measurement, which is one of `sensor`. The prior speed along the road is `speed_mps`.
-    pub(crate) fn new(measurement: &Measurement, speed_mps: f64, sensor: usize) -> Self {
+    pub(crate) fn new(measurement: &Measurement, speed_mps: f64, sensor: Option<usize>) -> Self {
         let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
         let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
         let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
@@ -119,7 +120,7 @@ impl RoadFilter {
             slow_m2: measurement.slow_m2(),
             slow_share: [1.0; 2],
             since_middle_s: f64::INFINITY,
-            followed: [Followed { sensor, age_s: 0.0, position_m: 0.0, variance_m2: 0.0 }; 2],
+            followed: [Followed { sensor: 0, age_s: f64::INFINITY, position_m: 0.0, variance_m2: 0.0 }; 2],
         };
         filter.correct(measurement, 0.0, sensor);
         filter
@@ -148,7 +149,7 @@ impl RoadFilter {
     ///
     /// Along each axis, the filter follows one sensor. What another one measures corrects nothing there if it contradicts that one: two
     /// sensors of which one is mounted askew would pull the track apart in every scan, always in the same order.
-    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, sensor: usize) {
+    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, sensor: Option<usize>) {
         let estimate = self.estimate();
         if Self::counts(&mut self.followed[0], &measurement.along, &estimate[0], sensor) {
             self.smooth(0, measurement);
@@ -176,10 +177,16 @@ impl RoadFilter {
         self.across.measure_position(&self.smoothed(measurement).across_for(half_length_m, &estimate));
     }
 
-    /// Returns whether the measurement of a sensor along or across the road counts: if it is the sensor that the axis follows, if that one
+    /// Returns whether the measurement of a sensor along or across the road counts: if it is that of the camera alone (`None`), if it is the sensor that the axis follows, if that one
     /// has not measured for a while, and it is followed from now on, or if it agrees with what that one has measured last.
     /// `estimate` is that of the axis.
-    fn counts(followed: &mut Followed, measurement: &AxisMeasurement, estimate: &AxisEstimate, sensor: usize) -> bool {
+    fn counts(
+        followed: &mut Followed,
+        measurement: &AxisMeasurement,
+        estimate: &AxisEstimate,
+        sensor: Option<usize>,
+    ) -> bool {
+        let Some(sensor) = sensor else { return true };
         let [position_m, variance_m2] = measurement.position_now(estimate.speed_mps);
         if followed.sensor == sensor || followed.age_s > FOLLOWED_S {
             *followed = Followed { sensor, age_s: 0.0, position_m, variance_m2 };
@@ -305,13 +312,13 @@ mod tests {
     /// Returns the estimate across the road after these measurements, of which the first is that of step 0.
     fn across(all: impl IntoIterator<Item = Measurement>) -> AxisEstimate {
         let mut all = all.into_iter();
-        let mut filter = RoadFilter::new(&all.next().unwrap(), 30.0, 0);
+        let mut filter = RoadFilter::new(&all.next().unwrap(), 30.0, Some(0));
         let mut at_s = 0.0;
         for measurement in all {
             let to_s = measurement.along.position_m / 30.0;
             filter.predict(to_s - at_s, &EGO);
             at_s = to_s;
-            filter.correct(&measurement, 2.3, 0);
+            filter.correct(&measurement, 2.3, Some(0));
         }
         filter.estimate()[1]
     }
@@ -337,14 +344,14 @@ mod tests {
     /// Returns the estimate across the road after 16 s in which sensor 0 measures every `first` and sensor 1 every `second` scan, the
     /// latter `off_m` to the side, and sensor 0 nothing in every 25th.
     fn across_of_two([first, second]: [u32; 2], off_m: f64) -> AxisEstimate {
-        let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, 0);
+        let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, Some(0));
         for step in 1..400 {
             filter.predict(SCAN_S, &EGO);
             if step % first == 0 && step % 25 != 0 {
-                filter.correct(&seen(step, 0.0, false), 2.3, 0);
+                filter.correct(&seen(step, 0.0, false), 2.3, Some(0));
             }
             if step % second == 0 {
-                filter.correct(&seen(step, off_m, false), 2.3, 1);
+                filter.correct(&seen(step, off_m, false), 2.3, Some(1));
             }
         }
         filter.estimate()[1]
@@ -368,16 +375,16 @@ mod tests {
 
     #[test]
     fn a_track_follows_another_sensor_once_its_own_has_not_measured_for_a_while() {
-        let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, 0);
+        let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, Some(0));
         for step in 1..100 {
             filter.predict(SCAN_S, &EGO);
-            filter.correct(&seen(step, 0.0, false), 2.3, if step < 50 { 0 } else { 1 });
+            filter.correct(&seen(step, 0.0, false), 2.3, Some(usize::from(step >= 50)));
         }
         // Sensor 0 is back, and off.
         for step in 100..150 {
             filter.predict(SCAN_S, &EGO);
-            filter.correct(&seen(step, 0.5, false), 2.3, 0);
-            filter.correct(&seen(step, 0.0, false), 2.3, 1);
+            filter.correct(&seen(step, 0.5, false), 2.3, Some(0));
+            filter.correct(&seen(step, 0.0, false), 2.3, Some(1));
         }
         let [_, across] = filter.estimate();
         assert!(across.position_m.abs() < 0.005, "{across:?}");

@@ -214,7 +214,11 @@ impl Tracker {
     fn correct(&mut self, track_index: usize, detection_index: usize, scan: &TrackerScan<'_>) {
         let detection = &scan.detections[detection_index];
         let track = &mut self.tracks[track_index];
-        track.filter.correct(&self.measurements[detection_index], 0.5 * track.size_m().0, scan.sensor);
+        track.filter.correct(
+            &self.measurements[detection_index],
+            0.5 * track.size_m().0,
+            followed_sensor(detection, scan),
+        );
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
         let [along, _] = track.filter.estimate();
@@ -259,7 +263,7 @@ impl Tracker {
             }
             let mut track = TrackState {
                 id: list.new_id(),
-                filter: RoadFilter::new(measurement, ego_mps, scan.sensor),
+                filter: RoadFilter::new(measurement, ego_mps, followed_sensor(detection, scan)),
                 lifecycle: match detection.seen_by {
                     SeenBy::Lidar => Lifecycle::first_hit(&self.model.rules),
                     SeenBy::CameraAlone => Lifecycle::first_kept(&self.model.rules),
@@ -295,6 +299,11 @@ impl Tracker {
             }
         }
     }
+}
+
+/// Returns the sensor that a track may follow for this detection: none if only the camera sees it, which comes with the scan of any LiDAR.
+fn followed_sensor(detection: &Detection, scan: &TrackerScan<'_>) -> Option<usize> {
+    (detection.seen_by == SeenBy::Lidar).then_some(scan.sensor)
 }
 
 /// Returns what a scan shows of a track that this detection belongs to.

@@ -162,7 +162,10 @@ impl BoxFit {
         fit.footprint_columns = scan.resolution.footprint_rad[0] * fit.range_m / fit.spacing_m;
         let steps =
             fit.azimuth_rad.map(|azimuth_rad| column_step_rad(&scan.resolution, azimuth_rad - scan.axis_azimuth_rad));
-        if !fit.shows_flank() && steps[0] == steps[1] && fit.spacing_m > FINE_SPACING_M {
+        if !fit.shows_flank()
+            && steps == [column_step_rad(&scan.resolution, from_axis_rad); 2]
+            && fit.spacing_m > FINE_SPACING_M
+        {
             fit.edges = edges(&fit, [sin, cos], members, scan);
         }
         fit

@@ -343,8 +343,8 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
     let lost_share = LOST_EDGE_GROWTH * (fit.range_m / LOST_EDGE_RANGE_M).powi(2);
     let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m * (1.0 + lost_share);
     let told_sd = fit.edges.map_or(edge_sd, |edges| edges.sd_share * edge_sd);
-    // An edge lies between the outermost sub-rays that meet the face and the next ones.
-    let mean_columns = 0.5 - 0.25 * fit.footprint_columns.min(1.0);
+    // An edge lies between the inner sub-rays of the outermost beam that meets the face and those of the next one.
+    let mean_columns = 0.5 - 0.25 * fit.footprint_columns;
     let [right_shift, left_shift] = fit.edges.map_or([0.0; 2], |edges| edges.shifts);
     let right_m = right - (mean_columns + right_shift) * fit.spacing_m;
     let left_m = left + (mean_columns + left_shift) * fit.spacing_m;

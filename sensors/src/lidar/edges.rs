@@ -18,7 +18,8 @@ use super::receiver::MAX_INTENSITY;
 /// Least power of the neighbour, in multiples of the detection threshold: half of it exceeds the threshold by 2.5 standard deviations of
 /// the noise. Otherwise the outermost beam may be missed, and the share says nothing.
 const MIN_NEIGHBOUR_POWER: f64 = 3.0;
-/// Least share of a beam that is seen. Two sub-rays side by side sample a footprint here: one with less is noise of the receiver.
+/// Least share of a beam that is seen. Two sub-rays side by side sample a footprint, so that a beam meets a face with half of them or with
+/// all; a smaller share comes from noise.
 const MIN_SHARE: f64 = 0.5;
 /// Shares beyond which the two beams meet different materials, such as paint beside a headlamp (assumption): the noise of the weakest
 /// neighbour, and that of the outer beam, change a share by 0.08 to 0.09.
@@ -93,7 +94,8 @@ fn edge_shift(
         // An edge within the beam is where the share says; one beyond it, on average, half a column outward of the beam.
         is_told.then(|| at + share.clamp(MIN_SHARE, 1.0) - 1.0 + 0.25 * fit.footprint_columns)
     };
-    // A tyre or a grille is darker than the paint beside it, and a layer that meets it tells too little. No edge is inward of the point.
+    // A tyre or a grille is darker than the paint beside it, and a layer that meets it tells too little. No edge is inward of
+    // the inner sub-rays of the outermost beam.
     let shift_columns = powers.iter().zip(&at).filter_map(shift).reduce(f64::max)?;
     Some(shift_columns.max(-0.5))
 }
