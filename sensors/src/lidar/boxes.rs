@@ -117,6 +117,11 @@ impl BoxFit {
         if side_seen && has_many { refined() } else { fit }
     }
 
+    /// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
+    pub(super) fn sees_side(&self) -> bool {
+        self.azimuth_rad[0] > 0.0 || self.azimuth_rad[1] < 0.0
+    }
+
     /// Returns true if a side of the box faces the sensor: its outermost points are then not those of the front.
     fn shows_flank(&self) -> bool {
         self.azimuth_rad[0] > -self.heading_rad || self.azimuth_rad[1] < -self.heading_rad

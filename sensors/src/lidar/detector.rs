@@ -2,11 +2,12 @@
 
 use closecall_traffic::{ClassScores, Time, VehicleClass};
 
+use super::across::across;
 use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
-use super::parts::{ends_at_plate, join_lamps, plate_middle};
+use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
 use closecall_tracking::SIDE_PROTRUSION_M;
 
@@ -16,24 +17,11 @@ use crate::{Detection, Extent, SeenBy, SensorError};
 const OCCLUSION_COLUMNS: f64 = 3.0;
 /// Difference in range from which a cluster may occlude another (m).
 const OCCLUSION_DEPTH_M: f64 = 1.0;
-/// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the last step, 1/√12 = 0.29.
-const EDGE_SD_COLUMNS: f64 = 0.3;
 /// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate, bonnet edge.
 pub(crate) const FACE_SD_M: f64 = 0.034;
 /// Additional standard deviation of the front if a side is seen too, whose points lie close behind those of the front
 /// (m).
 const CORNER_SD_M: f64 = 0.05;
-/// Additional lateral standard deviation if a side is seen, from which mirrors and wheels protrude (m).
-const SIDE_SD_M: f64 = 0.02;
-/// Relative increase of an edge's standard deviation at [`LOST_EDGE_RANGE_M`].
-///
-/// The probability that the outermost columns are lost to weak returns grows with distance. The increase is
-/// proportional to the square of the distance.
-const LOST_EDGE_GROWTH: f64 = 0.6;
-/// Distance that [`LOST_EDGE_GROWTH`] refers to (m).
-const LOST_EDGE_RANGE_M: f64 = 100.0;
-/// Minimum lateral standard deviation of a detection (m).
-const MIN_LATERAL_SD_M: f64 = 0.004;
 /// Height of the lowest footprint on a car's front above which only the cabin was seen (m).
 const CABIN_ONLY_FROM_M: f64 = 0.95;
 /// Mean distance by which a car's bumper is ahead of its cabin (m).
@@ -304,7 +292,7 @@ fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, la
 
 /// Returns the position of the front face along the box's heading, and its standard deviation (m).
 fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
-    let face_sd_m = if sees_side(fit) { FACE_SD_M.hypot(CORNER_SD_M) } else { FACE_SD_M };
+    let face_sd_m = if fit.sees_side() { FACE_SD_M.hypot(CORNER_SD_M) } else { FACE_SD_M };
     let sd = face_sd_m.hypot(fit.point_sd_m / (fit.front_points.max(1) as f64).sqrt());
     if fit.is_truncated() {
         // The vehicle is partly or entirely beside the ego. The front follows from the rear end and the typical length.
@@ -324,70 +312,6 @@ fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
         VehicleClass::Motorcycle => (fit.front_u_m, sd.hypot(WHEEL_SD_M)),
         VehicleClass::Car | VehicleClass::Truck => (fit.front_u_m, sd),
     }
-}
-
-/// The lateral extent of a box: its middle, with standard deviation, and its width.
-struct Across {
-    middle_m: f64,
-    sd_m: f64,
-    width_m: f64,
-    extent: Extent,
-    /// Whether the middle is that of the plate.
-    is_by_plate: bool,
-}
-
-/// Returns the lateral extent of a box from its visible edges and the typical width of its class.
-fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) -> Across {
-    let [right, left] = fit.across_m;
-    let seen = left - right;
-    let lost_share = LOST_EDGE_GROWTH * (fit.range_m / LOST_EDGE_RANGE_M).powi(2);
-    let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m * (1.0 + lost_share);
-    let told_sd = fit.edges.map_or(edge_sd, |edges| edges.sd_share * edge_sd);
-    // An edge lies between the inner sub-rays of the outermost beam that meets the face and those of the next one.
-    let mean_columns = 0.5 - 0.25 * fit.footprint_columns;
-    let [right_shift, left_shift] = fit.edges.map_or([0.0; 2], |edges| edges.shifts);
-    let right_m = right - (mean_columns + right_shift) * fit.spacing_m;
-    let left_m = left + (mean_columns + left_shift) * fit.spacing_m;
-    let missing = (typical_m - seen).max(0.0);
-    let (middle_m, sd_m) = match (right_hidden, left_hidden) {
-        // Weak returns may have lost columns on both sides alike.
-        (false, false) => (0.5 * (left_m + right_m), told_sd / f64::sqrt(2.0)),
-        (true, false) => (left_m - 0.5 * (left_m - right).max(typical_m), told_sd),
-        (false, true) => (right_m + 0.5 * (left - right_m).max(typical_m), told_sd),
-        (true, true) => (0.5 * (left + right), edge_sd),
-    };
-    let lost = missing / f64::sqrt(12.0);
-    let both_seen = !right_hidden && !left_hidden && !ends_at_plate(fit);
-    let extent = if both_seen && missing < 2.0 * fit.spacing_m + 0.2 { Extent::Seen } else { Extent::Assumed };
-    let sd_m = match extent {
-        Extent::Seen => sd_m.hypot(0.5 * lost),
-        Extent::Assumed => sd_m.hypot(lost),
-    };
-    let width_m = match extent {
-        Extent::Seen => left_m - right_m,
-        Extent::Assumed => seen.max(typical_m),
-    };
-    let side_sd_m = if sees_side(fit) { SIDE_SD_M } else { 0.0 };
-    let sd_m = sd_m.max(MIN_LATERAL_SD_M).hypot(side_sd_m);
-    let by_edges = Across { middle_m, sd_m, width_m, extent, is_by_plate: false };
-    let Some(plate) = plate_middle(fit) else {
-        return by_edges;
-    };
-    // Both hold: the mean is weighted by the inverse variances.
-    // A plate saturates the receiver, however little of it a beam meets.
-    let plate_m2 = 0.5 * edge_sd * edge_sd + plate.offset_sd_m * plate.offset_sd_m;
-    let share = sd_m * sd_m / (sd_m * sd_m + plate_m2);
-    Across {
-        middle_m: middle_m + share * (plate.v_m - middle_m),
-        sd_m: (share * plate_m2).sqrt(),
-        is_by_plate: true,
-        ..by_edges
-    }
-}
-
-/// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
-fn sees_side(fit: &BoxFit) -> bool {
-    fit.azimuth_rad[0] > 0.0 || fit.azimuth_rad[1] < 0.0
 }
 
 /// Returns true if a side is visible to its end.

@@ -9,6 +9,7 @@
 //!
 //! The two halves share only the [`LidarScan`]: the processing chain has no access to the scene.
 
+mod across;
 mod bare_road;
 mod boxes;
 mod cast;
