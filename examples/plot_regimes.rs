@@ -1,7 +1,7 @@
 //! Draws the regimes of the Wiedemann 99 model in the plane of speed difference and gap, and the trajectory of a follower.
 //!
 //! ```sh
-//! cargo run --release --example plot_regimes -- docs/wiedemann99-regimes.svg
+//! cargo run --release --example plot_regimes -- docs/reference/wiedemann99-regimes.svg
 //! ```
 //!
 //! The colours show the regime that the model itself reports, for a driver with the defaults of Vissim behind a lead vehicle

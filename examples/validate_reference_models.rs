@@ -1,7 +1,7 @@
 //! Compares the reference models of UN Regulation 157 with published outcomes of cut-ins.
 //!
 //! Usage: `cargo run --release --example validate_reference_models -- FILE.csv[.gz]`. The table has the columns of
-//! `docs/controllers.md`; rows of models other than `CC_human_driver` and `FSM` are left out. Exit code 1 if fewer than 99 % of
+//! `docs/reference/controllers.md`; rows of models other than `CC_human_driver` and `FSM` are left out. Exit code 1 if fewer than 99 % of
 //! the cases of a model have the same outcome, or if the table has no case of one.
 
 use std::error::Error;

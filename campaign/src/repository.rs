@@ -9,8 +9,8 @@ use closecall_simulation::scenario::source::{PROJECT_FILE, SCENARIOS};
 
 const SCENARIO: &str = include_str!("repository/scenario.toml");
 const PROJECT: &str = include_str!("repository/closecall.toml");
-const GITHUB: &str = include_str!("../../docs/ci/github.yml");
-const GITLAB: &str = include_str!("../../docs/ci/gitlab.yml");
+const GITHUB: &str = include_str!("../../docs/how-to/ci/github.yml");
+const GITLAB: &str = include_str!("../../docs/how-to/ci/gitlab.yml");
 
 /// The name of the scenario in the template.
 const TEMPLATE_NAME: &str = "NAME";

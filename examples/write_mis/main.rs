@@ -1,4 +1,4 @@
-//! Writes the tables of `docs/mis.md`: what the margin increase systems and a longer gap change in every scenario of the library.
+//! Writes the tables of `docs/evidence/mis.md`: what the margin increase systems and a longer gap change in every scenario of the library.
 //!
 //! ```sh
 //! cargo run --release --example write_mis -- -n 2000 --member-samples 400 --seed 1001
@@ -17,7 +17,7 @@ use clap::Parser;
 use tables::{Study, page_with};
 
 /// The page, below the folder of the repository.
-const PAGE: &str = "docs/mis.md";
+const PAGE: &str = "docs/evidence/mis.md";
 
 /// The command line.
 #[derive(Parser)]

@@ -1,7 +1,7 @@
 //! Digests of the outcomes of every scenario of the library, with true tracks and with object-level sensors.
 //!
 //! They say whether a change moves an outcome by a bit. The mathematical functions have a digest of their own, so that it is seen if these
-//! are the cause, see `docs/determinism.md`.
+//! are the cause, see `docs/explanation/determinism.md`.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -17,7 +17,7 @@ use closecall_simulation::{Arm, NoObserver, RunKey};
 use serde::{Deserialize, Serialize};
 
 /// The file with the digests, relative to the root of the repository.
-pub(crate) const DIGESTS: &str = "docs/determinism.json";
+pub(crate) const DIGESTS: &str = "docs/evidence/determinism.json";
 /// The folder of the scenarios.
 const LIBRARY: &str = "scenarios/library";
 /// Its folders of files that scenarios read.

@@ -1,4 +1,4 @@
-//! Writes `docs/scenario.md`, the reference of the scenario file, and `docs/determinism.json`, the digests of the library's outcomes.
+//! Writes `docs/reference/scenario.md`, the reference of the scenario file, and `docs/evidence/determinism.json`, the digests of the library's outcomes.
 //!
 //! ```sh
 //! cargo run --release --example write_references
@@ -6,7 +6,7 @@
 //!
 //! The tables, keys, types and descriptions come from the JSON Schema of the scenario file, and so from the doc comments
 //! of the configuration structs. The allowed ranges come from the checks themselves: `probe` sets each key of
-//! `docs/scenario/every-key.toml` to a value that cannot be right and reads what the check says is needed. The examples
+//! `docs/reference/scenario/every-key.toml` to a value that cannot be right and reads what the check says is needed. The examples
 //! are the values of that file. Tests fail if the committed files are not the ones that this program writes.
 
 mod digests;

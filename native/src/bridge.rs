@@ -1,5 +1,5 @@
 //! Serves a library or an FMU as a process that speaks the protocol of external processes: one line of JSON for each control
-//! step. `docs/controllers.md` documents the protocol.
+//! step. `docs/reference/controllers.md` documents the protocol.
 
 use std::io::{BufRead, Write};
 

@@ -1,4 +1,4 @@
-"""The files that `docs/cluster.md` shows, and how it reads outcomes of many campaigns."""
+"""The files that `docs/how-to/cluster.md` shows, and how it reads outcomes of many campaigns."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from support import SCENARIO, command
 import closecall as cc
 
 ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "docs" / "cluster"
+FOLDER = ROOT / "docs" / "how-to" / "cluster"
 
 
 def manifests() -> dict[str, Any]:
@@ -120,7 +120,7 @@ def test_the_parts_of_the_workflow_are_those_of_one_machine(tmp_path: Path) -> N
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Outcomes of several campaigns, laid out as `docs/cluster.md` says."""
+    """Outcomes of several campaigns, laid out as `docs/how-to/cluster.md` says."""
     folder = tmp_path_factory.mktemp("store")
     for scenario in (SCENARIO, "low-thw-overtake-at-cut-out"):
         for seed in (1, 2):
@@ -136,8 +136,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def blocks(language: str) -> list[str]:
-    """The examples of `docs/cluster.md` in a language."""
-    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "docs" / "cluster.md").read_text(), re.DOTALL)
+    """The examples of `docs/how-to/cluster.md` in a language."""
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "docs" / "how-to" / "cluster.md").read_text(), re.DOTALL)
 
 
 def test_duckdb_and_polars_read_the_outcomes_of_many_campaigns(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:

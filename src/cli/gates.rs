@@ -15,7 +15,7 @@ use super::CliError;
 #[command(next_help_heading = "Gates")]
 pub(super) struct GateArgs {
     /// Require this of the samples of each scenario, such as "p1(min_ttc_rear_s) >= 1.0" or
-    /// "lower(prevented | baseline.ego_collided) >= 0.5"; can be repeated. docs/campaigns.md lists aggregates and measures
+    /// "lower(prevented | baseline.ego_collided) >= 0.5"; can be repeated. docs/reference/criteria.md lists aggregates and measures
     #[arg(long = "gate", value_name = "CRITERION")]
     require: Vec<Expression>,
     /// Measure only: no gate is judged, and there is no verdict

@@ -1,4 +1,4 @@
-//! Every constant of the controllers and drivers that is an assumption stands in the list of `docs/mis.md`, and nothing else.
+//! Every constant of the controllers and drivers that is an assumption stands in the list of `docs/reference/assumptions.md`, and nothing else.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -52,5 +52,5 @@ fn every_assumed_constant_of_the_controllers_is_listed() {
     let assumed: BTreeSet<String> =
         files.iter().flat_map(|path| assumed(&std::fs::read_to_string(path).unwrap())).collect();
     assert!(assumed.len() > 40, "{assumed:?}");
-    assert_eq!(listed(include_str!("../../docs/mis.md")), assumed);
+    assert_eq!(listed(include_str!("../../docs/reference/assumptions.md")), assumed);
 }

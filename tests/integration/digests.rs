@@ -1,4 +1,4 @@
-//! Outcomes have the bits that `docs/determinism.json` states, in every scenario of the library: no change moves one unnoticed.
+//! Outcomes have the bits that `docs/evidence/determinism.json` states, in every scenario of the library: no change moves one unnoticed.
 
 use std::path::Path;
 

@@ -130,12 +130,12 @@ fn the_list_shows_the_members() {
 
 #[test]
 fn the_page_of_the_drivers_names_every_member_with_its_values() {
-    let page = include_str!("../../docs/drivers.md");
+    let page = include_str!("../../docs/reference/drivers.md");
     let listed = json(&closecall(["list", "--format=json"]), 0);
     for member in listed["members"].as_array().unwrap() {
         let name = member["name"].as_str().unwrap();
         let row = page.lines().find(|line| line.starts_with(&format!("| `{name}` |")));
-        let row = row.unwrap_or_else(|| panic!("docs/drivers.md has no row for `{name}`"));
+        let row = row.unwrap_or_else(|| panic!("docs/reference/drivers.md has no row for `{name}`"));
         assert!(row.contains(member["description"].as_str().unwrap()), "{name}");
         for source in member["sources"].as_array().unwrap() {
             assert!(row.contains(source.as_str().unwrap()), "{name}: {source}");

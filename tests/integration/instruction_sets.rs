@@ -1,5 +1,5 @@
 //! The network of the rear camera runs on kernels that are chosen by what the processor can do, and so do the mathematical functions of
-//! the C library. Outcomes do not depend on the choice: the program calls functions of its own instead (`docs/determinism.md`).
+//! the C library. Outcomes do not depend on the choice: the program calls functions of its own instead (`docs/explanation/determinism.md`).
 //! The ray cast, whose vector registers no variable chooses, is compared in `sensors/src/lidar/tests/cast.rs`.
 
 use std::collections::BTreeSet;

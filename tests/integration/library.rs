@@ -54,7 +54,7 @@ fn every_parameter_is_fitted_or_assumed() {
 
 #[test]
 fn every_scenario_names_a_requirement_of_the_list() {
-    let list = include_str!("../../docs/requirements.md");
+    let list = include_str!("../../docs/reference/requirements.md");
     for path in all_of_library() {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         let requirements = &file.config().requirements;

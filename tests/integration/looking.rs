@@ -1,4 +1,4 @@
-//! Recordings are read by programs and shown in the browser as `docs/looking.md` says.
+//! Recordings are read by programs and shown in the browser as `docs/how-to/looking.md` says.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -20,7 +20,7 @@ fn record_pair(file: &Path) -> Value {
 
 /// Returns the Python program of the page.
 fn program_of_page() -> String {
-    let page = std::fs::read_to_string(Path::new(ROOT).join("docs/looking.md")).unwrap();
+    let page = std::fs::read_to_string(Path::new(ROOT).join("docs/how-to/looking.md")).unwrap();
     let (_, after) = page.split_once("```python\n").expect("a program");
     after.split_once("```").expect("its end").0.to_owned()
 }

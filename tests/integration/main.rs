@@ -5,6 +5,7 @@
 mod agreement;
 mod arms;
 mod assumptions;
+mod book;
 mod calibrate;
 mod campaign_example;
 mod causes;

@@ -1,4 +1,4 @@
-//! The tables of `docs/mis.md` are those that `examples/write_mis` writes.
+//! The tables of `docs/evidence/mis.md` are those that `examples/write_mis` writes.
 
 use crate::support::all_of_library;
 
@@ -7,7 +7,7 @@ mod tables;
 
 use tables::{Study, between_markers, page_with};
 
-const PAGE: &str = include_str!("../../docs/mis.md");
+const PAGE: &str = include_str!("../../docs/evidence/mis.md");
 
 /// The rows of the tables: the cells of each.
 fn rows(tables: &str) -> Vec<Vec<String>> {

@@ -196,7 +196,7 @@ fn follow(path: &Path) -> Findings {
 }
 
 /// Returns the README and the pages below `docs/`, in alphabetical order.
-fn documents() -> Vec<PathBuf> {
+pub(crate) fn documents() -> Vec<PathBuf> {
     let mut documents = vec![Path::new(ROOT).join("README.md")];
     let mut folders = vec![Path::new(ROOT).join("docs")];
     while let Some(folder) = folders.pop() {
@@ -218,7 +218,7 @@ fn documents_show_commands_that_work_with_the_output_that_they_print() {
     let mut wrong = Vec::new();
     for path in documents() {
         let findings = follow(&path);
-        if path.ends_with("README.md") {
+        if path == Path::new(ROOT).join("README.md") {
             assert!(findings.has_campaign, "the README shows no output of a campaign: {findings:?}");
         }
         commands += findings.commands;

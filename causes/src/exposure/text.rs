@@ -80,7 +80,7 @@ impl fmt::Display for ExposureText<'_> {
                     writeln!(
                         f,
                         "by hand: rate = 10^6 N / D, interval by gamma quantiles of shape N + 1/2 over D; difference = (prevented - \
-                     induced) / n, Wilson intervals combined; net = rate x difference, intervals combined as in docs/causes.md"
+                     induced) / n, Wilson intervals combined; net = rate x difference, intervals combined as in docs/explanation/causes.md"
                     )?;
                 }
                 writeln!(

@@ -16,7 +16,7 @@ const TABLE: [(&str, Of, Effect); 82] = [
     ("camera-dead", Of::RearCamera, Dead { from_step: 125 }),
     ("camera-dirty", Of::RearCamera, Unclassified { loss: 0.2 }),
     ("camera-frozen", Of::RearCamera, FrozenImage { from_step: 125 }),
-    // What glare costs at this magnitude is small: see docs/perception.md.
+    // What glare costs at this magnitude is small: see docs/evidence/faults.md.
     ("camera-low-sun", Of::RearCamera, Unclassified { loss: 0.0 }),
     ("camera-main-beam", Of::RearCamera, Unclassified { loss: 0.0 }),
     ("camera-out-of-focus", Of::RearCamera, Unclassified { loss: 0.2 }),

@@ -5,7 +5,7 @@
 //!                           (one line or element at a time)          (in memory: incomplete ones)     (all tracks)
 //! ```
 //!
-//! The content of a file determines its layout; the file's name does not. `docs/trajectory-data.md` describes all
+//! The content of a file determines its layout; the file's name does not. `docs/reference/trajectory-data.md` describes all
 //! layouts for users:
 //!
 //! | layout | content | module |

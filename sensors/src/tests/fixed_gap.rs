@@ -79,7 +79,7 @@ fn a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     for (row, &gap_m) in (0..).zip(&GAPS_M) {
         for (column, &paint) in (0..).zip(&PAINTS) {
             let Found { scans, errors_m, audit } = at_gap(gap_m, paint, 10 * row + column);
-            // The plate carries every car as far as 86 m (docs/perception.md); beyond, the body of a bright one.
+            // The plate carries every car as far as 86 m (docs/evidence/perception.md); beyond, the body of a bright one.
             let is_followed = gap_m <= 80.0 || paint >= 0.5;
             let most = scans[0].max(scans[1]);
             assert!(!is_followed || most >= 99, "{scans:?} scans at {gap_m} m with {paint}");

@@ -13,7 +13,7 @@ use toml::Table;
 
 use super::{SCHEMA_VERSION, ScenarioConfig, ScenarioError, ScenarioFile};
 
-const EVERY_KEY: &str = include_str!("../../../docs/scenario/every-key.toml");
+const EVERY_KEY: &str = include_str!("../../../docs/reference/scenario/every-key.toml");
 /// The actor of that scenario that follows trajectory data: a file that is not part of the program.
 const RECORDED_ACTOR: &str = "recorded";
 /// The key of a LiDAR that names another file, which is not part of the program either.

@@ -1,16 +1,16 @@
-//! The tables of `docs/output.md`, and what was written against them.
+//! The tables of `docs/reference/output.md`, and what was written against them.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::Value;
 
-/// The text of `docs/output.md`.
+/// The text of `docs/reference/output.md`.
 pub(super) fn document() -> String {
-    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/output.md")).unwrap()
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/output.md")).unwrap()
 }
 
-/// The rows of the table behind a marker of `docs/output.md`, each as its cells.
+/// The rows of the table behind a marker of `docs/reference/output.md`, each as its cells.
 pub(super) fn rows(marker: &str) -> Vec<Vec<String>> {
     let text = document();
     let (_, after) = text.split_once(&format!("<!-- {marker}")).unwrap_or_else(|| panic!("no table `{marker}`"));
@@ -33,7 +33,7 @@ fn documented(name: &str) -> Vec<Documented> {
     // The name of one table may begin the name of another.
     let is_of_table = |rest: &&str| rest.is_empty() || rest.starts_with(" + ");
     let includes = text.lines().filter_map(|line| line.strip_prefix(&start)?.strip_suffix(" -->")).find(is_of_table);
-    let includes = includes.unwrap_or_else(|| panic!("docs/output.md has no keys of `{name}`"));
+    let includes = includes.unwrap_or_else(|| panic!("docs/reference/output.md has no keys of `{name}`"));
     let mut all: Vec<Documented> = rows(&format!("keys: {name}{includes} -->"))
         .into_iter()
         .flat_map(|cells| {
@@ -118,8 +118,8 @@ pub(super) fn hold<'a>(section: &str, values: impl IntoIterator<Item = &'a Value
         of(path, false) || path.strip_suffix("_absent").is_some_and(|path| of(path, true))
     };
     let unknown: Vec<_> = paths.leaves.iter().filter(|path| !is_documented(path)).collect();
-    assert!(unknown.is_empty(), "docs/output.md, {section}: written but not documented: {unknown:?}");
+    assert!(unknown.is_empty(), "docs/reference/output.md, {section}: written but not documented: {unknown:?}");
     let is_written = |one: &&Documented| one.is_rare || paths.all.iter().any(|path| matches(&one.pattern, path));
     let missing: Vec<_> = documented.iter().filter(|one| !is_written(one)).map(|one| &one.pattern).collect();
-    assert!(missing.is_empty(), "docs/output.md, {section}: documented but not written: {missing:?}");
+    assert!(missing.is_empty(), "docs/reference/output.md, {section}: documented but not written: {missing:?}");
 }

@@ -1,4 +1,4 @@
-//! `docs/output.md` against the files, columns and keys that small campaigns and runs write.
+//! `docs/reference/output.md` against the files, columns and keys that small campaigns and runs write.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -149,8 +149,16 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let gated = ["campaign", headline, "-n", "20", "--seed", "1", "--paired", "--gate", gates[0], "--gate", gates[1]];
     let gated = program(&gated, 4);
     // This scenario expects something of its runs.
-    let every_key =
-        ["campaign", "docs/scenario/every-key.toml", "-n", "4", "--sensors", "object", "--max-probability", "0.9"];
+    let every_key = [
+        "campaign",
+        "docs/reference/scenario/every-key.toml",
+        "-n",
+        "4",
+        "--sensors",
+        "object",
+        "--max-probability",
+        "0.9",
+    ];
     let expecting = program(&every_key, 0);
     hold("campaign", [&open, &certain, &gated, &expecting]);
 
@@ -272,7 +280,7 @@ track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehi
 
 #[test]
 fn the_measures_of_gates_are_those_documented() {
-    let text = std::fs::read_to_string(Path::new(ROOT).join("docs/campaigns.md")).unwrap();
+    let text = std::fs::read_to_string(Path::new(ROOT).join("docs/reference/criteria.md")).unwrap();
     let (_, section) = text.split_once("## Criteria").unwrap();
     let rows = section.lines().take_while(|line| !line.starts_with("## ")).filter_map(|line| line.strip_prefix("| `"));
     let documented: BTreeSet<&str> = rows.filter_map(|row| row.split('`').next()).collect();

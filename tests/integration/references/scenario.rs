@@ -1,4 +1,4 @@
-//! `docs/scenario.md` against its generator, and what it states against the program.
+//! `docs/reference/scenario.md` against its generator, and what it states against the program.
 
 use closecall_traffic::{KeyPath, Segment};
 

@@ -32,7 +32,7 @@
 //! Sources: PTV Vissim user manual, "Defining the Wiedemann 99 model" (the parameters and their meaning); Wiedemann,
 //! *Simulation des Straßenverkehrsflusses*, Karlsruhe 1974 (the plane and its thresholds); Aghabayk, Sarvi, Young and
 //! Kautzsch, *A novel methodology for evolutionary calibration of Vissim by multi-threading*, Australasian Transport
-//! Research Forum 2013 (the formulas of the thresholds). `docs/wiedemann99-regimes.svg` shows the plane.
+//! Research Forum 2013 (the formulas of the thresholds). `docs/reference/wiedemann99-regimes.svg` shows the plane.
 
 use super::Parameters99;
 use crate::driver::Lead;

@@ -84,7 +84,7 @@ fn verdict(text: &str) -> Option<String> {
 
 #[test]
 fn every_valid_scenario_satisfies_the_schema() {
-    let annotated = include_str!("../../../../docs/scenario/annotated.toml");
+    let annotated = include_str!("../../../../docs/reference/scenario/annotated.toml");
     for text in library::names().filter_map(library::text).chain([EVERY_KEY, annotated]) {
         assert_eq!(verdict(text), None, "{text}");
     }

@@ -1,0 +1,114 @@
+//! The book holds together: its links resolve, its summary lists every page, and there is one glossary.
+
+use std::collections::BTreeSet;
+use std::path::{Component, Path, PathBuf};
+
+use crate::readme::documents;
+use crate::support::ROOT;
+
+/// Returns the lines of a Markdown file outside its fenced blocks.
+fn prose(markdown: &str) -> Vec<&str> {
+    let mut is_code = false;
+    let is_prose = |line: &&str| {
+        let is_fence = line.starts_with("```");
+        is_code ^= is_fence;
+        !is_code && !is_fence
+    };
+    markdown.lines().filter(is_prose).collect()
+}
+
+/// Returns the targets of the links and pictures of a Markdown file, without those of the web.
+fn targets(markdown: &str) -> Vec<&str> {
+    let ends = prose(markdown).into_iter().flat_map(|line| line.split("](").skip(1));
+    let targets = ends.filter_map(|end| end.split_once(')').map(|(target, _)| target));
+    targets.filter(|target| !target.contains("://") && !target.contains(' ')).collect()
+}
+
+/// Returns the anchors of a Markdown file: its explicit ids, and its headings as GitHub and mdBook spell them.
+fn anchors(markdown: &str) -> BTreeSet<String> {
+    let ids = markdown.split("id=\"").skip(1).filter_map(|rest| rest.split_once('"')).map(|(id, _)| id.to_owned());
+    let headings = prose(markdown).into_iter().filter(|line| line.starts_with('#'));
+    let slugs = headings.map(|line| {
+        let title = line.trim_start_matches('#').trim().to_lowercase();
+        let kept = title.chars().filter(|c| c.is_alphanumeric() || "-_ ".contains(*c));
+        kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+    });
+    ids.chain(slugs).collect()
+}
+
+/// Returns a path without `.` and `..`.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => _ = plain.pop(),
+            Component::CurDir => {}
+            part => plain.push(part),
+        }
+    }
+    plain
+}
+
+/// Returns what is wrong with the links of a document.
+fn broken(path: &Path, markdown: &str) -> Vec<String> {
+    let book = Path::new(ROOT).join("docs");
+    let wrong = |target: &&str| {
+        let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+        let aim = if file.is_empty() { path.to_owned() } else { plain(&path.with_file_name(file)) };
+        let is_page = aim.extension().is_some_and(|end| end == "md");
+        let has_anchor = anchor.is_empty()
+            || !is_page
+            || std::fs::read_to_string(&aim).is_ok_and(|text| anchors(&text).contains(anchor));
+        // A page of the book links to nothing that the book does not contain.
+        !aim.exists() || !has_anchor || path.starts_with(&book) && !aim.starts_with(&book)
+    };
+    targets(markdown).into_iter().filter(wrong).map(|target| format!("{}: {target}", path.display())).collect()
+}
+
+#[test]
+fn every_link_of_the_documents_resolves() {
+    let documents = documents().into_iter().chain([Path::new(ROOT).join("CONTRIBUTING.md")]);
+    let wrong: Vec<String> =
+        documents.flat_map(|path| broken(&path, &std::fs::read_to_string(&path).unwrap())).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_broken_link_is_found() {
+    let page = Path::new(ROOT).join("docs/reference/glossary.md");
+    let found = |text: &str| broken(&page, text).len();
+    assert_eq!(
+        found("[a](criteria.md) ![b](../how-to/looking/pair.png) [c](#terms-of-the-field) [d](https://x.org/y)"),
+        0
+    );
+    for wrong in ["[a](nothing.md)", "[a](criteria.md#nothing)", "[a](#nothing)", "[a](../../README.md)"] {
+        assert_eq!(found(wrong), 1, "{wrong}");
+    }
+}
+
+#[test]
+fn the_summary_lists_every_page_once() {
+    let book = Path::new(ROOT).join("docs");
+    let summary = std::fs::read_to_string(book.join("SUMMARY.md")).unwrap();
+    let mut listed: Vec<PathBuf> = targets(&summary).into_iter().map(|target| book.join(target)).collect();
+    listed.sort();
+    let is_page = |path: &PathBuf| path.starts_with(&book) && !path.ends_with("SUMMARY.md");
+    let pages: Vec<PathBuf> = documents().into_iter().filter(is_page).collect();
+    assert_eq!(listed, pages);
+}
+
+/// Returns the first and the last cell of each row of a glossary that begins with the term of a paper.
+fn terms(text: &str) -> Vec<(String, String)> {
+    let lines = text.lines().map(|line| line.trim_start_matches("//!").trim());
+    let table = lines.skip_while(|line| !line.starts_with("| paper |")).take_while(|line| line.starts_with('|'));
+    let cells = table.map(|line| line.trim_matches('|').split('|').map(str::trim).collect::<Vec<_>>());
+    cells.map(|cells| (cells[0].to_owned(), cells[cells.len() - 1].to_owned())).collect()
+}
+
+#[test]
+fn the_glossary_of_the_book_is_that_of_the_code() {
+    let read = |path: &str| terms(&std::fs::read_to_string(Path::new(ROOT).join(path)).unwrap());
+    let terms = read("docs/reference/glossary.md");
+    assert!(terms.len() > 20, "{terms:?}");
+    assert_eq!(terms, read("traffic/src/lib.rs"));
+}
