@@ -256,7 +256,7 @@ mod tests {
         assert!(pairs.into_iter().all(|(found, documented)| (found - documented).abs() < 0.02), "{found:?}");
     }
 
-    /// The table of docs/how-to/trajectory-data.md: 50, 200 and 800 new values; no drift, 5 % faster, 0.1 s closer.
+    /// The table of docs/evidence/statistics.md: 50, 200 and 800 new values; no drift, 5 % faster, 0.1 s closer.
     const DOCUMENTED: [[f64; 3]; 3] = [[0.046, 0.184, 0.104], [0.048, 0.452, 0.216], [0.043, 0.711, 0.394]];
 
     #[test]
