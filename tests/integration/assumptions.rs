@@ -41,7 +41,7 @@ fn assumed(text: &str) -> Vec<String> {
 
 /// Returns the first cells of the table of assumptions.
 fn listed(markdown: &str) -> BTreeSet<String> {
-    let (_, list) = markdown.split_once("## Constants without a source that was looked up").unwrap();
+    let (_, list) = markdown.split_once("# Assumed constants").unwrap();
     let rows = list.lines().filter_map(|line| line.strip_prefix("| `"));
     rows.filter_map(|row| row.split_once('`')).map(|(name, _)| name.to_owned()).collect()
 }
