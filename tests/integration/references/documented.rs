@@ -39,7 +39,10 @@ fn documented(name: &str) -> Vec<Documented> {
         .flat_map(|cells| {
             let key = cells[0].split('`').nth(1).unwrap().to_owned();
             let (may_be_absent, is_rare) = (cells[3].contains("reason beside it"), cells[0].contains('†'));
-            expanded(&key).into_iter().map(move |pattern| Documented { pattern, may_be_absent, is_rare })
+            // A list of two numbers documents its elements, too.
+            let elements = (cells[1] == "list of 2 numbers").then(|| format!("{key}[]"));
+            let patterns: Vec<String> = std::iter::once(key).chain(elements).flat_map(|key| expanded(&key)).collect();
+            patterns.into_iter().map(move |pattern| Documented { pattern, may_be_absent, is_rare })
         })
         .collect();
     for include in includes.split(" + ").filter(|include| !include.is_empty()) {

@@ -45,10 +45,17 @@ fn columns(path: &Path) -> Vec<[String; 3]> {
     columns.collect()
 }
 
-/// The documented columns of a table, each with its type and its unit.
+/// The documented columns of a table, each with its type and its unit. A value that may be absent has its reason in a
+/// column of its own behind it.
 fn documented_columns(table: &str) -> Vec<[String; 3]> {
     let rows = rows(&format!("columns: {table} -->"));
-    rows.iter().map(|cells| [cells[0].trim_matches('`').to_owned(), cells[1].clone(), cells[2].clone()]).collect()
+    let columns = rows.iter().flat_map(|cells| {
+        let name = cells[0].trim_matches('`');
+        let reason =
+            cells[3].contains("reason beside it").then(|| [format!("{name}_absent"), "text".into(), "".into()]);
+        std::iter::once([name.to_owned(), cells[1].clone(), cells[2].clone()]).chain(reason)
+    });
+    columns.collect()
 }
 
 #[test]
