@@ -32,10 +32,9 @@ pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
 const INTRODUCTION: &str = "\
 # The scenario file
 
-This page lists every table and key of the scenario file. `cargo run --release --example write_references` writes it from
-the program: the descriptions are the doc comments of the code, the ranges are what the checks of `closecall check` allow,
-and the examples are values of [every-key.toml](scenario/every-key.toml), a scenario that uses every key. A test fails if
-the page and the program differ.
+This page lists every table and key of the scenario file. `cargo run --release --example write_references` writes the page
+from the program. Descriptions are doc comments of the code, ranges are the checks of `closecall check`, and examples are
+values of [every-key.toml](scenario/every-key.toml), a scenario that uses every key. A test fails if page and program differ.
 
 ## An annotated example
 
@@ -44,18 +43,16 @@ the page and the program differ.
 const READING: &str = "
 ## How to read the tables
 
-- A scenario file is TOML. Keys are written in kebab case, and an unknown key is an error. `closecall check FILE` names the
-  line, the key, the value and what is allowed. `closecall schema` prints the JSON Schema, with which an editor can
-  complete and check the file.
+- A scenario file is TOML. Keys are in kebab case, and an unknown key is an error. `closecall check FILE` names the line, the
+  key, the value and what is allowed. An editor can complete and check the file with the JSON Schema of `closecall schema`.
 - The end of a key is its unit: `gap-m` is in metres, `speed-mps` in metres per second.
 - *number* is a finite number, or `\"$name\"`: the value of the parameter `name` in [`[parameters]`](#parameters-NAME).
-  Only parameters are sampled. A *fixed number* cannot be a parameter. *word* is one of the words that are listed below the
-  table; where the table says so, `\"$name\"` may stand for it as well.
-- *Default* is the value that an absent key has. A *required* key has no default. `-` means that an absent key has no
-  effect, or that the text says what holds.
-- `--set` changes a value on the command line by the path in the heading of its section, with the name of an actor after
-  `actor`: `--set actor.rear.start.behind.gap-m=90`. The name of a parameter alone fixes that parameter:
-  `--set brake-mps2=6`.
+  Only parameters are sampled. A *fixed number* cannot be a parameter. *word* is one of the words below the table, or
+  `\"$name\"` where the table says so.
+- *Default* is the value of an absent key. A *required* key has no default. `-` means that an absent key has no effect, or
+  that the text says what holds.
+- `--set` changes a value by the path in the heading of its section, with the name of an actor after `actor`:
+  `--set actor.rear.start.behind.gap-m=90`. The name of a parameter alone fixes the parameter: `--set brake-mps2=6`.
 
 ";
 
@@ -68,9 +65,9 @@ pub(crate) fn scenario_page() -> Result<String, Box<dyn Error>> {
     let mut page = format!("{INTRODUCTION}```toml\n{annotated}```\n{READING}");
     writeln!(page, "## The tables\n")?;
     for table in &tables {
-        let names: Vec<String> =
-            table.ways.iter().map(|way| format!("[`{}`](#{})", title(way), anchor(&table.ways[0]))).collect();
-        writeln!(page, "{}- {}", "  ".repeat(table.ways[0].len().saturating_sub(1).min(3)), names.join(", "))?;
+        // The heading of a section names its other places, too.
+        let way = &table.ways[0];
+        writeln!(page, "{}- [`{}`](#{})", "  ".repeat(way.len().saturating_sub(1).min(3)), title(way), anchor(way))?;
     }
     for table in &tables {
         section(&mut page, table, &tables, &probe)?;

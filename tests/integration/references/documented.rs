@@ -38,7 +38,7 @@ fn documented(name: &str) -> Vec<Documented> {
         .into_iter()
         .flat_map(|cells| {
             let key = cells[0].split('`').nth(1).unwrap().to_owned();
-            let (may_be_absent, is_rare) = (cells[3].contains("reason beside it"), cells[0].contains('†'));
+            let (may_be_absent, is_rare) = (cells[2].contains("reason beside it"), cells[0].contains('†'));
             // A list of two numbers documents its elements, too.
             let elements = (cells[1] == "list of 2 numbers").then(|| format!("{key}[]"));
             let patterns: Vec<String> = std::iter::once(key).chain(elements).flat_map(|key| expanded(&key)).collect();
