@@ -48,10 +48,10 @@ impl Study {
     pub(crate) fn tables(self) -> Result<String, Box<dyn Error>> {
         let Self { samples, member_samples, seed } = self;
         let mut text = format!(
-            "The tables of this section are written by `cargo run --release --example write_mis -- -n {samples} --member-samples \
-             {member_samples} --seed {seed}`: {samples} samples of each scenario with seed {seed}, {member_samples} of each scenario with \
-             each member of the ensemble, `object` sensors, all arms on the same samples. Intervals are exact (Clopper-Pearson, 95 %): of \
-             the prevented collisions as a share of those without the system, of the induced ones as a share of all samples. Arms:"
+            "`cargo run --release --example write_mis -- -n {samples} --member-samples {member_samples} --seed {seed}` writes these tables: \
+             {samples} samples of each scenario with seed {seed}, {member_samples} of each scenario with each member of the ensemble, \
+             `object` sensors, all arms on the same samples. Intervals are exact (Clopper-Pearson, 95 %). Shares of prevented collisions \
+             refer to the collisions without the system, shares of induced collisions to all samples. Arms:"
         );
         let arms: Vec<String> = ARMS.iter().map(|(name, what)| format!(" `{name}` is {what}")).collect();
         writeln!(text, "{}.", arms.join(","))?;
@@ -68,8 +68,8 @@ impl Study {
         }
         writeln!(
             text,
-            "\n### The driver ensemble\n\nMedian and worst member by each column of its own, and drivers who look at the vehicle \
-             directly ahead alone (`{NO_ANTICIPATION}`). A scenario without humans whom a member changes has no row.\n\n\
+            "\n### The driver ensemble\n\nEach column has its own median and worst member, and the drivers who look only at the \
+             vehicle directly ahead (`{NO_ANTICIPATION}`). A scenario without humans whom a member changes has no row.\n\n\
              | scenario | arm | prevented: median | worst | `{NO_ANTICIPATION}` | induced: median | worst | `{NO_ANTICIPATION}` | change of \
              harm per sample: median | worst |\n|---|---|---|---|---|---|---|---|---|---|"
         )?;
