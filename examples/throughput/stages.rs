@@ -179,6 +179,10 @@ impl ControllerFactory for Marked<Arc<dyn ControllerFactory>> {
         self.0.has_mis(settings)
     }
 
+    fn looks_back(&self, settings: &EgoSettings) -> bool {
+        self.0.looks_back(settings)
+    }
+
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         Box::new(Marked(self.0.build(settings)))
     }

@@ -23,12 +23,12 @@ const MIN_LIDAR_HEIGHT_M: f64 = 0.1;
 #[serde(rename_all = "kebab-case")]
 pub enum SensorMode {
     /// LiDAR point clouds behind the ego, clustered, classified and tracked; object-level sensors ahead and to the
-    /// sides.
-    Full,
-    /// Object-level sensors in all directions: the fast mode.
+    /// sides. This is the chain that is judged.
     #[default]
+    Full,
+    /// Object-level sensors in all directions: the fast approximation, for sweeps.
     Object,
-    /// Tracks without errors, taken from the true state.
+    /// Tracks without errors, taken from the true state: the ideal.
     GroundTruth,
 }
 
@@ -47,7 +47,7 @@ impl SensorMode {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct SensorsConfig {
-    /// Level of detail at which the sensors are simulated; `object` by default.
+    /// Level of detail at which the sensors are simulated; `full` by default.
     pub mode: Choice<SensorMode>,
     /// The radar that looks ahead.
     pub front_radar: ObjectSensorConfig,
@@ -95,6 +95,7 @@ pub struct Sensors {
     camera: Camera,
     rear_object: ObjectSensorModel,
     altered: Alterations,
+    has_rear: bool,
 }
 
 impl Check for SensorsConfig {
@@ -121,6 +122,7 @@ impl Check for SensorsConfig {
             camera: self.rear_camera.check(parameters).map_err(within("rear-camera"))?,
             rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
             altered: Alterations::default(),
+            has_rear: true,
         })
     }
 }
@@ -204,6 +206,13 @@ impl Sensors {
                 .with_latency_steps(altered.latency_steps(tracker.latency_steps(), MAX_TRACKER_LATENCY_STEPS)),
         };
         Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
+    }
+
+    /// Returns the same sensors without those that look back, in mode [`SensorMode::Full`]: for a controller that does not use them.
+    /// In the other modes they cost next to nothing, and stay.
+    #[must_use]
+    pub fn without_rear(self) -> Self {
+        Self { has_rear: false, ..self }
     }
 
     /// Returns the injected faults.
@@ -300,6 +309,9 @@ impl Sensors {
             SensorMode::Full => {
                 let perception =
                     FullPerception::new(&self.full, key).altered(self.altered).with_faults(&self.altered.faults);
+                if !self.has_rear {
+                    return Ok(Box::new(perception.without_rear()));
+                }
                 match (self.altered.classifier(), self.camera.pipeline) {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),

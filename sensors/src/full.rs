@@ -73,7 +73,8 @@ pub struct FullPerception {
     front: ObjectSensor,
     front_lidar: Option<FrontLidar>,
     surround: ObjectSensor,
-    rear: LidarChain,
+    /// The sensors that look back, if they are simulated.
+    rear: Option<LidarChain>,
     belief: Belief,
     classifier: Option<Box<dyn DetectionClassifier>>,
     altered: Alterations,
@@ -88,7 +89,7 @@ impl FullPerception {
             front: ObjectSensor::front_radar(model.front_radar, key),
             front_lidar: model.front_lidar.map(|lidar| FrontLidar::new(lidar, model.tracker, key)),
             surround: ObjectSensor::surround(model.surround, key),
-            rear: LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"]),
+            rear: Some(LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"])),
             belief: Belief::default(),
             classifier: None,
             altered: Alterations::default(),
@@ -101,6 +102,12 @@ impl FullPerception {
     #[must_use]
     pub fn with_classifier(self, classifier: Box<dyn DetectionClassifier>) -> Self {
         Self { classifier: Some(classifier), ..self }
+    }
+
+    /// Returns the same sensors without those that look back.
+    #[must_use]
+    pub(crate) fn without_rear(self) -> Self {
+        Self { rear: None, classifier: None, ..self }
     }
 
     /// Returns the same sensors with parts of the rear LiDAR's chain replaced by the truth.
@@ -116,7 +123,7 @@ impl FullPerception {
             front: self.front.with_faults(faults.front_radar),
             front_lidar: self.front_lidar.map(|lidar| lidar.with_faults(faults.front_lidar)),
             surround: self.surround.with_faults(faults.surround),
-            rear: self.rear.with_faults(faults.rear_lidar),
+            rear: self.rear.map(|rear| rear.with_faults(faults.rear_lidar)),
             belief: Belief::new(faults.odometry),
             ..self
         }
@@ -132,16 +139,18 @@ impl FullPerception {
             None => self.front.scan(&input, &mut self.list),
         }
         self.surround.scan(&input, &mut self.list);
-        let seen = Seen { scene, believed, others: &self.others, altered: &self.altered };
-        self.rear.detect(seen, self.classifier.as_mut())?;
-        self.rear.update_tracker(-0.5 * scene.ego.vehicle.dimensions.length_m, &mut self.list);
-        self.rear.report(scene.time, &frame, &mut self.list);
+        if let Some(rear) = &mut self.rear {
+            let seen = Seen { scene, believed, others: &self.others, altered: &self.altered };
+            rear.detect(seen, self.classifier.as_mut())?;
+            rear.update_tracker(-0.5 * scene.ego.vehicle.dimensions.length_m, &mut self.list);
+            rear.report(scene.time, &frame, &mut self.list);
+        }
         Ok(())
     }
 
     /// Returns the worse of the health of the LiDARs and of the camera.
     fn rear_health(&self) -> Health {
-        let lidars = self.rear.health();
+        let lidars = self.rear.as_ref().map_or(Health::Ok, LidarChain::health);
         match self.classifier.as_ref().map_or(Health::Ok, |classifier| classifier.health()) {
             Health::Ok => lidars,
             Health::Failed => Health::Failed,
@@ -165,7 +174,11 @@ impl Perception for FullPerception {
     }
 
     fn lidars(&self) -> Vec<MountedLidar<'_>> {
-        self.front_lidar.iter().flat_map(FrontLidar::lidar).chain(self.rear.lidars()).collect()
+        self.front_lidar
+            .iter()
+            .flat_map(FrontLidar::lidar)
+            .chain(self.rear.iter().flat_map(LidarChain::lidars))
+            .collect()
     }
 
     fn rear_image(&self) -> Option<&RearImage> {
@@ -173,6 +186,6 @@ impl Perception for FullPerception {
     }
 
     fn rear_fields(&self) -> Vec<FieldOfView> {
-        self.rear.fields().collect()
+        self.rear.iter().flat_map(LidarChain::fields).collect()
     }
 }

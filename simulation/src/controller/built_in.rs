@@ -80,6 +80,11 @@ impl ControllerFactory for BuiltInFactory {
         self.settings(settings).mis().is_some()
     }
 
+    /// Cruise control, emergency braking and the models of UN Regulation 157 look ahead and to the sides.
+    fn looks_back(&self, settings: &EgoSettings) -> bool {
+        self.has_mis(settings)
+    }
+
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         let settings = self.settings(settings);
         match self.built_in {

@@ -161,6 +161,10 @@ impl ControllerFactory for Named {
         self.factory.has_mis(settings)
     }
 
+    fn looks_back(&self, settings: &EgoSettings) -> bool {
+        self.factory.looks_back(settings)
+    }
+
     fn isolated(&self) -> Option<Isolated> {
         match self.factory.isolated()? {
             Isolated::Hosted(hosted) => Some(Isolated::Hosted(HostedProcess { name: self.name.clone(), ..hosted })),

@@ -28,6 +28,11 @@ pub trait ControllerFactory: Send + Sync {
     }
     /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
+    /// Returns whether the controller uses the sensors that look back. If it does not, their tracks do not reach it, and mode
+    /// [`SensorMode::Full`] simulates them only for an observer of the steps.
+    fn looks_back(&self, _: &EgoSettings) -> bool {
+        true
+    }
     /// Returns the controller that a worker process is to run, together with the whole sample; `None` for every controller that
     /// runs in this process, or brings a process of its own.
     fn isolated(&self) -> Option<Isolated> {

@@ -18,7 +18,7 @@ pub fn simulate(
     arm: &Arm,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SampleError> {
-    let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm))?;
+    let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm), observer.wants_steps())?;
     let mut controller = controller(scenario, settings_of(scenario), arm);
     loop {
         match run.go_on(observer)? {
@@ -30,5 +30,52 @@ pub fn simulate(
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_sensors::SensorMode;
+    use closecall_traffic::{Source, Time};
+
+    use super::*;
+    use crate::controller::ControllerChoice;
+    use crate::scenario::source;
+    use crate::{NoObserver, RunEvent, StepView};
+
+    /// Counts the tracks of the sensors that look back.
+    #[derive(Default)]
+    struct RearTracks(usize);
+
+    impl Observer for RearTracks {
+        fn step(&mut self, view: &StepView<'_>) {
+            self.0 += view.tracks.iter().filter(|track| track.source == Source::Rear).count();
+        }
+
+        fn event(&mut self, _: Time, _: &RunEvent) {}
+    }
+
+    #[test]
+    fn rear_sensors_that_only_an_observer_needs_leave_the_outcome_as_it_is() {
+        let file = source::load("low-thw-overtake".as_ref(), &["duration-s=15".parse().unwrap()]).unwrap();
+        let scenario = file.concrete(&file.space().nominal()).unwrap();
+        let key = RunKey { seed: 3, sample: 1 };
+        for controller in [ControllerChoice::ACC, "gap-1.6".parse().unwrap()] {
+            let arm = Arm { controller: controller.factory(), sensors: Some(SensorMode::Full) };
+            let mut observer = RearTracks::default();
+            let observed = simulate(&scenario, key, &arm, &mut observer).unwrap();
+            assert!(observer.0 > 100, "the observer sees {} tracks of the rear sensors", observer.0);
+            assert!(simulate(&scenario, key, &arm, &mut NoObserver).unwrap().has_same_bits(&observed));
+        }
+    }
+
+    #[test]
+    fn a_controller_that_looks_back_has_its_sensors_without_an_observer() {
+        let file = source::load("low-thw-overtake".as_ref(), &[]).unwrap();
+        let scenario = file.concrete(&file.space().nominal()).unwrap();
+        let arm =
+            Arm { controller: "mis".parse::<ControllerChoice>().unwrap().factory(), sensors: Some(SensorMode::Full) };
+        let outcome = simulate(&scenario, RunKey { seed: 3, sample: 1 }, &arm, &mut NoObserver).unwrap();
+        assert!(outcome.mis.unwrap().engaged_at_s.is_ok());
     }
 }

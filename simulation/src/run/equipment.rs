@@ -8,8 +8,13 @@ use super::suppressed::Suppressed;
 use super::{Arm, RunKey};
 use crate::scenario::Scenario;
 
-/// Returns the sensors of the arm in a run.
-pub(super) fn perception(scenario: &Scenario, arm: &Arm, key: RunKey) -> Result<Box<dyn Perception>, SensorError> {
+/// Returns the sensors of the arm in a run. The run needs those that look back only if `needs_rear`.
+pub(super) fn perception(
+    scenario: &Scenario,
+    arm: &Arm,
+    key: RunKey,
+    needs_rear: bool,
+) -> Result<Box<dyn Perception>, SensorError> {
     let sensors = match arm.sensors {
         Some(mode) => scenario.sensors.with_mode(mode),
         None => scenario.sensors,
@@ -17,6 +22,7 @@ pub(super) fn perception(scenario: &Scenario, arm: &Arm, key: RunKey) -> Result<
     if scenario.interventions.has_true_tracks {
         return Ok(Box::new(DelayedTruth::new(sensors.latency_steps())));
     }
+    let sensors = if needs_rear { sensors } else { sensors.without_rear() };
     sensors.build(&NoiseKey {
         seed: key.seed,
         sample: key.sample,

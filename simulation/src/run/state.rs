@@ -7,7 +7,9 @@ use std::borrow::Cow;
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{EgoCommand, EgoInput, EgoSettings, EgoState, Looks, MisSettings, Neighbours, Reason};
 use closecall_sensors::{Perception, Scene, SceneVehicle};
-use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Track, VehicleState};
+use closecall_traffic::{
+    CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Track, VehicleState,
+};
 
 use super::ego_input::{odometry, sensor_availability};
 use super::equipment::perception;
@@ -51,6 +53,8 @@ pub(super) struct Run<'a> {
     arm: Cow<'a, Arm>,
     world: World,
     perception: Box<dyn Perception>,
+    /// Whether the controller gets the tracks of the sensors that look back.
+    looks_back: bool,
     humans: Vec<Human>,
     events: Events,
     encounter: Encounter,
@@ -65,6 +69,8 @@ pub(super) struct Run<'a> {
     // Buffers that are reused in each step.
     neighbours: Vec<Neighbours>,
     tracks: Vec<Track>,
+    /// The tracks of the other sensors: what a controller gets that does not look back.
+    tracks_ahead: Vec<Track>,
     margins: CurrentMargins,
     actions: Vec<Action>,
     /// All vehicles other than the ego, in the order of their names.
@@ -78,8 +84,15 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    pub(super) fn new(scenario: Cow<'a, Scenario>, key: RunKey, arm: Cow<'a, Arm>) -> Result<Self, SampleError> {
+    /// Prepares a run. `is_observed` says whether an observer looks at its steps.
+    pub(super) fn new(
+        scenario: Cow<'a, Scenario>,
+        key: RunKey,
+        arm: Cow<'a, Arm>,
+        is_observed: bool,
+    ) -> Result<Self, SampleError> {
         let settings = *settings_of(&scenario);
+        let looks_back = arm.controller.looks_back(&settings);
         let own = key;
         // Noise and drivers draw from these random numbers; the outcome names the run itself.
         let key = scenario.random_numbers.map_or(own, |of| RunKey { seed: of.seed, sample: of.sample });
@@ -104,7 +117,8 @@ impl<'a> Run<'a> {
         let humans = human_drivers(&scenario, key);
         let mut run = Self {
             key: own,
-            perception: perception(&scenario, &arm, key)?,
+            perception: perception(&scenario, &arm, key, looks_back || is_observed)?,
+            looks_back,
             looks: looks(&humans, scenario.actors.len()),
             humans,
             events: Events::new(&scenario),
@@ -117,6 +131,7 @@ impl<'a> Run<'a> {
             neighbours: vec![Neighbours::default(); world.len()],
             // One track of each of the three object-level sensors.
             tracks: Vec::with_capacity(3 * world.len()),
+            tracks_ahead: Vec::with_capacity(2 * world.len()),
             margins,
             actions: vec![Action::default(); world.len()],
             others: Vec::with_capacity(world.len()),
@@ -175,7 +190,7 @@ impl<'a> Run<'a> {
             time,
             odometry: odometry(&self.scenario, &self.world),
             road: if is_map_right { &self.scenario.road } else { &self.wrong_map },
-            tracks: &self.tracks,
+            tracks: if self.looks_back { &self.tracks } else { &self.tracks_ahead },
             sensors: sensor_availability(self.perception.as_ref()),
         }
     }
@@ -236,6 +251,10 @@ impl<'a> Run<'a> {
         let tracks = self.perception.step(&scene)?;
         self.tracks.clear();
         self.tracks.extend_from_slice(tracks);
+        if !self.looks_back {
+            self.tracks_ahead.clear();
+            self.tracks_ahead.extend(tracks.iter().filter(|track| track.source != Source::Rear).cloned());
+        }
         Ok(())
     }
 

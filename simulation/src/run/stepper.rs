@@ -35,7 +35,7 @@ impl Stepper {
         observer: &mut dyn Observer,
     ) -> Result<Self, SampleError> {
         let arm = Arm { controller: Arc::new(External), sensors };
-        let run = Run::new(Cow::Owned(scenario), key, Cow::Owned(arm))?;
+        let run = Run::new(Cow::Owned(scenario), key, Cow::Owned(arm), observer.wants_steps())?;
         let mut stepper = Self { run: Some(run), outcome: None };
         stepper.go_on(observer)?;
         Ok(stepper)
