@@ -4,8 +4,8 @@
 //! cargo run --release --example write_mis -- -n 2000 --member-samples 400 --seed 1001
 //! ```
 //!
-//! The tables stand between two markers, and everything else on the page stays as it is. Each scenario runs with its own
-//! drivers and with each member of the driver ensemble, on the same samples in every arm.
+//! Each part of the page stands between two markers, and everything else on the page stays as it is. Each scenario runs with its own
+//! drivers and full sensors, and with each member of the driver ensemble and object-level sensors, on the same samples in every arm.
 
 mod tables;
 
@@ -13,8 +13,8 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use clap::Parser;
-use tables::{Study, page_with};
+use clap::{Parser, ValueEnum};
+use tables::{Part, Study, page_with};
 
 /// The page, below the folder of the repository.
 const PAGE: &str = "docs/evidence/mis.md";
@@ -31,15 +31,21 @@ struct Args {
     /// Seed of the random numbers
     #[arg(long, default_value_t = 1001)]
     seed: u64,
+    /// The part of the page that is written [default: every part]
+    #[arg(long, value_enum)]
+    part: Option<Part>,
 }
 
 #[expect(clippy::print_stdout, reason = "a program on the command line")]
 fn main() -> Result<(), Box<dyn Error>> {
     let args = Args::parse();
     let started = Instant::now();
-    let tables = Study { samples: args.samples, member_samples: args.member_samples, seed: args.seed }.tables()?;
+    let study = Study { samples: args.samples, member_samples: args.member_samples, seed: args.seed };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(PAGE);
-    std::fs::write(&path, page_with(&std::fs::read_to_string(&path)?, &tables)?)?;
+    for part in Part::value_variants().iter().filter(|part| args.part.is_none_or(|wanted| wanted == **part)) {
+        let tables = study.tables(*part)?;
+        std::fs::write(&path, page_with(&std::fs::read_to_string(&path)?, *part, &tables)?)?;
+    }
     println!("written: {PAGE}, after {:.0} s", started.elapsed().as_secs_f64());
     Ok(())
 }

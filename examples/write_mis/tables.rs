@@ -3,23 +3,21 @@
 use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
+use clap::ValueEnum;
 use closecall_campaign::ensemble::{MemberValue, Quantity, verdicts_of_arm};
 use closecall_campaign::ledger::{ArmCounts, Pairs};
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::summary::Summary;
+use closecall_perception::agreement::{Agreement, Pair};
 use closecall_scenarios::parameters::Variation;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::scenario::member::{ensemble_of, members};
-
-/// The line before the tables.
-const BEGIN: &str = "<!-- write_mis: the lines up to the next marker are written by examples/write_mis -->";
-/// The line behind the tables.
-const END: &str = "<!-- write_mis: end -->";
 
 /// The arms, the baseline first. The others are compared with it.
 const ARMS: [(&str, &str); 4] = [
@@ -32,66 +30,154 @@ const ARMS: [(&str, &str); 4] = [
 /// The member of the ensemble that has columns of its own: drivers who see only the vehicle directly ahead.
 const NO_ANTICIPATION: &str = "anticipation-none";
 
+/// A part of the page, which stands between markers of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Part {
+    /// The scenarios with their own drivers and full sensors, and the agreement of the object-level sensors.
+    Scenarios,
+    /// The driver ensemble with object-level sensors.
+    Ensemble,
+}
+
+impl Part {
+    /// Returns the lines before and behind the part.
+    fn markers(self) -> [String; 2] {
+        let name = match self {
+            Self::Scenarios => "scenarios",
+            Self::Ensemble => "ensemble",
+        };
+        [
+            format!("<!-- write_mis {name}: the lines up to the next marker are written by examples/write_mis -->"),
+            format!("<!-- write_mis {name}: end -->"),
+        ]
+    }
+}
+
 /// How many samples of each scenario are run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Study {
     /// With the drivers of the scenario.
     pub(crate) samples: u64,
-    /// With each member of the driver ensemble.
+    /// With each member of the driver ensemble, and in each scenario with surrounding traffic.
     pub(crate) member_samples: u64,
     pub(crate) seed: u64,
 }
 
+/// A scenario of the library, with the number of samples that its table rests on.
+struct Entry {
+    file: ScenarioFile,
+    samples: u64,
+}
+
 impl Study {
-    /// Runs every scenario of the library, with its own drivers and with every member of the ensemble, and returns the
-    /// tables.
-    pub(crate) fn tables(self) -> Result<String, Box<dyn Error>> {
-        let Self { samples, member_samples, seed } = self;
-        let mut text = format!(
-            "`cargo run --release --example write_mis -- -n {samples} --member-samples {member_samples} --seed {seed}` writes these tables: \
-             {samples} samples of each scenario with seed {seed}, {member_samples} of each scenario with each member of the ensemble, \
-             `object` sensors, all arms on the same samples. Intervals are exact (Clopper-Pearson, 95 %). Shares of prevented collisions \
-             refer to the collisions without the system, shares of induced collisions to all samples. Arms:"
-        );
-        let arms: Vec<String> = ARMS.iter().map(|(name, what)| format!(" `{name}` is {what}")).collect();
-        writeln!(text, "{}.", arms.join(","))?;
-        text.push_str(
-            "\n### The drivers of the scenarios\n\n\
-             | scenario | arm | collisions without | with | prevented | share of those without | induced | share of all | both | \
-             harm prevented | harm induced | largest speed deficit (m/s) |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-        );
-        let library = library()?;
-        for path in &library {
-            let file = ScenarioFile::load(path, &[])?;
-            let name = file.config().name.clone();
-            text.push_str(&rows_of(&name, &self.run(vec![file], samples)?)?);
+    /// Runs every scenario of the library and returns the tables of a part.
+    pub(crate) fn tables(self, part: Part) -> Result<String, Box<dyn Error>> {
+        match part {
+            Part::Scenarios => self.scenarios(),
+            Part::Ensemble => self.ensemble(),
         }
+    }
+
+    /// Returns how the tables of a part were made.
+    fn head(self, part: &str, sentence: &str) -> String {
+        let Self { samples, member_samples, seed } = self;
+        let arms: Vec<String> = ARMS.iter().map(|(name, what)| format!(" `{name}` is {what}")).collect();
+        format!(
+            "Written by `cargo run --release --example write_mis -- -n {samples} --member-samples {member_samples} --seed {seed} --part \
+             {part}`.\n\n{}\n\n{sentence} All arms run on the same samples. Intervals are exact (Clopper-Pearson, 95 %). \
+             Shares of prevented collisions refer to the collisions without the system, shares of induced collisions to all samples. \
+             Arms:{}.\n",
+            provenance(),
+            arms.join(",")
+        )
+    }
+
+    /// Returns the table of the scenarios with their own drivers, and the agreement of the sensor modes.
+    fn scenarios(self) -> Result<String, Box<dyn Error>> {
+        let Self { samples, member_samples, seed } = self;
+        let mut text = self.head(
+            "scenarios",
+            &format!(
+                "{samples} samples of each scenario with seed {seed} and `full` sensors; {member_samples} of each scenario with \
+                 surrounding traffic; one of a scenario in which nothing varies."
+            ),
+        );
+        text.push_str(
+            "\n| scenario | arm | samples | collisions without | with | prevented | share of those without | induced | share of all | \
+             both | harm prevented | harm induced | largest speed deficit (m/s) |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        );
+        let library = self.library()?;
+        for Entry { file, samples } in &library {
+            let name = file.config().name.clone();
+            text.push_str(&rows_of(&name, *samples, &self.run(vec![file.clone()], *samples, SensorMode::Full)?)?);
+        }
+        text.push_str(
+            "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the same samples with `full` and \
+             with `object` sensors. κ is Cohen's; it is undefined if no run or every run collides.\n\n\
+             | scenario | samples | collisions: `full` | `object` | samples that differ | κ |\n|---|---|---|---|---|---|\n",
+        );
+        for Entry { file, samples } in &library {
+            let agreement = Agreement::of(file, seed, *samples)?;
+            let collisions = |has: fn(&Pair) -> bool| agreement.pairs.iter().filter(|pair| has(pair)).count();
+            writeln!(
+                text,
+                "| `{}` | {samples} | {} | {} | {} | {} |",
+                file.config().name,
+                collisions(|pair| pair.full.has_collided),
+                collisions(|pair| pair.object.has_collided),
+                collisions(Pair::differs),
+                agreement.kappa().map_or_else(|| "-".to_owned(), |kappa| format!("{kappa:.2}"))
+            )?;
+        }
+        Ok(text)
+    }
+
+    /// Returns the table of the driver ensemble.
+    fn ensemble(self) -> Result<String, Box<dyn Error>> {
+        let Self { member_samples, seed, .. } = self;
+        let mut text = self.head(
+            "ensemble",
+            &format!(
+                "{member_samples} samples of each scenario with each member of the ensemble, with seed {seed} and `object` sensors."
+            ),
+        );
         writeln!(
             text,
-            "\n### The driver ensemble\n\nEach column has its own median and worst member, and the drivers who look only at the \
-             vehicle directly ahead (`{NO_ANTICIPATION}`). A scenario without humans whom a member changes has no row.\n\n\
+            "\nEach column has its own median and worst member, and the drivers who look only at the vehicle directly ahead \
+             (`{NO_ANTICIPATION}`). A scenario without humans whom a member changes has no row.\n\n\
              | scenario | arm | prevented: median | worst | `{NO_ANTICIPATION}` | induced: median | worst | `{NO_ANTICIPATION}` | change of \
              harm per sample: median | worst |\n|---|---|---|---|---|---|---|---|---|---|"
         )?;
         let members = members(&[])?;
-        for path in &library {
-            let ensemble = ensemble_of(&[ScenarioFile::load(path, &[])?], &members)?;
+        for Entry { file, .. } in self.library()? {
+            let ensemble = ensemble_of(&[file], &members)?;
             if !ensemble.entries.is_empty() {
-                text.push_str(&ensemble_rows(&self.run(ensemble.entries, member_samples)?));
+                text.push_str(&ensemble_rows(&self.run(ensemble.entries, member_samples, SensorMode::Object)?));
             }
         }
         Ok(text)
     }
 
+    /// Returns the scenarios of the library in alphabetical order; those with surrounding traffic come last.
+    fn library(self) -> Result<Vec<Entry>, Box<dyn Error>> {
+        let mut entries = Vec::new();
+        for (folder, samples) in [("", self.samples), ("traffic", self.member_samples)] {
+            for path in files_of(folder)? {
+                let file = ScenarioFile::load(&path, &[])?;
+                // If nothing varies, all samples are the same.
+                let is_fixed = file.space().variation() == Variation::None;
+                entries.push(Entry { file, samples: if is_fixed { 1 } else { samples } });
+            }
+        }
+        Ok(entries)
+    }
+
     /// Runs scenarios in all arms.
-    fn run(self, files: Vec<ScenarioFile>, samples: u64) -> Result<Summary, Box<dyn Error>> {
-        // If nothing varies, all samples are the same.
-        let is_fixed = files.iter().all(|file| file.space().variation() == Variation::None);
-        let samples = if is_fixed { 1 } else { samples };
+    fn run(self, files: Vec<ScenarioFile>, samples: u64, mode: SensorMode) -> Result<Summary, Box<dyn Error>> {
         let sampling = Sampling { seed: self.seed, design: Design::Random, samples };
         let arms = ARMS.iter().map(|(name, _)| name.parse()).collect::<Result<Vec<ControllerChoice>, _>>()?;
         let mut plan = Plan::new(files, sampling, arms)?;
-        plan.sensors = Some(SensorMode::Object);
+        plan.sensors = Some(mode);
         let summary = plan.campaign().count()?;
         match summary.scenarios.iter().find(|(_, counts)| counts.errors() > 0) {
             Some((name, counts)) => Err(format!("{name}: {} runs ended in an error", counts.errors()).into()),
@@ -136,13 +222,13 @@ fn share_cell(value: Option<&MemberValue>, is_named: bool) -> String {
 }
 
 /// Returns the rows of one scenario: one for each arm but the baseline.
-fn rows_of(name: &str, summary: &Summary) -> Result<String, Box<dyn Error>> {
+fn rows_of(name: &str, samples: u64, summary: &Summary) -> Result<String, Box<dyn Error>> {
     let Some((_, counts)) = summary.scenarios.first() else { return Ok(String::new()) };
     let mut text = String::new();
     for pair in counts.arm_pairs.iter().filter(|pair| pair.baseline == 0) {
         let (without, with) = (counts.arms[0], counts.arms[pair.tested]);
         let arm = &summary.controllers[pair.tested];
-        writeln!(text, "| `{name}` | `{arm}` | {} |", cells(summary, &without, &with, &pair.pairs))?;
+        writeln!(text, "| `{name}` | `{arm}` | {samples} | {} |", cells(summary, &without, &with, &pair.pairs))?;
     }
     Ok(text)
 }
@@ -172,9 +258,9 @@ fn cells(summary: &Summary, without: &ArmCounts, with: &ArmCounts, pairs: &Pairs
     .join(" | ")
 }
 
-/// Returns the files of the library, in alphabetical order.
-fn library() -> Result<Vec<PathBuf>, Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+/// Returns the scenario files of a folder of the library, in alphabetical order.
+fn files_of(folder: &str) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library").join(folder);
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
     files.retain(|path| path.extension().is_some_and(|end| end == "toml"));
@@ -182,15 +268,34 @@ fn library() -> Result<Vec<PathBuf>, Box<dyn Error>> {
     Ok(files)
 }
 
-/// Returns the lines of a page between the markers.
-pub(crate) fn between_markers(page: &str) -> Result<&str, String> {
-    let (_, after) = page.split_once(BEGIN).ok_or_else(|| format!("the page has no line `{BEGIN}`"))?;
-    let (tables, _) = after.split_once(END).ok_or_else(|| format!("the page has no line `{END}`"))?;
+/// The first words of the line that names commit, date and machine.
+pub(crate) const PROVENANCE: &str = "Measured on commit ";
+
+/// Returns the line that names commit, date and machine.
+fn provenance() -> String {
+    let output = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit = output("git", &["describe", "--always", "--dirty"]).unwrap_or_else(|| "unknown".to_owned());
+    let date = output("date", &["+%Y-%m-%d"]).unwrap_or_else(|| "unknown".to_owned());
+    let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpus.lines().find_map(|line| line.strip_prefix("model name")).map_or("unknown processor", |name| name);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{PROVENANCE}{commit}, {date}, {}, {threads} threads.", model.trim_start_matches([' ', '\t', ':']))
+}
+
+/// Returns the lines of a part of the page.
+pub(crate) fn between_markers(page: &str, part: Part) -> Result<&str, String> {
+    let [begin, end] = part.markers();
+    let (_, after) = page.split_once(&begin).ok_or_else(|| format!("the page has no line `{begin}`"))?;
+    let (tables, _) = after.split_once(&end).ok_or_else(|| format!("the page has no line `{end}`"))?;
     Ok(tables)
 }
 
-/// Returns a page with other tables between its markers.
-pub(crate) fn page_with(page: &str, tables: &str) -> Result<String, String> {
-    let old = between_markers(page)?;
-    Ok(page.replacen(&format!("{BEGIN}{old}{END}"), &format!("{BEGIN}\n\n{tables}\n{END}"), 1))
+/// Returns a page with other tables in one part.
+pub(crate) fn page_with(page: &str, part: Part, tables: &str) -> Result<String, String> {
+    let [begin, end] = part.markers();
+    let old = between_markers(page, part)?;
+    Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}\n\n{tables}\n{end}"), 1))
 }

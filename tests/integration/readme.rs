@@ -7,6 +7,8 @@
 //! - A block whose info string has a second word is a file of that name: `toml my.toml`.
 //! - A `text` block that is the next one after a `sh` block is the output of its commands, to the letter. Only the wall
 //!   time of a campaign, its number of threads and the share of its validity checks may differ.
+//!
+//! With `CLOSECALL_WRITE_DOCUMENTS=1` the documents get the outputs that their commands print.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -151,6 +153,22 @@ impl Reader {
     }
 }
 
+/// If this variable of the environment is set, the documents are written anew with what their commands print.
+const WRITES: &str = "CLOSECALL_WRITE_DOCUMENTS";
+
+/// Returns a document with another text in the block that opens in this line, counted from 1.
+fn with_block(document: &str, line: usize, text: &str) -> String {
+    let lines: Vec<&str> = document.lines().collect();
+    let end = (line..lines.len()).find(|index| lines[*index] == "```").unwrap();
+    let mut written = lines[..line].join("\n");
+    written.push('\n');
+    written.push_str(text.trim_end());
+    written.push('\n');
+    written.push_str(&lines[end..].join("\n"));
+    written.push('\n');
+    written
+}
+
 /// What a document showed, and what was wrong with it.
 #[derive(Debug, Default)]
 struct Findings {
@@ -166,6 +184,7 @@ fn follow(path: &Path) -> Findings {
     let blocks = blocks(&std::fs::read_to_string(path).unwrap());
     let reader = Reader::new();
     let mut findings = Findings::default();
+    let mut outputs = Vec::new();
     for (index, block) in blocks.iter().enumerate() {
         let place = format!("{}:{}", path.strip_prefix(ROOT).unwrap().display(), block.line);
         let mut words = block.info.split_whitespace();
@@ -189,8 +208,15 @@ fn follow(path: &Path) -> Findings {
         findings.outputs += 1;
         findings.has_campaign |= lines(&block.text).iter().any(|line| line.command.starts_with("closecall campaign "));
         if without_wall_time(&shown.text) != without_wall_time(&printed) {
+            outputs.push((shown.line, printed.clone()));
             findings.wrong.push(format!("{place} shows\n{}\nbut the commands print\n{printed}", shown.text));
         }
+    }
+    if std::env::var_os(WRITES).is_some() {
+        // From the last to the first, so that the lines of the others stay.
+        let document = std::fs::read_to_string(path).unwrap();
+        let written = outputs.iter().rev().fold(document, |text, (line, output)| with_block(&text, *line, output));
+        std::fs::write(path, written).unwrap();
     }
     findings
 }
@@ -238,6 +264,13 @@ fn a_block_is_read_with_its_commands_and_exit_codes() {
     assert_eq!(found[1].text, "name = 1\n");
     let line = |command: &str, exit_code| Line { command: command.to_owned(), exit_code };
     assert_eq!(lines(&found[0].text), [line("closecall check a.toml    b.toml", 0), line("closecall run c.toml", 3)]);
+}
+
+#[test]
+fn a_block_gets_another_output_and_the_rest_of_the_document_stays() {
+    let document = "A\n```text\nold\nlines\n```\nB\n```text\nother\n```\n";
+    assert_eq!(with_block(document, 2, "new\n"), "A\n```text\nnew\n```\nB\n```text\nother\n```\n");
+    assert_eq!(with_block(document, 7, "new"), "A\n```text\nold\nlines\n```\nB\n```text\nnew\n```\n");
 }
 
 #[test]

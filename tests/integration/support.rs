@@ -15,7 +15,16 @@ pub(crate) fn library(name: &str) -> PathBuf {
 
 /// Returns the paths of all scenarios of the library, in alphabetical order.
 pub(crate) fn all_of_library() -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(library_folder()).expect("the scenario library");
+    scenarios_in(&library_folder())
+}
+
+/// Returns the scenarios of the library that have surrounding traffic.
+pub(crate) fn traffic_of_library() -> Vec<PathBuf> {
+    scenarios_in(&library_folder().join("traffic"))
+}
+
+fn scenarios_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("the scenario library");
     let paths = entries.map(|entry| entry.expect("an entry of the scenario library").path());
     let mut files: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|end| end == "toml")).collect();
     files.sort();
