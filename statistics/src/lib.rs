@@ -17,14 +17,12 @@
 //! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
 //! * [`two_sample`]: whether new values come from a fitted distribution
 //! * [`normal`]: the truncated normal distribution
-//! * [`dbscan`]: clusters of points by density
 //! * [`sensitivity`]: which input of a function moves its output most
 //!
 //! All methods for probabilities assume independent, identically distributed samples, as in the random sampling design.
 
 pub mod binomial;
 pub mod consistency;
-pub mod dbscan;
 pub mod format;
 pub mod holm;
 pub mod interval;

@@ -1,4 +1,5 @@
-//! For tests only: finds what a test needs of the machine, and skips or fails the test if the machine lacks it.
+//! For tests only: finds what a test needs of the machine, and skips or fails the test if the machine lacks it. Also has the
+//! reference implementation that the clustering is compared with, [`dbscan_by_definition`].
 //!
 //! A few tests compare Closecall with other programs, or read trajectory data that is not part of the repository. On a
 //! machine that lacks one of these, such a test says `skipped (NEED): REASON` and passes. The environment variable
@@ -19,10 +20,12 @@
 //! let Some(viewer) = closecall_testing::viewer() else { return };
 //! ```
 
+mod dbscan;
 mod find;
 mod need;
 mod require;
 
+pub use dbscan::dbscan_by_definition;
 pub use find::{browser, data, has_display, has_python, onnxruntime, python_with_onnxruntime, viewer};
 pub use need::Need;
 pub use require::skip;

@@ -16,10 +16,18 @@
 //! and receives the label of the cell afterwards: all points of such a cell are core points of the same cluster anyway.
 //! Thinning never joins clusters that DBSCAN would keep apart. It may split a cluster that is connected only by gaps of
 //! more than 0.43 of the radius, which is the radius less two diagonals of a cell.
+//!
+//! DBSCAN is that of `linfa-clustering`, over the search for neighbours in [`neighbours`](super::neighbours). A point that lies exactly at
+//! the radius is a neighbour.
 
-use closecall_statistics::dbscan::Dbscan;
+use linfa::ParamGuard;
+use linfa::traits::Transformer;
+use linfa_clustering::Dbscan;
+use linfa_nn::distance::L2Dist;
+use ndarray::{Array1, ArrayView2};
 
 use super::ground::Candidate;
+use super::neighbours::GridSearch;
 
 /// Radius along the road at the sensor (m).
 const ALONG_M: f32 = 0.8;
@@ -34,18 +42,36 @@ pub(crate) const CORE_POINTS: usize = 3;
 /// Radius in the stretched plane.
 const RADIUS: f64 = 1.0;
 /// Number of thinning cells per radius. All points of a cell are within the radius of each other.
-const CELLS_PER_RADIUS: f32 = CELLS_IN_RADIUS as f32;
-const CELLS_IN_RADIUS: usize = 5;
+const CELLS_PER_RADIUS: f32 = 5.0;
 /// Number of thinning cells along the road, which cover the region of interest.
 const CELLS_ALONG: usize = 525;
 /// Number of thinning cells across the road, which cover the region of interest.
 const CELLS_ACROSS: usize = 200;
 
-/// Number of cells with a side of one radius that cover the same region.
-const GRID_CELLS: usize = (CELLS_ALONG / CELLS_IN_RADIUS + 1) * (CELLS_ACROSS / CELLS_IN_RADIUS + 1);
-
 /// Label of a point that belongs to no cluster.
 pub(crate) const NOISE: u32 = u32::MAX;
+
+/// The points of a scan as DBSCAN has clustered them, for a comparison with another DBSCAN.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClusteredPoints {
+    /// Coordinates in the plane of the clustering, whose unit is the radius.
+    pub points: Vec<[f64; 2]>,
+    /// Cluster of each point, `None` for noise.
+    pub labels: Vec<Option<usize>>,
+}
+
+impl ClusteredPoints {
+    /// Number of points within the radius, the point itself included, that make a point a core point.
+    pub const CORE_POINTS: usize = CORE_POINTS;
+    /// Radius within which points are neighbours.
+    pub const RADIUS: f64 = RADIUS;
+
+    /// Clusters points. Allocates what `linfa-clustering` and the search for neighbours do, and nothing else.
+    pub fn new(points: Vec<[f64; 2]>) -> Self {
+        let labels = dbscan(&points, RADIUS, CORE_POINTS).into_raw_vec_and_offset().0;
+        Self { points, labels }
+    }
+}
 
 /// The cluster labels of the candidates, and the working memory of the clustering.
 #[derive(Clone, Debug)]
@@ -62,7 +88,6 @@ pub(crate) struct Clustering {
     row_of: Vec<u32>,
     /// Stretched coordinates of the candidates that were kept.
     rows: Vec<[f64; 2]>,
-    dbscan: Dbscan,
     /// New number of each cluster that is merged into no other one.
     renumbered: Vec<u32>,
     /// The vehicles of the clusters that the truth gives.
@@ -85,7 +110,6 @@ impl Clustering {
             cell_of: Vec::with_capacity(candidates),
             row_of: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(candidates),
-            dbscan: Dbscan::with_capacity(candidates, GRID_CELLS),
             renumbered: Vec::with_capacity(super::RESERVED_CLUSTERS),
             vehicles: Vec::new(),
         }
@@ -94,10 +118,20 @@ impl Clustering {
     /// Assigns the candidates to clusters.
     pub(crate) fn run(&mut self, candidates: &[Candidate]) {
         self.thin(candidates);
-        self.count = self.dbscan.run(&self.rows, RADIUS, CORE_POINTS) as usize;
-        let found = &self.dbscan.labels;
+        let of_rows = dbscan(&self.rows, RADIUS, CORE_POINTS);
+        self.count = of_rows.iter().flatten().max().map_or(0, |last| last + 1);
+        let label = |row: u32| of_rows[row as usize].and_then(|label| u32::try_from(label).ok()).unwrap_or(NOISE);
         self.labels.clear();
-        self.labels.extend(self.row_of.iter().map(|&row| found[row as usize].unwrap_or(NOISE)));
+        self.labels.extend(self.row_of.iter().map(|&row| label(row)));
+    }
+
+    /// Returns the points that the latest run has given to DBSCAN, in the stretched plane, with their labels.
+    pub(crate) fn rows(&self) -> (&[[f64; 2]], Vec<Option<usize>>) {
+        let mut labels = vec![None; self.rows.len()];
+        for (&row, &label) in self.row_of.iter().zip(&self.labels) {
+            labels[row as usize] = (label != NOISE).then_some(label as usize);
+        }
+        (&self.rows, labels)
     }
 
     /// Assigns the candidates to clusters by the vehicle that each belongs to, `None` for one that belongs to no vehicle.
@@ -168,6 +202,13 @@ impl Clustering {
     }
 }
 
+/// Returns the cluster of each point by linfa's DBSCAN, `None` for noise. Needs two core points or more, and a radius above 0.
+#[expect(clippy::expect_used, reason = "the caller passes constants")]
+fn dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<Option<usize>> {
+    let params = Dbscan::params_with(core_points, L2Dist, GridSearch { cell: radius }).tolerance(radius);
+    params.check().expect("two core points or more, a radius above 0").transform(&ArrayView2::from(points))
+}
+
 /// Returns the coordinates (X, Y) of a candidate in the stretched plane.
 fn to_stretched_plane(candidate: &Candidate) -> [f32; 2] {
     let along = (ALONG_GAIN / ALONG_M * candidate.back_m).ln_1p() / ALONG_GAIN;
@@ -184,9 +225,91 @@ fn cell(along: f32, across: f32) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use closecall_testing::dbscan_by_definition;
     use proptest::prelude::*;
 
     use super::*;
+
+    /// A set of points of the golden file, with the labels of scikit-learn.
+    struct GoldenSet<'a> {
+        name: &'a str,
+        radius: f64,
+        core_points: usize,
+        points: Vec<[f64; 2]>,
+        expected: Vec<i64>,
+    }
+
+    #[test]
+    fn clusters_match_scikit_learn_up_to_numbering() {
+        let golden = include_str!("../../tests/golden/dbscan.csv");
+        let mut sets: Vec<GoldenSet<'_>> = Vec::new();
+        for line in golden.lines().skip(1) {
+            let fields: Vec<&str> = line.split(',').collect();
+            if sets.last().is_none_or(|set| set.name != fields[0]) {
+                let (radius, core_points) = (fields[1].parse().unwrap(), fields[2].parse().unwrap());
+                sets.push(GoldenSet { name: fields[0], radius, core_points, points: vec![], expected: vec![] });
+            }
+            let set = sets.last_mut().unwrap();
+            set.points.push([fields[3].parse().unwrap(), fields[4].parse().unwrap()]);
+            set.expected.push(fields[5].parse().unwrap());
+        }
+        assert_eq!(sets.len(), 4);
+        for GoldenSet { name, radius, core_points, points, expected } in sets {
+            let mut pairs: Vec<(usize, i64)> = Vec::new();
+            for (label, &expected) in dbscan(&points, radius, core_points).iter().zip(&expected) {
+                match label {
+                    None => assert_eq!(expected, -1, "{name}"),
+                    Some(label) => pairs.push((*label, expected)),
+                }
+            }
+            pairs.sort_unstable();
+            pairs.dedup();
+            // The mapping is one to one: each label corresponds to one of scikit-learn's, and vice versa.
+            let clusters = expected.iter().max().unwrap() + 1;
+            assert!(clusters > 1, "{name}");
+            assert_eq!(pairs.len(), usize::try_from(clusters).unwrap(), "{name}");
+            for (index, pair) in pairs.iter().enumerate() {
+                assert_eq!(pair.0, index, "{name}");
+                assert!(pair.1 >= 0 && pairs.iter().filter(|other| other.1 == pair.1).count() == 1, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_exactly_at_the_radius_are_neighbours() {
+        // With only the nearer points as neighbours, the first three were no core points, and all were noise.
+        assert_eq!(
+            dbscan(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.5, 0.0]], 1.0, 3).to_vec(),
+            [Some(0), Some(0), Some(0), None]
+        );
+    }
+
+    /// Points in clumps, so that clusters, their borders and noise all occur. Coordinates are whole quarters in half of the cases, so
+    /// that points lie exactly at the radius.
+    fn clumps() -> impl Strategy<Value = Vec<[f64; 2]>> {
+        let clump = ((0.0..30.0_f64, -9.0..9.0_f64), prop::collection::vec((-1.5..1.5_f64, -1.5..1.5_f64), 1..20));
+        let clumps = prop::collection::vec(clump, 0..8);
+        (clumps, any::<bool>()).prop_map(|(clumps, in_quarters)| {
+            let place = |value: f64| if in_quarters { (4.0 * value).round() / 4.0 } else { value };
+            let mut points = Vec::new();
+            for ((x, y), around) in clumps {
+                points.extend(around.into_iter().map(|(dx, dy)| [place(x + dx), place(y + dy)]));
+            }
+            points
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_labels_are_those_of_the_definition(
+            points in clumps(),
+            radius in prop::sample::select(vec![0.25, 0.7, 1.0, 1.25, 1.9]),
+            core_points in 2..6_usize,
+        ) {
+            let labels = dbscan(&points, radius, core_points).to_vec();
+            prop_assert_eq!(labels, dbscan_by_definition(&points, radius, core_points));
+        }
+    }
 
     fn candidates(points: &[(f32, f32)]) -> Vec<Candidate> {
         points.iter().zip(0..).map(|(&(back_m, left_m), index)| Candidate { index, back_m, left_m }).collect()
@@ -241,11 +364,7 @@ mod tests {
             let stretched = |at: &Candidate| to_stretched_plane(at).map(f64::from);
             let rows: Vec<[f64; 2]> = candidates(&points).iter().map(stretched).collect();
             let thinned = labels(&points);
-            let unthinned = |radius: f64| {
-                let mut dbscan = Dbscan::default();
-                dbscan.run(&rows, radius, CORE_POINTS);
-                dbscan.labels
-            };
+            let unthinned = |radius: f64| dbscan_by_definition(&rows, radius, CORE_POINTS);
             let (whole, tight) = (unthinned(RADIUS), unthinned(0.43));
             // A point on the border of two clusters may belong to either, so only core points are compared.
             let neighbours = |at: usize, radius: f64| {

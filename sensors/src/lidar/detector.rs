@@ -5,7 +5,7 @@ use closecall_traffic::{ClassScores, Time, VehicleClass};
 use super::across::across;
 use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
-use super::clustering::{Clustering, NOISE};
+use super::clustering::{ClusteredPoints, Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
 use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
@@ -169,6 +169,12 @@ impl Detector {
         self.clustering.run(&self.candidates);
         self.group_by_cluster();
         Ok(())
+    }
+
+    /// Returns the latest clustering, before parts of a vehicle are merged if [`Detector::cluster`] made it.
+    pub(crate) fn clustered(&self) -> ClusteredPoints {
+        let (points, labels) = self.clustering.rows();
+        ClusteredPoints { points: points.to_vec(), labels }
     }
 
     /// Groups the indices of the candidates by cluster.

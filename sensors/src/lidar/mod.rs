@@ -24,6 +24,7 @@ mod ground;
 mod kind;
 mod material;
 mod model;
+mod neighbours;
 mod noise;
 mod parts;
 mod pattern;
@@ -49,6 +50,7 @@ mod viewpoint;
 pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
 pub use closecall_tracking::LaneGeometry;
+pub use clustering::ClusteredPoints;
 pub(crate) use config::{FRONT_NAME, REAR_NAME, intern_name};
 pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;

@@ -2,7 +2,9 @@
 
 use closecall_traffic::Stream;
 
-use super::{Detector, LaneGeometry, Lidar, LidarScan, PointBeam, ScanTruth, Scanner, SegmentationReport};
+use super::{
+    ClusteredPoints, Detector, LaneGeometry, Lidar, LidarScan, PointBeam, ScanTruth, Scanner, SegmentationReport,
+};
 use crate::faults::LidarFault;
 use crate::{Detection, Scene, SensorError};
 
@@ -85,6 +87,18 @@ impl RearLidar {
     /// [`RearLidar::completed`].
     pub fn latest(&self) -> &LidarScan {
         self.scanner.latest()
+    }
+
+    /// Clusters the latest scan once more, and returns what DBSCAN has made of it. Returns no points before the first scan.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Detector::detect`].
+    pub fn clustered(&self) -> Result<ClusteredPoints, SensorError> {
+        let mut detector = Detector::default();
+        if let Some(lane) = &self.lane {
+            detector.cluster(self.scanner.latest(), lane)?;
+        }
+        Ok(detector.clustered())
     }
 
     /// Returns the ground truth of the points of [`RearLidar::latest`].

@@ -1,9 +1,9 @@
-"""Labels point sets with scikit-learn's DBSCAN, as a reference for the DBSCAN of this project.
+"""Labels point sets with scikit-learn's DBSCAN, as a reference for the clustering of the LiDAR.
 
     python -m venv venv && venv/bin/pip install scikit-learn==1.9.1
-    venv/bin/python statistics/tests/golden/dbscan.py > statistics/tests/golden/dbscan.csv
+    venv/bin/python sensors/tests/golden/dbscan.py > sensors/tests/golden/dbscan.csv
 
-The tests of `dbscan` read the file, and only this script writes it. Coordinates have three decimals, so
+The tests of `lidar::clustering` read the file, and only this script writes it. Coordinates have three decimals, so
 that both sides read the same numbers. A label of -1 is noise.
 """
 
