@@ -35,12 +35,15 @@ pub struct Campaign {
     pub remote: Option<Arc<RemoteWorkers>>,
     /// True if samples of the journal that ended in an error are run again.
     pub retry_errors: bool,
+    /// True if the campaign goes on without its folder when results can no longer be written, as on a full disk, and still
+    /// counts every sample. Else it ends there.
+    pub goes_on_without_folder: bool,
     /// A request from outside to start no further samples.
     pub stop: StopFlag,
 }
 
 /// What was found in the journal of a campaign that goes on.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default)]
 pub struct ResumeReport {
     /// The line at which the journal was cut off: it and everything after it was damaged.
     pub torn: Option<TornLine>,
@@ -48,6 +51,8 @@ pub struct ResumeReport {
     pub damaged: Vec<TornLine>,
     /// Number of samples that had ended in an error, and were run again.
     pub retried: u64,
+    /// Why the last records are not in the folder, if the campaign went on without it.
+    pub lost: Option<WriteError>,
 }
 
 impl ResumeReport {
@@ -113,8 +118,16 @@ pub struct NextRecord<'a> {
 impl Campaign {
     /// Returns a campaign that runs every sample of the given scenarios.
     pub fn new(works: Vec<Arc<Work>>, workers: Workers) -> Self {
-        let (inference, stop) = (Inference::default(), StopFlag::default());
-        Self { works, partition: None, workers, inference, remote: None, retry_errors: false, stop }
+        Self {
+            works,
+            partition: None,
+            workers,
+            inference: Inference::default(),
+            remote: None,
+            retry_errors: false,
+            goes_on_without_folder: false,
+            stop: StopFlag::default(),
+        }
     }
 
     /// Returns a summary of no samples yet.
@@ -183,7 +196,7 @@ impl Campaign {
         mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<ResumeReport, CampaignError> {
         let Repair { damaged, retried } = folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
-        let mut report = ResumeReport { torn: None, damaged, retried };
+        let mut report = ResumeReport { torn: None, damaged, retried, lost: None };
         if let Some(folder) = folder.filter(|folder| self.stop.is_set() && folder.journal_path().exists()) {
             // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
@@ -195,18 +208,22 @@ impl Campaign {
             return Ok(report);
         }
         let mut position = Position { work: 0, done: 0, total: 0, is_over: false };
-        let mut files = match folder {
-            Some(folder) => Some(self.resume(folder, &mut position, &mut on_record)?),
-            None => None,
-        };
+        let mut kept = KeptFiles { files: None, may_be_lost: self.goes_on_without_folder, lost: None };
+        match folder.map(|folder| self.resume(folder, &mut position, &mut on_record)).transpose() {
+            Ok(files) => kept.files = files,
+            // All records of the journal have been read before the files are opened for appending.
+            Err(FolderError::Write(error)) if kept.may_be_lost => kept.lost = Some(error),
+            Err(error) => return Err(error.into()),
+        }
+        report.torn = kept.files.as_mut().and_then(|files| files.torn.take());
         if !position.is_over {
-            self.run_from(position, files.as_mut(), &mut on_record)?;
+            self.run_from(position, &mut kept, &mut on_record)?;
         }
-        if let Some(ResumedFiles { journal, wall_times, .. }) = &mut files {
-            journal.sync()?;
-            wall_times.flush()?;
-        }
-        report.torn = files.and_then(|files| files.torn);
+        kept.write(|files| {
+            files.journal.sync()?;
+            files.wall_times.flush()
+        })?;
+        report.lost = kept.lost;
         Ok(report)
     }
 
@@ -249,7 +266,7 @@ impl Campaign {
     fn run_from(
         &self,
         start: Position,
-        mut files: Option<&mut ResumedFiles>,
+        kept: &mut KeptFiles,
         on_record: &mut impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<(), CampaignError> {
         let (mut index, mut is_over) = (start.total, false);
@@ -257,9 +274,7 @@ impl Campaign {
             let done = if number == start.work { start.done } else { 0 };
             let samples = work.samples(self.partition).skip(done);
             self.run_samples((number, work), samples, |finished: Finished| {
-                if let Some(files) = files.as_deref_mut() {
-                    append(files, index, &finished)?;
-                }
+                kept.write(|files| append(files, index, &finished))?;
                 index += 1;
                 let spent_s = [finished.wall_s.iter().sum(), finished.check_s];
                 let next = NextRecord { work: number, record: &finished.record, is_new: true, spent_s };
@@ -289,6 +304,27 @@ impl Campaign {
             Some(remote) => remote.run((number, work), samples, &self.stop, on_finished),
             None => self.workers.run(work, samples, &self.stop, on_finished),
         }
+    }
+}
+
+/// The files of a running campaign, if it has any.
+struct KeptFiles {
+    files: Option<ResumedFiles>,
+    /// True if the campaign goes on when they can no longer be written.
+    may_be_lost: bool,
+    /// Why they can no longer be written.
+    lost: Option<WriteError>,
+}
+
+impl KeptFiles {
+    /// Writes to the files, if there are any.
+    fn write(&mut self, write: impl FnOnce(&mut ResumedFiles) -> Result<(), WriteError>) -> Result<(), WriteError> {
+        let Some(Err(error)) = self.files.as_mut().map(write) else { return Ok(()) };
+        if !self.may_be_lost {
+            return Err(error);
+        }
+        (self.files, self.lost) = (None, Some(error));
+        Ok(())
     }
 }
 

@@ -49,9 +49,10 @@ impl From<&FolderError> for FailureKind {
     fn from(error: &FolderError) -> Self {
         match error {
             FolderError::Write(_) | FolderError::Read { .. } | FolderError::Busy { .. } => Self::Io,
-            FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => {
-                Self::Usage
-            }
+            FolderError::AlreadyThere { .. }
+            | FolderError::OtherCampaign { .. }
+            | FolderError::NotACampaign { .. }
+            | FolderError::Foreign { .. } => Self::Usage,
             FolderError::Content { .. } => Self::InvalidInput,
         }
     }

@@ -10,6 +10,7 @@
 //!  junit.xml          one test case per sample and controller
 //!  report.html        report for human readers; summary.md: the same for a pull request
 //!  recordings/        recordings (Rerun files) of selected samples, and a page that shows them
+//!  causes.json        what `explain` has found, if it was asked
 //! ```
 
 use std::fs;
@@ -19,20 +20,42 @@ use closecall_scenarios::atomic::{WriteError, is_temporary, write_file};
 use closecall_simulation::outcome::Outcome;
 
 use super::journal::{self, Entry, Journal};
-use super::lock::Lock;
+use super::lock::{LOCK, Lock};
 use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::record::Record;
 use super::wall_times::{self, WallTime, WallTimes};
 
 pub use crate::folder_error::FolderError;
 
-const MANIFEST: &str = "manifest.json";
+pub(crate) const MANIFEST: &str = "manifest.json";
 const JOURNAL: &str = "journal.jsonl";
 const WALL_TIMES: &str = "wall-times.jsonl";
 
+/// The report for human readers, in a campaign's folder.
+pub const REPORT: &str = "report.html";
+/// The folder of the recordings, in a campaign's folder.
+pub const RECORDINGS: &str = "recordings";
+/// The page of the recordings, in their folder.
+pub const RECORDINGS_PAGE: &str = "index.html";
+
+/// All files of a campaign's folder, without those of the recordings.
+pub(crate) const FILES: [&str; 12] = [
+    MANIFEST,
+    JOURNAL,
+    WALL_TIMES,
+    LOCK,
+    "outcomes.parquet",
+    "timings.parquet",
+    "arm_pairs.parquet",
+    "junit.xml",
+    "samples.xml",
+    REPORT,
+    "summary.md",
+    "causes.json",
+];
+
 /// The reports of a campaign's folder that a reader opens first.
-pub const REPORT_FILES: [&str; 5] =
-    ["report.html", "summary.md", "junit.xml", "outcomes.parquet", "recordings/index.html"];
+pub const REPORT_FILES: [&str; 5] = [REPORT, "summary.md", "junit.xml", "outcomes.parquet", "recordings/index.html"];
 
 /// The folder of a campaign.
 #[derive(Clone, Debug)]

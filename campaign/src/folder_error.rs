@@ -46,6 +46,14 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
+    /// Something that no campaign has put there is where results belong.
+    #[error("failed to use {}: {reason}; nothing is overwritten, moved or removed", path.display())]
+    Foreign {
+        /// The path.
+        path: PathBuf,
+        /// What is there.
+        reason: String,
+    },
     /// Another program has locked the folder.
     #[error("failed to use {}: another campaign is running in it ({holder})", path.display())]
     Busy {

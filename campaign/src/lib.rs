@@ -46,6 +46,7 @@ pub mod remote;
 mod repair;
 mod repeats;
 pub mod repository;
+pub mod results;
 pub mod resume_command;
 pub mod robustness;
 pub mod runner;

@@ -11,12 +11,15 @@ use closecall_scenarios::atomic::WriteError;
 
 use super::folder_error::FolderError;
 
-const LOCK: &str = "lock";
+/// The name of the lock file.
+pub(crate) const LOCK: &str = "lock";
+/// Number of attempts to lock a folder that is moved meanwhile.
+const ATTEMPTS: usize = 5;
 
 /// A lock on a folder, released when the value is dropped.
 #[derive(Debug)]
 pub struct Lock {
-    _file: File,
+    file: File,
 }
 
 impl Lock {
@@ -26,6 +29,16 @@ impl Lock {
     /// [`FolderError::Busy`] if another program holds the lock, [`FolderError::Write`] if the lock file cannot be
     /// written.
     pub fn acquire(folder: &Path) -> Result<Self, FolderError> {
+        for _ in 0..ATTEMPTS {
+            let lock = Self::acquire_file(folder)?;
+            if lock.is_in(folder) {
+                return Ok(lock);
+            }
+        }
+        Err(FolderError::Busy { path: folder.to_owned(), holder: "it is being moved".to_owned() })
+    }
+
+    fn acquire_file(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LOCK);
         let fail = |source| WriteError::new(&path, source);
         let options = OpenOptions::new().create(true).read(true).write(true).truncate(false).open(&path);
@@ -42,7 +55,24 @@ impl Lock {
         }
         let cleared = file.set_len(0).and_then(|()| file.rewind());
         cleared.and_then(|()| writeln!(file, "process {}", std::process::id())).map_err(fail)?;
-        Ok(Self { _file: file })
+        Ok(Self { file })
+    }
+
+    /// Returns true if the lock file is still the one in the folder. Between its opening and its lock, another program may have
+    /// moved the folder, and have put another one in its place.
+    #[cfg(unix)]
+    fn is_in(&self, folder: &Path) -> bool {
+        use std::os::unix::fs::MetadataExt as _;
+        match (self.file.metadata(), folder.join(LOCK).metadata()) {
+            (Ok(locked), Ok(there)) => (locked.dev(), locked.ino()) == (there.dev(), there.ino()),
+            _ => false,
+        }
+    }
+
+    /// Returns true if the folder has a lock file: a folder with an open file cannot be moved.
+    #[cfg(not(unix))]
+    fn is_in(&self, folder: &Path) -> bool {
+        self.file.metadata().is_ok() && folder.join(LOCK).exists()
     }
 
     /// Returns true if `name` is the name of the lock file, which stays in the folder after the lock is released.

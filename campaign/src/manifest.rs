@@ -154,12 +154,15 @@ pub struct Manifest {
     /// Scenarios and members of a driver ensemble that were not run, because the member changes nothing in the scenario.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without_effect: Vec<(String, String)>,
+    /// True if the campaign has chosen its folder itself, so that a later one may take its place.
+    #[serde(default)]
+    pub replaceable: bool,
     /// The command line.
     pub command: Vec<String>,
 }
 
 /// Keys of a manifest that do not affect the outcomes, or whose differences are worded elsewhere.
-const INCIDENTAL: [&str; 3] = ["command", "working_folder", "controllers"];
+const INCIDENTAL: [&str; 4] = ["command", "working_folder", "replaceable", "controllers"];
 /// Keys of a scenario in a manifest that do not affect the outcomes, which follow from its text.
 const INCIDENTAL_OF_SCENARIO: [&str; 2] = ["path", "settings"];
 
@@ -183,7 +186,7 @@ impl Manifest {
         texts.iter().filter_map(|text| text.parse().ok()).collect()
     }
 
-    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, the paths of the
+    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, whether it named a folder, the paths of the
     /// scenario files, the partition, and the build of the program. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {
@@ -192,7 +195,9 @@ impl Manifest {
             whole.closecall_version.truncate(end);
         }
         let mut value = serde_json::to_value(whole).ok()?;
-        value.as_object_mut()?.remove("command");
+        for name in ["command", "replaceable"] {
+            value.as_object_mut()?.remove(name);
+        }
         for scenario in value.get_mut("scenarios")?.as_array_mut()? {
             for name in INCIDENTAL_OF_SCENARIO {
                 scenario.as_object_mut()?.remove(name);
@@ -313,6 +318,7 @@ mod tests {
             controllers: Vec::new(),
             working_folder: None,
             without_effect: Vec::new(),
+            replaceable: false,
             command: vec!["closecall".to_owned()],
         }
     }
@@ -357,6 +363,8 @@ mod tests {
         let mut other = manifest();
         other.command.push("--jobs=2".to_owned());
         other.scenarios[0].path = "b.toml".to_owned();
+        assert_eq!(manifest().differences(&other), Vec::<String>::new());
+        other.replaceable = true;
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
         other.partition = Some("1/3".parse().unwrap());
         assert_eq!(manifest().determining_json(), other.determining_json());

@@ -155,6 +155,7 @@ impl Plan {
             inference: self.inference,
             retry_errors: false,
             remote: None,
+            goes_on_without_folder: false,
             stop: StopFlag::default(),
         }
     }
@@ -233,6 +234,7 @@ impl Plan {
             working_folder: std::env::current_dir().ok(),
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
             without_effect: self.without_effect.clone(),
+            replaceable: false,
             command,
         })
     }

@@ -128,6 +128,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         controllers: Vec::new(),
         working_folder: None,
         without_effect: Vec::new(),
+        replaceable: false,
         command: Vec::new(),
     }
 }

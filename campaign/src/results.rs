@@ -1,0 +1,284 @@
+//! The folder in which a campaign keeps its results if its command line names none.
+//!
+//! ```text
+//!  closecall-results            the last campaign of this working folder
+//!  closecall-results.previous   the one before it
+//! ```
+//!
+//! A new campaign takes the place of the last one, whose folder becomes the previous one. A folder is moved or removed only if a
+//! campaign has made it here on its own account, which its manifest says, and if it holds no other file than those of a
+//! campaign. Everything else at one of the two paths is refused and stays as it is: a file, a symbolic link, a folder with other
+//! files, the folder of a campaign that somebody has put there.
+//!
+//! Two campaigns that start in one working folder at the same time do not meet: the lock of the folder at `closecall-results`
+//! also guards the previous one, and a folder is moved while its lock is held. Files are removed one by one, the manifest last.
+//! A program that is killed meanwhile leaves a folder that the next campaign still recognises.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use closecall_scenarios::atomic::{WriteError, is_temporary};
+use serde_json::Value;
+
+use crate::folder::{FILES, Folder, LockedFolder, MANIFEST, RECORDINGS, RECORDINGS_PAGE, REPORT};
+use crate::folder_error::FolderError;
+use crate::lock::Lock;
+use crate::manifest::Manifest;
+use crate::resume_command::resume_command;
+
+/// The folder of the last campaign, in the working folder.
+pub const RESULTS: &str = "closecall-results";
+/// The folder of the campaign before it.
+pub const PREVIOUS: &str = "closecall-results.previous";
+
+/// Number of attempts to take a folder while other campaigns begin and end in it.
+const ATTEMPTS: usize = 5;
+/// Largest number of files that a message names.
+const NAMED_FILES: usize = 3;
+
+/// The folder of a campaign that keeps its results where no option says, and what it has taken the place of.
+#[derive(Debug)]
+pub struct Taken {
+    /// The folder, locked for the campaign.
+    pub locked: LockedFolder,
+    /// The results that are now the previous ones; `None` if there were none.
+    pub moved: Option<Moved>,
+}
+
+/// Results that have become the previous ones.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Moved {
+    /// The folder in which they are.
+    pub to: PathBuf,
+    /// The command that resumes the campaign; `None` if it has come to its end.
+    pub resume: Option<String>,
+    /// True if older results were removed.
+    pub has_removed: bool,
+}
+
+/// What is at a path where results belong.
+enum Place {
+    /// Nothing.
+    Free,
+    /// An empty folder, or one whose campaign was killed before it had written its manifest.
+    Unused,
+    /// Results that a campaign has kept here on its own account.
+    Results(Kept),
+}
+
+/// Results of an earlier campaign.
+struct Kept {
+    /// The command line of the campaign.
+    command: Vec<String>,
+    /// True if the campaign has come to its end: the report is the last file but one that it writes.
+    is_finished: bool,
+    /// The names of its scenarios, by which recordings are named.
+    scenarios: Vec<String>,
+}
+
+/// Creates the folder of the results in `folder`, the working folder, for the campaign of `manifest`. Earlier results become the
+/// previous ones.
+///
+/// # Errors
+/// [`FolderError::Foreign`] if something is at one of the two paths that no campaign has put there, [`FolderError::Busy`] if
+/// another campaign runs there, other [`FolderError`]s if a folder cannot be read or written.
+pub fn take(folder: &Path, manifest: &Manifest) -> Result<Taken, FolderError> {
+    let [path, previous] = [RESULTS, PREVIOUS].map(|name| folder.join(name));
+    let mut moved = None;
+    let mut taken = Err(FolderError::Busy { path: path.clone(), holder: "several start at the same time".to_owned() });
+    for _ in 0..ATTEMPTS {
+        if let Place::Results(_) = inspect(&path, true)? {
+            // What is in the way is found before anything is written, be it a lock.
+            inspect(&previous, true)?;
+            moved = set_aside(&path, &previous)?.or(moved);
+        }
+        taken = Folder::lock(&path, manifest, false);
+        // Another campaign has begun and ended here since the path was free.
+        if !matches!(taken, Err(FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. })) {
+            break;
+        }
+    }
+    Ok(Taken { locked: taken?, moved })
+}
+
+/// Locks the folder of the results in `folder`, the working folder, to resume the campaign of `manifest`. The folder is created
+/// if there is none.
+///
+/// # Errors
+/// [`FolderError`] as of [`take`], and if the folder holds another campaign.
+pub fn resume(folder: &Path, manifest: &Manifest) -> Result<LockedFolder, FolderError> {
+    let path = folder.join(RESULTS);
+    inspect(&path, false)?;
+    Folder::lock(&path, manifest, true)
+}
+
+/// Checks that none of the inputs of a campaign is in one of the two folders.
+///
+/// # Errors
+/// [`FolderError::Foreign`] if one is.
+pub fn check_inputs(folder: &Path, inputs: &[PathBuf]) -> Result<(), FolderError> {
+    for path in [RESULTS, PREVIOUS].map(|name| folder.join(name)) {
+        let Ok(whole) = path.canonicalize() else { continue };
+        let is_within = |input: &&PathBuf| input.canonicalize().is_ok_and(|input| input.starts_with(&whole));
+        if let Some(input) = inputs.iter().find(is_within) {
+            return Err(foreign(&path, format!("it holds an input of the campaign, {}", input.display())));
+        }
+    }
+    Ok(())
+}
+
+/// Makes the results at `path` the previous ones. Returns `None` if there are none any more.
+fn set_aside(path: &Path, previous: &Path) -> Result<Option<Moved>, FolderError> {
+    let lock = Lock::acquire(path)?;
+    let Place::Results(kept) = inspect(path, true)? else { return Ok(None) };
+    let has_removed = remove(previous)?;
+    fs::rename(path, previous).map_err(|source| WriteError::new(previous, source))?;
+    drop(lock);
+    let resume = (!kept.is_finished).then(|| {
+        let named = kept.command.into_iter().filter(|word| word != "--resume");
+        let out = ["--out".to_owned(), previous.display().to_string()];
+        resume_command(named.chain(out), false)
+    });
+    Ok(Some(Moved { to: previous.to_owned(), resume, has_removed }))
+}
+
+/// Removes earlier results. Returns false if there are none.
+fn remove(path: &Path) -> Result<bool, FolderError> {
+    let fail = |path: &Path| {
+        let path = path.to_owned();
+        move |source| WriteError::new(&path, source)
+    };
+    match inspect(path, true)? {
+        Place::Free => return Ok(false),
+        Place::Unused => {
+            let _lock = Lock::acquire(path)?;
+            inspect(path, true)?;
+            for name in names(path)? {
+                let file = path.join(name);
+                fs::remove_file(&file).map_err(fail(&file))?;
+            }
+        }
+        Place::Results(_) => {
+            let _lock = Lock::acquire(path)?;
+            inspect(path, true)?;
+            let recordings = path.join(RECORDINGS);
+            if recordings.exists() {
+                remove_files(&recordings, |_| true)?;
+                fs::remove_dir(&recordings).map_err(fail(&recordings))?;
+            }
+            remove_files(path, |name| name != MANIFEST)?;
+            remove_files(path, |_| true)?;
+        }
+    }
+    fs::remove_dir(path).map_err(fail(path))?;
+    Ok(true)
+}
+
+/// Removes the files of a folder whose names are chosen. A folder within it is not removed.
+fn remove_files(folder: &Path, is_chosen: impl Fn(&OsStr) -> bool) -> Result<(), FolderError> {
+    for name in names(folder)?.iter().filter(|name| is_chosen(name)) {
+        let file = folder.join(name);
+        fs::remove_file(&file).map_err(|source| WriteError::new(&file, source))?;
+    }
+    Ok(())
+}
+
+/// Says what is at a path where results belong, without changing it. If the results are to be replaced, they must be those of a
+/// campaign whose command line named no folder.
+fn inspect(path: &Path, is_replaced: bool) -> Result<Place, FolderError> {
+    let read = |source| FolderError::Read { path: path.to_owned(), source };
+    let kind = match fs::symlink_metadata(path) {
+        Ok(metadata) => metadata.file_type(),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Place::Free),
+        Err(error) => return Err(read(error)),
+    };
+    if kind.is_symlink() {
+        return Err(foreign(path, "it is a symbolic link"));
+    }
+    if !kind.is_dir() {
+        return Err(foreign(path, "it is not a folder"));
+    }
+    let is_unused = |name: &OsStr| Lock::is_file_name(name) || is_temporary(name);
+    if names(path)?.iter().all(|name| is_unused(name) && is_file(&path.join(name))) {
+        return Ok(Place::Unused);
+    }
+    let manifest = path.join(MANIFEST);
+    if !is_file(&manifest) {
+        return Err(foreign(path, "it holds other files, and no results of a campaign"));
+    }
+    let text = fs::read(&manifest).map_err(|source| FolderError::Read { path: manifest.clone(), source })?;
+    let Some(kept) = kept(&text, path) else { return Err(foreign(path, "its manifest is not that of a campaign")) };
+    if is_replaced && !is_replaceable(&text) {
+        return Err(foreign(path, "it holds a campaign whose command line named its folder"));
+    }
+    let others = other_files(path, &kept)?;
+    if !others.is_empty() {
+        let more = others.len().saturating_sub(NAMED_FILES);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let named = others.into_iter().take(NAMED_FILES).collect::<Vec<_>>().join(", ");
+        return Err(foreign(path, format!("beside the results of a campaign it holds {named}{more}")));
+    }
+    Ok(Place::Results(kept))
+}
+
+/// Returns what the manifest of a campaign says, of whatever version of this program; `None` if it is not one.
+fn kept(text: &[u8], path: &Path) -> Option<Kept> {
+    let manifest: Value = serde_json::from_slice(text).ok()?;
+    manifest.get("manifest_version")?.as_u64()?;
+    manifest.get("closecall_version")?.as_str()?;
+    let words = manifest.get("command")?.as_array()?.iter();
+    let command = words.map(|word| word.as_str().map(str::to_owned)).collect::<Option<_>>()?;
+    let names = manifest.get("scenarios")?.as_array()?.iter();
+    let scenarios = names.map(|one| one.get("name")?.as_str().map(str::to_owned)).collect::<Option<_>>()?;
+    Some(Kept { command, is_finished: is_file(&path.join(REPORT)), scenarios })
+}
+
+/// Returns true if the manifest says that a later campaign may take the folder.
+fn is_replaceable(text: &[u8]) -> bool {
+    let manifest: Option<Value> = serde_json::from_slice(text).ok();
+    manifest.is_some_and(|manifest| manifest.get("replaceable") == Some(&Value::Bool(true)))
+}
+
+/// Returns what a folder holds beside the files of a campaign, by the paths below it.
+fn other_files(path: &Path, kept: &Kept) -> Result<Vec<String>, FolderError> {
+    let is_recording = |name: &OsStr| {
+        name == RECORDINGS_PAGE || is_temporary(name) || name.to_str().is_some_and(|name| kept.has_recording(name))
+    };
+    let mut others = Vec::new();
+    for name in names(path)? {
+        let entry = path.join(&name);
+        if name == RECORDINGS && fs::symlink_metadata(&entry).is_ok_and(|entry| entry.is_dir()) {
+            let within = names(&entry)?.into_iter().filter(|name| !(is_recording(name) && is_file(&entry.join(name))));
+            others.extend(within.map(|name| format!("{RECORDINGS}/{}", name.display())));
+        } else if !(is_file(&entry) && (is_temporary(&name) || FILES.iter().any(|file| name == *file))) {
+            others.push(name.display().to_string());
+        }
+    }
+    others.sort();
+    Ok(others)
+}
+
+impl Kept {
+    /// Returns true if a recording of this campaign has this name.
+    fn has_recording(&self, name: &str) -> bool {
+        let sample = |scenario: &String| name.strip_prefix(scenario.as_str())?.strip_prefix('-')?.strip_suffix(".rrd");
+        self.scenarios.iter().filter_map(sample).any(|sample| sample.parse::<u64>().is_ok())
+    }
+}
+
+/// Returns the names of what a folder holds.
+fn names(folder: &Path) -> Result<Vec<std::ffi::OsString>, FolderError> {
+    let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
+    entries.map_err(|source: io::Error| FolderError::Read { path: folder.to_owned(), source })
+}
+
+/// Returns true if a path leads to a file by itself: a symbolic link does not.
+fn is_file(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_file())
+}
+
+fn foreign(path: &Path, reason: impl Into<String>) -> FolderError {
+    FolderError::Foreign { path: path.to_owned(), reason: reason.into() }
+}
