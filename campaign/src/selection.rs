@@ -12,6 +12,11 @@
 //!
 //! All of this refers to the arm under test, and the counts are for each scenario. A count alone is the count of
 //! failures. A sample that is selected for several reasons is recorded once.
+//!
+//! The word `each-kind` stands for at most three samples of the whole campaign: the worst collision that the system
+//! prevented, the worst that it induced, and the worst that happens in both arms. The measure is the harm
+//! ([`closecall_simulation::harm`]) in the arm that collides: the baseline for a prevented collision, else the arm under test.
+//! If no sample is of any of the three kinds, as in a campaign with one controller, the worst sample as above stands for them.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -20,6 +25,7 @@ use closecall_simulation::outcome::Outcome;
 use closecall_traffic::{ActorId, Measured, stream};
 use rand::RngExt;
 
+use super::ledger::PairFate;
 use super::record::{ArmRecord, Record};
 
 /// The channel of the random stream.
@@ -34,7 +40,12 @@ pub struct Selection {
     pub failures: u64,
     /// Number of samples drawn at random.
     pub random: u64,
+    /// True for the worst sample of each kind of the whole campaign.
+    pub each_kind: bool,
 }
+
+/// The word for the worst sample of each kind.
+const EACH_KIND: &str = "each-kind";
 
 impl FromStr for Selection {
     type Err = String;
@@ -46,14 +57,15 @@ impl FromStr for Selection {
         let mut selection = Self::default();
         let mut named: Vec<&str> = Vec::new();
         for part in text.split(',').map(str::trim) {
-            let wrong = || format!("`{part}` is not `worst:N`, `failures:N` or `random:N`");
-            let (kind, count) = part.split_once(':').ok_or_else(wrong)?;
+            let wrong = || format!("`{part}` is not `each-kind`, `worst:N`, `failures:N` or `random:N`");
+            let (kind, count) = if part == EACH_KIND { (part, "1") } else { part.split_once(':').ok_or_else(wrong)? };
             let count = count.parse().map_err(|_| wrong())?;
             if named.contains(&kind) {
                 return Err(format!("`{kind}` is named twice"));
             }
             named.push(kind);
             match kind {
+                EACH_KIND if part == EACH_KIND => selection.each_kind = true,
                 "worst" => selection.worst = count,
                 "failures" => selection.failures = count,
                 "random" => selection.random = count,
@@ -66,7 +78,8 @@ impl FromStr for Selection {
 
 impl std::fmt::Display for Selection {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "worst:{},failures:{},random:{}", self.worst, self.failures, self.random)
+        let each_kind = if self.each_kind { ",each-kind" } else { "" };
+        write!(f, "worst:{},failures:{},random:{}{each_kind}", self.worst, self.failures, self.random)
     }
 }
 
@@ -75,8 +88,87 @@ impl std::fmt::Display for Selection {
 pub struct Chosen {
     /// The sample's number.
     pub sample: u64,
-    /// The kinds for which it was selected: `worst`, `failure`, `random`.
+    /// The kinds for which it was selected: `worst`, `failure`, `random`, and the words of [`Kind`].
     pub reasons: Vec<&'static str>,
+}
+
+/// The kind of a sample of which the worst is selected from a whole campaign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The system prevents the collision.
+    Prevented,
+    /// The system induces the collision.
+    Induced,
+    /// There is a collision in both arms.
+    Both,
+    /// No sample is of any of these kinds: the sample with the hardest collision, else with the smallest time headway.
+    Any,
+}
+
+impl Kind {
+    /// Returns the words for the worst sample of this kind.
+    pub const fn reason(self) -> &'static str {
+        match self {
+            Self::Prevented => "worst prevented collision",
+            Self::Induced => "worst induced collision",
+            Self::Both => "worst collision in both arms",
+            Self::Any => "worst sample",
+        }
+    }
+}
+
+/// Selects the worst sample of each kind of a campaign, whose records are passed to it one by one.
+#[derive(Debug, Default)]
+pub struct KindChooser {
+    /// The worst sample so far of each of [`KINDS`], with its harm.
+    worst: [Option<(f64, String, u64)>; 3],
+    /// The worst sample so far, whatever its kind, and its scenario.
+    any: Option<(Severity, String)>,
+}
+
+/// The kinds in the order in which their samples are named.
+const KINDS: [Kind; 3] = [Kind::Prevented, Kind::Induced, Kind::Both];
+
+impl KindChooser {
+    /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be recorded.
+    ///
+    /// The kind is that of the runs themselves, which a recording shows, whatever the validity checks say of them.
+    pub fn push(&mut self, record: &Record) {
+        let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
+        let (Some(outcomes), Some(tested)) = (outcomes, record.arms.last()) else { return };
+        let tested = tested.tally();
+        if let [baseline, _, ..] = &record.arms[..] {
+            let baseline = baseline.tally();
+            let found = match PairFate::of(&baseline, &tested) {
+                Some(PairFate::Prevented) => Some((0, baseline.harm)),
+                Some(PairFate::Induced) => Some((1, tested.harm)),
+                Some(PairFate::Both) => Some((2, tested.harm)),
+                Some(PairFate::Neither) | None => None,
+            };
+            if let Some((kind, harm)) = found
+                && self.worst[kind].as_ref().is_none_or(|(worst, ..)| harm > *worst)
+            {
+                self.worst[kind] = Some((harm, record.scenario.clone(), record.sample));
+            }
+        }
+        let severity = outcomes.last().map(|outcome| severity(record.sample, outcome));
+        if let Some(severity) = severity.filter(|severity| severity.is_eventful)
+            && self.any.as_ref().is_none_or(|(worst, _)| measure(&severity, worst).is_gt())
+        {
+            self.any = Some((severity, record.scenario.clone()));
+        }
+    }
+
+    /// Returns the worst sample of each kind: its scenario and its number. Of two equal samples the earlier one is the worse.
+    pub fn choose(&self) -> Vec<(Kind, &str, u64)> {
+        let kinds = KINDS.into_iter().zip(&self.worst);
+        let found = kinds.filter_map(|(kind, worst)| worst.as_ref().map(|(_, name, sample)| (kind, &**name, *sample)));
+        let found: Vec<_> = found.collect();
+        if !found.is_empty() {
+            return found;
+        }
+        self.any.iter().map(|(severity, name)| (Kind::Any, &**name, severity.sample)).collect()
+    }
 }
 
 /// The severity of a sample.
@@ -230,8 +322,13 @@ fn severity(sample: u64, outcome: &Outcome) -> Severity {
 
 /// Compares by the change of velocity, then by the time headway. Of two equal samples the earlier one is the worse.
 fn compare(a: &Severity, b: &Severity) -> std::cmp::Ordering {
+    measure(a, b).then(b.sample.cmp(&a.sample))
+}
+
+/// Compares by the change of velocity, then by the time headway.
+fn measure(a: &Severity, b: &Severity) -> std::cmp::Ordering {
     let collided = |severity: &Severity| severity.delta_v_mps.unwrap_or(f64::NEG_INFINITY);
-    collided(a).total_cmp(&collided(b)).then(b.thw_s.total_cmp(&a.thw_s)).then(b.sample.cmp(&a.sample))
+    collided(a).total_cmp(&collided(b)).then(b.thw_s.total_cmp(&a.thw_s))
 }
 
 #[cfg(test)]
@@ -241,12 +338,27 @@ mod tests {
     #[test]
     fn a_selection_is_parsed_and_printed() {
         let read = |text: &str| text.parse::<Selection>();
-        assert_eq!(read("worst:5,failures:20,random:3"), Ok(Selection { worst: 5, failures: 20, random: 3 }));
+        let counts = Selection { worst: 5, failures: 20, random: 3, each_kind: false };
+        assert_eq!(read("worst:5,failures:20,random:3"), Ok(counts));
+        assert_eq!(read("each-kind"), Ok(Selection { each_kind: true, ..Selection::default() }));
+        assert_eq!(
+            read("each-kind,failures:2"),
+            Ok(Selection { failures: 2, each_kind: true, ..Selection::default() })
+        );
         assert_eq!(read("failures:0"), Ok(Selection::default()));
         assert_eq!(read("4"), read("failures:4"));
-        let selection = Selection { worst: 1, failures: 0, random: 2 };
+        let selection = Selection { worst: 1, failures: 0, random: 2, each_kind: true };
         assert_eq!(selection.to_string().parse(), Ok(selection));
-        for wrong in ["", "worst", "worst:-1", "best:3", "worst:1,worst:2", "random:1;worst:1"] {
+        for wrong in [
+            "",
+            "worst",
+            "worst:-1",
+            "best:3",
+            "worst:1,worst:2",
+            "random:1;worst:1",
+            "each-kind:2",
+            "each-kind,each-kind",
+        ] {
             assert!(read(wrong).is_err(), "{wrong}");
         }
     }
@@ -271,7 +383,7 @@ mod tests {
     #[test]
     fn collisions_are_worse_than_near_misses_and_each_sample_is_selected_once() {
         let samples = [(None, 0.4), (Some(2.0), 0.1), (None, 0.1), (Some(9.0), 0.3)];
-        let chosen = chooser(Selection { worst: 3, failures: 1, random: 0 }, eventful(&samples))
+        let chosen = chooser(Selection { worst: 3, failures: 1, ..Selection::default() }, eventful(&samples))
             .choose(0, &ActorId::new("ego").unwrap());
         let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
         assert_eq!(numbers, [3, 1, 2]);
@@ -280,7 +392,7 @@ mod tests {
 
     #[test]
     fn an_uneventful_sample_is_not_among_the_worst() {
-        let selection = Selection { worst: 2, failures: 0, random: 0 };
+        let selection = Selection { worst: 2, ..Selection::default() };
         let mut samples = eventful(&[(None, 0.7), (None, 0.9)]);
         samples[0].is_eventful = false;
         let chosen = chooser(selection, samples).choose(0, &ActorId::new("ego").unwrap());
@@ -291,8 +403,8 @@ mod tests {
     fn induced_failures_precede_all_others() {
         let mut samples = eventful(&[(Some(9.0), 0.1), (Some(2.0), 0.1), (Some(1.0), 0.1)]);
         samples[2].is_safe_in_baseline = true;
-        let chosen =
-            chooser(Selection { worst: 0, failures: 2, random: 0 }, samples).choose(0, &ActorId::new("ego").unwrap());
+        let chosen = chooser(Selection { failures: 2, ..Selection::default() }, samples)
+            .choose(0, &ActorId::new("ego").unwrap());
         let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
         assert_eq!(numbers, [2, 0]);
     }
@@ -301,7 +413,7 @@ mod tests {
     fn the_seed_determines_the_random_samples_and_none_repeats() {
         let samples = [(None, 1.0); 20];
         let choose = |random, seed| {
-            chooser(Selection { worst: 0, failures: 0, random }, eventful(&samples))
+            chooser(Selection { random, ..Selection::default() }, eventful(&samples))
                 .choose(seed, &ActorId::new("ego").unwrap())
         };
         assert_eq!(choose(5, 1), choose(5, 1));
@@ -316,7 +428,7 @@ mod tests {
         let mut sorted = eventful(&samples);
         sorted.sort_by(|a, b| compare(b, a));
         let expected: Vec<u64> = sorted.iter().take(100).map(|severity| severity.sample).collect();
-        let chooser = chooser(Selection { worst: 100, failures: 3, random: 0 }, eventful(&samples));
+        let chooser = chooser(Selection { worst: 100, failures: 3, ..Selection::default() }, eventful(&samples));
         assert_eq!(chooser.worst.iter().map(|severity| severity.sample).collect::<Vec<_>>(), expected);
         assert_eq!(chooser.others, [0, 7, 14]);
     }

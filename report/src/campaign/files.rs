@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use closecall_campaign::failure::FailureKind;
-use closecall_campaign::folder::{Folder, FolderError};
+use closecall_campaign::folder::{Folder, FolderError, RECORDINGS, RECORDINGS_PAGE, REPORT};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::{ArmRecord, Record};
 use closecall_campaign::runner::Work;
@@ -24,7 +24,7 @@ use super::junit::write_junit;
 use super::markdown::{markdown, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
-use super::recordings::{INDEX, RECORDINGS, record};
+use super::recordings::{RecordedSample, record};
 use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
@@ -86,11 +86,11 @@ pub struct CampaignReport<'a> {
 }
 
 impl CampaignReport<'_> {
-    /// Writes every file into the folder, with recordings of the selected samples.
+    /// Writes every file into the folder, with recordings of the selected samples, which are returned.
     ///
     /// # Errors
     /// [`ReportError`] if the journal cannot be read or a file cannot be written; the files that exist are complete.
-    pub fn write(&self, folder: &Folder, selection: Selection) -> Result<(), ReportError> {
+    pub fn write(&self, folder: &Folder, selection: Selection) -> Result<Vec<RecordedSample>, ReportError> {
         let files = self.scenario_files();
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
         let rows = || rows(folder, self.manifest);
@@ -104,7 +104,7 @@ impl CampaignReport<'_> {
             }
         });
         write_timings(&folder.file("timings.parquet"), timings)?;
-        let recorded = record(folder, &files, selection)?;
+        let (recorded, samples) = record(folder, &files, selection)?;
         let with_recordings = rows()?.map(|row| {
             row.map(|row| {
                 let recording = recorded.get(&(row.scenario.clone(), row.sample, row.controller.clone())).cloned();
@@ -118,10 +118,11 @@ impl CampaignReport<'_> {
         }
         self.with_findings(&files, Some(folder), &recorded, &slowest, |findings| {
             write_junit(&folder.file("junit.xml"), findings, &wall_s)?;
-            write_html(&folder.file("report.html"), findings)?;
+            write_html(&folder.file(REPORT), findings)?;
             write_markdown(&folder.file("summary.md"), findings)
         })?;
-        self.append_step_summary(Some(folder), &recorded)
+        self.append_step_summary(Some(folder), &recorded)?;
+        Ok(samples)
     }
 
     /// Appends the summary of a campaign without a folder to the file of the CI server.
@@ -155,7 +156,7 @@ impl CampaignReport<'_> {
         write: impl FnOnce(&Findings<'_>) -> T,
     ) -> T {
         let summary = &self.tally.summary;
-        let gallery = format!("{RECORDINGS}/{INDEX}");
+        let gallery = format!("{RECORDINGS}/{RECORDINGS_PAGE}");
         let has_gallery = folder.is_some_and(|folder| folder.file(&gallery).exists());
         write(&Findings {
             manifest: self.manifest,

@@ -53,6 +53,6 @@ impl Findings<'_> {
     /// Returns the command that runs a sample again, from within the campaign's folder.
     pub(super) fn replay(&self, scenario: &str, sample: u64) -> String {
         let named = if self.files.len() > 1 { format!(" --scenario {scenario}") } else { String::new() };
-        format!("closecall replay . {sample}{named} --record sample-{sample}.rrd")
+        format!("closecall replay . {sample}{named} --record ../sample-{sample}.rrd")
     }
 }

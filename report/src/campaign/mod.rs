@@ -27,5 +27,6 @@ pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};
 pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{CampaignReport, ReportError};
+pub use recordings::RecordedSample;
 pub use tally::Tally;
 pub use text::{CountsText, VerdictText};

@@ -1,10 +1,11 @@
 //! Recordings of selected samples of a campaign, and the page that shows them.
 
 use std::fs;
+use std::path::PathBuf;
 
-use closecall_campaign::folder::Folder;
+use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
 use closecall_campaign::saved::SavedCampaign;
-use closecall_campaign::selection::{Chooser, Chosen, Selection};
+use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::atomic::WriteError;
 use closecall_simulation::scenario::ScenarioFile;
 
@@ -16,53 +17,83 @@ use crate::run::figure::{scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording_of;
 
-/// The folder of the recordings within a campaign's folder.
-pub(super) const RECORDINGS: &str = "recordings";
-/// The page of the recordings, in their folder.
-pub(super) const INDEX: &str = "index.html";
+/// A recording of a sample.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedSample {
+    /// The scenario's name.
+    pub scenario: String,
+    /// The sample's number.
+    pub sample: u64,
+    /// Why it was recorded, in words.
+    pub reasons: Vec<&'static str>,
+    /// The file.
+    pub path: PathBuf,
+}
 
-/// Runs the selected samples again, records all arms of each in one file, and writes the page.
+/// Runs the selected samples again, records all arms of each in one file, and writes the page. Returns where the reports find
+/// the recordings, and the recordings in the order of the page.
 pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
     selection: Selection,
-) -> Result<Recordings, ReportError> {
+) -> Result<(Recordings, Vec<RecordedSample>), ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
     // An earlier, identical campaign may have recorded other samples.
     if path.exists() {
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
-    let mut recorded = Recordings::new();
-    let mut entries = Vec::new();
-    for scenario in scenarios {
-        for chosen in choose(&saved, scenario, selection)? {
-            fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
-            let name = &scenario.config().name;
-            let entry = record_one(&saved, name, &chosen)?;
-            for outcome in &entry.outcomes {
-                let key = (name.clone(), chosen.sample, outcome.controller.clone());
-                recorded.insert(key, format!("{RECORDINGS}/{}", entry.file));
-            }
-            entries.push(entry);
+    let (mut recorded, mut samples, mut entries) = (Recordings::new(), Vec::new(), Vec::new());
+    for (name, chosen) in choose(&saved, scenarios, selection)? {
+        fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
+        let entry = record_one(&saved, name, &chosen)?;
+        for outcome in &entry.outcomes {
+            let key = (name.to_owned(), chosen.sample, outcome.controller.clone());
+            recorded.insert(key, format!("{RECORDINGS}/{}", entry.file));
         }
+        let (scenario, path) = (name.to_owned(), path.join(&entry.file));
+        samples.push(RecordedSample { scenario, sample: chosen.sample, reasons: chosen.reasons, path });
+        entries.push(entry);
     }
     if !entries.is_empty() {
-        write_index(&path.join(INDEX), &entries)?;
+        write_index(&path.join(RECORDINGS_PAGE), &entries)?;
     }
-    Ok(recorded)
+    Ok((recorded, samples))
 }
 
-fn choose(saved: &SavedCampaign, scenario: &ScenarioFile, selection: Selection) -> Result<Vec<Chosen>, ReportError> {
-    let Some(ego) = scenario.ego_id() else { return Ok(Vec::new()) };
-    let mut chooser = Chooser::new(selection);
+/// Returns the selected samples with their scenarios: the worst of each kind first, then those of each scenario.
+fn choose<'a>(
+    saved: &SavedCampaign,
+    scenarios: &[&'a ScenarioFile],
+    selection: Selection,
+) -> Result<Vec<(&'a str, Chosen)>, ReportError> {
+    let mut choosers: Vec<_> = scenarios.iter().map(|file| (*file, Chooser::new(selection))).collect();
+    let mut kinds = KindChooser::default();
     for record in saved.folder().records()? {
         let record = record?;
-        if record.scenario == scenario.config().name {
+        if selection.each_kind {
+            kinds.push(&record);
+        }
+        if let Some((_, chooser)) = choosers.iter_mut().find(|(file, _)| file.config().name == record.scenario) {
             chooser.push(&record);
         }
     }
-    Ok(chooser.choose(saved.manifest().sampling.seed, ego))
+    let mut all: Vec<(&str, Chosen)> = Vec::new();
+    for (kind, name, sample) in kinds.choose() {
+        if let Some(file) = scenarios.iter().find(|file| file.config().name == name) {
+            all.push((&file.config().name, Chosen { sample, reasons: vec![kind.reason()] }));
+        }
+    }
+    for (file, chooser) in &choosers {
+        let (name, Some(ego)) = (&file.config().name, file.ego_id()) else { continue };
+        for chosen in chooser.choose(saved.manifest().sampling.seed, ego) {
+            match all.iter_mut().find(|(known, one)| known == name && one.sample == chosen.sample) {
+                Some((_, known)) => known.reasons.extend(chosen.reasons),
+                None => all.push((name, chosen)),
+            }
+        }
+    }
+    Ok(all)
 }
 
 fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<IndexEntry, ReportError> {
@@ -79,10 +110,8 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     let films: Vec<Film> = films.into_iter().map(named).collect();
     let file = format!("{scenario}-{sample}.rrd");
     let paired = if films.len() > 1 { " --paired" } else { "" };
-    let replay = format!(
-        "closecall replay {} {sample} --scenario {scenario}{paired} --record {file}",
-        quoted(&saved.folder().path().display().to_string()),
-    );
+    // The folder may be moved: the command names it from the page's folder.
+    let replay = format!("closecall replay .. {sample} --scenario {scenario}{paired} --record {file}");
     let story = films.iter().flat_map(|film| {
         let arm = film.arm_label();
         [Some(film.headline()), film.mis_summary()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
@@ -101,10 +130,4 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     };
     write_recording_of(&saved.folder().file(&format!("{RECORDINGS}/{file}")), films)?;
     Ok(entry)
-}
-
-/// Returns a path as one word of a command.
-fn quoted(path: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+:@".contains(letter);
-    if path.chars().all(is_plain) { path.to_owned() } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }

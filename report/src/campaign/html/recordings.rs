@@ -104,7 +104,7 @@ fn section(entry: &IndexEntry) -> Markup {
                 p { "Open it, from this page's folder:" }
                 pre.command tabindex="0" { "rerun " (entry.file) }
                 a.in-browser hidden href=(entry.file) { "Open in this browser" }
-                p { "Run it again, from the folder that the campaign was run in:" }
+                p { "Run it again, from this page's folder:" }
                 pre.command tabindex="0" { (entry.replay) }
             }
         }

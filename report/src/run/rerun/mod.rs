@@ -33,4 +33,6 @@ mod vehicles;
 mod write;
 
 pub(crate) use write::write_recording_of;
-pub use write::{RecordingError, check_recording_possible, write_recording, write_recording_unchecked};
+pub use write::{
+    RecordingError, check_recording_possible, is_recording_enabled, write_recording, write_recording_unchecked,
+};

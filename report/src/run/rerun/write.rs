@@ -48,12 +48,17 @@ impl RecordingError {
     }
 }
 
+/// Returns false if the environment (`RERUN=off`) switches recordings off.
+pub fn is_recording_enabled() -> bool {
+    re_sdk::decide_logging_enabled(true)
+}
+
 /// Checks whether a recording can be written, before the run starts.
 ///
 /// # Errors
 /// [`RecordingError`] if recording is switched off, or no file can be created at `path`.
 pub fn check_recording_possible(path: &Path) -> Result<(), RecordingError> {
-    if !re_sdk::decide_logging_enabled(true) {
+    if !is_recording_enabled() {
         return Err(RecordingError::Disabled);
     }
     Ok(check_writable(path)?)
