@@ -64,6 +64,8 @@ fn called(arguments: &[&str], has_folder: bool) -> Result<BTreeSet<String>, Box<
     command.args(arguments);
     if has_folder {
         command.arg("--out").arg(folder.path().join("out"));
+    } else {
+        command.arg("--no-out");
     }
     let output = command.output().map_err(|error| format!("failed to start valgrind: {error}"))?;
     if !output.status.code().is_some_and(|code| HAS_RUN.contains(&code)) {

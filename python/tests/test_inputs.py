@@ -145,3 +145,11 @@ def test_a_policy_may_answer_an_action_of_the_environment() -> None:
         margins(lambda observation: np.zeros(2))
     with pytest.raises(cc.UsageError, match="policy: 3 cannot be called"):
         ccgym.PolicyController(3)  # type: ignore[arg-type]
+
+
+def test_a_campaign_without_out_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cc.campaign(SCENARIO, 2, sensors="object", no_gate=True).folder is None
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(cc.UsageError, match="name the folder of the campaign with --out"):
+        cc.campaign(SCENARIO, 2, sensors="object", resume=True)

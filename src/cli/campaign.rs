@@ -8,8 +8,8 @@ use clap::Args;
 use closecall_campaign::arguments::positive;
 use closecall_campaign::end_rule::EndMonitor;
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
-use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
+use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::remote::connect;
@@ -34,8 +34,9 @@ use super::backend::{check_backend, check_cameras};
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
-use super::output::{heartbeat, out, outln, print_error, print_report_files};
+use super::output::{heartbeat, out, outln, print_error};
 use super::plan::PlanArgs;
+use super::results::{Place, Results, ResultsArgs, print_results, selection};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -69,19 +70,16 @@ pub(super) struct CampaignArgs {
     /// Longest wall time of a sample with one controller; a sample that takes longer ends in an error
     #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive)]
     sample_timeout_s: f64,
-    /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and recordings
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// With --out: resume the interrupted campaign in that folder
-    #[arg(long, requires = "out")]
-    resume: bool,
+    #[command(flatten)]
+    results: ResultsArgs,
     /// With --out: run only part I of N of the samples; `closecall merge` merges the parts
     #[arg(long, value_name = "I/N", requires = "out")]
     partition: Option<Partition>,
-    /// With --out: save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND
-    /// is `worst`, `failures` or `random`
-    #[arg(long, alias = "recordings", default_value = "failures:3", value_name = "KIND:N,…")]
-    record: Selection,
+    /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
+    /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
+    /// scenarios [default: each-kind]
+    #[arg(long, alias = "recordings", value_name = "KIND:N,…")]
+    record: Option<Selection>,
     #[command(flatten)]
     gates: GateArgs,
     #[command(flatten)]
@@ -129,12 +127,10 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
     check_cameras(plan.mask_rcnn_cameras())?;
-    let (mut campaign, manifest) = (plan.campaign(), plan.manifest(session::arguments())?);
+    let replaceable = args.results.place()? == Place::Default;
+    let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
     campaign.remote = connect(args.ray.as_deref(), &manifest).map_err(CampaignError::from)?;
-    let locked = match &args.out {
-        Some(path) => Some(Folder::lock(path, &manifest, args.resume)?),
-        None => None,
-    };
+    let mut results = Results::start(&args.results, &mut campaign, &manifest)?;
     campaign.retry_errors = args.end.retry_errors;
     session::stop_on_request(&mut campaign.stop);
     let started = Instant::now();
@@ -144,21 +140,34 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         scenarios: campaign.works.len(),
     };
     let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndMonitor::new(args.end.rule()));
-    let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
+    let resumption = campaign.run(results.locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
     resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));
+    results.lose(resumption.lost);
     if let Some(ending) =
         session::received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule))
     {
-        return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
+        let kept = results.locked.as_ref().map(|locked| locked.folder.path());
+        let code = ending.print(args.format, &campaign, &progress.tally.summary, kept);
+        return Ok(results.into_lost().map_or(code, |error| {
+            print_error(format_args!("{:?}\n", miette::Report::new(error)));
+            ExitCode::first_of([code, ExitCode::Io])
+        }));
     }
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let judged = tally.judgement();
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
-    match &locked {
-        Some(locked) => report.write(&locked.folder, args.record)?,
-        None => report.write_without_folder()?,
-    }
+    // A full disk costs the reports, and not the verdict.
+    let recorded = match results.complete() {
+        Some(folder) => {
+            let written = report.write(folder, selection(args.record));
+            results.reported(written)
+        }
+        None => {
+            report.write_without_folder()?;
+            None
+        }
+    };
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, Some(wall_s))),
         Format::Human => {
@@ -170,10 +179,10 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
             out!("{}", VerdictText(&judged));
         }
     }
-    if let Some(locked) = &locked {
-        print_report_files(&locked.folder);
+    if let (Some(folder), Some(recorded)) = (results.complete(), recorded) {
+        print_results(folder, &recorded);
     }
-    Ok(ExitCode::from(&judged))
+    results.into_lost().map_or(Ok(ExitCode::from(&judged)), Err)
 }
 
 /// Counts the records of a running campaign, shows the progress, and applies the stop rule.

@@ -66,6 +66,20 @@ pub enum CliError {
     /// A campaign's folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// The default folder of a campaign's results cannot be used.
+    #[error(transparent)]
+    #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
+    Results(FolderError),
+    /// The default folder of a campaign's results holds only the first of them.
+    #[error(
+        "{0}\nthe campaign went on without its folder: the verdict counts every sample, and --resume runs those again that are not kept"
+    )]
+    #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
+    ResultsCut(WriteError),
+    /// The reports cannot be written into the default folder of a campaign's results.
+    #[error("{0}\nthe verdict counts every sample; when there is room again, --resume writes the reports")]
+    #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
+    ResultsReport(ReportError),
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -203,7 +217,7 @@ impl From<&CliError> for ExitCode {
             | CliError::Serve(ServeError::Nothing { .. } | ServeError::Foreign { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Controller(error) => FailureKind::from(error).into(),
-            CliError::Folder(error) => FailureKind::from(error).into(),
+            CliError::Folder(error) | CliError::Results(error) => FailureKind::from(error).into(),
             CliError::Campaign(error) => FailureKind::from(error).into(),
             CliError::Saved(error) => FailureKind::from(error).into(),
             CliError::Sensitivity(PlanFailure::Workers(_)) => Self::Io,
@@ -215,6 +229,8 @@ impl From<&CliError> for ExitCode {
             CliError::Causes(error) => error.kind().into(),
             CliError::Sensors(error) => error.kind().into(),
             CliError::Write(_)
+            | CliError::ResultsCut(_)
+            | CliError::ResultsReport(_)
             | CliError::Chart(_)
             | CliError::Record(_)
             | CliError::Serve(ServeError::Read { .. } | ServeError::Listen { .. })

@@ -13,7 +13,8 @@ use closecall_report::json;
 use super::CliError;
 use super::args::Format;
 use super::gates::GateArgs;
-use super::output::{out, outln, print_report_files};
+use super::output::{out, outln};
+use super::results::{print_results, selection};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall merge`.
@@ -26,9 +27,10 @@ pub(super) struct MergeArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
-    /// `failures` or `random`
-    #[arg(long, alias = "recordings", default_value = "failures:3", value_name = "KIND:N,…")]
-    record: Selection,
+    /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
+    /// scenarios [default: each-kind]
+    #[arg(long, alias = "recordings", value_name = "KIND:N,…")]
+    record: Option<Selection>,
     #[command(flatten)]
     gates: GateArgs,
     /// Output format
@@ -47,7 +49,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let tally = Tally::of(&saved, &works, &gates)?;
     let judged = tally.judgement();
     let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged };
-    report.write(saved.folder(), args.record)?;
+    let recorded = report.write(saved.folder(), selection(args.record))?;
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
@@ -56,6 +58,6 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
             out!("{}", VerdictText(&judged));
         }
     }
-    print_report_files(saved.folder());
+    print_results(saved.folder(), &recorded);
     Ok(ExitCode::from(&judged))
 }

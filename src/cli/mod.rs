@@ -29,6 +29,7 @@ mod record;
 mod reenact;
 mod render;
 mod replay;
+mod results;
 mod robustness;
 mod run;
 mod sample;

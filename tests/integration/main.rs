@@ -48,6 +48,7 @@ mod references;
 mod refused_libraries;
 mod reports;
 mod rerun_files;
+mod results;
 mod sampling;
 mod sensitivity;
 mod signals;

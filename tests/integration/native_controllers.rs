@@ -167,6 +167,7 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
         "-n",
         "8",
         "--no-gate",
+        "--no-out",
         "--sensors",
         "object",
         "--controller",

@@ -1,5 +1,6 @@
 //! Runs the program and reads its output.
 
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -42,8 +43,13 @@ pub(crate) fn program() -> Command {
     program
 }
 
-/// Runs the program in the folder of the repository.
-pub(crate) fn closecall<S: AsRef<std::ffi::OsStr>>(args: impl IntoIterator<Item = S>) -> Output {
+/// Runs the program in the folder of the repository. A campaign that names no folder keeps no results: they would lie there.
+pub(crate) fn closecall<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> Output {
+    let mut args: Vec<OsString> = args.into_iter().map(|arg| arg.as_ref().to_owned()).collect();
+    let has_place = |arg: &OsString| arg.to_str().is_some_and(|arg| arg == "--out" || arg.starts_with("--out="));
+    if args.first().is_some_and(|command| command == "campaign") && !args.iter().any(has_place) {
+        args.insert(1, "--no-out".into());
+    }
     program().args(args).output().expect("the program starts")
 }
 

@@ -1,0 +1,200 @@
+//! Where a campaign keeps its results: in the folder of `--out`, nowhere with `--no-out`, else in `closecall-results`.
+//!
+//! Nobody has asked for the default folder. If it cannot be written, because the disk is full or the working folder read-only, the
+//! campaign goes on without it, prints its verdict, and ends with the exit code of a file that cannot be written. If something
+//! else is at its path, nothing runs.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use closecall_campaign::execution::Campaign;
+use closecall_campaign::failure::FailureKind;
+use closecall_campaign::folder::{Folder, FolderError, LockedFolder, REPORT};
+use closecall_campaign::manifest::Manifest;
+use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
+use closecall_campaign::resume_command::quoted;
+use closecall_campaign::selection::Selection;
+use closecall_campaign::session;
+use closecall_report::campaign::{RecordedSample, ReportError};
+use closecall_report::run::rerun::is_recording_enabled;
+use closecall_scenarios::atomic::WriteError;
+
+use super::CliError;
+use super::output::{print_error, print_report_files};
+use super::protect::{of_controller, of_scenario};
+
+/// Largest number of recordings that are named one by one.
+const NAMED_RECORDINGS: usize = 3;
+/// The program that opens a page in the browser.
+const OPEN: &str = if cfg!(target_os = "macos") {
+    "open"
+} else if cfg!(windows) {
+    "start"
+} else {
+    "xdg-open"
+};
+
+/// Where a campaign keeps its results.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ResultsArgs {
+    /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and recordings. It must be new or empty
+    /// [default: closecall-results, which replaces the last results there; these become closecall-results.previous]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Keep no results, only print them
+    #[arg(long, conflicts_with_all = ["out", "resume"])]
+    no_out: bool,
+    /// Resume the interrupted campaign in the folder of --out, or in closecall-results
+    #[arg(long)]
+    resume: bool,
+}
+
+/// The place of the results.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place<'a> {
+    /// They are not kept.
+    Nowhere,
+    /// The folder that the command line names.
+    Named(&'a Path),
+    /// The default folder.
+    Default,
+}
+
+impl ResultsArgs {
+    /// Returns the place of the results. A caller in its own process, such as a Python program, has no default folder.
+    pub(super) fn place(&self) -> Result<Place<'_>, CliError> {
+        match &self.out {
+            Some(path) => Ok(Place::Named(path)),
+            None if session::is_active() && self.resume => {
+                Err(CliError::usage("--resume: name the folder of the campaign with --out"))
+            }
+            None if self.no_out || session::is_active() => Ok(Place::Nowhere),
+            None => Ok(Place::Default),
+        }
+    }
+}
+
+/// The folder of a running campaign.
+#[derive(Debug)]
+pub(super) struct Results {
+    pub(super) locked: Option<LockedFolder>,
+    is_default: bool,
+    /// Why the results are not kept completely, if they should be.
+    lost: Option<CliError>,
+}
+
+impl Results {
+    /// Locks the folder of a campaign, which is told whether it goes on without the folder.
+    pub(super) fn start(args: &ResultsArgs, campaign: &mut Campaign, manifest: &Manifest) -> Result<Self, CliError> {
+        let (locked, lost) = match args.place()? {
+            Place::Nowhere => (None, None),
+            Place::Named(path) => (Some(Folder::lock(path, manifest, args.resume)?), None),
+            Place::Default => {
+                campaign.goes_on_without_folder = true;
+                match in_default_folder(args.resume, campaign, manifest) {
+                    Ok(locked) => (Some(locked), None),
+                    Err(error) if may_go_on(&error) && !args.resume => {
+                        print_error(format_args!(
+                            "warning: {error}: the results will not be kept; name a folder with --out DIR, or keep none with --no-out\n"
+                        ));
+                        (None, Some(CliError::Results(error)))
+                    }
+                    Err(error) => return Err(CliError::Results(error)),
+                }
+            }
+        };
+        Ok(Self { locked, is_default: campaign.goes_on_without_folder, lost })
+    }
+
+    /// Returns the folder if it holds every result so far.
+    pub(super) fn complete(&self) -> Option<&Folder> {
+        self.locked.as_ref().map(|locked| &locked.folder).filter(|_| self.lost.is_none())
+    }
+
+    /// Notes that the last results could not be written.
+    pub(super) fn lose(&mut self, error: Option<WriteError>) {
+        if let Some(error) = error {
+            self.lost = Some(CliError::ResultsCut(error));
+        }
+    }
+
+    /// Returns what the reports have written, or notes why they could not be made.
+    pub(super) fn reported<T>(&mut self, written: Result<T, ReportError>) -> Option<T> {
+        match written {
+            Ok(written) => Some(written),
+            Err(error) => {
+                let is_lost = self.is_default && error.kind() == FailureKind::Io;
+                self.lost = Some(if is_lost { CliError::ResultsReport(error) } else { error.into() });
+                None
+            }
+        }
+    }
+
+    /// Returns the reason for which the results are not kept completely, if they should be.
+    pub(super) fn into_lost(self) -> Option<CliError> {
+        self.lost
+    }
+}
+
+/// Locks the default folder, and says what has become of earlier results.
+fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest) -> Result<LockedFolder, FolderError> {
+    let scenarios = campaign.works.iter().flat_map(|work| of_scenario(&work.file));
+    let inputs: Vec<PathBuf> = scenarios.chain(manifest.arms.iter().flat_map(of_controller)).collect();
+    let working_folder = Path::new("");
+    check_inputs(working_folder, &inputs)?;
+    if is_resumed {
+        return resume(working_folder, manifest);
+    }
+    let taken = take(working_folder, manifest)?;
+    if let Some(Moved { to, resume, has_removed }) = taken.moved {
+        let removed = if has_removed { ", in place of older ones" } else { "" };
+        print_error(format_args!("the last results are now in {}{removed}\n", to.display()));
+        if let Some(resume) = resume {
+            print_error(format_args!("their campaign has not come to its end; it is resumed by: {resume}\n"));
+        }
+    }
+    Ok(taken.locked)
+}
+
+/// Returns the samples to record: those of the command line, else the worst of each kind. These are not recorded if the environment
+/// switches recordings off.
+pub(super) fn selection(named: Option<Selection>) -> Selection {
+    named.unwrap_or_else(|| Selection { each_kind: is_recording_enabled(), ..Selection::default() })
+}
+
+/// Returns true if a campaign can do without its default folder: the folder cannot be written. Else something is in the way, of
+/// which the user should know before anything runs.
+fn may_go_on(error: &FolderError) -> bool {
+    matches!(error, FolderError::Write(_))
+}
+
+/// Prints to standard error which files a campaign has written, and the commands that open its report and its recordings.
+pub(super) fn print_results(folder: &Folder, recorded: &[RecordedSample]) {
+    print_report_files(folder);
+    let word = |path: &Path| quoted(&path.display().to_string());
+    print_error(format_args!("look: {OPEN} {}\n", word(&folder.file(REPORT))));
+    for RecordedSample { scenario, sample, reasons, path } in recorded.iter().take(NAMED_RECORDINGS) {
+        let why = reasons.join(", ");
+        print_error(format_args!("look: closecall view {}  # {why}: sample {sample} of {scenario}\n", word(path)));
+    }
+    if let Some(more) = recorded.len().checked_sub(NAMED_RECORDINGS).filter(|more| *more > 0) {
+        print_error(format_args!("look: closecall view {}  # {more} more recordings\n", word(folder.path())));
+    }
+}
+
+/// Returns the folder of the last results in the working folder.
+pub(super) fn last_results() -> Result<Folder, CliError> {
+    let path = Path::new(RESULTS);
+    if !path.is_dir() {
+        return Err(CliError::usage(format!(
+            "there are no results here: `closecall campaign SCENARIO` writes them to {RESULTS}; or name a recording or a folder"
+        )));
+    }
+    let folder = Folder::open(path);
+    if !folder.file(REPORT).is_file() {
+        return Err(CliError::usage(format!(
+            "{RESULTS} has no report: its campaign has not come to its end; the same command with --resume goes on with it"
+        )));
+    }
+    Ok(folder)
+}
