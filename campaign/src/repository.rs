@@ -1,4 +1,5 @@
-//! The files of a repository of scenarios: a commented scenario, the project file, and CI jobs for GitHub and GitLab.
+//! The files of a repository of scenarios: a commented scenario, the project file, CI jobs for GitHub and GitLab, and the list of
+//! what Git leaves alone.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -11,6 +12,8 @@ const SCENARIO: &str = include_str!("repository/scenario.toml");
 const PROJECT: &str = include_str!("repository/closecall.toml");
 const GITHUB: &str = include_str!("../../docs/how-to/ci/github.yml");
 const GITLAB: &str = include_str!("../../docs/how-to/ci/gitlab.yml");
+/// What Git leaves alone: the results of campaigns.
+const IGNORED: &str = "/closecall-results/\n/closecall-results.previous/\n";
 
 /// The name of the scenario in the template.
 const TEMPLATE_NAME: &str = "NAME";
@@ -48,6 +51,7 @@ pub fn repository_files(folder: &Path, installation: Installation<'_>) -> Vec<(P
         (folder.join(PROJECT_FILE), PROJECT.to_owned()),
         (folder.join(".github/workflows/closecall.yml"), installed(GITHUB)),
         (folder.join(".gitlab-ci.yml"), installed(GITLAB)),
+        (folder.join(".gitignore"), IGNORED.to_owned()),
     ];
     if !has_scenario(&scenarios) {
         files.push((scenarios.join(format!("{FIRST_SCENARIO}.toml")), scenario_template(FIRST_SCENARIO)));
@@ -103,9 +107,11 @@ mod tests {
     fn the_first_scenario_is_written_only_into_an_empty_repository() {
         let folder = tempfile::tempdir().unwrap();
         let files = || repository_files(folder.path(), Installation { url: "URL", rev: "REV" });
-        assert_eq!(files().len(), 4);
+        assert_eq!(files().len(), 5);
+        let ignored = IGNORED.lines().map(|line| line.trim_matches('/'));
+        assert!(ignored.eq([crate::results::RESULTS, crate::results::PREVIOUS]));
         assert!(files().iter().all(|(_, text)| !text.contains("@URL@") && !text.contains("@REV@")));
         create(&folder.path().join(SCENARIOS).join("mine.toml"), "").unwrap();
-        assert_eq!(files().len(), 3);
+        assert_eq!(files().len(), 4);
     }
 }

@@ -1,6 +1,6 @@
 //! `closecall new` and `closecall init`: write a scenario, or the files of a repository of scenarios.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::arguments::scenario_name;
@@ -62,9 +62,21 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
 pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
     for (path, text) in repository_files(&args.dir, Installation { url: &args.url, rev: &args.rev }) {
         let is_new = create(&path, &text)?;
-        outln!("{}: {}", if is_new { "written" } else { "kept" }, path.display());
+        let advice = if is_new { String::new() } else { advice(&path, &text) };
+        outln!("{}: {}{advice}", if is_new { "written" } else { "kept" }, path.display());
     }
     let scenarios = args.dir.join(SCENARIOS);
     outln!("next: closecall check {0}, closecall campaign {0} -n 200 --paired", scenarios.display());
     Ok(ExitCode::Pass)
+}
+
+/// Returns which lines an existing list of what Git leaves alone lacks; nothing for any other file.
+fn advice(path: &Path, text: &str) -> String {
+    if !path.ends_with(".gitignore") {
+        return String::new();
+    }
+    let there = std::fs::read_to_string(path).unwrap_or_default();
+    let lacks = |line: &&str| !there.lines().any(|known| known.trim_matches('/') == line.trim_matches('/'));
+    let missing: Vec<&str> = text.lines().filter(lacks).collect();
+    if missing.is_empty() { String::new() } else { format!(" (add the line {})", missing.join(", and ")) }
 }

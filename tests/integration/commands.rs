@@ -16,8 +16,8 @@ fn run_in(folder: &Path, args: &[&str]) -> std::process::Output {
 fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
     let folder = folder();
     let written = stdout(&run_in(folder.path(), &["init"]), 0);
-    for path in ["closecall.toml", ".github/workflows/closecall.yml", ".gitlab-ci.yml", "scenarios/late-overtake.toml"]
-    {
+    let files = [".github/workflows/closecall.yml", ".gitlab-ci.yml", ".gitignore", "scenarios/late-overtake.toml"];
+    for path in files.into_iter().chain(["closecall.toml"]) {
         assert!(written.contains(&format!("written: ./{path}")), "{written}");
         assert!(folder.path().join(path).is_file(), "{path}");
     }
