@@ -1,6 +1,6 @@
 //! Moves vehicles that have collided: rigid bodies that hit each other, spin and slide.
 //!
-//! A swept test in `f64` finds the moment of contact (see [`super::contact`]). This module receives the vehicles at that
+//! parry finds the moment of contact in `f64` (see [`super::contact`]). This module receives the vehicles at that
 //! moment and lets rapier2d's solver compute the impact. Rapier computes in `f32`, so positions are relative to that of
 //! the first vehicle that collided.
 //!

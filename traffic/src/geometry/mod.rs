@@ -1,14 +1,13 @@
 //! Plane geometry of vehicles: oriented boxes, the distance between them, and the first contact of two moving ones.
 //!
-//! A vehicle seen from above is a rectangle. Two rectangles are disjoint if and only if one of the four directions of
-//! their sides separates them (the separating axis theorem for convex polygons; S. Gottschalk, M. C. Lin, D. Manocha,
-//! *OBBTree*, SIGGRAPH 1996). Every function of this module rests on this theorem.
+//! [`OrientedBox`] is a vehicle seen from above. Whether and when two vehicles touch is decided by parry, the geometry library
+//! of the rapier family; the module `queries` is the only place that calls it.
 
 mod oriented_box;
-mod swept;
+mod queries;
 
 #[cfg(test)]
 mod tests;
 
 pub use oriented_box::{BoxSide, OrientedBox};
-pub use swept::{Contact, first_contact};
+pub use queries::{Contact, first_contact};

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::Absent;
-use crate::geometry::OrientedBox;
+use crate::geometry::{OrientedBox, first_contact};
 
 const HORIZON_S: f64 = 10.0;
 
@@ -161,6 +161,21 @@ proptest! {
                 prop_assert!((nearest_m - distance_after_m(&a, &b, HORIZON_S)).abs() < 1e-9 && nearest_m > 0.0);
             }
             Err(other) => prop_assert!(false, "{other}"),
+        }
+    }
+
+    #[test]
+    fn the_time_to_touch_is_that_of_the_first_contact(a in any_moving(), b in any_moving()) {
+        let [a_then, b_then] = [&a, &b].map(|one| after(one, HORIZON_S));
+        let contact = first_contact(&a.shape, &a_then, &b.shape, &b_then);
+        match (time_to_touch_s(&a, &b), contact) {
+            (Ok(touch_s), Some(contact)) => {
+                let contact_s = contact.fraction * HORIZON_S;
+                prop_assert!((touch_s - contact_s).abs() < 1e-7, "{contact_s} {touch_s}");
+            }
+            (Ok(touch_s), None) => prop_assert!(touch_s > HORIZON_S - 1e-9),
+            (Err(_), None) => {}
+            (Err(absent), Some(_)) => prop_assert!(false, "{absent}"),
         }
     }
 
