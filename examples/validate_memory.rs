@@ -24,7 +24,7 @@ use std::time::Duration;
 use plotters::prelude::*;
 
 /// Largest allowed peak memory (MB).
-const LIMIT_MB: f64 = 40.0;
+const LIMIT_MB: f64 = 100.0;
 const MB_PER_KIB: f64 = 1.024e-3;
 /// The modes, with numbers of samples that take a few seconds.
 const MODES: [(&str, u64); 3] = [("ground-truth", 100), ("object", 100), ("full", 8)];

@@ -1,6 +1,6 @@
 //! The search for what a test needs. Each function says that the test is skipped if it finds nothing.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::Need;
@@ -56,14 +56,27 @@ pub fn has_python() -> bool {
 /// # Panics
 /// As [`skip`].
 pub fn python_with_onnxruntime() -> Option<PathBuf> {
-    let library = onnxruntime()?;
-    let mut programs = library.ancestors().map(|folder| folder.join("bin/python")).filter(|path| path.is_file());
-    let has_packages = |python: &PathBuf| {
-        let output = Command::new(python).args(["-c", "import numpy, onnxruntime"]).output();
-        output.is_ok_and(|output| output.status.success())
-    };
     let reason = "CLOSECALL_ONNXRUNTIME does not lie in a Python environment with onnxruntime and numpy";
-    found(programs.find(has_packages), Need::Python, reason)
+    found(python_around(&onnxruntime()?, "numpy, onnxruntime"), Need::Python, reason)
+}
+
+/// Returns a Python interpreter that has the packages `rerun`, `datafusion`, `pandas` and `matplotlib`: that of the environment in which
+/// the Rerun viewer lies.
+///
+/// # Panics
+/// As [`skip`].
+pub fn python_with_rerun() -> Option<PathBuf> {
+    let reason = "CLOSECALL_RERUN does not lie in a Python environment with datafusion, pandas and matplotlib";
+    found(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
+}
+
+/// Returns the interpreter of the Python environment in which a file lies, if it has these packages.
+fn python_around(file: &Path, packages: &str) -> Option<PathBuf> {
+    let mut programs = file.ancestors().map(|folder| folder.join("bin/python")).filter(|path| path.is_file());
+    programs.find(|python| {
+        let output = Command::new(python).args(["-c", &format!("import {packages}")]).output();
+        output.is_ok_and(|output| output.status.success())
+    })
 }
 
 /// Returns the program of a web browser.

@@ -13,7 +13,7 @@
 //! | `onnxruntime` | `CLOSECALL_ONNXRUNTIME` names the shared library of ONNX Runtime |
 //! | `display` | `xvfb-run` is installed and the viewer can draw on its display |
 //! | `data` | `CLOSECALL_DATA` names the folder of trajectory data |
-//! | `python` | `python3` is installed; for a comparison with Python's ONNX Runtime, `CLOSECALL_ONNXRUNTIME` lies in a Python environment that has it |
+//! | `python` | `python3` is installed; for a comparison with Python's ONNX Runtime, `CLOSECALL_ONNXRUNTIME` lies in a Python environment that has it; to query recordings, `CLOSECALL_RERUN` lies in one with datafusion, pandas and matplotlib |
 //! | `browser` | Chromium or Google Chrome is installed |
 //!
 //! ```no_run
@@ -26,6 +26,8 @@ mod need;
 mod require;
 
 pub use dbscan::dbscan_by_definition;
-pub use find::{browser, data, has_display, has_python, onnxruntime, python_with_onnxruntime, viewer};
+pub use find::{
+    browser, data, has_display, has_python, onnxruntime, python_with_onnxruntime, python_with_rerun, viewer,
+};
 pub use need::Need;
 pub use require::skip;

@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use closecall_testing::viewer;
+use closecall_testing::{python_with_rerun, viewer};
 use serde_json::Value;
 
 use crate::support::{ROOT, closecall, code, folder, library, message, program, stderr, stdout};
@@ -18,10 +18,10 @@ fn record_pair(file: &Path) -> Value {
     serde_json::from_str(&stdout(&closecall(arguments), 0)).unwrap()
 }
 
-/// Returns the Python program of the page.
-fn program_of_page() -> String {
+/// Returns a Python program of the page.
+fn program_of_page(number: usize) -> String {
     let page = std::fs::read_to_string(Path::new(ROOT).join("docs/how-to/looking.md")).unwrap();
-    let (_, after) = page.split_once("```python\n").expect("a program");
+    let after = page.split("```python\n").nth(number + 1).expect("a program");
     after.split_once("```").expect("its end").0.to_owned()
 }
 
@@ -31,7 +31,7 @@ fn the_program_of_the_page_reads_a_recording() {
     let folder = folder();
     let [file, script] = ["pair.rrd", "read.py"].map(|name| folder.path().join(name));
     let outcomes = record_pair(&file);
-    std::fs::write(&script, program_of_page()).unwrap();
+    std::fs::write(&script, program_of_page(1)).unwrap();
     let python = viewer.with_file_name("python3");
     let output = Command::new(python).arg(&script).arg(&file).output().unwrap();
     let text = stdout(&output, 0);
@@ -44,6 +44,63 @@ fn the_program_of_the_page_reads_a_recording() {
     assert_eq!([words[3], words[5]], ["s", "s"], "{text}");
     // The curve has the control steps only.
     assert!(curve_s >= property_s && curve_s < property_s + 0.1, "{text}");
+}
+
+#[test]
+fn the_first_program_of_the_page_plots_the_rear_headway_and_lists_the_collisions() {
+    let Some(python) = python_with_rerun() else { return };
+    let folder = folder();
+    let [file, script, picture] = ["pair.rrd", "plot.py", "thw.png"].map(|name| folder.path().join(name));
+    let outcomes = record_pair(&file);
+    std::fs::write(&script, program_of_page(0)).unwrap();
+    let output = Command::new(&python).arg(&script).args([&file, &picture]).output().unwrap();
+    let text = stdout(&output, 0);
+    assert_eq!(&std::fs::read(&picture).unwrap()[1..4], b"PNG");
+    let outcomes = outcomes.as_array().or(outcomes["results"].as_array()).unwrap();
+    let collisions = outcomes[0]["collisions"].as_array().unwrap();
+    assert!(collisions.len() >= 2 && outcomes[1]["collisions"].as_array().unwrap().is_empty(), "{outcomes:?}");
+    let printed: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(printed.len(), collisions.len(), "{text}");
+    for (row, collision) in printed.iter().zip(collisions) {
+        let between = [0, 1].map(|vehicle| collision["between"][vehicle].as_str().unwrap());
+        assert_eq!([row[0], row[2], row[3]], ["acc", between[0], between[1]], "{text}");
+        for (word, name) in [(row[1], "time_s"), (row[4], "relative_speed_mps")] {
+            let difference = word.parse::<f64>().unwrap() - collision[name].as_f64().unwrap();
+            assert!(difference.abs() < 1e-6, "{name}: {text}");
+        }
+    }
+}
+
+#[test]
+fn the_table_of_the_page_names_what_a_recording_holds() {
+    let Some(python) = python_with_rerun() else { return };
+    let folder = folder();
+    let [file, script] = ["pair.rrd", "columns.py"].map(|name| folder.path().join(name));
+    record_pair(&file);
+    let program = "import sys\nfrom rerun.experimental import RrdReader\n\
+                   for column in RrdReader(sys.argv[1]).stream().collect().schema().component_columns():\n\
+                   \x20   print(column.entity_path, column.component)\n";
+    std::fs::write(&script, program).unwrap();
+    let text = stdout(&Command::new(&python).arg(&script).arg(&file).output().unwrap(), 0);
+    let held: Vec<&str> = text.lines().collect();
+    let page = std::fs::read_to_string(Path::new(ROOT).join("docs/how-to/looking.md")).unwrap();
+    let (_, table) = page.split_once("| entity below `ARM` | component |").expect("a table");
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let mut count = 0;
+    for row in rows {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let [entities, components] =
+            [cells[1], cells[2]].map(|cell| cell.split('`').skip(1).step_by(2).collect::<Vec<_>>());
+        assert!(!entities.is_empty() && !components.is_empty(), "{row}");
+        for entity in entities {
+            for component in &components {
+                let paths = ["acc", "mis"].map(|arm| format!("/{arm}/{entity} {component}").replace("VEHICLE", "rear"));
+                assert!(held.iter().any(|held| paths.contains(&(*held).to_owned())), "no {entity} {component}: {text}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 15, "{count} columns");
 }
 
 /// A running server, ended when the value is dropped.

@@ -16,8 +16,8 @@
 
 mod names;
 
-use crate::run::rerun::sdk::{LineStrips2D, Points2D};
 use closecall_traffic::{Indicator, Lane, Measured, Source, Time, TrackStatus};
+use rerun::{LineStrips2D, Points2D};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

@@ -16,23 +16,24 @@
 //!
 //! The layout contains only views that have something to show.
 
+pub(super) mod archetypes;
 mod nodes;
 
 use closecall_traffic::Time;
-use re_sdk_types::blueprint::archetypes::{
+use rerun::blueprint::components::{BackgroundKind, Eye3DKind};
+use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use rerun::components::Range1D;
+use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
+
+use self::archetypes::{
     Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
     VisualBounds2D,
 };
-use re_sdk_types::blueprint::components::{BackgroundKind, Eye3DKind};
-use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use re_sdk_types::components::Range1D;
-use re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
-
 use self::nodes::{Node, View, below, beside, tabs};
 use super::RecordingError;
-use super::chunks::Chunks;
 use super::palette;
 use super::plots::Plot;
+use super::recording::Recording;
 use super::stream::OPENING_TIMELINE;
 
 /// Position of the eye of the 3D view in the frame of the rig (m): behind, beside and above.
@@ -67,8 +68,8 @@ pub(super) struct FilmContents {
     pub(super) weather: Option<String>,
 }
 
-/// Returns the chunks of the layout for these films.
-pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
+/// Writes the layout for these films.
+pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(), RecordingError> {
     let left = below(
         [Some((verdict_share(films), verdict())), bird(films).map(|view| (bird_share(films), view))]
             .into_iter()
@@ -90,7 +91,7 @@ pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     right.extend(tabs(states).map(|node| (1.9, node)));
     let columns = [left.map(|node| (11.0, node)), below(right).map(|node| (9.0, node))];
     let root = beside(columns.into_iter().flatten().collect());
-    nodes::chunks(root.unwrap_or_else(verdict), OPENING_TIMELINE)
+    nodes::write(recording, root.unwrap_or_else(verdict), OPENING_TIMELINE)
 }
 
 /// Returns the room for the view from above: recorded roads have more lanes.

@@ -7,8 +7,8 @@
 //!       ▔▔◯▔▔▔▔▔▔▔▔▔◯▔▔
 //! ```
 
-use crate::run::rerun::sdk::Mesh3D;
 use closecall_traffic::{Dimensions, Vehicle, VehicleClass};
+use rerun::Mesh3D;
 
 use super::palette::{self, Rgba};
 

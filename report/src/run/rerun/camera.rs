@@ -8,12 +8,12 @@
 //! The instances are those that the network found in the loop, at the moment of the exposure. An image of the Mask R-CNN is therefore
 //! one that was evaluated.
 
-use crate::run::rerun::sdk::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
 use closecall_camera::{
     Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
 };
 use closecall_sensors::rear_exposures;
 use closecall_traffic::{Time, VehicleClass};
+use rerun::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

@@ -3,8 +3,8 @@
 //! After Koschmieder, contrast falls with the distance r as exp(-3.912·r/V), with the meteorological visibility V at which 2 %
 //! of it are left. Each curtain takes the share that its distance from the one before accounts for.
 
-use crate::run::rerun::sdk::{Mesh3D, Transform3D};
 use nalgebra::Vector3;
+use rerun::{Mesh3D, Transform3D};
 
 use super::RecordingError;
 use super::palette;

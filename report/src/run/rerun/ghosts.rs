@@ -2,8 +2,8 @@
 //!
 //! They show where the vehicles are without the system under test, or in the recorded traffic.
 
-use crate::run::rerun::sdk::{Boxes3D, FillMode, LineStrips2D};
 use closecall_traffic::Time;
+use rerun::{Boxes3D, FillMode, LineStrips2D};
 
 use super::RecordingError;
 use super::bird::Canvas;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::run::rerun::sdk::{TextLog, TextLogLevel};
 use closecall_traffic::Time;
+use rerun::{TextLog, TextLogLevel};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

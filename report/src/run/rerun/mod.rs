@@ -8,14 +8,13 @@
 //! and it opens at the critical moment. Two films share one timeline and the same plots. Each has a 3D scene of its
 //! own, in which the vehicles of the other film appear as outlines.
 //!
-//! This folder is the only one that uses the rerun library.
+//! This folder is the only one that uses the rerun library: its public interface, and parts of it in `blueprint/archetypes.rs` alone.
 
 mod bird;
 mod blueprint;
 mod bodies;
 mod camera;
-mod chunks;
-mod encode;
+mod collisions;
 mod fog;
 mod ghosts;
 mod log;
@@ -24,8 +23,8 @@ mod perceived;
 mod plots;
 mod points;
 mod properties;
+mod recording;
 mod road;
-mod sdk;
 mod stream;
 mod summary;
 mod truth;

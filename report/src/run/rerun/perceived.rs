@@ -2,10 +2,10 @@
 //! covariance of their position. Each group of sensors has entities of its own, so that the user can switch each group
 //! off.
 
-use crate::run::rerun::sdk::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
 use nalgebra::{Matrix2, SymmetricEigen};
+use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

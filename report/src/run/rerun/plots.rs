@@ -8,14 +8,12 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::run::rerun::sdk::{
-    AsComponents, ComponentDescriptor, ComponentIdentifier, Scalars, SerializedComponentBatch, SeriesLines,
-};
 use arrow::array::StringArray;
 use closecall_controllers::{EgoState, MisPlan};
 use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
 use closecall_traffic::Time;
 use closecall_traffic::metrics::Encounter;
+use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch, SeriesLines};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
@@ -220,28 +218,19 @@ impl Plots<'_> {
             return Ok(());
         }
         let moments = self.film.moments();
-        if moments.is_empty() {
-            return Ok(());
-        }
-        let entity = format!("plots/{}/moments", plot.kind.name());
-        let style = SeriesLines::new()
-            .with_names(moments.iter().map(|noted| noted.moment.label()))
-            .with_colors(moments.iter().map(|noted| palette::moment(noted.moment)))
-            .with_widths(moments.iter().map(|_| THIN_LINE_WIDTH));
-        self.writer.write_static(&entity, &style)?;
         // The view of a pair can show more than the range of this film.
         let largest = plot.kind.largest_range();
         let ends = [0, 1].map(|end| if largest[end].is_finite() { largest[end] } else { plot.range[end] });
-        // One series per moment in one entity. A series has values in the two rows of its moment alone.
-        let rows: Vec<(Time, usize, f64)> =
-            moments.iter().enumerate().flat_map(|(number, noted)| ends.map(|end| (noted.time, number, end))).collect();
-        let times: Vec<Time> = rows.iter().map(|row| row.0).collect();
-        self.writer.write_curve(&entity, &times, |range| {
-            let values = rows[range].iter().flat_map(|&(_, shown, end)| {
-                (0..moments.len()).map(move |number| if number == shown { end } else { f64::NAN })
-            });
-            Scalars::new(values).columns(vec![moments.len(); times.len()])
-        })
+        for (number, noted) in moments.iter().enumerate() {
+            let entity = format!("plots/{}/moments/{}", plot.kind.name(), number + 1);
+            let style = SeriesLines::new()
+                .with_names([noted.moment.label()])
+                .with_colors([palette::moment(noted.moment)])
+                .with_widths([THIN_LINE_WIDTH]);
+            self.writer.write_static(&entity, &style)?;
+            self.writer.write_series(&entity, &[noted.time; 2], &ends.map(Some))?;
+        }
+        Ok(())
     }
 
     /// Writes name and style of a curve.

@@ -15,12 +15,12 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float32Array, UInt16Array, UInt32Array};
 
-use crate::run::rerun::sdk::{
+use closecall_sensors::Detection;
+use closecall_traffic::Time;
+use rerun::{
     Boxes3D, ComponentDescriptor, ComponentIdentifier, FillMode, Points3D, SerializationResult,
     SerializedComponentBatch, SerializedComponentColumn,
 };
-use closecall_sensors::Detection;
-use closecall_traffic::Time;
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

@@ -11,23 +11,21 @@
 
 use std::sync::Arc;
 
-use crate::run::rerun::sdk::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
 use closecall_simulation::outcome::Outcome;
 use closecall_traffic::{Measured, Value};
-use re_sdk::external::re_log_types::EntityPath;
-use re_sdk_types::archetypes::RecordingInfo;
+use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 
 use super::RecordingError;
-use super::chunks::Chunks;
+use super::recording::Recording;
 use crate::run::film::Film;
 use crate::units::unit_of;
 
 /// Writes the properties of the recording.
-pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError> {
+pub(super) fn write(recording: &Recording, films: &[Film]) -> Result<(), RecordingError> {
     let title =
         films.iter().map(|film| format!("{} ({})", film.title, film.arm_label())).collect::<Vec<_>>().join(" and ");
-    data.push_static(EntityPath::properties(), &RecordingInfo::update_fields().with_name(title))?;
+    recording.send_title(&title)?;
     let Some((film, outcome)) = films.iter().rev().find_map(|film| Some((film, film.outcome.as_ref()?))) else {
         return Ok(());
     };
@@ -37,7 +35,7 @@ pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError>
         .count("sample", outcome.sample)?
         .text("settings", &film.settings.join(" "))?
         .text("verdict", Film::verdict_word(films))?
-        .push(data, "run")?;
+        .push(recording, "run")?;
     let mut parameters = Properties::default();
     for (name, value) in outcome.parameters.iter() {
         parameters = match value {
@@ -45,9 +43,9 @@ pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError>
             other => parameters.text(&name.to_string(), &other.to_string())?,
         };
     }
-    parameters.push(data, "parameters")?;
+    parameters.push(recording, "parameters")?;
     for (film, outcome) in films.iter().filter_map(|film| Some((film, film.outcome.as_ref()?))) {
-        of_arm(film, outcome)?.push(data, &format!("arms/{}", film.arm))?;
+        of_arm(film, outcome)?.push(recording, &format!("arms/{}", film.arm))?;
     }
     Ok(())
 }
@@ -119,11 +117,10 @@ impl Properties {
         }
     }
 
-    fn push(self, data: &Chunks, entity: &str) -> Result<(), RecordingError> {
+    fn push(self, recording: &Recording, entity: &str) -> Result<(), RecordingError> {
         if self.0.is_empty() {
             return Ok(());
         }
-        let path: EntityPath = entity.into();
-        data.push_static(EntityPath::properties().join(&path), &self)
+        recording.send_property(entity, &self)
     }
 }

@@ -1,7 +1,7 @@
 //! The road in the 3D scene: surface, lane markings, guard rails. It is written once per film.
 
-use crate::run::rerun::sdk::{LineStrips3D, Mesh3D};
 use closecall_traffic::{Lane, Road};
+use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordingError;
 use super::fog;

@@ -12,14 +12,14 @@
 
 use std::ops::Range;
 
-use crate::run::rerun::sdk::{
-    AsComponents, Clear, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn, TimeColumn,
-};
 use closecall_traffic::Time;
-use re_sdk::external::re_log_types::EntityPath;
+use rerun::{
+    AsComponents, Clear, EntityPath, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn,
+    TimeColumn,
+};
 
 use super::RecordingError;
-use super::chunks::Chunks;
+use super::recording::Recording;
 use crate::run::film::Film;
 
 /// Timeline of the simulated time.
@@ -45,7 +45,7 @@ where
 
 /// Writes the entities of one film into a recording.
 pub(super) struct Writer<'a> {
-    chunks: &'a Chunks,
+    recording: &'a Recording,
     /// Prefix of the entity paths of this film.
     root: String,
     /// Whether the recording has no other film, so that the scene has room for speeds and headways.
@@ -61,9 +61,9 @@ pub(super) struct Writer<'a> {
 impl<'a> Writer<'a> {
     /// Creates the writer of one film whose entity paths begin with `root`. `span` holds the first and the last moment of any
     /// film.
-    pub(super) fn new(chunks: &'a Chunks, film: &Film, (root, is_alone): (&str, bool), span: [Time; 2]) -> Self {
+    pub(super) fn new(recording: &'a Recording, film: &Film, (root, is_alone): (&str, bool), span: [Time; 2]) -> Self {
         let critical = film.critical_frame_time();
-        Self { chunks, critical, root: root.to_owned(), is_alone, period: film.period, span }
+        Self { recording, critical, root: root.to_owned(), is_alone, period: film.period, span }
     }
 
     /// Returns the share of the time axis that a duration takes.
@@ -78,7 +78,7 @@ impl<'a> Writer<'a> {
 
     /// Writes components that hold for the whole run.
     pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
-        self.chunks.push_static(self.path(entity), what)
+        self.recording.log_static(self.path(entity), what)
     }
 
     /// Writes one row of components for each of `times`, which must ascend, and a copy of the row that holds at the
@@ -92,7 +92,7 @@ impl<'a> Writer<'a> {
         let until_critical = times.partition_point(|&time| time <= self.critical);
         if let Some(shown) = until_critical.checked_sub(1) {
             let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
-            self.chunks.push_columns(self.path(entity), self.copy_time(), columns)?;
+            self.recording.send_columns(self.path(entity), self.copy_time(), columns)?;
             self.clear_copy(entity, times[0])?;
         }
         self.write_curve(entity, times, build)
@@ -109,7 +109,7 @@ impl<'a> Writer<'a> {
             return Ok(());
         }
         let columns = build(0..times.len()).map_err(RecordingStreamError::from)?;
-        self.chunks.push_columns(self.path(entity), self.timelines(times), columns)
+        self.recording.send_columns(self.path(entity), self.timelines(times), columns)
     }
 
     /// Writes components that hold from `time` on.
@@ -121,11 +121,11 @@ impl<'a> Writer<'a> {
     pub(super) fn write_each(&self, entity: &str, whats: &[(Time, &dyn AsComponents)]) -> Result<(), RecordingError> {
         let until_critical = whats.partition_point(|(time, _)| *time <= self.critical);
         if let Some(shown) = until_critical.checked_sub(1) {
-            self.chunks.push_row(self.path(entity), self.copy_time(), whats[shown].1)?;
+            self.recording.send_row(self.path(entity), self.copy_time(), whats[shown].1)?;
             self.clear_copy(entity, whats[0].0)?;
         }
         for (time, what) in whats {
-            self.chunks.push_row(self.path(entity), self.timelines(&[*time]), *what)?;
+            self.recording.send_row(self.path(entity), self.timelines(&[*time]), *what)?;
         }
         Ok(())
     }
@@ -155,7 +155,7 @@ impl<'a> Writer<'a> {
             return Ok(());
         }
         let start = TimeColumn::new_duration_nanos(OPENING_TIMELINE, [self.span[0].ns()]);
-        self.chunks.push_row(self.path(entity), vec![start], &Clear::flat())
+        self.recording.send_row(self.path(entity), vec![start], &Clear::flat())
     }
 
     /// Returns the moment of the copy.

@@ -3,9 +3,9 @@
 //! A vehicle in the field of view of the rear sensor counts as known if the near face of a confirmed rear track lies
 //! within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts as missed, even if another vehicle hides it.
 
-use crate::run::rerun::sdk::{Boxes3D, FillMode, Quaternion};
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
+use rerun::{Boxes3D, FillMode, Quaternion};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

@@ -1,8 +1,8 @@
 //! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around the ego.
 
-use crate::run::rerun::sdk::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
+use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 
 use super::RecordingError;
 use super::bodies;

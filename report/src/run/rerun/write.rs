@@ -1,22 +1,21 @@
 //! Writing films into a recording file.
 
-use std::io;
 use std::path::Path;
 
-use crate::run::rerun::sdk::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 use closecall_traffic::Time;
+use rerun::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 
 use super::blueprint::{self, FilmContents};
-use super::chunks::{self, Chunks};
-use super::encode::Recording;
 use super::plots::Role;
+use super::recording::{self, Recording};
 use super::stream::Writer;
 use super::{
-    bird, camera, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth, vehicles,
+    bird, camera, collisions, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth,
+    vehicles,
 };
 use crate::memory::return_free_memory;
 use crate::run::film::{Film, Level};
-use closecall_scenarios::atomic::{WriteError, check_writable, write_atomically};
+use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
@@ -36,9 +35,6 @@ pub enum RecordingError {
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The bytes cannot be written to where they go. [`write_recording`] names the file, as [`Self::Write`].
-    #[error(transparent)]
-    Output(#[from] io::Error),
 }
 
 impl RecordingError {
@@ -50,7 +46,7 @@ impl RecordingError {
 
 /// Returns false if the environment (`RERUN=off`) switches recordings off.
 pub fn is_recording_enabled() -> bool {
-    re_sdk::decide_logging_enabled(true)
+    rerun::decide_logging_enabled(true)
 }
 
 /// Checks whether a recording can be written, before the run starts.
@@ -85,10 +81,8 @@ pub(crate) fn write_recording_of(path: &Path, films: Vec<Film>) -> Result<(), Re
 }
 
 fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
-    write_atomically(path, |file| recording.encode(file)).map_err(|error| match error {
-        RecordingError::Output(source) => WriteError::new(path, source).into(),
-        other => other,
-    })
+    let bytes = recording.encode()?;
+    Ok(write_file(path, |file| file.write_all(&bytes))?)
 }
 
 /// Writes films like [`write_recording_unchecked`], after [`check_recording_possible`].
@@ -102,7 +96,10 @@ pub fn write_recording(path: &Path, films: &[Film]) -> Result<(), RecordingError
 
 /// Returns the recording of the films, with its layout.
 fn record(films: &[Film]) -> Result<Recording, RecordingError> {
-    let data = Chunks::default();
+    let level = films.iter().map(|film| format!("{:?} {}", film.level, film.frames.len())).collect();
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    let name = recording::name(&[version, level, summary::verdict(films), summary::story(films)]);
+    let recording = Recording::new(application(films), &name)?;
     let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min();
     let end = films.iter().map(Film::end).max();
     let span = [start, end].map(|time| time.unwrap_or(Time::ZERO));
@@ -115,18 +112,16 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
             _ => Role::Tested,
         };
         let root = format!("{}/", film.arm);
-        let writer = Writer::new(&data, film, (&root, films.len() == 1), span);
+        let writer = Writer::new(&recording, film, (&root, films.len() == 1), span);
         contents.push(write_film(&writer, &canvases[index], (root, role))?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, &canvases[index], ghosts)?;
         }
     }
-    write_texts(&data, films)?;
-    properties::write(&data, films)?;
-    let level = films.iter().map(|film| format!("{:?} {}", film.level, film.frames.len())).collect();
-    let version = env!("CARGO_PKG_VERSION").to_owned();
-    let name = chunks::name(&[version, level, summary::verdict(films), summary::story(films)]);
-    Ok(Recording::new((application(films), name), blueprint::layout(&contents)?, data))
+    write_texts(&recording, films)?;
+    properties::write(&recording, films)?;
+    blueprint::write(&recording, &contents)?;
+    Ok(recording)
 }
 
 /// Returns the application id. The viewer keeps one layout per application, so that each kind of recording has its own.
@@ -181,14 +176,15 @@ fn write_film(
     }
     contents.plots = plots::write(writer, film, role)?;
     contents.has_states = film.frames.iter().any(|frame| frame.command.is_some());
+    collisions::write(writer, film)?;
     log::write(writer, film, role == Role::Alone)?;
     Ok(contents)
 }
 
 /// Writes the verdict and the story, each of which has a view.
-fn write_texts(data: &Chunks, films: &[Film]) -> Result<(), RecordingError> {
+fn write_texts(recording: &Recording, films: &[Film]) -> Result<(), RecordingError> {
     for (entity, text) in [("verdict", summary::verdict(films)), ("summary", summary::story(films))] {
-        data.push_static(entity.into(), &TextDocument::new(text).with_media_type(MediaType::markdown()))?;
+        recording.log_static(entity.into(), &TextDocument::new(text).with_media_type(MediaType::markdown()))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The names of the vehicles in the view from above, with their speeds and headways.
 
-use crate::run::rerun::sdk::Points2D;
 use closecall_traffic::{Measured, Time};
+use rerun::Points2D;
 
 use super::super::RecordingError;
 use super::super::palette::{self, Rgba};

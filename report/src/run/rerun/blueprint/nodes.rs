@@ -1,20 +1,17 @@
-//! Containers and views of a layout, and their chunks.
+//! Containers and views of a layout.
 //!
-//! The library's own builder names each node by chance. Here a node is named after its place, so that the same layout
-//! gives the same bytes.
+//! The identifier of a node is its place in the layout, so that the same films give the same layout.
 
-use crate::run::rerun::sdk::{AsComponents, TimeColumn};
 use closecall_traffic::Time;
-use re_sdk::external::re_log_types::EntityPath;
-use re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
-};
-use re_sdk_types::blueprint::components::TimelineName;
-use re_sdk_types::blueprint::components::{ColumnShare, ContainerKind, PanelState, PlayState, RowShare};
-use re_sdk_types::datatypes::Uuid;
+use rerun::blueprint::components::{ColumnShare, ContainerKind, PanelState, PlayState, RowShare, TimelineName};
+use rerun::datatypes::Uuid;
+use rerun::{AsComponents, EntityPath, TimeColumn};
 
 use super::super::RecordingError;
-use super::super::chunks::Chunks;
+use super::super::recording::Recording;
+use super::archetypes::{
+    ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+};
 
 /// The timeline on which the viewer reads a layout.
 const BLUEPRINT_TIMELINE: &str = "blueprint";
@@ -85,9 +82,9 @@ fn container(kind: ContainerKind, mut nodes: Vec<(f32, Node)>) -> Option<Node> {
     }
 }
 
-/// Returns the chunks of a layout that opens on `timeline`.
-pub(super) fn chunks(root: Node, timeline: &str) -> Result<Chunks, RecordingError> {
-    let mut writer = NodeWriter { chunks: Chunks::default(), count: 0 };
+/// Writes a layout that opens on `timeline`.
+pub(super) fn write(recording: &Recording, root: Node, timeline: &str) -> Result<(), RecordingError> {
+    let mut writer = NodeWriter { recording, count: 0 };
     // The root of a layout must be a container.
     let root = match root {
         Node::View(view) => Node::Container(ContainerKind::Tabs, vec![(1.0, view.into())]),
@@ -104,15 +101,15 @@ pub(super) fn chunks(root: Node, timeline: &str) -> Result<Chunks, RecordingErro
         .with_timeline(TimelineName(timeline.into()))
         .with_play_state(PlayState::Paused);
     writer.push("time_panel", &time)?;
-    Ok(writer.chunks)
+    recording.activate_layout()
 }
 
-struct NodeWriter {
-    chunks: Chunks,
+struct NodeWriter<'a> {
+    recording: &'a Recording,
     count: u64,
 }
 
-impl NodeWriter {
+impl NodeWriter<'_> {
     /// Writes a node and those below it, and returns its number.
     fn write(&mut self, node: Node) -> Result<u64, RecordingError> {
         self.count += 1;
@@ -160,7 +157,7 @@ impl NodeWriter {
 
     fn push(&self, path: &str, what: &dyn AsComponents) -> Result<(), RecordingError> {
         let time = TimeColumn::new_sequence(BLUEPRINT_TIMELINE, [Time::ZERO.ns()]);
-        self.chunks.push_row(EntityPath::from(path), vec![time], what)
+        self.recording.send_layout(EntityPath::from(path), time, what)
     }
 }
 

@@ -7,10 +7,9 @@ use super::{ENTITY, PIXEL_ROWS, PIXEL_STEP, class_colour, fixed_marks, in_pictur
 use crate::run::film::Frame;
 use crate::run::rerun::RecordingError;
 use crate::run::rerun::palette::{self, Rgba};
-use crate::run::rerun::sdk::{
-    AnnotationContext, AsComponents, Boxes2D, ChannelDatatype, ImageFormat, Rgba32, SegmentationImage,
-};
 use crate::run::rerun::stream::Writer;
+use rerun::datatypes::ImageFormat;
+use rerun::{AnnotationContext, AsComponents, Boxes2D, ChannelDatatype, Rgba32, SegmentationImage};
 
 /// Score from which an instance is more likely right than not: it has the colour of its class, and its mask is shown.
 const LIKELY: f64 = 0.5;

@@ -6,7 +6,7 @@ use closecall_sensors::Detection;
 use super::{class_colour, in_picture};
 use crate::run::film::{Film, Frame};
 use crate::run::rerun::palette::{self, Rgba};
-use crate::run::rerun::sdk::Boxes2D;
+use rerun::Boxes2D;
 
 /// Returns the windows of the detections of a frame with their classes.
 pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::run::rerun::sdk::{StateChange, StateConfiguration};
 use closecall_controllers::EgoState;
 use closecall_simulation::outcome::{Phase, ReachedMoment};
 use closecall_traffic::Time;
+use rerun::{StateChange, StateConfiguration};
 
 use super::super::RecordingError;
 use super::super::palette::{self, Rgba};

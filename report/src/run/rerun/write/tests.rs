@@ -1,21 +1,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use arrow::array::{Array, AsArray, RecordBatch};
-use arrow::datatypes::{Float32Type, Int64Type, UInt16Type, UInt32Type};
-use arrow::ipc::reader::StreamReader;
-use re_protos::log_msg::v1alpha1::ArrowMsg;
-use re_sdk::external::re_log_encoding::external::lz4_flex;
-use re_sdk::external::re_log_encoding::{Decodable, MessageHeader, MessageKind, StreamHeader};
-
-use crate::run::rerun::sdk::StoreKind;
+use arrow::array::AsArray;
+use arrow::datatypes::{Float32Type, UInt16Type, UInt32Type};
 use closecall_scenarios::encounter::encounter;
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::geometry::BoxSide;
-use re_sdk::TimelineName;
-use re_sdk::log::Chunk;
+use rerun::log::Chunk;
+use rerun::{StoreKind, TimelineName};
 
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
@@ -71,8 +65,7 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
 }
 
 fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
-    let recording = record(films).unwrap();
-    if kind == StoreKind::Blueprint { recording.layout } else { recording.data }
+    record(films).unwrap().take_chunks(kind)
 }
 
 /// Returns the latest moment on a timeline (ns).
@@ -263,19 +256,46 @@ fn all_timelines_span_the_run_and_the_opening_one_begins_with_the_critical_momen
 
 /// Returns the bytes of the recording of the films.
 fn encoded(films: &[Film]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    record(films).unwrap().encode(&mut bytes).unwrap();
-    bytes
+    record(films).unwrap().encode().unwrap()
 }
 
 #[test]
-fn the_same_films_give_the_same_bytes_and_other_films_another_name() {
+fn the_same_films_give_the_same_rows_and_other_films_another_name() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
     let pair = || [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
-    assert!(encoded(&pair()) == encoded(&pair()));
-    let name = |films: &[Film]| record(films).unwrap().name;
+    for kind in [StoreKind::Blueprint, StoreKind::Recording] {
+        let [one, two] = [chunks(&pair(), kind), chunks(&pair(), kind)];
+        assert_eq!(one.len(), two.len());
+        for (one, two) in one.iter().zip(&two) {
+            // Whatever but the numbers of chunks and rows, which follow the clock.
+            Chunk::ensure_similar(one, two).unwrap();
+        }
+    }
+    let name = |films: &[Film]| record(films).unwrap().name();
     let [baseline, tested] = pair();
+    let alone = std::slice::from_ref(&tested);
+    assert_eq!(name(alone), name(alone));
     assert_ne!(name(&[baseline]), name(&[tested]));
+}
+
+#[test]
+fn what_holds_for_the_whole_run_precedes_what_changes() {
+    let data = chunks(&[default_film()], StoreKind::Recording);
+    let fixed = data.iter().take_while(|chunk| chunk.is_static()).count();
+    assert!(fixed > 10 && data[fixed..].iter().all(|chunk| !chunk.is_static()));
+    assert!(data.len() > fixed + 10);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_threads_of_recordings_end() {
+    const RECORDINGS: usize = 200;
+    for _ in 0..RECORDINGS {
+        Recording::new("closecall-test", "empty").unwrap().encode().unwrap();
+    }
+    // A stream has two threads. Other tests run beside this one.
+    let threads = std::fs::read_dir("/proc/self/task").unwrap().count();
+    assert!(threads < 2 * RECORDINGS, "{threads}");
 }
 
 #[test]
@@ -337,42 +357,20 @@ fn the_file_is_complete_and_no_temporary_file_remains() {
 /// A point as it was measured: beam, time after the start of the sweep (ns), and bits of the intensity.
 type Measured = (u16, u32, u32);
 
-/// Returns the columns of the messages of a recording file that belong to an entity.
-fn columns_in_file(bytes: &[u8], entity: &str) -> Vec<RecordBatch> {
-    let mut found = Vec::new();
-    let mut at = StreamHeader::ENCODED_SIZE_BYTES;
-    loop {
-        let header = MessageHeader::from_rrd_bytes(&bytes[at..at + MessageHeader::ENCODED_SIZE_BYTES]).unwrap();
-        let start = at + MessageHeader::ENCODED_SIZE_BYTES;
-        at = start + usize::try_from(header.len).unwrap();
-        match header.kind {
-            MessageKind::End => return found,
-            MessageKind::ArrowMsg => {
-                let message = ArrowMsg::from_rrd_bytes(&bytes[start..at]).unwrap();
-                let size = usize::try_from(message.uncompressed_size).unwrap();
-                let columns = lz4_flex::block::decompress(&message.payload, size).unwrap();
-                let batches = StreamReader::try_new(columns.as_slice(), None).unwrap();
-                let is_of = |batch: &RecordBatch| {
-                    batch.schema().metadata().get("rerun:entity_path").is_some_and(|path| path == entity)
-                };
-                found.extend(batches.map(Result::unwrap).filter(is_of));
-            }
-            _ => {}
-        }
-    }
-}
-
-/// Returns the measured points of each step that a recording file has in a layer.
-fn measured_in_file(bytes: &[u8], entity: &str) -> BTreeMap<i64, Vec<Measured>> {
+/// Returns the measured points of each step that a recording has in a layer.
+fn measured_points(chunks: &[Chunk], entity: &str) -> BTreeMap<i64, Vec<Measured>> {
     let mut steps = BTreeMap::new();
-    for batch in columns_in_file(bytes, entity) {
+    let timeline = TimelineName::from_static_str(STEP_TIMELINE);
+    for chunk in chunks.iter().filter(|chunk| chunk.entity_path().to_string() == entity) {
         // What is static, and the copy of the critical moment, is at no step.
-        let Some(times) = batch.column_by_name(STEP_TIMELINE) else { continue };
-        let times = times.as_primitive::<Int64Type>().values().to_vec();
-        let lists =
-            |name: &str| batch.column_by_name(name).unwrap_or_else(|| panic!("no {name}")).as_list::<i32>().clone();
+        let Some(times) = chunk.timelines().get(&timeline) else { continue };
+        let lists = |name: &str| {
+            let mut columns = chunk.components().values();
+            let column = columns.find(|column| column.descriptor.component.as_str() == name);
+            column.unwrap_or_else(|| panic!("no {name}")).list_array.clone()
+        };
         let [beams, offsets, intensities] = ["beam", "offset_ns", "intensity"].map(lists);
-        for (row, step) in times.into_iter().enumerate() {
+        for (row, &step) in times.times_raw().iter().enumerate() {
             let (beams, offsets, intensities) = (beams.value(row), offsets.value(row), intensities.value(row));
             let beams = beams.as_primitive::<UInt16Type>().values();
             let offsets = offsets.as_primitive::<UInt32Type>().values();
@@ -386,12 +384,12 @@ fn measured_in_file(bytes: &[u8], entity: &str) -> BTreeMap<i64, Vec<Measured>> 
 }
 
 #[test]
-fn beam_time_and_intensity_in_the_file_are_those_of_the_scan() {
+fn recorded_beam_time_and_intensity_are_those_of_the_scan() {
     let films = [filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full))];
-    let bytes = encoded(&films);
+    let data = chunks(&films, StoreKind::Recording);
     let film = &films[0];
     for (layer, is_clustered) in [("clusters", true), ("rejected", false)] {
-        let found = measured_in_file(&bytes, &format!("/mis/world/ego/lidar/{layer}"));
+        let found = measured_points(&data, &format!("/mis/world/ego/lidar/{layer}"));
         let mut points = 0;
         for frame in &film.frames {
             let Some(scan) = &frame.scan else { continue };

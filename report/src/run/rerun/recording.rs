@@ -1,0 +1,172 @@
+//! A recording while it is written: its messages in memory, in three streams of the rerun library.
+//!
+//! ```text
+//!  layout │ what holds for the whole run │ what changes in time     the order in the file
+//! ```
+//!
+//! The viewer can show a view only when it knows the fixed properties of its entities. Rows that hold for the whole run
+//! therefore precede the others, whenever they are logged.
+//!
+//! The library's own sink for files writes on a thread, and reports an error of the disk as a line of its log at most.
+//! Here the library encodes into memory, and the caller writes the bytes.
+
+use rerun::log::ChunkBatcherConfig;
+use rerun::sink::MemorySinkStorage;
+use rerun::{
+    AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, RecordingStreamError, SerializedComponentColumn,
+    StoreId, StoreKind, TimeColumn,
+};
+
+use super::RecordingError;
+use super::blueprint::archetypes::BlueprintActivationCommand;
+
+/// Number of digits of the hash that names a recording.
+const NAME_DIGITS: usize = 32;
+
+/// The contents of a recording file.
+pub(super) struct Recording {
+    layout: Stream,
+    fixed: Stream,
+    moving: Stream,
+}
+
+impl Recording {
+    /// Creates an empty recording. The viewer keeps one layout for each `application`.
+    pub(super) fn new(application: &'static str, name: &str) -> Result<Self, RecordingError> {
+        let stream = |kind| Stream::new(&StoreId::new(kind, application, name));
+        Ok(Self {
+            layout: stream(StoreKind::Blueprint)?,
+            fixed: stream(StoreKind::Recording)?,
+            moving: stream(StoreKind::Recording)?,
+        })
+    }
+
+    /// Adds components that hold on all timelines at all times.
+    pub(super) fn log_static(&self, entity: EntityPath, what: &dyn AsComponents) -> Result<(), RecordingError> {
+        Ok(self.fixed.stream.log_static(entity, what)?)
+    }
+
+    /// Adds a property of the whole recording.
+    pub(super) fn send_property(&self, name: &str, what: &dyn AsComponents) -> Result<(), RecordingError> {
+        Ok(self.fixed.stream.send_property(name, what)?)
+    }
+
+    /// Sets the title under which the viewer lists the recording.
+    pub(super) fn send_title(&self, title: &str) -> Result<(), RecordingError> {
+        Ok(self.fixed.stream.send_recording_name(title)?)
+    }
+
+    /// Adds one row of components.
+    pub(super) fn send_row(
+        &self,
+        entity: EntityPath,
+        times: Vec<TimeColumn>,
+        what: &dyn AsComponents,
+    ) -> Result<(), RecordingError> {
+        self.send_columns(entity, times, as_columns(what))
+    }
+
+    /// Adds one row of components per time.
+    pub(super) fn send_columns(
+        &self,
+        entity: EntityPath,
+        times: Vec<TimeColumn>,
+        columns: impl Iterator<Item = SerializedComponentColumn>,
+    ) -> Result<(), RecordingError> {
+        Ok(self.moving.stream.send_columns(entity, times, columns)?)
+    }
+
+    /// Adds components of the layout, at a moment of the layout's own timeline.
+    pub(super) fn send_layout(
+        &self,
+        entity: EntityPath,
+        time: TimeColumn,
+        what: &dyn AsComponents,
+    ) -> Result<(), RecordingError> {
+        Ok(self.layout.stream.send_columns(entity, [time], as_columns(what))?)
+    }
+
+    /// Tells the viewer that the layout is complete.
+    pub(super) fn activate_layout(&self) -> Result<(), RecordingError> {
+        let stream = &self.layout.stream;
+        // The message would overtake rows that the stream has not passed on.
+        stream.flush_blocking().map_err(RecordingError::encode)?;
+        if let Some(info) = stream.store_info() {
+            stream.record_msg(BlueprintActivationCommand::make_active(info.store_id).into());
+        }
+        Ok(())
+    }
+
+    /// Returns the bytes of the file.
+    pub(super) fn encode(self) -> Result<Vec<u8>, RecordingError> {
+        let streams = [&self.layout, &self.fixed, &self.moving];
+        for stream in streams {
+            stream.stream.flush_blocking().map_err(RecordingError::encode)?;
+        }
+        MemorySinkStorage::concat_memory_sinks_as_bytes(&streams.map(|stream| &stream.storage))
+            .map_err(RecordingError::encode)
+    }
+}
+
+#[cfg(test)]
+impl Recording {
+    /// Returns the name of the recording.
+    pub(super) fn name(&self) -> String {
+        self.fixed.stream.store_info().map(|info| info.recording_id().to_string()).unwrap_or_default()
+    }
+
+    /// Takes the chunks of the layout or of the data out of the recording, in the order of the file.
+    pub(super) fn take_chunks(&self, kind: StoreKind) -> Vec<rerun::log::Chunk> {
+        let streams = match kind {
+            StoreKind::Blueprint => vec![&self.layout],
+            StoreKind::Recording => vec![&self.fixed, &self.moving],
+        };
+        let messages = streams.into_iter().flat_map(|stream| stream.storage.take());
+        let chunk = |message| match message {
+            rerun::log::LogMsg::ArrowMsg(_, columns) => {
+                Some(rerun::log::Chunk::from_arrow_msg(&columns).expect("a chunk"))
+            }
+            _ => None,
+        };
+        messages.filter_map(chunk).collect()
+    }
+}
+
+/// A stream of the library with the messages that came out of it.
+struct Stream {
+    stream: RecordingStream,
+    storage: MemorySinkStorage,
+}
+
+impl Stream {
+    fn new(id: &StoreId) -> Result<Self, RecordingStreamError> {
+        // Without a timer, the same run gives the same chunks.
+        let builder = RecordingStreamBuilder::from_store_id(id).batcher_config(ChunkBatcherConfig::NEVER);
+        let (stream, storage) = builder.send_properties(false).enabled(true).memory()?;
+        Ok(Self { stream, storage })
+    }
+}
+
+impl Drop for Stream {
+    /// Ends the threads of the stream. The memory sink holds the stream, and the stream's thread the sink: neither would
+    /// ever end.
+    fn drop(&mut self) {
+        self.stream.disconnect();
+    }
+}
+
+/// Returns a column with one row for each component.
+fn as_columns(what: &dyn AsComponents) -> impl Iterator<Item = SerializedComponentColumn> {
+    what.as_serialized_batches().into_iter().map(SerializedComponentColumn::from)
+}
+
+/// Returns the name of a recording: the first digits of the hash of its texts, which hold all results. The viewer takes
+/// two recordings of the same name for one.
+pub(super) fn name(texts: &[String]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for text in texts {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    hasher.finalize().to_hex().chars().take(NAME_DIGITS).collect()
+}
