@@ -1,11 +1,13 @@
-//! Shading and projection of a body: its faces are lit once, and its triangles are projected once for each moment of
-//! the exposure.
+//! Shading and projection of a body: the faces that can be seen are lit once, and their triangles are projected once for each moment of
+//! the exposure. The moments share a vector, and each lane has the bits of a single moment.
+
+use wide::f32x4;
 
 use super::hash::split;
 use super::light::Illumination;
 use super::mesh::{Mesh, Surface, Texture, Vec3, add_scaled, cross, dot, each, normalised, sub};
 use super::pinhole::Lens;
-use super::raster::{Projection, ScreenTriangle, project};
+use super::raster::{Facing, Projection, ScreenTriangle, project};
 
 /// Number of moments within one exposure at which the scene is sampled, once per pixel each. The mean over these
 /// samples blurs moving objects and smooths edges (Haeberli and Akeley, *The accumulation buffer*, 1990).
@@ -79,21 +81,78 @@ fn transform_point(rotation: &[Vec3; 3], at: Vec3, point: Vec3) -> Vec3 {
     sum
 }
 
-/// Shades the faces of a body, projects them for each moment, and appends the results to `faces` and `moments`. `corners` is
-/// memory that the next call may reuse.
+/// A corner of a body in camera axes (m): its x, y and z, each by moment.
+pub(crate) type Corner = [f32x4; 3];
+
+/// Returns the corners of a body in camera axes, by moment. Each lane takes the steps of a single [`transform_point`].
+fn corners_in_camera(
+    mesh: &Mesh,
+    placement: &Placement,
+    transform: &Transform,
+    shading: &Shading<'_>,
+    corners: &mut Vec<Corner>,
+) {
+    let lens = shading.lens;
+    let shifts: [[f64; 3]; MOMENTS] = std::array::from_fn(|moment| {
+        let delay_s = f64::from(shading.light.exposure_s) * moment_offset(moment);
+        let moved = [placement.velocity[0] * delay_s, placement.velocity[1] * delay_s];
+        lens.in_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0])
+    });
+    let at: Corner = each(|axis| shifts.map(|shift| shift[axis] as f32).into());
+    corners.clear();
+    corners.extend(mesh.vertices.iter().map(|vertex| {
+        let mut sum = at;
+        for (axis, share) in transform.camera_rotation.iter().zip(*vertex) {
+            sum = each(|part| sum[part] + f32x4::splat(axis[part] * share));
+        }
+        sum
+    }));
+    if lens.readout_s > 0.0 {
+        for corner in corners {
+            let mut parts = corner.map(f32x4::to_array);
+            for moment in 0..MOMENTS {
+                let at = each(|part| f64::from(parts[part][moment]));
+                let read = lens.when_read(at, placement.velocity);
+                parts.iter_mut().zip(read).for_each(|(part, read)| part[moment] = read as f32);
+            }
+            *corner = parts.map(f32x4::from);
+        }
+    }
+}
+
+/// Projects the faces of a body for each moment, shades those that face the lens, and appends the results to `faces` and `moments`.
+/// `corners` is memory that the next call may reuse.
 pub(crate) fn add_body(
     mesh: &Mesh,
     placement: &Placement,
     shading: &Shading<'_>,
     (faces, moments): (&mut Vec<Shade>, &mut [Vec<ScreenTriangle>; MOMENTS]),
-    corners: &mut Vec<Vec3>,
+    corners: &mut Vec<Corner>,
 ) {
     let transform = Transform::new(placement, shading.lens);
-    let first = faces.len();
-    corners.clear();
-    corners.extend(mesh.vertices.iter().map(|v| transform_point(&transform.rotation, transform.at, *v)));
+    corners_in_camera(mesh, placement, &transform, shading, corners);
+    let lens = shading.lens;
+    let projection = Projection { focal_px: lens.focal_px as f32, optics: &lens.optics };
     for face in &mesh.faces {
-        let on_ground = face.corners.map(|corner| corners[usize::from(corner)]);
+        let in_camera = face.corners.map(|corner| corners[usize::from(corner)]);
+        let edges = [1, 2].map(|to| each(|part| in_camera[to][part] - in_camera[0][part]));
+        let normal = crossed(edges[0], edges[1]);
+        let offset = normal[0] * in_camera[0][0] + normal[1] * in_camera[0][1] + normal[2] * in_camera[0][2];
+        let facing = offset.simd_lt(f32x4::splat(0.0)).to_bitmask();
+        if facing == 0 {
+            continue;
+        }
+        let index = faces.len() as u32;
+        let (in_camera, normal) = (in_camera.map(|corner| corner.map(f32x4::to_array)), normal.map(f32x4::to_array));
+        let offset = offset.to_array();
+        for (moment, triangles) in moments.iter_mut().enumerate().filter(|(moment, _)| facing >> moment & 1 == 1) {
+            let of_moment = in_camera.map(|corner| corner.map(|part| part[moment]));
+            let plane = Facing { normal: normal.map(|part| part[moment]), offset: offset[moment] };
+            project(of_moment, plane, projection, index, triangles);
+        }
+        let on_ground = face
+            .corners
+            .map(|corner| transform_point(&transform.rotation, transform.at, mesh.vertices[usize::from(corner)]));
         let radiance = shaded_radiance(&on_ground, &face.surface, shading);
         let (map, offset) = match face.surface.texture {
             Texture::Plain => ([[0.0; 3]; 2], [0.0; 2]),
@@ -101,24 +160,11 @@ pub(crate) fn add_body(
         };
         faces.push(Shade { radiance, texture: face.surface.texture, map, offset, instance: placement.instance });
     }
-    let lens = shading.lens;
-    let projection = Projection { focal_px: lens.focal_px as f32, optics: &lens.optics };
-    for (moment, triangles) in moments.iter_mut().enumerate() {
-        let delay_s = f64::from(shading.light.exposure_s) * moment_offset(moment);
-        let moved = [placement.velocity[0] * delay_s, placement.velocity[1] * delay_s];
-        let shift = shading.lens.in_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0]);
-        let at = shift.map(|part| part as f32);
-        for (to, from) in corners.iter_mut().zip(&mesh.vertices) {
-            *to = transform_point(&transform.camera_rotation, at, *from);
-            if lens.readout_s > 0.0 {
-                *to = lens.when_read(to.map(f64::from), placement.velocity).map(|part| part as f32);
-            }
-        }
-        for (index, face) in mesh.faces.iter().enumerate() {
-            let in_camera = face.corners.map(|corner| corners[usize::from(corner)]);
-            project(in_camera, projection, (first + index) as u32, triangles);
-        }
-    }
+}
+
+/// [`cross`] of each moment.
+fn crossed(a: Corner, b: Corner) -> Corner {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Returns the time of a moment relative to the middle of the exposure, in units of the exposure time (−½ to ½).
@@ -219,8 +265,30 @@ pub(crate) fn texture_factor(texture: Texture, u: f32, v: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::{Check, Environment, Parameters, SceneVehicle, Vehicle, VehicleClass, VehicleState};
+
     use super::*;
+    use crate::CameraConfig;
     use crate::mesh::Emission;
+
+    #[test]
+    fn the_faces_of_a_block_that_face_away_are_neither_shaded_nor_rendered() {
+        let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+        let state = VehicleState::default();
+        let ego = SceneVehicle { actor: 0, vehicle: Vehicle::typical(VehicleClass::Car), state, pitch_rad: 0.0 };
+        let lens = Lens::new(&camera, &ego);
+        let light = Illumination::new(&Environment::CLEAR_DAY, &camera, &state, 0.0);
+        let mut mesh = Mesh::default();
+        mesh.block([0.0, 0.0, 0.5], [0.5; 3], Surface::METAL);
+        let placement =
+            Placement { at: [-20.0, 0.0], turn: [1.0, 0.0], pitch_rad: 0.0, velocity: [3.0, 0.0], instance: 1 };
+        let shading = Shading { lens: &lens, light: &light, indicators: [false; 2] };
+        let (mut faces, mut moments) = (Vec::new(), <[Vec<ScreenTriangle>; MOMENTS]>::default());
+        add_body(&mesh, &placement, &shading, (&mut faces, &mut moments), &mut Vec::new());
+        // Two triangles ahead and two on top. The lens is above the block, and does not see its sides.
+        assert_eq!((mesh.faces.len(), faces.len()), (12, 4));
+        assert_eq!(moments.map(|triangles| triangles.len()), [4; MOMENTS]);
+    }
 
     #[test]
     fn moments_are_spread_evenly_about_the_middle_of_the_exposure() {

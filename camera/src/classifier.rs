@@ -134,10 +134,9 @@ impl Classifier {
     /// Returns [`ClassifierError::Run`] if inference fails, and [`ClassifierError::Answer`] if the output is not four
     /// probabilities.
     pub fn classify(&mut self, crop: &Crop) -> Result<ClassScores, ClassifierError> {
-        for (sample, rgb) in crop.rgb.chunks_exact(CHANNELS).enumerate().take(SAMPLES) {
-            for (channel, value) in rgb.iter().enumerate() {
-                self.planes[channel * SAMPLES + sample] = f32::from(*value);
-            }
+        for (channel, plane) in self.planes.chunks_exact_mut(SAMPLES).enumerate() {
+            let values = crop.rgb[channel..].iter().step_by(CHANNELS);
+            plane.iter_mut().zip(values).for_each(|(to, value)| *to = f32::from(*value));
         }
         let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
         let shape = [1, CHANNELS, CROP_PX, CROP_PX];

@@ -2,6 +2,8 @@
 //!
 //! Each pixel is a function of (scene, pixel, key) alone, and does not depend on what was rendered before.
 
+use wide::f32x4;
+
 use super::Frame;
 use super::background::Background;
 use super::body::{MOMENTS, texture_factor};
@@ -9,6 +11,7 @@ use super::frame::{Bounds, touches};
 use super::glow::{self, Glow};
 use super::ground::{GroundLight, Patch};
 use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
+use super::lanes::{mean, through_air};
 use super::line::Line;
 use super::mesh::{Texture, Vec3, dot, each};
 use super::pinhole::{HEIGHT_PX, PixelRect, WIDTH_PX};
@@ -102,14 +105,14 @@ impl Frame {
     /// Returns the share of the latest crop's samples that show the vehicle with the index `other` in the scene's list
     /// of other vehicles.
     pub fn instance_share(&self, other: usize) -> f64 {
-        let samples = self.lists.visibility[0].face.len();
+        let samples = self.lists.visibility.face.len();
         let hits = (0..samples).filter(|sample| usize::from(self.instance(*sample)) == other + 1).count();
         hits as f64 / samples.max(1) as f64
     }
 
     /// Returns the instance number that a sample of the latest rendering shows, or 0 if it shows no vehicle.
     fn instance(&self, sample: usize) -> u16 {
-        let face = self.lists.visibility[0].face[sample] as usize;
+        let face = self.lists.visibility.face[sample][0] as usize;
         self.lists.faces.get(face).map_or(0, |shade| shade.instance)
     }
 
@@ -121,12 +124,12 @@ impl Frame {
             return;
         };
         let bounds = [*left as f32, *top as f32, *right as f32 + 1.0, *bottom as f32 + 1.0];
+        self.lists.visibility.clear(columns.len() * rows.len());
         for moment in 0..MOMENTS {
             let lattice = Lattice { columns, rows, subpixel: self.subpixel[moment] };
-            self.lists.visibility[moment].clear(columns.len() * rows.len());
             for object in self.lists.objects.iter().filter(|object| touches(&object.bounds, &bounds)) {
-                self.lists.visibility[moment]
-                    .draw(&self.lists.triangles[moment][object.triangles[moment].clone()], &lattice);
+                let triangles = &self.lists.triangles[moment][object.triangles[moment].clone()];
+                self.lists.visibility.draw(moment, triangles, &lattice);
             }
         }
         let mut of_tile = std::mem::take(&mut self.lists.effects);
@@ -151,7 +154,7 @@ impl Frame {
         let pixel = [line.columns[place], line.row];
         let left_px = pixel[0] as f32;
         let (centre, length) = line.centre(self, place);
-        let (mut light, nearness) = match self.unobstructed((sample, place), length, line) {
+        let (mut light, nearness) = match self.at_once((sample, place), length, line) {
             Some(found) => found,
             None => self.moment_by_moment((sample, place), length, line),
         };
@@ -193,17 +196,57 @@ impl Frame {
         self.light.sun[0] > 0.0 && towards_sun > glow::NO_GLARE_TO_COSINE * length
     }
 
-    /// Returns the mean radiance of a pixel that shows nothing but background of one kind, and the sum of 1/depth over its moments (1/m).
-    /// Returns `None` for other pixels.
+    /// Returns the mean radiance of a pixel that shows nothing but bodies, or nothing but background of one kind, and the sum of 1/depth
+    /// over its moments (1/m). Returns `None` for other pixels.
     #[inline]
-    fn unobstructed(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> Option<(Vec3, f32)> {
-        if self.lists.visibility.iter().any(|of_moment| of_moment.inverse_depth[sample] > 0.0) {
-            return None;
+    fn at_once(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> Option<(Vec3, f32)> {
+        let inverse_depth = f32x4::from(self.lists.visibility.inverse_depth[sample]);
+        match inverse_depth.simd_gt(f32x4::splat(0.0)).to_bitmask() {
+            0 => {}
+            0b1111 => return Some(self.bodies((sample, place), inverse_depth, length, line)),
+            _ => return None,
         }
         let x = (!matches!(line.background, Background::Mixed)).then(|| line.x(place))?;
         let lit =
             GroundLight { light: &self.light, patches: &line.effects.patches, left_px: line.columns[place] as f32 };
         self.background(&line.background, (x, length), &lit, &mut line.background_noise)
+    }
+
+    /// Returns the mean radiance of a pixel that shows a body at each moment, and the sum of 1/depth over its moments (1/m).
+    #[inline]
+    fn bodies(
+        &self,
+        (sample, place): (usize, usize),
+        inverse_depth: f32x4,
+        length: f32,
+        line: &Line<'_>,
+    ) -> (Vec3, f32) {
+        let depth = f32x4::splat(1.0) / inverse_depth;
+        let depths = depth.to_array();
+        let faces = self.lists.visibility.face[sample];
+        let mut of_moments = [[0.0; MOMENTS]; 3];
+        for moment in 0..MOMENTS {
+            let radiance = self.of_face(faces[moment], (place, moment), depths[moment], line);
+            for (of_moments, part) in of_moments.iter_mut().zip(radiance) {
+                of_moments[moment] = part;
+            }
+        }
+        let seen = through_air(&self.light, of_moments.map(f32x4::from), depth * f32x4::splat(length));
+        (mean(seen), inverse_depth.to_array().into_iter().fold(0.0, |sum, part| sum + part))
+    }
+
+    /// Returns the radiance of a face at this depth (m), before the air, in the sample of a moment at a place of the row.
+    #[inline]
+    fn of_face(&self, face: u32, (place, moment): (usize, usize), depth: f32, line: &Line<'_>) -> Vec3 {
+        let shade = &self.lists.faces[face as usize];
+        if shade.texture == Texture::Plain {
+            return shade.radiance;
+        }
+        let ray = line.ray(self, place, moment);
+        let at = [ray[0] * depth, ray[1] * depth, depth];
+        let [u, v] = [0, 1].map(|axis| dot(shade.map[axis], at) + shade.offset[axis]);
+        let factor = texture_factor(shade.texture, u, v);
+        shade.radiance.map(|part| part * factor)
     }
 
     /// Returns the mean radiance of a pixel, and the sum of 1/depth over its moments (1/m).
@@ -223,21 +266,13 @@ impl Frame {
     /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky. The sample is given by its index in the
     /// lattice and in the row, and `length` is that of the ray through the middle of the pixel.
     fn sample(&self, (sample, place): (usize, usize), moment: usize, length: f32, line: &mut Line<'_>) -> (Vec3, f32) {
-        let ray = line.ray(self, place, moment);
-        let inverse_depth = self.lists.visibility[moment].inverse_depth[sample];
+        let inverse_depth = self.lists.visibility.inverse_depth[sample][moment];
         if inverse_depth > 0.0 {
             let depth = 1.0 / inverse_depth;
-            let shade = &self.lists.faces[self.lists.visibility[moment].face[sample] as usize];
-            let mut radiance = shade.radiance;
-            if shade.texture != Texture::Plain {
-                let at = [ray[0] * depth, ray[1] * depth, depth];
-                let [u, v] = [0, 1].map(|axis| dot(shade.map[axis], at) + shade.offset[axis]);
-                let factor = texture_factor(shade.texture, u, v);
-                radiance = radiance.map(|part| part * factor);
-            }
+            let radiance = self.of_face(self.lists.visibility.face[sample][moment], (place, moment), depth, line);
             return (self.through_air(radiance, depth * length), inverse_depth);
         }
-        let direction = self.lens.ray_in_ground(ray);
+        let direction = self.lens.ray_in_ground(line.ray(self, place, moment));
         let height = self.lens.height_m as f32;
         let slope = || direction[2] / (direction[0] * direction[0] + direction[1] * direction[1]).sqrt();
         if line.is_ground[moment] || slope() * GROUND_TO_M < -height {

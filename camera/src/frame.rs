@@ -12,7 +12,7 @@
 
 use closecall_traffic::{Indicator, Time};
 
-use super::body::{MOMENTS, Placement, Shade, Shading, add_body, moment_offset};
+use super::body::{Corner, MOMENTS, Placement, Shade, Shading, add_body, moment_offset};
 use super::draw::Effects;
 use super::glow::Glow;
 use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
@@ -79,14 +79,14 @@ pub struct FrameBuffers {
     pub(super) clouds: Vec<(Bounds, Cloud)>,
     pub(super) glows: Vec<(Bounds, Glow)>,
     pub(super) veils: Vec<Veil>,
-    pub(super) visibility: [Visibility; MOMENTS],
+    pub(super) visibility: Visibility,
     /// What may affect the pixels that are being rendered.
     pub(super) effects: Effects,
     /// Memory of the row that is being rendered.
     pub(super) line: LineMemory,
-    /// The body that is being added, and its corners in the frame of the ground or of the camera.
+    /// The body that is being added, and its corners in camera axes.
     mesh: Mesh,
-    corners: Vec<Vec3>,
+    corners: Vec<Corner>,
     roadside: Vec<Roadside>,
 }
 

@@ -4,7 +4,8 @@
 //! rasterization*, 1988) then decide whether a sample lies inside a triangle. They have no rounding error: adjacent
 //! triangles leave no gaps, and the result for one pixel does not depend on which other pixels are rendered.
 
-use super::mesh::{Vec3, cross, dot, sub};
+use super::body::MOMENTS;
+use super::mesh::Vec3;
 use super::optics::Optics;
 use super::pinhole::{HEIGHT_PX, NEAR_M, WIDTH_PX};
 
@@ -35,32 +36,32 @@ pub(crate) struct Lattice<'a> {
     pub(crate) subpixel: [i32; 2],
 }
 
-/// The depth buffer, and the visible face of each sample.
+/// The depth buffer, and the visible face of each sample, both by moment.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Visibility {
     /// 1/depth (1/m), or 0 if the sample shows no body.
-    pub(crate) inverse_depth: Vec<f32>,
+    pub(crate) inverse_depth: Vec<[f32; MOMENTS]>,
     /// Index of the visible face, or `u32::MAX` if the sample shows no body.
-    pub(crate) face: Vec<u32>,
+    pub(crate) face: Vec<[u32; MOMENTS]>,
 }
 
 impl Visibility {
     /// Clears the buffer and resizes it to `samples` samples.
     pub(crate) fn clear(&mut self, samples: usize) {
         self.inverse_depth.clear();
-        self.inverse_depth.resize(samples, 0.0);
+        self.inverse_depth.resize(samples, [0.0; MOMENTS]);
         self.face.clear();
-        self.face.resize(samples, u32::MAX);
+        self.face.resize(samples, [u32::MAX; MOMENTS]);
     }
 
-    /// Rasterises triangles into the buffer.
-    pub(crate) fn draw(&mut self, triangles: &[ScreenTriangle], lattice: &Lattice<'_>) {
+    /// Rasterises the triangles of a moment into the buffer.
+    pub(crate) fn draw(&mut self, moment: usize, triangles: &[ScreenTriangle], lattice: &Lattice<'_>) {
         for triangle in triangles {
-            self.draw_one(triangle, lattice);
+            self.draw_one(moment, triangle, lattice);
         }
     }
 
-    fn draw_one(&mut self, triangle: &ScreenTriangle, lattice: &Lattice<'_>) {
+    fn draw_one(&mut self, moment: usize, triangle: &ScreenTriangle, lattice: &Lattice<'_>) {
         let [left, right, top, bottom] = triangle.bounds;
         let [subpixel_x, subpixel_y] = lattice.subpixel;
         let misses = |positions: &[i32], subpixel: i32, low: i32, high: i32| match (positions.first(), positions.last())
@@ -95,9 +96,10 @@ impl Visibility {
                 }
                 let inverse_depth = (triangle.inverse_depth[0] * x as f64 + depth_of_row) as f32;
                 let sample = row * width + column;
-                if inverse_depth > self.inverse_depth[sample] {
-                    self.inverse_depth[sample] = inverse_depth;
-                    self.face[sample] = triangle.face;
+                let nearest = &mut self.inverse_depth[sample][moment];
+                if inverse_depth > *nearest {
+                    *nearest = inverse_depth;
+                    self.face[sample][moment] = triangle.face;
                 }
             }
         }
@@ -113,16 +115,23 @@ pub(crate) struct Projection<'a> {
     pub(crate) optics: &'a Optics,
 }
 
-/// Projects a triangle given in camera axes (m) and appends its visible part to `out`. Appends nothing if the triangle
-/// faces away from the lens.
-pub(crate) fn project(corners: [Vec3; 3], projection: Projection<'_>, face: u32, out: &mut Vec<ScreenTriangle>) {
-    let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
-    let offset = dot(normal, corners[0]);
-    // The lens is the origin of the camera axes, so a face is seen from outside if the origin lies in front of its
-    // plane.
-    if !(offset < 0.0) {
-        return;
-    }
+/// The plane of a triangle in camera axes, normal · p = offset. The length of the normal is twice the triangle's area.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facing {
+    /// The normal, which points outwards (m²).
+    pub(crate) normal: Vec3,
+    /// The offset (m³). The lens is the origin of the camera axes, so that a triangle is seen from outside if the offset is negative.
+    pub(crate) offset: f32,
+}
+
+/// Projects a triangle given in camera axes (m), which is seen from outside, and appends its visible part to `out`.
+pub(crate) fn project(
+    corners: [Vec3; 3],
+    Facing { normal, offset }: Facing,
+    projection: Projection<'_>,
+    face: u32,
+    out: &mut Vec<ScreenTriangle>,
+) {
     let focal_px = f64::from(projection.focal_px);
     let plane = Plane { normal: normal.map(f64::from), offset: f64::from(offset), focal_px };
     let near = NEAR_M as f32;
@@ -179,11 +188,18 @@ fn interpolated(corners: [[i32; 2]; 3], values: [f64; 3]) -> [f64; 3] {
     [a, b, values[0] - a * from[0] - b * from[1]]
 }
 
+/// Rounds to the nearest integer, halves away from zero, as `f32::round` does: that is a call of the C library.
+#[expect(clippy::cast_possible_truncation, reason = "a float cast saturates")]
+fn rounded(x: f32) -> i32 {
+    // With a whole half, the sum of the number just below a half would round up to 1.
+    const BELOW_HALF: f32 = 0.5_f32.next_down();
+    (x + BELOW_HALF.copysign(x)) as i32
+}
+
 /// Projects a point in camera axes to the fixed-point grid.
-#[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and the near plane bounds the quotient")]
 fn snap([x, y, z]: Vec3, Projection { focal_px, optics }: Projection<'_>) -> [i32; 2] {
     let steps = SUBPIXEL_STEPS as f32;
-    let to_grid = |centre: u16, offset: f32| ((f32::from(centre) / 2.0 + offset) * steps).round() as i32;
+    let to_grid = |centre: u16, offset: f32| rounded((f32::from(centre) / 2.0 + offset) * steps);
     if optics.is_straight() {
         return [to_grid(WIDTH_PX, focal_px * x / z), to_grid(HEIGHT_PX, focal_px * y / z)];
     }
@@ -222,7 +238,10 @@ fn edge(a: [i32; 2], b: [i32; 2]) -> [i64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::mesh::{cross, dot, sub};
 
     const PINHOLE: Projection<'_> = Projection { focal_px: 1000.0, optics: &STRAIGHT };
     const STRAIGHT: Optics = Optics { distortion: [0.0; 2], vignetting: 0.0, surface_reflectance: 0.0 };
@@ -230,8 +249,27 @@ mod tests {
     fn rasterised(triangles: &[ScreenTriangle], columns: &[i32], rows: &[i32]) -> Visibility {
         let mut visibility = Visibility::default();
         visibility.clear(columns.len() * rows.len());
-        visibility.draw(triangles, &Lattice { columns, rows, subpixel: [128, 128] });
+        visibility.draw(0, triangles, &Lattice { columns, rows, subpixel: [128, 128] });
         visibility
+    }
+
+    /// Projects a triangle, unless it faces away from the lens.
+    fn project(corners: [Vec3; 3], projection: Projection<'_>, face: u32, out: &mut Vec<ScreenTriangle>) {
+        let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+        let offset = dot(normal, corners[0]);
+        if offset < 0.0 {
+            super::project(corners, Facing { normal, offset }, projection, face, out);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_number_is_rounded_as_the_library_rounds_it(bits in any::<u32>(), steps in -2_000_i16..2_000) {
+            let near_half = f32::from(steps) + 0.5;
+            for x in [f32::from_bits(bits), near_half, near_half.next_down(), near_half.next_up()] {
+                prop_assert_eq!(rounded(x), x.round() as i32, "{}", x);
+            }
+        }
     }
 
     /// Returns two triangles that form the square from −1 to 1 at depth 10, seen from outside.
@@ -249,19 +287,12 @@ mod tests {
         let rows: Vec<i32> = (290..510).collect();
         let triangles = square();
         let both = rasterised(&triangles, &columns, &rows);
-        let hits = |visibility: &Visibility| visibility.face.iter().filter(|face| **face != u32::MAX).count();
+        let hits = |visibility: &Visibility| visibility.face.iter().filter(|face| face[0] != u32::MAX).count();
         assert_eq!(hits(&both), 200 * 200);
         let single: usize =
             triangles.iter().map(|one| hits(&rasterised(std::slice::from_ref(one), &columns, &rows))).sum();
         assert_eq!(single, 200 * 200);
-        assert!(both.inverse_depth.iter().all(|w| *w == 0.0 || (w - 0.1).abs() < 1e-6));
-    }
-
-    #[test]
-    fn a_triangle_that_faces_away_is_not_rendered() {
-        let mut out = Vec::new();
-        project([[-1.0, 1.0, 10.0], [1.0, -1.0, 10.0], [1.0, 1.0, 10.0]], PINHOLE, 0, &mut out);
-        assert!(out.is_empty());
+        assert!(both.inverse_depth.iter().all(|[w, ..]| *w == 0.0 || (w - 0.1).abs() < 1e-6));
     }
 
     #[test]
@@ -272,7 +303,7 @@ mod tests {
         let backwards: Vec<_> = near.into_iter().chain(square()).collect();
         let (columns, rows): (Vec<i32>, Vec<i32>) = ((600..700).collect(), (380..420).collect());
         assert_eq!(rasterised(&forwards, &columns, &rows).face, rasterised(&backwards, &columns, &rows).face);
-        assert!(rasterised(&forwards, &columns, &rows).face.contains(&7));
+        assert!(rasterised(&forwards, &columns, &rows).face.iter().any(|face| face[0] == 7));
     }
 
     #[test]

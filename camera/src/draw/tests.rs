@@ -17,8 +17,8 @@ fn vehicle(class: VehicleClass, [s_m, d_m]: [f64; 2]) -> SceneVehicle {
     SceneVehicle { actor: 1, vehicle: Vehicle::typical(class), state, pitch_rad: 0.002 }
 }
 
-/// Returns the number of pixels of one kind and that of all, after a comparison of both ways.
-fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize; 2] {
+/// Returns the number of pixels of one kind, that of those that show a body, and that of all, after a comparison of both ways.
+fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize; 3] {
     let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
     let mut ego = vehicle(VehicleClass::Car, [731.3, -5.4]);
     ego.state.heading_rad = heading_rad;
@@ -35,7 +35,7 @@ fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize;
         clouds: frame.lists.clouds.clone(),
         glows: frame.lists.glows.clone(),
     };
-    let mut counts = [0; 2];
+    let mut counts = [0; 3];
     let mut rgb = vec![0; columns.len() * CHANNELS];
     for row in (0..800).step_by(3) {
         frame.draw(&columns, &[row], &mut rgb);
@@ -44,9 +44,10 @@ fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize;
         for (place, column) in columns.iter().enumerate() {
             let (_, length) = line.centre(&frame, place);
             let singly = frame.moment_by_moment((place, place), length, &mut line);
-            counts[1] += 1;
-            if let Some(at_once) = frame.unobstructed((place, place), length, &mut line) {
+            counts[2] += 1;
+            if let Some(at_once) = frame.at_once((place, place), length, &mut line) {
                 counts[0] += 1;
+                counts[1] += usize::from(frame.instance(place) > 0);
                 assert_eq!(bits(at_once), bits(singly), "row {row}, column {column}");
             }
         }
@@ -65,9 +66,10 @@ fn pixels_of_one_kind_have_the_bits_of_their_moments() {
         for (road, heading_rad) in
             [(&straight, 0.0), (&straight, -0.03), (&Road::straight(2).with_curvature(-0.002), 0.02)]
         {
-            let [of_one_kind, all] = compared(road, &environment, heading_rad);
-            // Nearly all of the image is nothing but ground or sky.
+            let [of_one_kind, of_bodies, all] = compared(road, &environment, heading_rad);
+            // Nearly all of the image is nothing but ground, sky or vehicles.
             assert!(of_one_kind * 10 > all * 8 && of_one_kind < all, "{of_one_kind} of {all}");
+            assert!(of_bodies > 100, "{of_bodies}");
         }
     }
 }
