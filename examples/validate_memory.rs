@@ -5,8 +5,8 @@
 //! cargo build --release && cargo run --release --example validate_memory -- modes
 //! ```
 //!
-//! The second command runs short paired campaigns in each mode, with one and with two threads, with and without recordings. The program is read
-//! once before, so that the kernel has all of it at hand: that is the worst case, as it then maps the surroundings of each page that is used.
+//! The second command runs short paired campaigns in each mode, with one and with two threads, with and without recordings. It first reads the
+//! program once, so that the kernel has all of it at hand. That is the worst case: the kernel then maps the surroundings of each page that is used.
 //!
 //! The first command measures the growth with the samples.
 //! The scenario is `low-thw-overtake` with object-level sensors, cut to 2 s, so that a million samples take minutes. The

@@ -22,7 +22,6 @@ pub mod page {
 }
 pub mod heartbeat;
 pub mod json;
-mod memory;
 pub mod run;
 pub mod study;
 pub mod traffic;

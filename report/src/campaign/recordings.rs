@@ -12,7 +12,6 @@ use closecall_simulation::scenario::ScenarioFile;
 use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
-use crate::memory::return_free_memory;
 use crate::run::figure::{scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording_of;
@@ -98,13 +97,9 @@ fn choose<'a>(
 
 fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<IndexEntry, ReportError> {
     let sample = chosen.sample;
-    // Of the samples of the campaign, and of the recording before.
-    return_free_memory();
     let (concrete, key) = saved.sample(Some(scenario), sample)?;
     let films = film_arms(&concrete, key, &saved.manifest().arms(), Level::Full)
         .map_err(|source| ReportError::Sample { sample, source })?;
-    // Of the sensors of this sample.
-    return_free_memory();
     let settings = saved.manifest().settings();
     let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
     let films: Vec<Film> = films.into_iter().map(named).collect();

@@ -13,7 +13,6 @@ use super::{
     bird, camera, collisions, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth,
     vehicles,
 };
-use crate::memory::return_free_memory;
 use crate::run::film::{Film, Level};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 
@@ -76,7 +75,6 @@ pub(crate) fn write_recording_of(path: &Path, films: Vec<Film>) -> Result<(), Re
     check_recording_possible(path)?;
     let recording = record(&films)?;
     drop(films);
-    return_free_memory();
     write(path, recording)
 }
 
