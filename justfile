@@ -1,3 +1,48 @@
+# What CI and CONTRIBUTING.md name. `just` lists the recipes.
+
+_default:
+    @just --list
+
+# Builds the program as it is released.
+build:
+    cargo build --release
+
+# Runs all tests. One that lacks something outside the repository says so, see CONTRIBUTING.md.
+test *arguments:
+    cargo test --release --workspace {{arguments}}
+
+# Formats the code.
+format:
+    cargo fmt --all
+
+# Checks everything that a change must pass.
+check:
+    bash .ci/run
+
+# Checks the lints.
+lint:
+    cargo clippy --release --workspace --all-targets -- -D warnings
+
+# Checks the spelling. Needs `typos` (`pip install typos`).
+spell:
+    typos
+
+# Writes docs/reference/scenario.md and docs/evidence/determinism.json from the code.
+references:
+    cargo run --release --example write_references
+
+# Writes the results that the documentation shows (hours).
+evidence: references
+    cargo run --release --example write_mis -- -n 2000 --member-samples 400 --seed 1001
+
+# Measures the peak memory of each mode.
+memory: build
+    cargo run --release --example validate_memory -- modes
+
+# Measures the speed of each mode.
+speed:
+    cargo run --release --example throughput
+
 # Builds the book in target/book. Needs mdBook (`cargo install mdbook`).
 book:
     mdbook build docs
