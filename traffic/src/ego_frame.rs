@@ -12,8 +12,8 @@
 //! the ego, so a run at s = 100 km is as exact as one at s = 0. A rotation by the ego's heading relative to the road
 //! turns (a, b) into (x, y).
 
-use crate::{Lane, Road, Side, VehicleState};
-use statrs::function::erf::erfc;
+use crate::maths::erfc;
+use crate::{Lane, Road, Side, VehicleState, maths};
 
 /// Number of standard deviations from a lane's edge beyond which a vehicle is certainly on one side of it (the
 /// neglected probability is below 3e-7).
@@ -45,7 +45,7 @@ pub struct RoadPoint {
 impl<'a> EgoFrame<'a> {
     /// Creates the frame of an ego with this state.
     pub fn new(road: &'a Road, ego: &VehicleState) -> Self {
-        let (sin, cos) = ego.heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(ego.heading_rad);
         Self { road, s_m: ego.s_m, d_m: ego.d_m, heading_rad: ego.heading_rad, sin, cos, lane: road.lane_at(ego.d_m) }
     }
 
@@ -57,8 +57,8 @@ impl<'a> EgoFrame<'a> {
         if curvature != 0.0 {
             turn_rad = curvature * along_m;
             let radius_m = 1.0 / curvature - d_m;
-            let half_sin = (0.5 * turn_rad).sin();
-            along_m = radius_m * turn_rad.sin();
+            let half_sin = maths::sin(0.5 * turn_rad);
+            along_m = radius_m * maths::sin(turn_rad);
             across_m += radius_m * 2.0 * half_sin * half_sin;
         }
         RoadPoint {
@@ -75,7 +75,7 @@ impl<'a> EgoFrame<'a> {
         let curvature = self.road.curvature_per_m();
         let arc_length_m = match curvature {
             0.0 => along_m,
-            _ => (curvature * along_m).atan2(1.0 - curvature * (self.d_m + across_m)) / curvature,
+            _ => maths::atan2(curvature * along_m, 1.0 - curvature * (self.d_m + across_m)) / curvature,
         };
         (self.s_m + arc_length_m, self.lateral_position_m(x_m, y_m))
     }
@@ -96,7 +96,7 @@ impl<'a> EgoFrame<'a> {
         // lateral offset from a circle, and equals `across_m` for a straight line.
         let line_per_m = curvature / (1.0 - curvature * self.d_m);
         let offset_m = (2.0 * across_m - line_per_m * (along_m * along_m + across_m * across_m))
-            / (1.0 + (line_per_m * along_m).hypot(1.0 - line_per_m * across_m));
+            / (1.0 + maths::hypot(line_per_m * along_m, 1.0 - line_per_m * across_m));
         self.d_m + offset_m
     }
 
@@ -152,7 +152,7 @@ mod tests {
             let point = EgoFrame::new(&road, &state).point(100.0 + ds, d);
             let own = road.plane_pose(100.0, own_d, heading);
             let other = road.plane_pose(100.0 + ds, d, 0.0);
-            let (sin, cos) = own.yaw_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(own.yaw_rad);
             let (dx, dy) = (other.x_m - own.x_m, other.y_m - own.y_m);
             prop_assert!((point.x_m - (dx * cos + dy * sin)).abs() < 1e-7);
             prop_assert!((point.y_m - (dy * cos - dx * sin)).abs() < 1e-7);

@@ -1,6 +1,6 @@
 //! How much light the air absorbs and scatters.
 
-use crate::Environment;
+use crate::{Environment, maths};
 
 /// Product of extinction and meteorological visibility V, the distance at which contrast falls to 2 %: α = ln 50 / V
 /// (Koschmieder 1924).
@@ -12,5 +12,5 @@ const RAIN_EXPONENT: f64 = 0.67;
 
 /// Returns the extinction of the rain (dB/km).
 pub fn rain_db_per_km(environment: &Environment) -> f64 {
-    RAIN_DB_PER_KM * environment.rain_mm_per_h.powf(RAIN_EXPONENT)
+    RAIN_DB_PER_KM * maths::powf(environment.rain_mm_per_h, RAIN_EXPONENT)
 }

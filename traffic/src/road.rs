@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
-use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig};
+use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig, maths};
 
 /// A lateral side: left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -285,7 +285,7 @@ impl Road {
             return PlanePose { x_m: s_m, y_m: d_m, yaw_rad: heading_rad };
         }
         let angle = curvature * s_m;
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = maths::sin_cos(angle);
         PlanePose {
             x_m: sin / curvature - d_m * sin,
             y_m: (1.0 - cos) / curvature + d_m * cos,
@@ -302,8 +302,8 @@ impl Road {
         // Distance and bearing from the centre of the circle at (0, 1/κ).
         let radius = 1.0 / curvature;
         let (to_x, to_y) = (x_m, y_m - radius);
-        let angle = if curvature > 0.0 { to_x.atan2(-to_y) } else { -to_x.atan2(to_y) };
-        (angle * radius, radius - to_x.hypot(to_y) * radius.signum())
+        let angle = if curvature > 0.0 { maths::atan2(to_x, -to_y) } else { -maths::atan2(to_x, to_y) };
+        (angle * radius, radius - maths::hypot(to_x, to_y) * radius.signum())
     }
 }
 

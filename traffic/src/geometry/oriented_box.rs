@@ -12,7 +12,7 @@ use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Dimensions, PlanePose};
+use crate::{Dimensions, PlanePose, maths};
 
 /// One side of a vehicle's box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -74,7 +74,7 @@ impl OrientedBox {
 
     /// Returns the four corners (m), counter-clockwise: front left, rear left, rear right, front right.
     pub fn corners_m(&self) -> [Vector2<f64>; 4] {
-        let (sin, cos) = self.yaw_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(self.yaw_rad);
         let along = Vector2::new(cos, sin) * (0.5 * self.length_m);
         let across = Vector2::new(-sin, cos) * (0.5 * self.width_m);
         [along + across, across - along, -along - across, along - across].map(|offset| self.centre_m() + offset)
@@ -82,6 +82,6 @@ impl OrientedBox {
 
     /// Returns the radius of the circle through the corners (m).
     pub fn radius_m(&self) -> f64 {
-        0.5 * self.length_m.hypot(self.width_m)
+        0.5 * maths::hypot(self.length_m, self.width_m)
     }
 }

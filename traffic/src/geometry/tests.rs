@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde::de::{IntoDeserializer, value};
 
 use super::*;
+use crate::maths;
 
 const CAR: OrientedBox = OrientedBox { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0, length_m: 4.0, width_m: 2.0 };
 
@@ -128,7 +129,7 @@ fn a_cut_in_with_the_front_corner_strikes_a_side() {
     // It comes from the left and is turned to the right: its front right corner meets the left side of the other box.
     let contact = first_contact(&car(-2.0, 3.5, -0.3), &car(-1.5, 2.0, -0.3), &CAR, &CAR).unwrap();
     assert_eq!(contact.sides[1], BoxSide::Left);
-    let corner_beside = 2.0 * 0.3_f64.sin() + 0.3_f64.cos();
+    let corner_beside = 2.0 * maths::sin(0.3) + maths::cos(0.3);
     assert!((contact.fraction - (3.5 - corner_beside - 1.0) / 1.5).abs() < 1e-12);
 }
 
@@ -137,7 +138,7 @@ fn a_turning_corner_in_closed_form() {
     // The corner at the angle atan(1/2) rises as √5·sin(angle) and meets the lower side of the wall at 1.8 m.
     let wall = OrientedBox { x_m: 0.0, y_m: 2.3, yaw_rad: 0.0, length_m: 50.0, width_m: 1.0 };
     let contact = first_contact(&CAR, &car(0.0, 0.0, 0.8), &wall, &wall).unwrap();
-    let angle = (1.8 / 5.0_f64.sqrt()).asin() - 0.5_f64.atan();
+    let angle = maths::asin(1.8 / 5.0_f64.sqrt()) - maths::atan(0.5);
     assert!((contact.fraction - angle / 0.8).abs() < 1e-9, "{} {}", contact.fraction, angle / 0.8);
     assert_eq!(contact.sides[1], BoxSide::Right);
     // The corner reaches at most √5 m = 2.236 m, so it never touches a wall at 2.3 m. A wall just beyond √5 m stays
@@ -176,7 +177,7 @@ fn vehicles_that_meet_head_on_cannot_tunnel() {
 fn a_tail_that_swings_out_and_back_within_a_step_touches() {
     // The corner of a truck rises by 0.01 m above the lower side of a wall half-way through the step.
     let truck = |yaw_rad: f64| OrientedBox { yaw_rad, length_m: 16.0, width_m: 2.5, ..CAR };
-    let upright = FRAC_PI_2 - (1.25 / 8.0_f64).atan();
+    let upright = FRAC_PI_2 - maths::atan(1.25 / 8.0_f64);
     let reach_m = truck(0.0).radius_m();
     let wall = |clearance_m: f64| OrientedBox { y_m: reach_m + clearance_m + 0.5, length_m: 50.0, width_m: 1.0, ..CAR };
     let swings = |clearance_m: f64| {

@@ -28,7 +28,7 @@
 use nalgebra::Vector2;
 
 use crate::geometry::OrientedBox;
-use crate::{Absent, Measured};
+use crate::{Absent, Measured, maths};
 
 /// Difference below which the ends of a side pass equally near, so that the side counts as parallel to the course (m).
 const PARALLEL_M: f64 = 1e-9;
@@ -175,7 +175,7 @@ impl Course {
 
 /// Returns the half axes of a box along its length and width (m), each with a unit vector perpendicular to it.
 fn half_axes(shape: &OrientedBox) -> [(Vector2<f64>, Vector2<f64>); 2] {
-    let (sin, cos) = shape.yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(shape.yaw_rad);
     let (forward, left) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
     [(forward * (0.5 * shape.length_m), left), (left * (0.5 * shape.width_m), forward)]
 }

@@ -6,8 +6,8 @@ use nalgebra::{Rotation2, Vector2};
 use proptest::prelude::*;
 
 use super::*;
-use crate::Absent;
 use crate::geometry::{OrientedBox, first_contact};
+use crate::{Absent, maths};
 
 const HORIZON_S: f64 = 10.0;
 
@@ -146,7 +146,7 @@ proptest! {
         let step_s = HORIZON_S / f64::from(STEPS);
         let scan = (0..=STEPS).map(|step| distance_after_m(&a, &b, f64::from(step) * step_s));
         let nearest_m = scan.fold(f64::INFINITY, f64::min);
-        let speed_mps = (b.vx_mps - a.vx_mps).hypot(b.vy_mps - a.vy_mps);
+        let speed_mps = maths::hypot(b.vx_mps - a.vx_mps, b.vy_mps - a.vy_mps);
         match closest_encounter(&a, &b, HORIZON_S) {
             Ok(Encounter { ttce_s, dce_m }) => {
                 prop_assert!((distance_after_m(&a, &b, ttce_s) - dce_m).abs() < 1e-9, "the distance at that time");
