@@ -5,6 +5,7 @@
 //! half of the digits at a million samples. A tail is the sum of single probabilities, each a simple multiple of its
 //! neighbour. The sum has positive terms only, and stops when further terms no longer change it.
 
+use closecall_traffic::maths;
 use std::f64::consts::PI;
 
 /// Smallest n for which Stirling's series is accurate to all digits. Factorials of smaller n are exact in `f64`.
@@ -18,7 +19,7 @@ fn stirling_error(n: u64) -> f64 {
     let x = n as f64;
     if n < SERIES_FROM {
         let factorial: f64 = (1..=n).map(|factor| factor as f64).product();
-        return factorial.ln() - (0.5 * (2.0 * PI * x).ln() + x * x.ln() - x);
+        return maths::ln(factorial) - (0.5 * maths::ln(2.0 * PI * x) + x * maths::ln(x) - x);
     }
     // Stirling's series: its coefficients are Bernoulli numbers divided by 2j(2j − 1).
     let inverse = 1.0 / x;
@@ -30,7 +31,7 @@ fn stirling_error(n: u64) -> f64 {
 fn deviance(x: f64, mean: f64) -> f64 {
     let (difference, sum) = (x - mean, x + mean);
     if difference.abs() >= SERIES_BELOW * sum {
-        return x * (x / mean).ln() + mean - x;
+        return x * maths::ln(x / mean) + mean - x;
     }
     // With v = (x − m)/(x + m), ln(x/m) = 2·artanh(v). The terms that would cancel are left out of the series.
     let v = difference / sum;
@@ -58,10 +59,10 @@ pub fn probability(hits: u64, samples: u64, p: f64) -> f64 {
     }
     let (k, n, q) = (hits as f64, samples as f64, 1.0 - p);
     if hits == 0 {
-        return (n * (-p).ln_1p()).exp();
+        return maths::exp(n * maths::ln_1p(-p));
     }
     if hits == samples {
-        return (n * p.ln()).exp();
+        return maths::exp(n * maths::ln(p));
     }
     if p == 0.0 || p == 1.0 {
         return 0.0;
@@ -71,7 +72,7 @@ pub fn probability(hits: u64, samples: u64, p: f64) -> f64 {
         - stirling_error(samples - hits)
         - deviance(k, n * p)
         - deviance(n - k, n * q);
-    logarithm.exp() * (n / (2.0 * PI * k * (n - k))).sqrt()
+    maths::exp(logarithm) * (n / (2.0 * PI * k * (n - k))).sqrt()
 }
 
 /// Returns the probability of at most `hits` hits, divided by that of exactly `hits` hits.

@@ -81,8 +81,8 @@ impl Consistency {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, stream};
-    use rand_distr::{Distribution, StandardNormal};
+    use closecall_traffic::{ActorId, StandardNormal, stream};
+    use rand::distr::Distribution;
 
     use super::*;
 

@@ -1,5 +1,7 @@
 //! How probabilities and shares are printed.
 
+use closecall_traffic::maths;
+
 /// Significant digits of a printed share.
 const DIGITS: i32 = 3;
 
@@ -10,7 +12,7 @@ pub fn percent(share: f64) -> String {
         return format!("{value} %");
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number, above 0 by the clamp")]
-    let decimals = (DIGITS - 1 - value.log10().floor() as i32).clamp(0, 9) as usize;
+    let decimals = (DIGITS - 1 - maths::log10(value).floor() as i32).clamp(0, 9) as usize;
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     format!("{text} %")

@@ -6,6 +6,7 @@
 //! [`super::sequence`] for that case.
 
 use super::binomial::{at_least, at_most};
+use closecall_traffic::maths;
 
 /// Returns the one-sided upper bound: the smallest probability at which at most `hits` hits in `samples` samples would occur
 /// with a probability of 1 − `confidence` or less. The true probability lies above it in at most a fraction of
@@ -22,7 +23,7 @@ pub fn upper_bound(hits: u64, samples: u64, confidence: f64) -> f64 {
     }
     if hits == 0 {
         // (1 − p)ⁿ = 1 − C.
-        return -(error.ln() / samples as f64).exp_m1();
+        return -maths::exp_m1(maths::ln(error) / samples as f64);
     }
     let estimate = hits as f64 / samples as f64;
     bisect(estimate, 1.0, |p| at_most(hits, samples, p) > error).high
@@ -42,7 +43,7 @@ pub fn lower_bound(hits: u64, samples: u64, confidence: f64) -> f64 {
     }
     if hits >= samples {
         // pⁿ = 1 − C.
-        return (error.ln() / samples as f64).exp();
+        return maths::exp(maths::ln(error) / samples as f64);
     }
     let estimate = hits as f64 / samples as f64;
     bisect(0.0, estimate, |p| at_least(hits, samples, p) < error).low

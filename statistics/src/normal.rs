@@ -1,13 +1,15 @@
 //! The standard normal distribution, truncated at two bounds and accurate in both tails.
 //!
 //! The distribution function Φ and its inverse are evaluated in the smaller tail, so that neither 1 − 10⁻²⁰ nor a
-//! truncation at five standard deviations loses digits. The inverse of statrs is accurate to 11 digits. One step of
-//! Newton's method with libm's complementary error function improves this to 15 digits.
+//! truncation at five standard deviations loses digits. [`erfc_inv`] is accurate to 11 digits. One step of
+//! Newton's method with the complementary error function improves this to 15 digits.
+
+mod erfc_inv;
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
-use libm::erfc;
-use statrs::function::erf::erfc_inv;
+use closecall_traffic::maths::{erfc, exp};
+pub use erfc_inv::erfc_inv;
 
 /// Returns the probability below `z`: Φ(z).
 fn below(z: f64) -> f64 {
@@ -17,7 +19,7 @@ fn below(z: f64) -> f64 {
 /// Returns the z below which `probability` lies: Φ⁻¹. It is infinite for a probability of 0.
 fn quantile(probability: f64) -> f64 {
     let z = -SQRT_2 * erfc_inv(2.0 * probability);
-    let density = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
+    let density = exp(-0.5 * z * z) / (2.0 * PI).sqrt();
     let step = (below(z) - probability) / density;
     // The density is 0 if z is infinite, or so large that the exponential underflows.
     if step.is_finite() { z - step } else { z }

@@ -16,6 +16,7 @@
 use rand::{Rng, RngExt};
 
 use crate::quantiles::quantile;
+use closecall_traffic::maths;
 
 /// Number of simulated distances.
 const SIMULATED: usize = 999;
@@ -120,7 +121,7 @@ pub fn needed(level: f64, n: usize, distance: f64) -> Option<u64> {
 }
 
 fn factor(level: f64) -> f64 {
-    (-0.5 * (0.5 * level).ln()).sqrt()
+    (-0.5 * maths::ln(0.5 * level)).sqrt()
 }
 
 #[cfg(test)]

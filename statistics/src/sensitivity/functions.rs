@@ -1,12 +1,13 @@
 //! Functions of the unit cube with known indices.
 
+use closecall_traffic::maths;
 use std::f64::consts::PI;
 
 /// T. Ishigami and T. Homma, *An importance quantification technique in uncertainty analysis for computer models*, ISUMA 1990,
 /// with a = 7 and b = 0.1.
 pub(super) fn ishigami(u: &[f64]) -> f64 {
     let x: Vec<f64> = u.iter().map(|u| PI * (2.0 * u - 1.0)).collect();
-    x[0].sin() + A * x[1].sin().powi(2) + B * x[2].powi(4) * x[0].sin()
+    maths::sin(x[0]) + A * maths::sin(x[1]).powi(2) + B * x[2].powi(4) * maths::sin(x[0])
 }
 
 const A: f64 = 7.0;
