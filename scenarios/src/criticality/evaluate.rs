@@ -5,7 +5,7 @@ use closecall_traffic::metrics::{
     CRITICAL_THW_S, Moving, bumper_gap_m, closest_encounter, required_deceleration_mps2, time_headway_s,
     time_to_collision_s,
 };
-use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint};
+use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint, maths};
 
 use super::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
@@ -75,7 +75,7 @@ struct VehicleState<'a> {
 impl<'a> VehicleState<'a> {
     fn new((track, point): (&'a Trajectory, &'a TrajectoryPoint)) -> Self {
         let (vx_mps, vy_mps) = (point.speed_mps, point.lateral_speed_mps);
-        let yaw_rad = if vx_mps.hypot(vy_mps) < HEADING_FROM_MPS { 0.0 } else { vy_mps.atan2(vx_mps) };
+        let yaw_rad = if maths::hypot(vx_mps, vy_mps) < HEADING_FROM_MPS { 0.0 } else { maths::atan2(vy_mps, vx_mps) };
         let (length_m, width_m) = (track.dimensions.length_m, track.dimensions.width_m);
         let shape = OrientedBox { x_m: point.s_m, y_m: point.d_m, yaw_rad, length_m, width_m };
         Self { track, point, moving: Moving { shape, vx_mps, vy_mps } }

@@ -5,6 +5,7 @@
 //! steady-state initial conditions and odd reflection at the ends. SciPy calls this `filtfilt`; the tests compare with
 //! it.
 
+use closecall_traffic::maths;
 use std::f64::consts::{PI, SQRT_2};
 
 /// A second-order low-pass filter.
@@ -22,7 +23,7 @@ impl LowPass {
         if !(corner_hz > 0.0 && corner_hz < 0.5 * rate_hz && rate_hz.is_finite()) {
             return None;
         }
-        let warped = (PI * corner_hz / rate_hz).tan();
+        let warped = maths::tan(PI * corner_hz / rate_hz);
         let squared = warped * warped;
         let norm = 1.0 / (1.0 + SQRT_2 * warped + squared);
         let gain = squared * norm;
@@ -88,7 +89,7 @@ mod tests {
     #[test]
     fn the_gain_at_the_corner_is_one_half() {
         let rate = 10.0;
-        let wave = |k: usize| (2.0 * PI * 1.3 * k as f64 / rate).sin();
+        let wave = |k: usize| maths::sin(2.0 * PI * 1.3 * k as f64 / rate);
         let out = filter().forwards_and_backwards(&(0..2_000).map(wave).collect::<Vec<_>>(), PADDING);
         let largest = out[500..1_500].iter().fold(0.0_f64, |max, value| max.max(value.abs()));
         assert!((largest - 0.5).abs() < 0.01, "{largest}");

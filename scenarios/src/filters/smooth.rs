@@ -174,6 +174,7 @@ fn derivative(values: &[f64], period: Time) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::trajectory_data::test_support::{straight_track, trajectory_data_of};
+    use closecall_traffic::maths;
 
     #[test]
     fn constant_speed_passes_unchanged() {
@@ -205,14 +206,14 @@ mod tests {
             let mut track = straight_track(1, 0.0, 25.0, -1.75, 20_000 / period_ms);
             for (k, point) in (0_i64..).zip(&mut track.points) {
                 point.time = Time::from_ms(period_ms) * k;
-                point.d_m = (2.0 * std::f64::consts::PI * 0.2 * point.time.s()).sin();
+                point.d_m = maths::sin(2.0 * std::f64::consts::PI * 0.2 * point.time.s());
             }
             smooth_track(&track).unwrap().trajectory.points
         };
         for period_ms in [10, 40, 100, 200] {
             for point in wave(period_ms).iter().filter(|point| (3.0..17.0).contains(&point.time.s())) {
                 let angular = 2.0 * std::f64::consts::PI * 0.2;
-                let expected_mps = angular * (angular * point.time.s()).cos();
+                let expected_mps = angular * maths::cos(angular * point.time.s());
                 assert!((point.lateral_speed_mps - expected_mps).abs() < 0.01, "{period_ms} ms at {}", point.time);
             }
         }

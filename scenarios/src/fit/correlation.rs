@@ -3,6 +3,7 @@
 use super::{Quantity, Samples};
 use crate::criticality::spearman;
 use crate::parameters::cholesky;
+use closecall_traffic::maths;
 
 /// Least number of lane changes or pairs with both values, from which a correlation is kept: with fewer, its 95 % interval spans
 /// more than ±0.6.
@@ -53,7 +54,7 @@ fn is_consistent(all: &[RankCorrelation]) -> bool {
     let at = |a: Quantity, b: Quantity| {
         let pair = all.iter().find(|one| (one.of, one.with) == (a, b) || (one.of, one.with) == (b, a));
         let spearman = pair.map_or(0.0, |one| one.spearman);
-        if a == b { 1.0 } else { 2.0 * (std::f64::consts::PI * spearman / 6.0).sin() }
+        if a == b { 1.0 } else { 2.0 * maths::sin(std::f64::consts::PI * spearman / 6.0) }
     };
     let rows = Quantity::ALL.map(|a| Quantity::ALL.map(|b| at(a, b)).to_vec());
     cholesky(&rows).is_some()

@@ -2,7 +2,7 @@
 
 use closecall_statistics::normal::TruncatedStandardNormal;
 use closecall_statistics::quantiles::{median, quantile};
-use closecall_traffic::Stream;
+use closecall_traffic::{Stream, maths};
 use rand::{RngExt, SeedableRng};
 
 use super::Quantity;
@@ -144,8 +144,8 @@ impl Family {
     fn fit(self, values: &[f64]) -> Option<Form> {
         match self {
             Self::LogNormal => {
-                let (mean, sigma) = moments(values.iter().map(|value| value.ln()))?;
-                Some(Form::LogNormal { median: mean.exp(), sigma })
+                let (mean, sigma) = moments(values.iter().map(|value| maths::ln(*value)))?;
+                Some(Form::LogNormal { median: maths::exp(mean), sigma })
             }
             Self::TruncatedNormal => {
                 let (mean, sd) = moments(values.iter().copied())?;
@@ -199,7 +199,7 @@ impl Form {
     /// Returns the standard normal variate that corresponds to `value`.
     fn standardised(self, value: f64) -> f64 {
         match self {
-            Self::LogNormal { median, sigma } => (value / median).ln() / sigma,
+            Self::LogNormal { median, sigma } => maths::ln(value / median) / sigma,
             Self::TruncatedNormal { mean, sd, .. } => (value - mean) / sd,
         }
     }
@@ -207,7 +207,7 @@ impl Form {
     /// Returns the value that corresponds to the standard normal variate `z`.
     fn value(self, z: f64) -> f64 {
         match self {
-            Self::LogNormal { median, sigma } => median * (sigma * z).exp(),
+            Self::LogNormal { median, sigma } => median * maths::exp(sigma * z),
             Self::TruncatedNormal { mean, sd, .. } => mean + sd * z,
         }
     }

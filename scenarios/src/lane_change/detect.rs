@@ -231,6 +231,7 @@ fn lane_change(sampled: &Sampled<'_>, manoeuvre: &Manoeuvre, height_share: f64, 
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::maths;
     use proptest::prelude::*;
 
     use super::*;
@@ -249,7 +250,7 @@ mod tests {
     #[test]
     fn a_swerve_within_the_lane_is_no_lane_change() {
         let mut track = straight_track(1, 0.0, 25.0, -1.75, 200);
-        track.points.iter_mut().enumerate().for_each(|(k, point)| point.d_m += (0.1 * k as f64).sin());
+        track.points.iter_mut().enumerate().for_each(|(k, point)| point.d_m += maths::sin(0.1 * k as f64));
         assert!(found(track).is_empty());
     }
 

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use closecall_statistics::normal::TruncatedStandardNormal;
-use closecall_traffic::{ConfigError, ParameterName, Problem, Range};
+use closecall_traffic::{ConfigError, ParameterName, Problem, Range, maths};
 
 use super::space::{SpaceEntry, Variation};
 
@@ -53,7 +53,7 @@ impl Copula {
         let members: Vec<usize> = (0..entries.len()).filter(is_member).collect();
         let correlation = |a: usize, b: usize| match pairs.get(&(a.min(b), a.max(b))) {
             _ if a == b => 1.0,
-            Some(spearman) => 2.0 * (PI * spearman / 6.0).sin(),
+            Some(spearman) => 2.0 * maths::sin(PI * spearman / 6.0),
             None => 0.0,
         };
         let matrix: Vec<Vec<f64>> =

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use closecall_statistics::normal::TruncatedStandardNormal;
 use closecall_statistics::quantiles;
-use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value};
+use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value, maths};
 
 use super::Variation;
 use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, UniformConfig};
@@ -97,8 +97,8 @@ impl Distribution {
         let min = config.min.map(|min| at_least(0.0).check(min, "min")).transpose()?;
         // A log-normal value is positive: 0 cuts nothing off.
         let min = min.filter(|&min| min > 0.0);
-        let high = max.map_or(f64::INFINITY, |max| (max / median).ln() / sigma);
-        let low = min.map_or(f64::NEG_INFINITY, |min| (min / median).ln() / sigma);
+        let high = max.map_or(f64::INFINITY, |max| maths::ln(max / median) / sigma);
+        let low = min.map_or(f64::NEG_INFINITY, |min| maths::ln(min / median) / sigma);
         let standard = TruncatedStandardNormal::new(low, high).ok_or_else(|| {
             let rule = format!("no probability is left between `min` and `max` (sigma {sigma})");
             ConfigError::new(
@@ -186,7 +186,7 @@ impl Distribution {
             }
             Kind::LogNormal { median, sigma, cut: [min, max], standard } => {
                 let z = standard.quantile(u.max(SMALLEST_PROBABILITY));
-                let value = (median * (sigma * z).exp()).min(max.unwrap_or(f64::INFINITY));
+                let value = (median * maths::exp(sigma * z)).min(max.unwrap_or(f64::INFINITY));
                 Value::Number(value.max(min.unwrap_or(0.0)))
             }
             Kind::Choice(weights) => {
@@ -212,7 +212,7 @@ impl Distribution {
             Kind::Uniform { min, max } => Some(((x - min) / (max - min)).clamp(0.0, 1.0)),
             Kind::TruncatedNormal { mean, sd, standard, .. } => Some(standard.cdf((x - mean) / sd)),
             Kind::LogNormal { .. } if x <= 0.0 => Some(0.0),
-            Kind::LogNormal { median, sigma, standard, .. } => Some(standard.cdf((x / median).ln() / sigma)),
+            Kind::LogNormal { median, sigma, standard, .. } => Some(standard.cdf(maths::ln(x / median) / sigma)),
             Kind::Empirical { quantiles: values } => Some(quantiles::cdf(values, x)),
             Kind::Fixed(Value::Number(value)) => Some(if x < *value { 0.0 } else { 1.0 }),
             Kind::Choice(_) | Kind::Fixed(Value::Label(_)) => None,
@@ -226,7 +226,7 @@ impl Distribution {
         match &self.0 {
             Kind::Uniform { min, max } | Kind::TruncatedNormal { bounds: [min, max], .. } => Some([*min, *max]),
             Kind::LogNormal { median, sigma, cut: [min, max], standard } => {
-                let at = |u| median * (sigma * standard.quantile(u)).exp();
+                let at = |u| median * maths::exp(sigma * standard.quantile(u));
                 let low = min.unwrap_or_else(|| at(SMALLEST_PROBABILITY));
                 Some([low, max.unwrap_or_else(|| at(1.0 - 2.0 * SMALLEST_PROBABILITY))])
             }

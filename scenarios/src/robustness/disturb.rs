@@ -1,7 +1,7 @@
 //! Disturbance of the lateral position.
 
-use closecall_traffic::{ActorId, Trajectory, stream};
-use rand_distr::{Distribution, StandardNormal};
+use closecall_traffic::{ActorId, StandardNormal, Trajectory, stream};
+use rand::distr::Distribution;
 
 use crate::trajectory_data::MarkingDistances;
 

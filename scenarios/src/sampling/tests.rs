@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use closecall_traffic::{ParameterName, Parameters, Value};
+use closecall_traffic::{ParameterName, Parameters, Value, maths};
 use proptest::prelude::*;
 
 use super::Design;
@@ -48,7 +48,7 @@ fn designs_are_named_as_in_files() {
 #[test]
 fn random_numbers_are_uniform() {
     const N: usize = 2_000;
-    let critical = (-0.5 * (0.5e-6_f64).ln() / N as f64).sqrt();
+    let critical = (-0.5 * maths::ln(0.5e-6) / N as f64).sqrt();
     let cube = unit_cube(4);
     for seed in SEEDS {
         let samples: Vec<Vec<f64>> =

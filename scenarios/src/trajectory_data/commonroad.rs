@@ -12,7 +12,7 @@
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
-use closecall_traffic::{Time, VehicleClass};
+use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
@@ -247,7 +247,7 @@ impl<R: BufRead> CommonRoadSource<R> {
         };
         let road = *obstacle.road.get_or_insert_with(|| roads.road_at((x_m, y_m), heading_rad));
         let Some(position) = roads.locate(road, (x_m, y_m)) else { return Ok(None) };
-        let along = (heading_rad - position.heading_rad).cos();
+        let along = maths::cos(heading_rad - position.heading_rad);
         let (number, period) = (obstacle.id, self.step.unwrap_or_default());
         Ok(Some(Row {
             number,

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
-use closecall_traffic::{Lane, Time};
+use closecall_traffic::{Lane, Time, maths};
 
 use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
@@ -189,7 +189,7 @@ impl InferredRoad {
                 current = DrivenPath { vehicle: Some(track), heading_rad, ..DrivenPath::default() };
             }
             current.changes_lanes |= first_of(field(columns.lane_change)) == "1";
-            let is_far = |last: &Point| (point.0 - last.0).hypot(point.1 - last.1) >= SPACING_M;
+            let is_far = |last: &Point| maths::hypot(point.0 - last.0, point.1 - last.1) >= SPACING_M;
             if current.points.last().is_none_or(is_far) && current.points.len() < MAX_POINTS {
                 current.points.push(point);
             }
@@ -237,7 +237,7 @@ impl InferredRoad {
 
     /// Returns the index of the direction that agrees best with `heading_rad`.
     fn direction(&self, heading_rad: f64) -> Option<usize> {
-        let agrees = |direction: &Direction| (heading_rad - direction.heading_rad).cos();
+        let agrees = |direction: &Direction| maths::cos(heading_rad - direction.heading_rad);
         let ranked = self.directions.iter().map(agrees).enumerate();
         ranked.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
     }
@@ -268,7 +268,7 @@ impl InferredRoad {
 fn keep_best_path(paths: &mut Vec<(bool, f64, DrivenPath)>, path: DrivenPath) {
     let Some(length_m) = ReferenceLine::through(path.points.iter().copied()).length_m() else { return };
     let stays = !path.changes_lanes;
-    let same = |kept: &&mut (bool, f64, DrivenPath)| (kept.2.heading_rad - path.heading_rad).cos() > 0.0;
+    let same = |kept: &&mut (bool, f64, DrivenPath)| maths::cos(kept.2.heading_rad - path.heading_rad) > 0.0;
     match paths.iter_mut().find(same) {
         Some(kept) if (stays, length_m) > (kept.0, kept.1) => *kept = (stays, length_m, path),
         Some(_) => {}

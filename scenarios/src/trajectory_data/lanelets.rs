@@ -16,7 +16,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use closecall_traffic::Lane;
+use closecall_traffic::{Lane, maths};
 
 use super::markings::LaneMarkings;
 use super::reference_line::{Point, Projection, ReferenceLine};
@@ -108,7 +108,7 @@ impl Roads {
     pub(super) fn road_at(&self, point: Point, heading_rad: f64) -> usize {
         let rank = |road: &Road| {
             let on = road.line.project(point);
-            let is_against = (heading_rad - on.heading_rad).cos() < 0.0;
+            let is_against = maths::cos(heading_rad - on.heading_rad) < 0.0;
             let is_outside = !road.outlines.iter().any(|outline| contains(outline, point));
             (is_against, is_outside, on.d_m.abs())
         };

@@ -12,6 +12,8 @@
 //! its ends. (E. Héry, S. Masi, P. Xu, P. Bonnifait, "Map-based curvilinear coordinates for autonomous vehicles",
 //! ITSC 2017.) Points so far inside a bend that normals cross get the nearest position instead.
 
+use closecall_traffic::maths;
+
 /// A point in a plane (m).
 pub(super) type Point = (f64, f64);
 
@@ -64,7 +66,7 @@ impl Segment {
             start,
             end,
             length_m,
-            heading_rad: uy.atan2(ux),
+            heading_rad: maths::atan2(uy, ux),
             along_m: dx * ux + dy * uy,
             left_m: ux * dy - uy * dx,
             is_first: false,
@@ -85,7 +87,7 @@ impl Segment {
         let share = (self.along_m + self.left_m * from) / spread_m;
         // A point on the bisector of a kink belongs to one of its two segments, whatever is rounded.
         let is_within = spread_m > 0.0 && (-ROUNDING..=1.0 + ROUNDING).contains(&share);
-        is_within.then(|| self.projection(share * self.length_m, (from + share * (to - from)).atan()))
+        is_within.then(|| self.projection(share * self.length_m, maths::atan(from + share * (to - from))))
     }
 
     /// Returns the projection onto the nearest position of this segment.
@@ -100,7 +102,7 @@ impl Segment {
     fn projection(&self, along_m: f64, turned_rad: f64) -> Projection {
         Projection {
             s_m: self.start.s_m + along_m,
-            d_m: (self.along_m - along_m).hypot(self.left_m).copysign(self.left_m),
+            d_m: maths::hypot(self.along_m - along_m, self.left_m).copysign(self.left_m),
             heading_rad: self.heading_rad + turned_rad,
         }
     }
@@ -126,7 +128,7 @@ impl ReferenceLine {
                 vertices.push(Vertex { point, s_m: 0.0, half_turn: 0.0 });
                 continue;
             };
-            let step_m = (point.0 - last.point.0).hypot(point.1 - last.point.1);
+            let step_m = maths::hypot(point.0 - last.point.0, point.1 - last.point.1);
             if step_m > SAME_POINT_M {
                 let s_m = last.s_m + step_m;
                 vertices.push(Vertex { point, s_m, half_turn: 0.0 });
@@ -164,7 +166,7 @@ impl ReferenceLine {
 /// turns back has no bisector; it counts as straight.
 fn half_turn(a: Point, b: Point, c: Point) -> f64 {
     let (first, second) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
-    let lengths = first.0.hypot(first.1) * second.0.hypot(second.1);
+    let lengths = maths::hypot(first.0, first.1) * maths::hypot(second.0, second.1);
     let sine = (first.0 * second.1 - first.1 * second.0) / lengths;
     let one_plus_cosine = 1.0 + (first.0 * second.0 + first.1 * second.1) / lengths;
     if one_plus_cosine > TURNS_BACK { sine / one_plus_cosine } else { 0.0 }
@@ -204,8 +206,9 @@ mod tests {
         // A bend of 400 m radius in chords of 20 m; the vehicle drives 11 m inside or outside of it, between the first and
         // the last chord, which have no kink at their outer ends.
         let (radius_m, chord_rad) = (400.0_f64, 0.05);
-        let on_circle =
-            |radius_m: f64, angle_rad: f64| (radius_m * angle_rad.sin(), radius_m * (1.0 - angle_rad.cos()));
+        let on_circle = |radius_m: f64, angle_rad: f64| {
+            (radius_m * maths::sin(angle_rad), radius_m * (1.0 - maths::cos(angle_rad)))
+        };
         let line = ReferenceLine::through((0..20).map(|k| on_circle(radius_m, chord_rad * f64::from(k))));
         for left_m in [11.0, -11.0] {
             let drive = (110..1_790).map(|k| {

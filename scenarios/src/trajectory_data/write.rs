@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use closecall_traffic::{Dimensions, Time, Trajectory, TrajectoryPoint};
+use closecall_traffic::{Dimensions, Time, Trajectory, TrajectoryPoint, maths};
 
 use super::data::TrajectoryData;
 use super::error::WriteError;
@@ -96,7 +96,7 @@ fn write_row(
     let TrajectoryPoint { s_m, d_m, lane, speed_mps, acceleration_mps2, .. } = point;
     write!(file, "{name},{},{},{frame},{},", track.track_id, track.vehicle_id, point.time.s())?;
     write!(file, "{s_m:.4},{:.4},{lane},{speed_mps:.4},{acceleration_mps2:.4},", -d_m)?;
-    write!(file, "{:.6},{s_m:.4},{d_m:.4},", point.lateral_speed_mps.atan2(*speed_mps))?;
+    write!(file, "{:.6},{s_m:.4},{d_m:.4},", maths::atan2(point.lateral_speed_mps, *speed_mps))?;
     let Dimensions { length_m, width_m, .. } = track.dimensions;
     writeln!(file, "{length_m:.4},{width_m:.4},{},{SOURCE}", track.class.name())
 }

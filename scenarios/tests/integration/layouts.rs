@@ -8,7 +8,7 @@ use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::trajectory_data::{
     Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read, read_from, read_with,
 };
-use closecall_traffic::{Lane, Side, Time};
+use closecall_traffic::{Lane, Side, Time, maths};
 
 use crate::support::data_folder;
 
@@ -181,7 +181,8 @@ fn write_bent_both_ways(folder: &Path) {
             let is_back = vehicle == 4;
             let along_m = if is_back { 290.0 - 29.0 * time_s } else { 20.0 + (24.0 + f64::from(vehicle)) * time_s };
             let angle = along_m / RADIUS_M;
-            let (x_m, y_m) = ((RADIUS_M - left_m) * angle.sin(), RADIUS_M - (RADIUS_M - left_m) * angle.cos());
+            let (x_m, y_m) =
+                ((RADIUS_M - left_m) * maths::sin(angle), RADIUS_M - (RADIUS_M - left_m) * maths::cos(angle));
             let heading = angle.to_degrees() + if is_back { 180.0 } else { 0.0 };
             let speed_mps = if is_back { 29.0 } else { 24.0 + f64::from(vehicle) };
             let changes = u8::from(vehicle == 2 && frame == 125);
