@@ -16,7 +16,7 @@
 //! independent. In road coordinates, a vehicle that follows a bend at constant speed moves uniformly, so a bend is not
 //! a manoeuvre.
 
-use closecall_traffic::CONTROL_STEP;
+use closecall_traffic::{CONTROL_STEP, maths};
 use nalgebra::{Matrix4, Vector4};
 
 use self::estimate::{ModeEstimate, mixture};
@@ -50,8 +50,8 @@ struct Remaining {
 impl Remaining {
     fn after(mode: &Mode, own: usize, step_s: f64) -> Self {
         Self {
-            persistence: if mode.persistence_s > 0.0 { (-step_s / mode.persistence_s).exp() } else { 0.0 },
-            speed: (-step_s / mode.speed_decay_s).exp(),
+            persistence: if mode.persistence_s > 0.0 { maths::exp(-step_s / mode.persistence_s) } else { 0.0 },
+            speed: maths::exp(-step_s / mode.speed_decay_s),
             stays: staying_probability(&mode.rates_per_s(Situation::FREE), own, step_s),
         }
     }
@@ -188,10 +188,10 @@ impl AxisFilter {
             let variance_m2 = predicted_variance_m2 + MANOEUVRE_SD_M * MANOEUVRE_SD_M;
             let deviations = innovation_m * innovation_m / variance_m2;
             squared_distance = squared_distance.min(deviations);
-            likelihood += estimate.probability * (-0.5 * deviations).exp() / variance_m2.sqrt();
+            likelihood += estimate.probability * maths::exp(-0.5 * deviations) / variance_m2.sqrt();
             variance += estimate.probability * variance_m2;
         }
-        AxisFit { squared_distance, cost: -2.0 * likelihood.ln(), log_variance: variance.ln() }
+        AxisFit { squared_distance, cost: -2.0 * maths::ln(likelihood), log_variance: maths::ln(variance) }
     }
 
     /// Forgets the slow error: the next measurement has another one.
@@ -211,7 +211,7 @@ impl AxisFilter {
         let mut logs = [f64::NEG_INFINITY; MODES];
         for (estimate, log) in self.estimates.iter_mut().zip(&mut logs).take(count) {
             let (innovation_m, gain, variance_m2) = estimate.innovation(measurement);
-            *log = -0.5 * (innovation_m * innovation_m / variance_m2 + variance_m2.ln());
+            *log = -0.5 * (innovation_m * innovation_m / variance_m2 + maths::ln(variance_m2));
             estimate.correct(innovation_m, &gain, variance_m2);
         }
         self.update_probabilities(&logs);
@@ -225,7 +225,7 @@ impl AxisFilter {
         for (estimate, log) in self.estimates.iter_mut().zip(&mut logs).take(count) {
             let gain = estimate.covariance.column(1).into_owned();
             let (innovation, variance) = (speed_mps - estimate.state[1], gain[1] + sd_mps * sd_mps);
-            *log = -0.5 * (innovation * innovation / variance + variance.ln());
+            *log = -0.5 * (innovation * innovation / variance + maths::ln(variance));
             estimate.correct(innovation, &gain, variance);
         }
         self.update_probabilities(&logs);
@@ -238,7 +238,7 @@ impl AxisFilter {
         }
         let max_log = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: [f64; MODES] =
-            std::array::from_fn(|index| self.estimates[index].probability * (logs[index] - max_log).exp());
+            std::array::from_fn(|index| self.estimates[index].probability * maths::exp(logs[index] - max_log));
         let sum: f64 = weights.iter().sum();
         // If the measurement is not a number, neither is any likelihood. The probabilities then stay unchanged.
         if sum > 0.0 && sum.is_finite() {
@@ -316,7 +316,7 @@ fn leaving_per_s(rates_per_s: &[f64; MODES], from: usize) -> f64 {
 
 /// Returns the probability that the mode with the index `from` goes on for a step of `step_s`.
 fn staying_probability(rates_per_s: &[f64; MODES], from: usize, step_s: f64) -> f64 {
-    (-leaving_per_s(rates_per_s, from) * step_s).exp()
+    maths::exp(-leaving_per_s(rates_per_s, from) * step_s)
 }
 
 /// Returns the probabilities that the mode changes from the index `from` to each mode in a step, in which it goes on with the

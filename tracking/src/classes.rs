@@ -4,7 +4,7 @@
 //! proportional to the likelihoods. The errors of successive scans of a vehicle are correlated (same distance, light
 //! and shape), so each scan counts only as a share of an independent observation.
 
-use closecall_traffic::ClassScores;
+use closecall_traffic::{ClassScores, maths};
 
 /// Weight of one scan relative to an independent observation; assumption: about three scans make one observation.
 const SCAN_WEIGHT: f64 = 0.3;
@@ -32,7 +32,7 @@ impl FusedClass {
     pub(crate) fn update(&mut self, seen: &ClassScores, points: usize) {
         let weight = weight(points);
         for (score, seen) in self.scores.iter_mut().zip(seen.0) {
-            *score *= seen.max(MIN_PROBABILITY).powf(weight);
+            *score *= maths::powf(seen.max(MIN_PROBABILITY), weight);
         }
         for _ in 0..2 {
             let sum: f64 = self.scores.iter().sum();
@@ -57,7 +57,7 @@ fn weight(points: usize) -> f64 {
 pub(crate) fn vehicle_log_likelihood_ratio(seen: &ClassScores, points: usize) -> f64 {
     let background = seen.0[ClassScores::BACKGROUND].clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
     // Under equal priors of the four classes, a vehicle of any class has three times the prior of background.
-    weight(points) * ((1.0 - background) / (3.0 * background)).ln()
+    weight(points) * maths::ln((1.0 - background) / (3.0 * background))
 }
 
 #[cfg(test)]

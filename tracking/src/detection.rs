@@ -4,7 +4,7 @@
 //! in a neighbouring lane. The extent of a face that is not seen is assumed from the class's usual size. The tracker
 //! may trust measured extents only, so a detection says which extents are measured.
 
-use closecall_traffic::{ClassScores, Time};
+use closecall_traffic::{ClassScores, Time, maths};
 
 /// Distance by which mirrors and wheels may protrude from a vehicle's side (m).
 pub const SIDE_PROTRUSION_M: f64 = 0.25;
@@ -72,7 +72,7 @@ impl Detection {
     /// The centre lies half a length farther from the ego than the nearest face.
     pub fn centre_m(&self) -> (f64, f64) {
         let away = if self.face_x_m < 0.0 { -0.5 } else { 0.5 } * self.length_m;
-        let (sin, cos) = self.heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(self.heading_rad);
         (self.face_x_m + away * cos, self.face_y_m + away * sin)
     }
 }

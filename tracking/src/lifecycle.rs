@@ -6,7 +6,7 @@
 //! gate. A hit multiplies the odds by P_D/P_F, and a miss by (1 − P_D)/(1 − P_F) (Bar-Shalom, Willett, Tian: *Tracking
 //! and Data Fusion*, 2011, chapter on track-score functions; here the score is kept as log-odds).
 
-use closecall_traffic::TrackStatus;
+use closecall_traffic::{TrackStatus, maths};
 
 /// Maximum number of scans in the confirmation window.
 pub const MAX_WINDOW: u8 = 16;
@@ -71,14 +71,14 @@ impl Lifecycle {
         self.history = self.history << 1 | 1;
         self.misses = 0;
         self.confirmed |= is_settled && self.hits_in_window(rules) >= rules.confirm_hits;
-        self.add_evidence((rules.detection_probability / rules.clutter_probability).ln());
+        self.add_evidence(maths::ln(rules.detection_probability / rules.clutter_probability));
     }
 
     /// Adds a scan in which only a sensor that confirms nothing has detected the track. It ends coasting, and is no hit in the window.
     pub fn keep(&mut self, rules: &LifecycleRules) {
         self.history <<= 1;
         self.misses = 0;
-        self.add_evidence((rules.detection_probability / rules.clutter_probability).ln());
+        self.add_evidence(maths::ln(rules.detection_probability / rules.clutter_probability));
     }
 
     /// Makes the latest scan, which [`Self::keep`] has added, a hit: a sensor that confirms has detected the track at the same time.
@@ -91,7 +91,7 @@ impl Lifecycle {
     #[inline]
     pub fn miss(&mut self, rules: &LifecycleRules) {
         self.skip();
-        self.add_evidence(((1.0 - rules.detection_probability) / (1.0 - rules.clutter_probability)).ln());
+        self.add_evidence(maths::ln((1.0 - rules.detection_probability) / (1.0 - rules.clutter_probability)));
     }
 
     /// Adds a scan that could not detect the track, because it was hidden or out of view.
@@ -133,7 +133,7 @@ impl Lifecycle {
     /// Returns the existence probability.
     #[inline]
     pub fn existence(&self) -> f64 {
-        1.0 / (1.0 + (-self.log_odds).exp())
+        1.0 / (1.0 + maths::exp(-self.log_odds))
     }
 
     fn hits_in_window(&self, rules: &LifecycleRules) -> u32 {

@@ -5,7 +5,7 @@
 //! The shares below were measured on the boxes of the library's scenarios. At 2 to 50 m, the errors of scans 0.4 s
 //! apart correlate by 0.9 and more along the road, and by 0.5 across; at 50 to 80 m by 0.7; beyond by less than 0.1.
 
-use closecall_traffic::{Time, VehicleClass};
+use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::axis::AxisMeasurement;
 use super::road_filter::Measurement;
@@ -62,7 +62,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
     let slow_share = if detection.points < MANY_POINTS { 0.0 } else { ALONG_SLOW_SHARE };
     let along_slow_m2 =
         FACE_SLOW_SD_M[class as usize].powi(2).max(slow_share * detection.range_sd_m * detection.range_sd_m);
-    let lateral_sd_m = detection.lateral_sd_m.hypot(part_offset_sd_m);
+    let lateral_sd_m = maths::hypot(detection.lateral_sd_m, part_offset_sd_m);
     Measurement {
         along: axis(s_m, detection.range_sd_m, along_slow_m2),
         across: axis(d_m, lateral_sd_m, ACROSS_SLOW_SHARE * lateral_sd_m * lateral_sd_m),
@@ -87,7 +87,7 @@ mod tests {
     /// Returns the standard deviation of the measured position across the road for a box 40 m behind the ego (m).
     fn across_sd_m(width_m: f64, points: usize, class: VehicleClass) -> f64 {
         let Measurement { across, .. } = of_box(width_m, Extent::Seen, points, class);
-        across.white_sd_m.hypot(across.slow_sd_m)
+        maths::hypot(across.white_sd_m, across.slow_sd_m)
     }
 
     /// Returns the measurement of a box 40 m behind the ego.

@@ -9,6 +9,7 @@ use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
 use crate::gaussian::Gaussian;
 use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::maths;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
@@ -66,7 +67,7 @@ impl Measurement {
         }
         let offset_sd_m = HALF_LENGTH_SD_M * across.speed_mps / along.speed_mps;
         let time_offset_s = self.across.time_offset_s + half_length_m / along.speed_mps;
-        AxisMeasurement { time_offset_s, slow_sd_m: self.across.slow_sd_m.hypot(offset_sd_m), ..self.across }
+        AxisMeasurement { time_offset_s, slow_sd_m: maths::hypot(self.across.slow_sd_m, offset_sd_m), ..self.across }
     }
 
     /// Returns the variances of the slow error along and across the road (m²).
@@ -130,7 +131,7 @@ impl RoadFilter {
     pub(crate) fn predict(&mut self, step_s: f64, ego: &EgoRear) {
         let [along, across] = self.estimate();
         let distance_m = (along.speed_mps - ego.speed_mps).abs() * step_s;
-        let slow_share = (-step_s / SLOW_TIME_S - distance_m / SLOW_DISTANCE_M).exp();
+        let slow_share = maths::exp(-step_s / SLOW_TIME_S - distance_m / SLOW_DISTANCE_M);
         let front_s_m = along.position_m + along.speed_mps * step_s;
         let situation =
             Situation::of(&RearVehicle { front_s_m, d_m: across.position_m, speed_mps: along.speed_mps }, ego);
@@ -219,7 +220,7 @@ impl RoadFilter {
     fn smoothed(&self, measurement: &Measurement) -> Measurement {
         let with = |axis: AxisMeasurement, slow_m2: f64| AxisMeasurement { slow_sd_m: slow_m2.sqrt(), ..axis };
         let new = |axis: AxisMeasurement| AxisMeasurement {
-            white_sd_m: axis.white_sd_m.hypot(axis.slow_sd_m),
+            white_sd_m: maths::hypot(axis.white_sd_m, axis.slow_sd_m),
             slow_sd_m: 0.0,
             ..axis
         };
@@ -266,7 +267,7 @@ pub struct EgoEstimate {
 #[inline]
 pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
     let point = frame.point(along.position_m, across.position_m);
-    let (sin, cos) = point.road_yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(point.road_yaw_rad);
     let path_scale = frame.path_scale(across.position_m);
     let to_ego = Matrix2::new(cos * path_scale, -sin, sin * path_scale, cos);
     let velocity_mps = to_ego * Vector2::new(along.speed_mps, across.speed_mps);
@@ -281,7 +282,7 @@ pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -
     EgoEstimate {
         state: Vector4::new(point.x_m, point.y_m, velocity_mps.x, velocity_mps.y),
         covariance,
-        heading_rad: if moves { velocity_mps.y.atan2(velocity_mps.x) } else { point.road_yaw_rad },
+        heading_rad: if moves { maths::atan2(velocity_mps.y, velocity_mps.x) } else { point.road_yaw_rad },
     }
 }
 

@@ -1,6 +1,6 @@
 //! The tracker: it updates all tracks with one scan after the other.
 
-use closecall_traffic::{Road, Source, Time, Track, TrackId, VehicleState};
+use closecall_traffic::{Road, Source, Time, Track, TrackId, VehicleState, maths};
 
 use super::TrackList;
 use super::assignment::{Assignment, RESERVED};
@@ -83,7 +83,7 @@ impl TrackState {
     /// Returns whether `other` is a part of this vehicle.
     fn has_part(&self, other: &Self) -> bool {
         let ([along, across], [part_along, part_across]) = (self.filter.estimate(), other.filter.estimate());
-        let apart_mps = (along.speed_mps - part_along.speed_mps).hypot(across.speed_mps - part_across.speed_mps);
+        let apart_mps = maths::hypot(along.speed_mps - part_along.speed_mps, across.speed_mps - part_across.speed_mps);
         self.contains(part_along.position_m, part_across.position_m) && apart_mps < MAX_PART_SPEED_MPS
     }
 
@@ -175,7 +175,7 @@ impl Tracker {
             if scan.time > self.time && !self.tracks.is_empty() { (scan.time - self.time).s() } else { 0.0 };
         self.time = scan.time.max(self.time);
         let frame = EgoFrame::new(scan.road, &scan.ego);
-        let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.path_scale(scan.ego.d_m);
+        let ego_mps = scan.ego.speed_mps * maths::cos(scan.ego.heading_rad) / frame.path_scale(scan.ego.d_m);
         let ego = EgoRear {
             s_m: scan.ego.s_m + scan.rear_x_m,
             d_m: scan.ego.d_m,

@@ -3,6 +3,8 @@
 //! A missing detection counts against a track only if the sensor could have seen the vehicle. A track behind a nearer
 //! one coasts and keeps its existence probability.
 
+use closecall_traffic::maths;
+
 /// Field of view and mounting of a rear sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RearView {
@@ -52,8 +54,8 @@ impl RearView {
         let in_view = if self.axis_azimuth_rad == 0.0 {
             y_m.abs() <= self.half_angle_tan * distance_m
         } else {
-            let azimuth_rad = y_m.atan2(distance_m);
-            (azimuth_rad - self.axis_azimuth_rad).abs() <= self.half_angle_tan.atan()
+            let azimuth_rad = maths::atan2(y_m, distance_m);
+            (azimuth_rad - self.axis_azimuth_rad).abs() <= maths::atan(self.half_angle_tan)
                 && azimuth_rad.abs() <= MAX_SIDE_AZIMUTH_RAD
         };
         let (low_slope, high_slope) = ((y_m - 0.5 * width_m) / distance_m, (y_m + 0.5 * width_m) / distance_m);

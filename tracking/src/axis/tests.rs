@@ -1,8 +1,7 @@
 //! Tests of the axis filter on motions and measurements that are drawn from its own model.
 
-use closecall_traffic::{ActorId, CONTROL_STEP, Stream, stream};
+use closecall_traffic::{ActorId, CONTROL_STEP, StandardNormal, Stream, stream};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use super::super::motion::{ACROSS_MODES, ALONG_MODES, ALONG_WHITE_MODE};
 use super::*;
