@@ -3,6 +3,7 @@
 
 use super::image::{CHANNELS, CROP_PX, Crop, Image, sample_positions};
 use super::sampling::Sampling;
+use closecall_traffic::maths;
 
 /// Side of the cells of the image that a blot of dirt covers or leaves (px). On a lens of 5 mm with 1280 pixels, a blot of
 /// 0.15 mm covers about 40 pixels (assumption).
@@ -85,7 +86,7 @@ fn blur(crop: &mut Crop, sd: f32) {
         return;
     }
     let side = CROP_PX as i32;
-    let weights: [f32; CROP_PX] = std::array::from_fn(|at| (-0.5 * (at as f32 / sd).powi(2)).exp());
+    let weights: [f32; CROP_PX] = std::array::from_fn(|at| maths::exp(-0.5 * (at as f32 / sd).powi(2)));
     let mut blurred = [0_u8; CROP_PX * CROP_PX * CHANNELS];
     for [step, across] in [[CHANNELS as i32, CHANNELS as i32 * side], [CHANNELS as i32 * side, CHANNELS as i32]] {
         for line in 0..side {
@@ -121,7 +122,7 @@ fn blur_picture(picture: &mut Image, sampling: &Sampling, sd_px: f32) {
                 .enumerate()
                 .map(|(from, other)| (from, (other - place) as f32 / sd_px))
                 .filter(|(_, apart)| apart.abs() <= REACH)
-                .map(|(from, apart)| (from, (-0.5 * apart * apart).exp()))
+                .map(|(from, apart)| (from, maths::exp(-0.5 * apart * apart)))
                 .collect();
             let total: f32 = weights.iter().map(|(_, weight)| weight).sum();
             for line in 0..lines {

@@ -10,7 +10,7 @@
 //! pixel, key) alone. The frame leaves out bodies, shadows, spray clouds and halos that cannot reach the requested
 //! pixels. Their bounds are never too small, and each contributes exactly nothing outside its bounds.
 
-use closecall_traffic::{Indicator, Time};
+use closecall_traffic::{Indicator, Time, maths};
 
 use super::body::{Corner, MOMENTS, Placement, Shade, Shading, add_body, moment_offset};
 use super::draw::Effects;
@@ -127,7 +127,7 @@ impl Frame {
         let ego = &scene.ego.state;
         let yaw = scene.road.plane_pose(ego.s_m, ego.d_m, ego.heading_rad).yaw_rad;
         let light = Illumination::new(scene.environment, camera, ego, yaw);
-        let (sin, cos) = ego.heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(ego.heading_rad);
         let (s_m, d_m) = (ego.s_m + lens.ahead_m * cos, ego.d_m + lens.ahead_m * sin);
         let drops = scene.time.ns() / DROP_PATTERN_PERIOD.ns();
         let mut frame = Self {
@@ -168,7 +168,7 @@ impl Frame {
         if !(at[0].abs() < MAX_DISTANCE_M) {
             return;
         }
-        let (sin, cos) = heading.sin_cos();
+        let (sin, cos) = maths::sin_cos(heading);
         let size = vehicle.vehicle.dimensions;
         let ego = &scene.ego.state;
         let speed = vehicle.state.speed_mps;
@@ -234,7 +234,7 @@ impl Frame {
             anchor.state = closecall_traffic::VehicleState { s_m: body.s_m, d_m: body.d_m, ..Default::default() };
             let (at, heading) = self.lens.pose_in_ground(scene, &anchor);
             let [half_length, half_width, height_m] = body.extent_m.map(f64::from);
-            let (sin, cos) = heading.sin_cos();
+            let (sin, cos) = maths::sin_cos(heading);
             let velocity = [-scene.ego.state.speed_mps, 0.0];
             let placement = Placement { at, turn: [cos, sin], pitch_rad: 0.0, velocity, instance: 0 };
             let around = GroundBox {
@@ -256,7 +256,7 @@ impl Frame {
     }
 
     fn add_patches(&mut self, body: &GroundBox, height_m: f64) {
-        let (sin, cos) = body.heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(body.heading_rad);
         let patch = Patch {
             at: [body.x_m as f32, body.y_m as f32],
             turn: [cos as f32, sin as f32],

@@ -3,7 +3,7 @@
 //! The markings follow German practice for motorways: edge lines are 0.30 m wide, lane lines are 0.15 m wide and
 //! dashed, with dashes of 6 m every 18 m.
 
-use closecall_traffic::Road;
+use closecall_traffic::{Road, maths};
 
 use super::frame::Bounds;
 use super::hash::{PlaneNoise, split};
@@ -113,8 +113,8 @@ impl Ground {
         Self {
             s_m: s_m.rem_euclid(PERIOD_M) as f32,
             d_m: d_m as f32,
-            cos: heading_rad.cos() as f32,
-            sin: heading_rad.sin() as f32,
+            cos: maths::cos(heading_rad) as f32,
+            sin: maths::sin(heading_rad) as f32,
             curvature_per_m: road.curvature_per_m() as f32,
             lane_width_m: road.lane_width_m() as f32,
             lanes: f32::from(road.lanes()),
@@ -285,7 +285,7 @@ mod tests {
         let ground = Ground::new(&road, s0, d0, heading);
         let lens = road.plane_pose(s0, d0, heading);
         for (x, y) in [(-10.0, 1.0), (-60.0, -4.0), (-120.0, 3.0)] {
-            let (sin, cos) = lens.yaw_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(lens.yaw_rad);
             let plane = (lens.x_m + cos * x - sin * y, lens.y_m + sin * x + cos * y);
             let (s, d) = road.road_position_m(plane.0, plane.1);
             let (got_s, got_d) = ground.road_position(x as f32, y as f32);

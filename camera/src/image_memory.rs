@@ -9,7 +9,7 @@
 //! image of the same class then changes nothing. Such an object is classified again if its scale in the image has
 //! changed by a fifth, and at least once per second (assumptions).
 
-use closecall_traffic::{ClassScores, Time};
+use closecall_traffic::{ClassScores, Time, maths};
 
 use closecall_tracking::Detection;
 
@@ -60,7 +60,7 @@ fn best(scores: &ClassScores) -> (usize, f64) {
 
 /// Returns the distance of a detection from the ego's origin (m).
 fn distance_m(detection: &Detection) -> f64 {
-    detection.face_x_m.hypot(detection.face_y_m)
+    maths::hypot(detection.face_x_m, detection.face_y_m)
 }
 
 /// The objects of one run that the network has classified lately.

@@ -6,7 +6,7 @@
 //! Air attenuates light by exp(−σ·distance): σ = 3.912/V for the visibility V (Koschmieder, contrast threshold 2 %).
 //! Rain adds 1.076·R^0.67 dB/km for the rain rate R in mm/h (Carbonneau and Wisely, 1998).
 
-use closecall_traffic::{Environment, Light, VehicleState};
+use closecall_traffic::{Environment, Light, VehicleState, maths};
 
 use super::Camera;
 use super::mesh::{Emission, Vec3, dot, each};
@@ -133,8 +133,8 @@ impl Illumination {
         let [hazy_m, clear_m] = SUN_FADES_M;
         let dry = 1.0 - (environment.rain_mm_per_h / OVERCAST_RAIN_MM_PER_H).min(1.0);
         let clear = dry * ((environment.visibility_m - hazy_m) / (clear_m - hazy_m)).clamp(0.0, 1.0);
-        let (sin, cos) = camera.sun.elevation_rad.sin_cos();
-        let (sin_azimuth, cos_azimuth) = (camera.sun.azimuth_rad - yaw_rad).sin_cos();
+        let (sin, cos) = maths::sin_cos(camera.sun.elevation_rad);
+        let (sin_azimuth, cos_azimuth) = maths::sin_cos(camera.sun.azimuth_rad - yaw_rad);
         let clear = clear as f32;
         // An overcast sky is grey, about as bright at the zenith as at the horizon, and illuminates from all sides.
         let grey = level.horizon.iter().sum::<f32>() / 3.0;
@@ -150,7 +150,7 @@ impl Illumination {
             zenith: level.zenith.map(|value| night_sky * overcast(value, 0.9 * grey)),
             horizon: level.horizon.map(|value| night_sky * overcast(value, grey)),
             extinction_per_m: extinction_per_m as f32,
-            gain: level.gain * (camera.exposure_ev as f32).exp2(),
+            gain: level.gain * maths::exp2(camera.exposure_ev as f32),
             exposure_s: level.exposure_s,
             noise: level.noise,
             headlamp: level.headlamp,
@@ -245,7 +245,7 @@ mod tests {
     fn the_series_approximates_the_exponential() {
         for step in 0_u8..100 {
             let x = f32::from(step) * 0.1;
-            assert!((exp_negative(x) - (-x).exp()).abs() < 2e-4, "{x}");
+            assert!((exp_negative(x) - maths::exp(-x)).abs() < 2e-4, "{x}");
         }
     }
 

@@ -11,7 +11,7 @@
 //! The camera axes follow the convention of computer vision: x right, y down, z along the optical axis (the *depth*).
 //! Pixels are square. Unless the lens is configured otherwise ([`Optics`]), it has no distortion.
 
-use closecall_traffic::{Scene, SceneVehicle};
+use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::Camera;
 use super::optics::Optics;
@@ -74,7 +74,7 @@ pub struct GroundBox {
 impl GroundBox {
     /// Returns the eight corners in the ego's vehicle frame (m).
     pub(crate) fn corners(&self) -> [[f64; 3]; 8] {
-        let (sin, cos) = self.heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(self.heading_rad);
         std::array::from_fn(|corner| {
             let sign = |bit: usize| if corner >> bit & 1 == 0 { -0.5 } else { 0.5 };
             let (along, across) = (sign(0) * self.length_m, sign(1) * self.width_m);
@@ -110,11 +110,11 @@ impl Lens {
         // If the nose of the ego dips, its tail rises: the lens moves up and its axis points higher.
         let pitch = camera.pitch_rad - ego.pitch_rad;
         Self {
-            focal_px: f64::from(WIDTH_PX) / 2.0 / (FIELD_OF_VIEW_RAD / 2.0).tan(),
+            focal_px: f64::from(WIDTH_PX) / 2.0 / maths::tan(FIELD_OF_VIEW_RAD / 2.0),
             ahead_m,
             height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
-            sin_pitch: pitch.sin(),
-            cos_pitch: pitch.cos(),
+            sin_pitch: maths::sin(pitch),
+            cos_pitch: maths::cos(pitch),
             optics: camera.optics,
             readout_s: camera.readout_s,
         }
@@ -174,7 +174,7 @@ impl Lens {
             scene.road.plane_pose(vehicle.state.s_m, vehicle.state.d_m, vehicle.state.heading_rad)
         };
         let (ego, other) = (pose(&scene.ego), pose(other));
-        let (sin, cos) = ego.yaw_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(ego.yaw_rad);
         let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
         ([cos * dx + sin * dy - self.ahead_m, cos * dy - sin * dx], other.yaw_rad - ego.yaw_rad)
     }
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn a_point_thirty_degrees_off_the_axis_appears_at_the_edge_of_the_image() {
         let lens = lens(0.0);
-        let [u, _] = lens.pixel([10.0 * (FIELD_OF_VIEW_RAD / 2.0).tan(), 0.0, 10.0]);
+        let [u, _] = lens.pixel([10.0 * maths::tan(FIELD_OF_VIEW_RAD / 2.0), 0.0, 10.0]);
         assert!((u - f64::from(WIDTH_PX)).abs() < 1e-9);
     }
 

@@ -13,7 +13,7 @@
 //! radiance stays that at 1°, and beyond 30° it goes on to fall, to zero where the source is behind the lens. The veil is added before the
 //! exposure, so that pixels near the source saturate, and all contrast is lost there. Nothing hides a source.
 
-use closecall_traffic::{Scene, SceneVehicle};
+use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::fault::CameraFault;
 use super::frame::Frame;
@@ -84,7 +84,7 @@ fn of_main_beams(
     (lens, light): (&Lens, &Illumination),
 ) -> Vec<Veil> {
     let (at, heading) = lens.pose_in_ground(scene, vehicle);
-    let (sin, cos) = heading.sin_cos();
+    let (sin, cos) = maths::sin_cos(heading);
     let lamps = shapes::vehicle(&vehicle.vehicle).lamps;
     let of_lamp = |[x, y, z]: [f64; 3]| {
         let to_lamp = [at[0] + cos * x - sin * y, at[1] + sin * x + cos * y, z - lens.height_m];

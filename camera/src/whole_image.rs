@@ -2,7 +2,7 @@
 //! returns the instances.
 
 use closecall_tracking::Detection;
-use closecall_traffic::{Check, Parameters, Scene, SceneVehicle};
+use closecall_traffic::{Check, Parameters, Scene, SceneVehicle, maths};
 
 use super::classifier::{Backend, ClassifierError};
 use super::detector::{InstanceDetector, LabelMap, SHIPPED_MASK_RCNN};
@@ -124,7 +124,7 @@ impl RearCamera {
             at = lens.optics.undistorted(at);
         }
         let [x, y, z] = lens.ray_in_ground(at.map(|part| part as f32)).map(f64::from);
-        let below = -z / x.hypot(y);
+        let below = -z / maths::hypot(x, y);
         (below > 1e-4).then(|| {
             let along = lens.height_m / -z;
             ([lens.ahead_m + along * x, along * y], below)

@@ -1,6 +1,8 @@
 //! What glare does to the pixels and to the classifier.
 
-use closecall_traffic::{Check, Environment, Light, Num, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{
+    Check, Environment, Light, Num, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState, maths,
+};
 
 use super::*;
 use crate::classifier::{Backend, Classifier};
@@ -74,7 +76,7 @@ fn seen(light: Light, camera: &Camera, fault: &CameraFault) -> [f64; 2] {
 fn the_veil_falls_with_the_square_of_the_angle_and_is_that_of_stiles_and_holladay() {
     let veil = Veil { towards: [-1.0, 0.0, 0.0], irradiance: [1.0; 3] };
     let at_deg = |angle_deg: f32| {
-        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        let (sin, cos) = maths::sin_cos(angle_deg.to_radians());
         let mut light = [0.0; 3];
         veil.add_to([-cos, sin, 0.0], &mut light);
         light[0]
