@@ -4,7 +4,7 @@
 //! the mean 4, the number of dimensions `[x, y, vx, vy]` of the nearest face (Bar-Shalom, Li, Kirubarajan 2001, section
 //! 5.4.2).
 
-use closecall_traffic::{Source, Track, TrackId, TrackStatus};
+use closecall_traffic::{Source, Track, TrackId, TrackStatus, maths};
 use nalgebra::{Matrix2, Vector2, Vector4};
 
 use crate::surroundings::{OtherVehicle, transform_scene};
@@ -173,5 +173,5 @@ fn face_error(track: &Track, other: &OtherVehicle) -> Vector4<f64> {
 /// Returns the distance between the nearest faces of a track and a vehicle.
 fn face_distance_m(track: &Track, other: &OtherVehicle) -> f64 {
     let error = face_error(track, other);
-    error[0].hypot(error[1])
+    maths::hypot(error[0], error[1])
 }

@@ -76,6 +76,7 @@ impl Perception for GroundTruth {
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::maths;
     use closecall_traffic::{Environment, Road, Time, VehicleClass};
 
     use super::*;
@@ -115,7 +116,7 @@ mod tests {
         // 100 m back on a circle with a radius of 500 m: 9.9 m to the left, turned by 0.2 rad relative to the ego.
         assert!(track.y_m() > 9.0, "{}", track.y_m());
         assert!((track.heading_rad + 0.2).abs() < 1e-9);
-        assert!((track.vx_mps().hypot(track.vy_mps()) - 36.0).abs() < 1e-9);
+        assert!((maths::hypot(track.vx_mps(), track.vy_mps()) - 36.0).abs() < 1e-9);
         assert_eq!(track.lane, [0.0, 1.0, 0.0]);
     }
 

@@ -8,7 +8,7 @@
 
 use closecall_camera::{FOCAL_PX, Instance, RearCamera, is_beside_road, overlap};
 use closecall_tracking::LaneGeometry;
-use closecall_traffic::{ClassScores, Time};
+use closecall_traffic::{ClassScores, Time, maths};
 
 use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy};
 
@@ -122,7 +122,7 @@ fn scores(instances: &[Instance], found: &Instance) -> ClassScores {
 /// Returns whether nearer detections hide the box of one in the image.
 fn is_hidden(index: usize, own: &[f64; 4], detections: &[Detection], bounds: &[Option<[f64; 4]>]) -> bool {
     let area = |[left, top, right, bottom]: &[f64; 4]| (right - left) * (bottom - top);
-    let distance = |at: usize| detections[at].face_x_m.hypot(detections[at].face_y_m);
+    let distance = |at: usize| maths::hypot(detections[at].face_x_m, detections[at].face_y_m);
     bounds.iter().enumerate().any(|(other, bounds)| {
         other != index
             && distance(other) < distance(index)
@@ -160,7 +160,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
     let typical = instance.class.typical_dimensions();
     let width_m = (right - left) / FOCAL_PX * depth_m;
     // The distance is h / tan β: its derivative by β is −h / sin² β, which is about d / tan β.
-    let range_sd_m = depth_m / below * (ROW_SD_PX / FOCAL_PX).hypot(PITCH_SD_RAD);
+    let range_sd_m = depth_m / below * maths::hypot(ROW_SD_PX / FOCAL_PX, PITCH_SD_RAD);
     let mut scores = [0.0; 4];
     (scores[instance.class as usize], scores[ClassScores::BACKGROUND]) = (instance.score, 1.0 - instance.score);
     let detection = Detection {
@@ -168,7 +168,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         face_x_m: x_m,
         face_y_m: y_m,
         range_sd_m,
-        lateral_sd_m: (depth_m * EDGE_SD_PX / FOCAL_PX).hypot(y_m / depth_m * range_sd_m),
+        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / FOCAL_PX, y_m / depth_m * range_sd_m),
         heading_rad: lane.direction_rad(x_m),
         length_m: typical.length_m,
         length: Extent::Assumed,

@@ -1,6 +1,6 @@
 //! The other vehicles in the ego's frame, computed once per step and shared by all object-level models.
 
-use closecall_traffic::{Appearance, VehicleClass};
+use closecall_traffic::{Appearance, VehicleClass, maths};
 
 use crate::{Scene, SceneVehicle, SensorError};
 use closecall_traffic::ego_frame::EgoFrame;
@@ -53,8 +53,8 @@ pub(crate) fn transform_scene<'a>(
         let state = &vehicle.state;
         let point = frame.point(state.s_m, state.d_m);
         let heading_rad = point.road_yaw_rad + state.heading_rad;
-        let (sin, cos) = heading_rad.sin_cos();
-        let (road_sin, road_cos) = state.heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(heading_rad);
+        let (road_sin, road_cos) = maths::sin_cos(state.heading_rad);
         // On the inside of a bend, a vehicle passes more metres of the reference line than it drives.
         let path_scale = 1.0 - curvature_per_m * state.d_m;
         others.push(OtherVehicle {

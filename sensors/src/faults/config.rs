@@ -3,7 +3,7 @@
 //! Sources: the yaw of a mounted LiDAR can be measured to 0.1° in production (Kim et al. 2020, arXiv 2008.10542), so that a
 //! residual of some tenths of a degree is what a fault of the mounting means. All other magnitudes are the scenario's choice.
 
-use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +145,7 @@ impl Combine for LidarFault {
             yaw_rad: self.yaw_rad + other.yaw_rad,
             pitch_rad: self.pitch_rad + other.pitch_rad,
             height_m: self.height_m + other.height_m,
-            range_noise_m: self.range_noise_m.hypot(other.range_noise_m),
+            range_noise_m: maths::hypot(self.range_noise_m, other.range_noise_m),
             rail_ghosts: either(self.rail_ghosts, other.rail_ghosts),
             crosstalk: self.crosstalk + other.crosstalk,
             blooming_deg: self.blooming_deg.max(other.blooming_deg),
@@ -320,7 +320,7 @@ impl Combine for CameraFault {
             sun_glare: self.sun_glare + other.sun_glare,
             main_beam_glare: self.main_beam_glare + other.main_beam_glare,
             dirt: either(self.dirt, other.dirt),
-            blur_px: self.blur_px.hypot(other.blur_px),
+            blur_px: maths::hypot(self.blur_px, other.blur_px),
         }
     }
 }

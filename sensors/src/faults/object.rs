@@ -5,7 +5,7 @@
 //! way halve it. For the angle of the mounting see [`LidarFaultConfig`](super::LidarFaultConfig). All magnitudes are the
 //! scenario's choice.
 
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -123,8 +123,8 @@ impl Combine for ObjectFault {
             jitter_s: self.jitter_s + other.jitter_s,
             clock_offset_s: self.clock_offset_s + other.clock_offset_s,
             yaw_rad: self.yaw_rad + other.yaw_rad,
-            noise_m: [along_m.hypot(other.noise_m[0]), across_m.hypot(other.noise_m[1])],
-            speed_noise_mps: self.speed_noise_mps.hypot(other.speed_noise_mps),
+            noise_m: [maths::hypot(along_m, other.noise_m[0]), maths::hypot(across_m, other.noise_m[1])],
+            speed_noise_mps: maths::hypot(self.speed_noise_mps, other.speed_noise_mps),
             ghost: other.ghost.or(self.ghost),
         }
     }

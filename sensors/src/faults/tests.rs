@@ -9,7 +9,7 @@ mod refused;
 
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Light, Parameters, Road, RoadConfig, Source, Time, Track,
-    TrackStatus, VehicleClass,
+    TrackStatus, VehicleClass, maths,
 };
 use serde::Deserialize;
 
@@ -271,9 +271,9 @@ fn a_wrong_mounting_moves_what_is_seen_by_its_angle_and_height() {
     // The sensor is turned to the left, so that it looks to the right, and a vehicle straight behind appears to its left of
     // centre: at 60 m by 60 · tan 0.5°.
     let shift_m = lateral_m("yaw-deg = 0.5") - lateral_m("yaw-deg = 0.0");
-    assert!((shift_m - 60.0 * 0.5_f64.to_radians().tan()).abs() < 0.08, "{shift_m}");
+    assert!((shift_m - 60.0 * maths::tan(0.5_f64.to_radians())).abs() < 0.08, "{shift_m}");
     let shift_m = lateral_m("yaw-deg = -0.5") - lateral_m("yaw-deg = 0.0");
-    assert!((shift_m + 60.0 * 0.5_f64.to_radians().tan()).abs() < 0.08, "{shift_m}");
+    assert!((shift_m + 60.0 * maths::tan(0.5_f64.to_radians())).abs() < 0.08, "{shift_m}");
     let height_m = |fault: &str| {
         let steps = with(fault);
         let points = steps.iter().flat_map(|step| &step.points);

@@ -3,6 +3,7 @@
 use super::boxes::BoxFit;
 use super::parts::{ends_at_plate, plate_middle};
 use crate::Extent;
+use closecall_traffic::maths;
 
 /// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the last step, 1/√12 = 0.29.
 const EDGE_SD_COLUMNS: f64 = 0.3;
@@ -52,15 +53,15 @@ pub(super) fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typic
     let both_seen = !right_hidden && !left_hidden && !ends_at_plate(fit);
     let extent = if both_seen && missing < 2.0 * fit.spacing_m + 0.2 { Extent::Seen } else { Extent::Assumed };
     let sd_m = match extent {
-        Extent::Seen => sd_m.hypot(0.5 * lost),
-        Extent::Assumed => sd_m.hypot(lost),
+        Extent::Seen => maths::hypot(sd_m, 0.5 * lost),
+        Extent::Assumed => maths::hypot(sd_m, lost),
     };
     let width_m = match extent {
         Extent::Seen => left_m - right_m,
         Extent::Assumed => seen.max(typical_m),
     };
     let side_sd_m = if fit.sees_side() { SIDE_SD_M } else { 0.0 };
-    let sd_m = sd_m.max(MIN_LATERAL_SD_M).hypot(side_sd_m);
+    let sd_m = maths::hypot(sd_m.max(MIN_LATERAL_SD_M), side_sd_m);
     let by_edges = Across { middle_m, sd_m, width_m, extent, is_by_plate: false };
     let Some(plate) = plate_middle(fit) else {
         return by_edges;

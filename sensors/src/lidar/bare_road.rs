@@ -24,6 +24,7 @@ use super::pattern::{CentreLines, Column, Elevation, ROAD_LAYERS};
 use super::power::{LinkBudget, MIN_POWER};
 use super::receiver::SensorPoseEstimate;
 use super::targets::{FaceRange, Targets};
+use closecall_traffic::maths;
 
 /// The faces of the road's surface, which is always the first of all faces.
 const GROUND_FACES: FaceRange = FaceRange { first: 0, first_back: 1, end: 1 };
@@ -48,7 +49,7 @@ pub(crate) struct BareRoad {
 
 /// Returns the distance beyond which a road of this strength (m) returns too little light to be detected (m).
 pub(crate) fn farthest_road_return_m(link: &LinkBudget, strength_m: f32) -> f32 {
-    (POWER_MARGIN * link.gain_m2 * strength_m / MIN_POWER).cbrt()
+    maths::cbrt(POWER_MARGIN * link.gain_m2 * strength_m / MIN_POWER)
 }
 
 impl BareRoad {

@@ -13,6 +13,7 @@
 //! (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape fitting for vehicle detection using laser scanners").
 
 use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
+use closecall_traffic::maths;
 
 use super::edges::{Edges, edges};
 use super::kind::Resolution;
@@ -129,7 +130,7 @@ impl BoxFit {
 
     /// Returns the box with a given heading, from the values that do not depend on it.
     fn with_heading(self, heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
-        let (sin, cos) = heading_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(heading_rad);
         let mut fit = Self { heading_rad, ..self };
         let (sensor_x, sensor_y) = (f64::from(scan.sensor_x_m), f64::from(scan.sensor_y_m));
         let mut nearest = LargestValues::default();
@@ -152,7 +153,7 @@ impl BoxFit {
             slopes = [lesser(slopes[0], slope), greater(slopes[1], slope)];
             squares = lesser(squares, (sensor_x - x).powi(2) + (y - sensor_y) * (y - sensor_y));
         }
-        fit.azimuth_rad = slopes.map(f64::atan);
+        fit.azimuth_rad = slopes.map(maths::atan);
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
         fit.in_view_m = scan.resolution.mount_height_m + fit.range_m * scan.resolution.highest_tan;
@@ -270,7 +271,7 @@ fn truncated_edges(beams: [u16; 2], scan: &LidarScan) -> [bool; 2] {
 /// Returns true if the points surely extend over more than [`REFINE_LENGTH_M`] behind the front face, for this heading. The front
 /// face is at most [`FACE_DEPTH_M`] behind the foremost point that is not taken for noise.
 fn has_long_side(heading_rad: f64, members: &[u32], scan: &LidarScan) -> bool {
-    let (sin, cos) = heading_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(heading_rad);
     let mut nearest = LargestValues::default();
     let mut far = f64::INFINITY;
     for &member in members {
@@ -325,7 +326,7 @@ fn refined_heading_rad(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 
     let mut best = (f64::INFINITY, road_rad);
     for step in -HEADINGS..=HEADINGS {
         let turned = f64::from(step) * HEADING_STEP_RAD;
-        let (sin, cos) = (road_rad + turned).sin_cos();
+        let (sin, cos) = maths::sin_cos(road_rad + turned);
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let rotated = |member: u32| {
             let [x, y, _] = point(scan, member);

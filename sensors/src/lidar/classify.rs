@@ -5,7 +5,7 @@
 //! be lost. The background class covers objects that stand beside the carriageway, return too little light, or are too
 //! low or too thin.
 
-use closecall_traffic::{ClassScores, VehicleClass};
+use closecall_traffic::{ClassScores, VehicleClass, maths};
 
 use super::LaneGeometry;
 use super::boxes::BoxFit;
@@ -81,17 +81,17 @@ pub(crate) fn typical_size_m(class: usize) -> [f64; 2] {
 pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) -> ClassScores {
     let mut logs = [0.0; 4];
     for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
-        *log = model.prior.ln()
+        *log = maths::ln(model.prior)
             + width_log(fit, model, width_seen && !ends_at_plate(fit))
             + height_log(fit, model)
             + length_log(fit, model);
     }
     logs[ClassScores::BACKGROUND] += background_log(fit, lane);
     if fit.plate_m.is_some() {
-        logs[VehicleClass::Motorcycle as usize] += MOTORCYCLE_PLATE_ODDS.ln();
+        logs[VehicleClass::Motorcycle as usize] += maths::ln(MOTORCYCLE_PLATE_ODDS);
     }
     let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut scores = logs.map(|log| (log - max).exp());
+    let mut scores = logs.map(|log| maths::exp(log - max));
     let sum: f64 = scores.iter().sum();
     for score in &mut scores {
         *score = MIN_SCORE + (1.0 - 4.0 * MIN_SCORE) * *score / sum;
@@ -101,17 +101,17 @@ pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) 
 
 /// Returns the logarithm of a normal density, up to a constant.
 fn normal_log(deviation: f64, sd: f64) -> f64 {
-    -0.5 * (deviation / sd).powi(2) - sd.ln()
+    -0.5 * (deviation / sd).powi(2) - maths::ln(sd)
 }
 
 /// Returns the log likelihood of the visible width.
 fn width_log(fit: &BoxFit, model: &ClassModel, seen: bool) -> f64 {
     let Gaussian { mean: width, sd } = model.width_m;
     let seen_m = fit.width_m() + 0.5 * fit.spacing_m;
-    let sd = sd.hypot(0.7 * fit.spacing_m);
+    let sd = maths::hypot(sd, 0.7 * fit.spacing_m);
     // A hidden edge, or one lost to weak returns, only makes a vehicle look narrower.
     let lost = if seen { fit.spacing_m } else { width };
-    if seen_m < width { normal_log(width - seen_m, sd.hypot(lost)) } else { normal_log(seen_m - width, sd) }
+    if seen_m < width { normal_log(width - seen_m, maths::hypot(sd, lost)) } else { normal_log(seen_m - width, sd) }
 }
 
 /// Returns the log likelihood of the visible height.
@@ -119,12 +119,12 @@ fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
     let Gaussian { mean: height, sd } = model.height_m;
     let half_layer = 0.5 * fit.layer_m();
     let expected = height.min(fit.in_view_m - half_layer);
-    let sd = sd.hypot(half_layer).hypot(0.1);
+    let sd = maths::hypot(maths::hypot(sd, half_layer), 0.1);
     // From afar a single layer may hit the vehicle, and the upper part of a car is glass, which returns little light.
     let lost = height * (fit.range_m / LOST_TOP_M).min(1.0);
     let deviation = fit.top_m - expected;
     // Neither branch is normalised: a class is not penalised because its top can be lost more easily.
-    if deviation < 0.0 { -0.5 * (deviation / sd.hypot(lost)).powi(2) } else { -0.5 * (deviation / sd).powi(2) }
+    if deviation < 0.0 { -0.5 * (deviation / maths::hypot(sd, lost)).powi(2) } else { -0.5 * (deviation / sd).powi(2) }
 }
 
 /// Returns the log likelihood of the visible length. Only a length in excess of the class's counts, since a box is at
@@ -132,17 +132,17 @@ fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
 fn length_log(fit: &BoxFit, model: &ClassModel) -> f64 {
     let Gaussian { mean: length, sd } = model.length_m;
     let excess = (fit.length_m() - length).max(0.0);
-    -0.5 * (excess / sd.hypot(0.3)).powi(2)
+    -0.5 * (excess / maths::hypot(sd, 0.3)).powi(2)
 }
 
 /// Returns the additional log odds of background, from the lateral position and the intensity.
 fn background_log(fit: &BoxFit, lane: &LaneGeometry) -> f64 {
-    let (sin, cos) = fit.heading_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(fit.heading_rad);
     let mean_v = 0.5 * (fit.across_m[0] + fit.across_m[1]);
     let (x, y) = (fit.front_u_m * cos - mean_v * sin, fit.front_u_m * sin + mean_v * cos);
     let left = y - lane.path_y_m(x);
     let beyond = (left - lane.edges_m[0]).max(lane.edges_m[1] - left) - VERGE_M;
-    let beside = VERGE_ODDS.ln() / (1.0 + (-beyond / VERGE_SOFTNESS_M).exp());
+    let beside = maths::ln(VERGE_ODDS) / (1.0 + maths::exp(-beyond / VERGE_SOFTNESS_M));
     let faint = fit.range_m < FAINT_REACH_M && fit.intensity < FAINT_INTENSITY;
-    beside + if faint { FAINT_ODDS.ln() } else { 0.0 }
+    beside + if faint { maths::ln(FAINT_ODDS) } else { 0.0 }
 }

@@ -20,6 +20,7 @@
 //! DBSCAN is that of `linfa-clustering`, over the search for neighbours in [`neighbours`](super::neighbours). A point that lies exactly at
 //! the radius is a neighbour.
 
+use closecall_traffic::maths;
 use linfa::ParamGuard;
 use linfa::traits::Transformer;
 use linfa_clustering::Dbscan;
@@ -211,7 +212,7 @@ fn dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<Option
 
 /// Returns the coordinates (X, Y) of a candidate in the stretched plane.
 fn to_stretched_plane(candidate: &Candidate) -> [f32; 2] {
-    let along = (ALONG_GAIN / ALONG_M * candidate.back_m).ln_1p() / ALONG_GAIN;
+    let along = maths::ln_1p(ALONG_GAIN / ALONG_M * candidate.back_m) / ALONG_GAIN;
     [along, candidate.left_m / (ACROSS_M + ACROSS_GAIN * candidate.back_m)]
 }
 
@@ -368,7 +369,7 @@ mod tests {
             let (whole, tight) = (unthinned(RADIUS), unthinned(0.43));
             // A point on the border of two clusters may belong to either, so only core points are compared.
             let neighbours = |at: usize, radius: f64| {
-                let distance = |to: usize| (rows[at][0] - rows[to][0]).hypot(rows[at][1] - rows[to][1]);
+                let distance = |to: usize| maths::hypot(rows[at][0] - rows[to][0], rows[at][1] - rows[to][1]);
                 (0..points.len()).filter(|&to| distance(to) <= radius).count()
             };
             let core: Vec<bool> = (0..points.len()).map(|at| neighbours(at, 0.43) >= CORE_POINTS).collect();

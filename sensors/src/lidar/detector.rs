@@ -1,6 +1,6 @@
 //! The detector: turns a scan into detections, by point selection, clustering, box fitting and classification.
 
-use closecall_traffic::{ClassScores, Time, VehicleClass};
+use closecall_traffic::{ClassScores, Time, VehicleClass, maths};
 
 use super::across::across;
 use super::boxes::BoxFit;
@@ -237,7 +237,7 @@ fn contains(whole: &BoxFit, part: &BoxFit, lane: &LaneGeometry) -> bool {
     }
     let class = class_scores(whole, true, lane);
     let [length, width] = typical_size_m(class.best_vehicle_class() as usize);
-    let (sin, cos) = (part.heading_rad - whole.heading_rad).sin_cos();
+    let (sin, cos) = maths::sin_cos(part.heading_rad - whole.heading_rad);
     let across = 0.5 * (part.across_m[0] + part.across_m[1]);
     let (u, v) = (part.front_u_m * cos - across * sin, part.front_u_m * sin + across * cos);
     let middle = 0.5 * (whole.across_m[0] + whole.across_m[1]);
@@ -274,7 +274,7 @@ fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, la
     let across = across(fit, hidden, typical_width);
     let length_seen = has_seen_length(fit);
     let (front_u_m, range_sd_m) = front(fit, &class);
-    let (sin, cos) = fit.heading_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(fit.heading_rad);
     #[expect(clippy::cast_possible_truncation, reason = "offsets lie within a sweep")]
     let time = start + Time::from_ns(fit.offset_ns as i64);
     Detection {
@@ -298,8 +298,8 @@ fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, la
 
 /// Returns the position of the front face along the box's heading, and its standard deviation (m).
 fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
-    let face_sd_m = if fit.sees_side() { FACE_SD_M.hypot(CORNER_SD_M) } else { FACE_SD_M };
-    let sd = face_sd_m.hypot(fit.point_sd_m / (fit.front_points.max(1) as f64).sqrt());
+    let face_sd_m = if fit.sees_side() { maths::hypot(FACE_SD_M, CORNER_SD_M) } else { FACE_SD_M };
+    let sd = maths::hypot(face_sd_m, fit.point_sd_m / (fit.front_points.max(1) as f64).sqrt());
     if fit.is_truncated() {
         // The vehicle is partly or entirely beside the ego. The front follows from the rear end and the typical length.
         let [typical_length, _] = typical_size_m(class.best_vehicle_class() as usize);
@@ -310,12 +310,12 @@ fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
     }
     match class.best_vehicle_class() {
         VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.footprint_m() > CABIN_ONLY_FROM_M => {
-            (fit.front_u_m + BUMPER_OFFSET_M, sd.hypot(BUMPER_OFFSET_SD_M))
+            (fit.front_u_m + BUMPER_OFFSET_M, maths::hypot(sd, BUMPER_OFFSET_SD_M))
         }
         VehicleClass::Motorcycle if fit.range_m > RIDER_ONLY_FROM_M => {
-            (fit.front_u_m + RIDER_OFFSET_M, sd.hypot(RIDER_OFFSET_SD_M))
+            (fit.front_u_m + RIDER_OFFSET_M, maths::hypot(sd, RIDER_OFFSET_SD_M))
         }
-        VehicleClass::Motorcycle => (fit.front_u_m, sd.hypot(WHEEL_SD_M)),
+        VehicleClass::Motorcycle => (fit.front_u_m, maths::hypot(sd, WHEEL_SD_M)),
         VehicleClass::Car | VehicleClass::Truck => (fit.front_u_m, sd),
     }
 }
@@ -328,7 +328,7 @@ fn has_seen_length(fit: &BoxFit) -> bool {
 /// Returns true if the columns hit the side so densely that its farthest point is the rear end.
 fn sees_rear(fit: &BoxFit) -> bool {
     // At distance r and lateral offset y, columns with the azimuth step Δφ hit a side every Δφ·r²/y.
-    let (sin, cos) = fit.heading_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(fit.heading_rad);
     let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);
     let (x, y) = (fit.rear_u_m * cos - middle * sin, fit.rear_u_m * sin + middle * cos);
     let step_rad = fit.spacing_m / fit.range_m.max(1.0);

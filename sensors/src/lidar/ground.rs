@@ -6,7 +6,7 @@
 //! centre, and may be off by half a footprint.
 
 use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
-use closecall_traffic::{Environment, Time};
+use closecall_traffic::{Environment, Time, maths};
 
 use super::bare_road::farthest_road_return_m;
 use super::material::asphalt;
@@ -71,7 +71,7 @@ pub(crate) fn select_candidates(
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     let (slope, bend, [left_end_m, right_end_m]) =
         (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32, lane.region_m.map(|end_m| end_m as f32));
-    let max_side_tan = MAX_SIDE_AZIMUTH_RAD.tan() as f32;
+    let max_side_tan = maths::tan(MAX_SIDE_AZIMUTH_RAD) as f32;
     let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
     for ((((&x, &y), &z), &intensity), index) in points.zip(0..) {
         if !(x + y + z + intensity).is_finite() {

@@ -7,12 +7,13 @@
 //! reached with the probability p: the received power is then P = 1 + Φ⁻¹(p)/T thresholds (see [`super::power`]). The nominal
 //! range of the model, at ρ = 0.5 with probability 0.5, is R·√(P·0.5/ρ₀).
 
+use std::f64::consts::SQRT_2;
 use std::sync::{Mutex, PoisonError};
 
-use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range, Time};
+use closecall_statistics::normal::erfc_inv;
+use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range, Time, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::pattern::{GROUPS, mirror_bounds_deg};
 use super::power::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
@@ -269,7 +270,7 @@ impl LidarKindConfig {
         let probability = number(self.range_probability, "range-probability", Range::closed(0.5, 0.99))?;
         let above = match probability {
             0.5 => 0.0,
-            _ => Normal::standard().inverse_cdf(probability),
+            _ => -SQRT_2 * erfc_inv(2.0 * probability),
         };
         let power = 1.0 + above / f64::from(THRESHOLD_OVER_NOISE);
         let nominal_m = range_m * (power * (NOMINAL_REFLECTIVITY / reflectivity)).sqrt();
@@ -334,8 +335,9 @@ impl Check for LidarKindConfig {
             fine_rad: [self.fine_half_field_deg.unwrap_or(0.0) * degree, fine_step_deg * degree],
             layer_rad: spacing_deg * degree,
             footprint_rad: [self.beam_width_deg * degree, self.beam_height_deg * degree],
-            highest_tan: (highest_deg.to_radians().tan() * HIGHEST_DECIMALS).round() / HIGHEST_DECIMALS,
-            point_sd_m: (self.range_sd_m.hypot(self.range_sd_at_threshold_m / USUAL_POWER) * SD_DECIMALS).round()
+            highest_tan: (maths::tan(highest_deg.to_radians()) * HIGHEST_DECIMALS).round() / HIGHEST_DECIMALS,
+            point_sd_m: (maths::hypot(self.range_sd_m, self.range_sd_at_threshold_m / USUAL_POWER) * SD_DECIMALS)
+                .round()
                 / SD_DECIMALS,
             mount_height_m: MOUNT_HEIGHT_M,
             ground_reach_m: GROUND_REACH_M,
@@ -352,7 +354,7 @@ impl Check for LidarKindConfig {
             azimuths_deg,
             half_field_deg,
             finest_step_deg: fine_step_deg,
-            half_field_tan: (half_field_deg.to_radians().tan() * TANGENT_DECIMALS).round() / TANGENT_DECIMALS,
+            half_field_tan: (maths::tan(half_field_deg.to_radians()) * TANGENT_DECIMALS).round() / TANGENT_DECIMALS,
             beam_width_deg: number(self.beam_width_deg, "beam-width-deg", beam)?,
             beam_height_deg: number(self.beam_height_deg, "beam-height-deg", beam)?,
             period_ns,

@@ -15,6 +15,7 @@
 //! A [`LidarKind`] says where the layers and the columns lie. A beam has a footprint. 2 × 4 sub-rays of equal weight sample it.
 
 use super::{LidarKind, MirrorSide};
+use closecall_traffic::maths;
 
 /// Greatest number of groups in a column.
 pub(crate) const GROUPS: usize = 4;
@@ -260,11 +261,11 @@ fn column(kind: &LidarKind, azimuth_deg: f64) -> Column {
     for group in 0..GROUPS {
         // The groups that the pattern lacks stay within its bounds.
         let centre_deg = group_azimuth_deg(kind, azimuth_deg, group.min(kind.groups() - 1));
-        let (sin, cos) = centre_deg.to_radians().sin_cos();
+        let (sin, cos) = maths::sin_cos(centre_deg.to_radians());
         column.centre[group] = [cos as f32, sin as f32];
         for across in 0..SUBRAY_COLUMNS {
             let offset_deg = kind.beam_width_deg * ((across as f64 + 0.5) / SUBRAY_COLUMNS as f64 - 0.5);
-            let (sin, cos) = (centre_deg + offset_deg).to_radians().sin_cos();
+            let (sin, cos) = maths::sin_cos((centre_deg + offset_deg).to_radians());
             column.cos[group][across] = cos as f32;
             column.sin[group][across] = sin as f32;
         }
@@ -281,9 +282,9 @@ fn elevation(kind: &LidarKind, layer: usize, azimuth_deg: f64, mirror_side: Mirr
     };
     Elevation {
         group: layer / kind.layers_per_group,
-        centre: [centre_deg.to_radians().tan() as f32, centre_deg.to_radians().cos() as f32],
-        tan: std::array::from_fn(|upward| subray_rad(upward).tan() as f32),
-        cos: std::array::from_fn(|upward| subray_rad(upward).cos() as f32),
+        centre: [maths::tan(centre_deg.to_radians()) as f32, maths::cos(centre_deg.to_radians()) as f32],
+        tan: std::array::from_fn(|upward| maths::tan(subray_rad(upward)) as f32),
+        cos: std::array::from_fn(|upward| maths::cos(subray_rad(upward)) as f32),
     }
 }
 
@@ -335,7 +336,7 @@ mod tests {
             for (index, column) in pattern.columns.iter().enumerate() {
                 for (layer, elevation) in pattern.elevations(mirror_side, index).iter().enumerate() {
                     let published_rad = published_deg(layer, column.azimuth_deg, sign).to_radians();
-                    assert_eq!(elevation.centre, [published_rad.tan() as f32, published_rad.cos() as f32]);
+                    assert_eq!(elevation.centre, [maths::tan(published_rad) as f32, maths::cos(published_rad) as f32]);
                     assert_eq!(elevation.group, layer / 4);
                 }
             }

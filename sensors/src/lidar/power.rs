@@ -16,7 +16,7 @@
 //! range (200 m), in air that does not attenuate. A surface of reflectivity 0.8 is then detected with probability 0.9
 //! up to 226 m, and one of reflectivity 0.1 up to 80 m.
 
-use closecall_traffic::{Environment, KOSCHMIEDER, rain_db_per_km};
+use closecall_traffic::{Environment, KOSCHMIEDER, maths, rain_db_per_km};
 
 use super::Lidar;
 
@@ -77,7 +77,7 @@ impl LinkBudget {
 
     /// Returns the share of the light that remains after the way out and back over `range_m`.
     pub(crate) fn transmission(&self, range_m: f32) -> f32 {
-        (-2.0 * self.extinction_per_m * range_m).exp()
+        maths::exp(-2.0 * self.extinction_per_m * range_m)
     }
 }
 

@@ -24,6 +24,7 @@ use super::power::LinkBudget;
 use super::receiver::SensorPoseEstimate;
 use super::targets::{Part, Targets};
 use super::{LaneGeometry, PointSource};
+use closecall_traffic::maths;
 
 /// Height of the lower edge of a rail (m).
 const BELOW_RAIL_M: f64 = 0.44;
@@ -49,7 +50,7 @@ pub(crate) struct RailReturns {
 /// Returns the distance up to which a beam of this height (°) is lower than the lower edge of a rail (m): 30 m for 0.6°.
 #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
 pub(crate) fn narrow_to_m(beam_height_deg: f64) -> f32 {
-    let exact_m = BELOW_RAIL_M / (BEAM_MARGIN * beam_height_deg).to_radians().tan();
+    let exact_m = BELOW_RAIL_M / maths::tan((BEAM_MARGIN * beam_height_deg).to_radians());
     ((exact_m / NARROW_STEP_M).floor() * NARROW_STEP_M) as f32
 }
 

@@ -15,6 +15,7 @@ use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
+use closecall_traffic::maths;
 
 /// Intensity at which the receiver saturates, as a reflectivity.
 pub(super) const MAX_INTENSITY: f32 = 4.0;
@@ -38,7 +39,7 @@ impl SensorPoseEstimate {
         let pitch_rad = scene.ego.pitch_rad + error_rad;
         let back_m = 0.5 * scene.ego.vehicle.dimensions.length_m - lidar.inset_m;
         let sensor = sensor_position_m([back_m, lidar.left_m, lidar.mount_height_m], pitch_rad);
-        let (sin, cos) = (pitch_rad + lidar.tilt_rad).sin_cos();
+        let (sin, cos) = maths::sin_cos(pitch_rad + lidar.tilt_rad);
         Self {
             sensor_m: [sensor.x as f32, sensor.y as f32, sensor.z as f32],
             cos: cos as f32,

@@ -20,6 +20,7 @@ use nalgebra::{Isometry3, Point3};
 use super::Material;
 use super::solid::Solid;
 use super::targets::BOUND_MARGIN_DEG;
+use closecall_traffic::maths;
 
 /// Number of faces of a box.
 const BOX_FACES: usize = 6;
@@ -51,7 +52,7 @@ impl Silhouette {
         let mut corners = [[0.0; 2]; 8];
         for (seen, corner) in corners.iter_mut().zip(solid.corners()) {
             let corner: Point3<f64> = pose * corner;
-            *seen = [corner.y.atan2(corner.x), corner.z / corner.x.hypot(corner.y)];
+            *seen = [maths::atan2(corner.y, corner.x), corner.z / maths::hypot(corner.x, corner.y)];
         }
         Self { planes, corners }
     }
@@ -65,18 +66,20 @@ impl Silhouette {
         for [low, high] in on_ends.chain(inside.map(|&[_, tan]| [tan; 2])) {
             bounds = [bounds[0].min(low), bounds[1].max(high)];
         }
-        let rise = 1.0 / (ends[1] - ends[0]).cos();
+        let rise = 1.0 / maths::cos(ends[1] - ends[0]);
         let [low, high] = [
             bounds[0] * if bounds[0] < 0.0 { rise } else { 1.0 },
             bounds[1] * if bounds[1] > 0.0 { rise } else { 1.0 },
         ];
-        (low <= high).then(|| [low.atan().to_degrees() - BOUND_MARGIN_DEG, high.atan().to_degrees() + BOUND_MARGIN_DEG])
+        (low <= high).then(|| {
+            [maths::atan(low).to_degrees() - BOUND_MARGIN_DEG, maths::atan(high).to_degrees() + BOUND_MARGIN_DEG]
+        })
     }
 
     /// Returns the least and the greatest tangent of the elevation at one azimuth, or `None` if the solid does not
     /// appear there.
     fn tangents_at(&self, azimuth_rad: f64) -> Option<[f64; 2]> {
-        let (sin, cos) = azimuth_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(azimuth_rad);
         // Each plane as (constant, slope) of m·d in t.
         let line = |plane: &[f64; 3]| [plane[0] * cos + plane[1] * sin, plane[2]];
         let mut bounds = [f64::NEG_INFINITY, f64::INFINITY];

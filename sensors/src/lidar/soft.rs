@@ -18,7 +18,7 @@
 
 use std::ops::Range;
 
-use closecall_traffic::{Environment, Vehicle, VehicleClass};
+use closecall_traffic::{Environment, Vehicle, VehicleClass, maths};
 use nalgebra::Isometry3;
 
 use super::echo::PULSE_M;
@@ -113,7 +113,7 @@ impl DropletEffect {
 
     /// Returns the share of the light from `range_m` that the plumes transmit, on the way out and back.
     pub(crate) fn transmission(&self, range_m: f32) -> f32 {
-        if self.optical_depth > 0.0 && range_m > self.near_m { (-2.0 * self.optical_depth).exp() } else { 1.0 }
+        if self.optical_depth > 0.0 && range_m > self.near_m { maths::exp(-2.0 * self.optical_depth) } else { 1.0 }
     }
 }
 
@@ -176,7 +176,7 @@ pub(crate) fn droplet_effect(
     let mut has_echo = false;
     for plume in plumes.iter().filter(|plume| plume.columns.contains(&at.column)) {
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
-        let clump = *clump.get_or_insert_with(|| -noise.uniform(at.clump(), Purpose::Plume).ln());
+        let clump = *clump.get_or_insert_with(|| -maths::ln(noise.uniform(at.clump(), Purpose::Plume)));
         let extinction = plume.extinction_per_m * clump;
         let before = found.optical_depth;
         found.near_m = found.near_m.min(from);
@@ -185,7 +185,7 @@ pub(crate) fn droplet_effect(
         if has_echo || 0.5 * (1.0 - depth) >= found.optical_depth {
             continue;
         }
-        let ends_at = -0.5 * depth.ln();
+        let ends_at = -0.5 * maths::ln(depth);
         if ends_at < found.optical_depth {
             has_echo = true;
             let range_m = from + (ends_at - before) / extinction;
@@ -280,9 +280,9 @@ fn fog(beam: usize, link: &LinkBudget, noise: Noise) -> Option<SoftEcho> {
     if !link.has_fog() {
         return None;
     }
-    let depth = -0.5 * noise.uniform(beam, Purpose::FogDepth).ln();
+    let depth = -0.5 * maths::ln(noise.uniform(beam, Purpose::FogDepth));
     let range_m = NEAREST_M + depth / link.extinction_per_m;
-    let clump = -noise.uniform(beam, Purpose::FogClump).ln();
+    let clump = -maths::ln(noise.uniform(beam, Purpose::FogClump));
     let power = soft_power(link.extinction_per_m * FOG_CLUMPINESS * clump, range_m, link);
     Some(SoftEcho { range_m, power, source: PointSource::Fog })
 }

@@ -18,6 +18,7 @@ use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
 use super::{LaneGeometry, LidarScan, Material, MirrorSide, PointSource, PointTruth, ScanTruth};
 use crate::faults::LidarFault;
 use closecall_traffic::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
+use closecall_traffic::maths;
 
 /// Number of columns of a burst, from the fewest to the most.
 const BURST_COLUMNS: [usize; 2] = [3, 10];
@@ -143,7 +144,7 @@ impl Spoiler<'_> {
     fn turned(&self, at_m: [f32; 3], angle_rad: f32, factor: f32) -> [f32; 3] {
         let sensor = self.sensor_m();
         let [x, y, z] = std::array::from_fn(|axis| (at_m[axis] - sensor[axis]) * factor);
-        let (sin, cos) = angle_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(angle_rad);
         [sensor[0] + cos * x - sin * y, sensor[1] + sin * x + cos * y, sensor[2] + z]
     }
 
@@ -226,7 +227,7 @@ impl Spoiler<'_> {
     fn lose(&self, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let (sensor, axis_deg) = (self.sensor_m(), scan.axis_azimuth_rad.to_degrees());
         let is_blocked = |x_m: f32, y_m: f32| {
-            let azimuth_deg = f64::from((y_m - sensor[1]).atan2(sensor[0] - x_m)).to_degrees() - axis_deg;
+            let azimuth_deg = f64::from(maths::atan2(y_m - sensor[1], sensor[0] - x_m)).to_degrees() - axis_deg;
             self.fault.blocked_deg.iter().flatten().any(|[from, to]| (*from..=*to).contains(&azimuth_deg))
         };
         let mut kept = 0;

@@ -20,6 +20,7 @@ use super::pattern::Pattern;
 use super::silhouette::Silhouette;
 use super::solid::{MAX_FACES, Solid, SolidFace};
 use super::{Material, MirrorSide, PointSource};
+use closecall_traffic::maths;
 
 /// Minimum distance of a face's plane from the sensor's centre (m). Nearer planes are moved to it, so that n/w stays
 /// finite.
@@ -213,7 +214,8 @@ impl Bounds {
         let [bottom, top] = fold(|corner| corner.z);
         let far = fold(|corner| corner.x * corner.x + corner.y * corner.y)[1].sqrt();
         let near = (distance_m(solid, pose) * DISTANCE_MARGIN).max(MIN_DISTANCE_M);
-        let above = |z: f64, near_m: f64, far_m: f64| (z / if z > 0.0 { near_m } else { far_m }).atan().to_degrees();
+        let above =
+            |z: f64, near_m: f64, far_m: f64| maths::atan(z / if z > 0.0 { near_m } else { far_m }).to_degrees();
         // The azimuth jumps by 360° if the solid crosses the half-plane y = 0, x ≤ 0, which extends forward from the
         // sensor.
         let crosses = fold(|corner| corner.x)[0] <= 0.0 && {
@@ -240,7 +242,7 @@ fn azimuths_deg(corners: &[Point3<f64>; 8]) -> [f64; 2] {
             greatest = *corner;
         }
     }
-    [least, greatest].map(|corner| corner.y.atan2(corner.x).to_degrees())
+    [least, greatest].map(|corner| maths::atan2(corner.y, corner.x).to_degrees())
 }
 
 fn corners(solid: &Solid) -> [Point3<f64>; 8] {
@@ -254,7 +256,7 @@ fn corners(solid: &Solid) -> [Point3<f64>; 8] {
 fn distance_m(solid: &Solid, pose: &Isometry3<f64>) -> f64 {
     let sensor = pose.inverse() * Point3::origin();
     let beyond = |axis: usize| (solid.low[axis] - sensor[axis]).max(sensor[axis] - solid.high[axis]).max(0.0);
-    beyond(0).hypot(beyond(1))
+    maths::hypot(beyond(0), beyond(1))
 }
 
 #[cfg(test)]
@@ -274,7 +276,7 @@ mod tests {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
             let pose = Isometry3::from_parts(Translation3::from(at), turn);
             let corners = corners(&solid).map(|corner| pose * corner);
-            let azimuths = corners.map(|corner| corner.y.atan2(corner.x).to_degrees());
+            let azimuths = corners.map(|corner| maths::atan2(corner.y, corner.x).to_degrees());
             let fold = |pick: fn(f64, f64) -> f64| azimuths.into_iter().reduce(pick).unwrap();
             let ends = [fold(f64::min), fold(f64::max)];
             // A box around the sensor, or one across the half-plane ahead of it, has all azimuths.

@@ -14,7 +14,7 @@
 //!
 //! A nose-down pitch p turns the ego's body about its origin: the rear rises, and the beams turn up by p.
 
-use closecall_traffic::PlanePose;
+use closecall_traffic::{PlanePose, maths};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::Lidar;
@@ -72,7 +72,7 @@ impl Viewpoint {
     /// Returns the ego's pose `before_end_s` before the end of the sweep, extrapolated from its speed and yaw rate.
     fn ego_at(&self, before_end_s: f64) -> PlanePose {
         let turned = self.yaw_rate_radps * before_end_s;
-        let (sin, cos) = (self.ego.yaw_rad - 0.5 * turned).sin_cos();
+        let (sin, cos) = maths::sin_cos(self.ego.yaw_rad - 0.5 * turned);
         let distance_m = self.speed_mps * before_end_s;
         PlanePose {
             x_m: self.ego.x_m - distance_m * cos,
@@ -118,7 +118,7 @@ fn small_sin_cos(angle_rad: f64) -> (f64, f64) {
 
 /// Returns the position in the ego's vehicle frame of a sensor that is mounted behind, to the left of and above the ego's origin (m).
 pub(crate) fn sensor_position_m([back_m, left_m, height_m]: [f64; 3], pitch_rad: f64) -> Vector3<f64> {
-    let (sin, cos) = pitch_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(pitch_rad);
     Vector3::new(-back_m * cos + height_m * sin, left_m, back_m * sin + height_m * cos)
 }
 
@@ -135,7 +135,7 @@ pub(crate) fn turned_axes(lidar: &Lidar, pitch_rad: f64) -> Rotation3<f64> {
 /// Returns the rotation from the ego's vehicle frame to the frame of a sensor whose axis points `axis_rad` above the
 /// horizontal.
 fn sensor_axes(axis_rad: f64) -> Rotation3<f64> {
-    let (sin, cos) = axis_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(axis_rad);
     Rotation3::from_matrix_unchecked(Matrix3::new(-cos, 0.0, sin, 0.0, -1.0, 0.0, sin, 0.0, cos))
 }
 
@@ -173,11 +173,11 @@ mod tests {
     fn braking_raises_the_sensor_and_tilts_it_upward() {
         let pitch = 0.02;
         let view = viewpoint(0.0, 0.0, pitch);
-        assert!((view.sensor_position_m.z - (0.6 * pitch.cos() + 2.3 * pitch.sin())).abs() < 1e-12);
+        assert!((view.sensor_position_m.z - (0.6 * maths::cos(pitch) + 2.3 * maths::sin(pitch))).abs() < 1e-12);
         // A point at the sensor's own height, 10 m back, now lies below the axis by p.
         let seen =
             view.sensor_from_plane(0.0) * Point3::new(view.sensor_position_m.x - 10.0, -5.6, view.sensor_position_m.z);
-        assert!((seen.z.atan2(seen.x) + pitch).abs() < 1e-12);
+        assert!((maths::atan2(seen.z, seen.x) + pitch).abs() < 1e-12);
     }
 
     #[test]

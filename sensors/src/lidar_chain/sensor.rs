@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use rand::RngExt;
 
 use closecall_tracking::RearView;
-use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleState};
+use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleState, maths};
 
 use super::Seen;
 use crate::alterations::give_true_boxes;
@@ -214,8 +214,8 @@ impl PendingScan {
         #[expect(clippy::cast_possible_truncation, reason = "some milliseconds")]
         let offset = Time::from_ns((offset_s * 1e9).round() as i64);
         self.time += offset;
-        self.ego.s_m += self.ego.speed_mps * self.ego.heading_rad.cos() * offset_s;
-        self.ego.d_m += self.ego.speed_mps * self.ego.heading_rad.sin() * offset_s;
+        self.ego.s_m += self.ego.speed_mps * maths::cos(self.ego.heading_rad) * offset_s;
+        self.ego.d_m += self.ego.speed_mps * maths::sin(self.ego.heading_rad) * offset_s;
         self.detections.iter_mut().for_each(|detection| detection.time += offset);
     }
 }

@@ -24,7 +24,7 @@
 //!
 //! All other values are assumptions.
 
-use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -120,7 +120,7 @@ impl ObjectSensorModel {
     /// Returns half of the field of view (deg); `None` if the sensor sees in all directions.
     pub fn half_angle_deg(&self) -> Option<f64> {
         // Up to rounding, the value of the configuration.
-        let rounded_deg = (1e9 * self.half_angle_tan.atan().to_degrees()).round() / 1e9;
+        let rounded_deg = (1e9 * maths::atan(self.half_angle_tan).to_degrees()).round() / 1e9;
         self.half_angle_tan.is_finite().then_some(rounded_deg)
     }
 
@@ -290,7 +290,7 @@ impl ObjectSensorConfig {
             None => f64::INFINITY,
             Some(deg) => {
                 let deg = number(&self.half_angle_deg, deg, "half-angle-deg", Range::above(0.0, 85.0))?;
-                deg.to_radians().tan()
+                maths::tan(deg.to_radians())
             }
         };
         let white_sd = Range::closed(0.01, 10.0);

@@ -17,7 +17,7 @@
 //! The figures stand in grids over paint and extinction, between whose points they are interpolated as ranges are. They hold for all plates
 //! and body shapes of a class.
 
-use closecall_traffic::{Appearance, CONTROL_STEP, Environment, VehicleClass};
+use closecall_traffic::{Appearance, CONTROL_STEP, Environment, VehicleClass, maths};
 use serde::{Deserialize, Serialize};
 
 use super::config::ObjectSensorModel;
@@ -248,7 +248,7 @@ pub(super) struct TargetErrors {
 
 /// Returns the share of a slow error with this correlation time (s) that remains after one scan (-).
 pub(super) fn decay(time_s: f64) -> f64 {
-    (-CONTROL_STEP.s() / time_s).exp()
+    maths::exp(-CONTROL_STEP.s() / time_s)
 }
 
 impl TargetErrors {

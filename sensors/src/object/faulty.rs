@@ -1,9 +1,10 @@
 //! What faults make of the measurements and the tracks of an object-level sensor, and what its monitor notices of them.
 
-use closecall_traffic::{CONTROL_STEP, ClassScores, Source, Stream, Time, Track, TrackId, TrackStatus, VehicleClass};
+use closecall_traffic::{
+    CONTROL_STEP, ClassScores, Source, StandardNormal, Stream, Time, Track, TrackId, TrackStatus, VehicleClass, maths,
+};
 use nalgebra::{Matrix4, Vector4};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use closecall_tracking::TrackList;
 
@@ -138,7 +139,7 @@ impl Faulty {
     pub(super) fn shift_m(&self, other: &OtherVehicle, mount_m: f64, input: &ScanInput<'_>) -> [f64; 2] {
         let [mut along_m, mut across_m] = [0.0; 2];
         if self.fault.yaw_rad != 0.0 {
-            let (sin, cos) = self.fault.yaw_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(self.fault.yaw_rad);
             let ahead_m = other.x_m - mount_m;
             let turned = (mount_m + ahead_m * cos + other.y_m * sin, other.y_m * cos - ahead_m * sin);
             let (s_m, d_m) = input.frame.road_position_m(other.x_m, other.y_m);
@@ -148,7 +149,7 @@ impl Faulty {
         let offset_s = self.fault.clock_offset_s;
         if offset_s != 0.0 {
             let own = &input.scene.ego.state;
-            let (sin, cos) = own.heading_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(own.heading_rad);
             let own_mps = [own.speed_mps * cos / input.frame.path_scale(own.d_m), own.speed_mps * sin];
             along_m += (own_mps[0] - other.road_mps[0]) * offset_s;
             across_m += (own_mps[1] - other.road_mps[1]) * offset_s;

@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use closecall_traffic::{Appearance, Environment, Plate, Vehicle, VehicleClass};
+use closecall_traffic::{Appearance, Environment, Plate, Vehicle, VehicleClass, maths};
 use serde::{Deserialize, Serialize};
 
 use super::errors::{ErrorGrids, FittedErrors};
@@ -220,8 +220,8 @@ pub(super) fn interpolated(
     grid: &[Vec<f64>],
     [paint, extinction_per_m]: [f64; 2],
 ) -> f64 {
-    let logs: Vec<f64> = paints.iter().map(|paint| paint.ln()).collect();
-    let (row, row_share) = place(&logs, paint.ln());
+    let logs: Vec<f64> = paints.iter().map(|paint| maths::ln(*paint)).collect();
+    let (row, row_share) = place(&logs, maths::ln(paint));
     let (column, column_share) = place(extinctions_per_m, extinction_per_m);
     let in_row = |row: usize| {
         let values = &grid[row.min(paints.len() - 1)];

@@ -15,9 +15,8 @@
 
 use std::sync::Arc;
 
-use closecall_traffic::{ActorId, Side, Stream, stream};
+use closecall_traffic::{ActorId, Side, StandardNormal, Stream, stream};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use super::errors::TargetErrors;
 
@@ -152,6 +151,7 @@ fn normal(rng: &mut Stream) -> f64 {
 mod tests {
     use super::super::errors::{Losses, NearFar, decay};
     use super::*;
+    use closecall_traffic::maths;
 
     const ERRORS: TargetErrors = TargetErrors {
         white_sd_m: NearFar { near: [0.01, 0.02], far: [0.1, 0.2] },
@@ -211,7 +211,7 @@ mod tests {
             let sd_m = (lag(0) / drawn.len() as f64).sqrt();
             assert!((sd_m / slow_only.slow_sd_m.near[axis] - 1.0).abs() < 0.05, "{sd_m}");
             let after_time = lag((time_s / 0.04) as usize) / lag(0);
-            assert!((after_time - (-1.0_f64).exp()).abs() < 0.05, "{after_time}");
+            assert!((after_time - maths::exp(-1.0)).abs() < 0.05, "{after_time}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! How far an object-level sensor sees in the weather of the latest scan.
 
-use closecall_traffic::{Environment, Vehicle, VehicleClass};
+use closecall_traffic::{Environment, Vehicle, VehicleClass, maths};
 
 use super::config::ObjectSensorModel;
 use super::errors::TargetErrors;
@@ -49,7 +49,7 @@ impl Ranges {
     pub(super) fn of_m(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> [f64; 2] {
         let [range_m, class_range_m] = match (model.fit, &self.weather) {
             (Some(fit), Some(weather)) => {
-                let relative = model.range_m / fit.usual_m() * (fit.range_spread * deviation).exp();
+                let relative = model.range_m / fit.usual_m() * maths::exp(fit.range_spread * deviation);
                 fit.ranges_m(other.class, &other.appearance, weather).map(|range_m| relative * range_m)
             }
             _ => [self.usual_m, f64::INFINITY],

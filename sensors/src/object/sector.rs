@@ -4,6 +4,7 @@ use super::visibility::Direction;
 use super::visibility::union_width;
 use crate::faults::Sectors;
 use crate::surroundings::OtherVehicle;
+use closecall_traffic::maths;
 
 /// Blocked sectors in the coordinates of a sensor's visibility, in memory that is reused.
 #[derive(Clone, Debug, Default)]
@@ -24,7 +25,7 @@ impl Blocked {
         match direction {
             Direction::Around => self.azimuths_rad.extend(ends_rad),
             // Ahead, the left is on the left of the ego. Behind, a slope is the distance to the left, too.
-            Direction::Ahead | Direction::Behind => self.slopes.extend(ends_rad.map(|ends| ends.map(f64::tan))),
+            Direction::Ahead | Direction::Behind => self.slopes.extend(ends_rad.map(|ends| ends.map(maths::tan))),
         }
     }
 
@@ -38,7 +39,7 @@ impl Blocked {
         if self.azimuths_rad.is_empty() {
             return 0.0;
         }
-        let azimuth_rad = |x_m: f64, y_m: f64| y_m.atan2(-x_m);
+        let azimuth_rad = |x_m: f64, y_m: f64| maths::atan2(y_m, -x_m);
         let centre_rad = azimuth_rad(other.x_m, other.y_m);
         let (ahead_m, left_m) = (0.5 * other.length_m, 0.5 * other.width_m);
         let corners = [(ahead_m, left_m), (ahead_m, -left_m), (-ahead_m, left_m), (-ahead_m, -left_m)];

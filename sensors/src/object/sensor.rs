@@ -9,9 +9,8 @@
 //! sensor models the output of a sensor with its own tracking. Only the full LiDAR chain can confuse two vehicles.
 
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
-use closecall_traffic::{CONTROL_STEP, ClassScores, Source, Track, VehicleClass};
+use closecall_traffic::{CONTROL_STEP, ClassScores, Source, StandardNormal, Track, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::{FaultStreams, Faulty};

@@ -8,8 +8,8 @@
 //! A slope is the distance to the left divided by the distance outward. Slopes order directions as angles do, without
 //! an arc tangent.
 
-use closecall_traffic::Dimensions;
 use closecall_traffic::metrics::bumper_gap_m;
+use closecall_traffic::{Dimensions, maths};
 
 use crate::surroundings::OtherVehicle;
 
@@ -152,7 +152,7 @@ fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhou
 fn box_distance_m(other: &OtherVehicle, ego: &Dimensions) -> f64 {
     let along_m = bumper_gap_m(other.x_m.abs(), other.length_m, ego.length_m);
     let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego.width_m);
-    along_m.max(0.0).hypot(across_m.max(0.0))
+    maths::hypot(along_m.max(0.0), across_m.max(0.0))
 }
 
 /// Returns the total width of the union of `intervals`, which it sorts.

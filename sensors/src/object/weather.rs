@@ -4,7 +4,7 @@
 //! nominal range R₀ on a clear day (extinction α₀). It follows that ln R + αR = ln R₀ + α₀R₀. The left side grows with
 //! R and is concave, so Newton's method approaches the solution from below if it starts below.
 
-use closecall_traffic::Environment;
+use closecall_traffic::{Environment, maths};
 
 use crate::lidar::extinction_per_m;
 
@@ -19,10 +19,10 @@ pub(crate) fn range_in_weather_m(clear_range_m: f64, environment: &Environment) 
         return clear_range_m;
     }
     let per_m = clear_per_m + excess_per_m;
-    let goal = clear_range_m.ln() + clear_per_m * clear_range_m;
-    let mut range_m = clear_range_m * (-excess_per_m * clear_range_m).exp();
+    let goal = maths::ln(clear_range_m) + clear_per_m * clear_range_m;
+    let mut range_m = clear_range_m * maths::exp(-excess_per_m * clear_range_m);
     for _ in 0..STEPS {
-        range_m += (goal - range_m.ln() - per_m * range_m) / (1.0 / range_m + per_m);
+        range_m += (goal - maths::ln(range_m) - per_m * range_m) / (1.0 / range_m + per_m);
     }
     range_m
 }
@@ -42,7 +42,7 @@ mod tests {
         for visibility_m in [5_000.0, 1_000.0, 300.0, 100.0, 20.0] {
             let range_m = range_in_weather_m(120.0, &fog(visibility_m));
             assert!(range_m < last_m && range_m > 0.0, "{visibility_m}: {range_m}");
-            let power = |range_m: f64, per_m: f64| (-2.0 * per_m * range_m).exp() / (range_m * range_m);
+            let power = |range_m: f64, per_m: f64| maths::exp(-2.0 * per_m * range_m) / (range_m * range_m);
             let clear = power(120.0, extinction_per_m(&Environment::CLEAR_DAY));
             let here = power(range_m, extinction_per_m(&fog(visibility_m)));
             assert!((here / clear - 1.0).abs() < 1e-6, "{visibility_m}: {}", here / clear);

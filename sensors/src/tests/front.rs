@@ -1,7 +1,7 @@
 //! The LiDAR that looks ahead.
 
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass,
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass, maths,
 };
 
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
@@ -66,7 +66,7 @@ fn a_vehicle_in_the_left_lane_that_moves_to_the_left_is_not_mirrored() {
         true_y_m = 3.0 + 0.4 * time.s();
         let (s_m, d_m) = (540.0 + 29.0 * time.s(), OWN_LANE_M + true_y_m);
         let mut lead = with_speed(scene_vehicle(1, VehicleClass::Car, s_m, d_m), 29.0);
-        lead.state.heading_rad = (0.4_f64 / 29.0).atan();
+        lead.state.heading_rad = maths::atan(0.4_f64 / 29.0);
         let scene = Scene { time, road: &road, environment: &environment, ego, others: &[lead] };
         tracks = perception.step(&scene).unwrap().to_vec();
     }

@@ -2,7 +2,8 @@
 
 use closecall_statistics::consistency::Consistency;
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass, stream,
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass, maths,
+    stream,
 };
 
 use crate::faults::{FaultEntries, Faults, LidarFaultConfig};
@@ -113,9 +114,9 @@ fn the_points_of_a_turned_sensor_lie_on_the_vehicle_that_it_sees() {
             assert!(is_along && is_across && (-0.1..size.height_m + 0.1).contains(&z_m), "{text}: {x_m} {y_m} {z_m}");
             // The measured range is the distance from the sensor.
             let sensor_m = [-0.5 * ego.vehicle.dimensions.length_m + inset_m, left_m];
-            let level_m = (x_m - sensor_m[0]).hypot(y_m - sensor_m[1]);
+            let level_m = maths::hypot(x_m - sensor_m[0], y_m - sensor_m[1]);
             let range_m = f64::from(lidar.point_beam(at).range_m);
-            assert!((level_m.hypot(z_m - 0.6) - range_m).abs() < 0.5, "{text}: {range_m}");
+            assert!((maths::hypot(level_m, z_m - 0.6) - range_m).abs() < 0.5, "{text}: {range_m}");
         }
         assert!(on_car > 100, "{text}: {on_car} points");
     }

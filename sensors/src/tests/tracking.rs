@@ -6,7 +6,6 @@ use closecall_traffic::{
     VehicleClass, stream,
 };
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use crate::lidar::FACE_SD_M;
 use crate::surroundings::transform_scene;
@@ -15,7 +14,7 @@ use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, TrackAudit, TrackerC
 use closecall_tracking::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
 use closecall_tracking::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
-use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::{StandardNormal, ego_frame::EgoFrame, maths};
 
 const LEFT_LANE_M: f64 = -1.875;
 pub(super) const PERIOD_S: f64 = CONTROL_STEP.s();
@@ -48,11 +47,11 @@ impl Motion {
         let rates_per_s = self.modes[self.mode].rates_per_s(Situation::FREE);
         self.mode = draw_index(rates_per_s.iter().map(|rate| rate * PERIOD_S), rng).unwrap_or(self.mode);
         let mode = &self.modes[self.mode];
-        let persistence = if mode.persistence_s > 0.0 { (-PERIOD_S / mode.persistence_s).exp() } else { 0.0 };
+        let persistence = if mode.persistence_s > 0.0 { maths::exp(-PERIOD_S / mode.persistence_s) } else { 0.0 };
         let increment_mps2 = mode.acceleration_sd_mps2 * (1.0 - persistence * persistence).sqrt() * normal(rng);
         self.acceleration_mps2 = persistence * self.acceleration_mps2 + increment_mps2;
         let white_mps = (mode.white_density_m2ps3 * PERIOD_S).sqrt() * normal(rng);
-        let decayed_mps = (-PERIOD_S / mode.speed_decay_s).exp() * self.speed_mps;
+        let decayed_mps = maths::exp(-PERIOD_S / mode.speed_decay_s) * self.speed_mps;
         self.speed_mps = decayed_mps + self.acceleration_mps2 * PERIOD_S + white_mps;
     }
 }
@@ -110,8 +109,8 @@ impl Bench {
         for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
             let state = &mut vehicle.state;
             let path_scale = 1.0 - self.road.curvature_per_m() * state.d_m;
-            state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / path_scale;
-            state.d_m += PERIOD_S * state.speed_mps * state.heading_rad.sin();
+            state.s_m += PERIOD_S * state.speed_mps * maths::cos(state.heading_rad) / path_scale;
+            state.d_m += PERIOD_S * state.speed_mps * maths::sin(state.heading_rad);
         }
         if manoeuvre {
             let before_mps = self.motion[0].speed_mps;
@@ -119,7 +118,7 @@ impl Bench {
             let [along, across] = &self.motion;
             for vehicle in &mut self.others {
                 vehicle.state.speed_mps += along.speed_mps - before_mps;
-                vehicle.state.heading_rad = (across.speed_mps / vehicle.state.speed_mps).asin();
+                vehicle.state.heading_rad = maths::asin(across.speed_mps / vehicle.state.speed_mps);
             }
         }
     }
@@ -133,7 +132,7 @@ impl Bench {
         transform_scene(&scene, &mut truths).unwrap();
         let mut detections = Vec::new();
         let closing_mps = others.first().map_or(0.0, |other| (other.state.speed_mps - ego.state.speed_mps).abs());
-        let slow_share = (-PERIOD_S / SLOW_TIME_S - closing_mps * PERIOD_S / SLOW_DISTANCE_M).exp();
+        let slow_share = maths::exp(-PERIOD_S / SLOW_TIME_S - closing_mps * PERIOD_S / SLOW_DISTANCE_M);
         for (slow_m, sd_m) in self.slow_m.iter_mut().zip([FACE_SD_M, SLOW_LATERAL_SHARE.sqrt() * LATERAL_SD_M]) {
             *slow_m = slow_share * *slow_m + (1.0 - slow_share * slow_share).sqrt() * sd_m * normal(&mut self.rng);
         }
@@ -142,8 +141,8 @@ impl Bench {
         for truth in truths.iter().filter(|truth| sees(truth.actor)) {
             let ahead_m = 0.5 * truth.length_m + self.slow_m[0];
             let face = (truth.x_m + ahead_m * truth.cos, truth.y_m + ahead_m * truth.sin);
-            let sight = face.1.atan2(face.0 + 2.3);
-            let (sin, cos) = sight.sin_cos();
+            let sight = maths::atan2(face.1, face.0 + 2.3);
+            let (sin, cos) = maths::sin_cos(sight);
             let (along, across) =
                 (white_range_m * normal(&mut self.rng), self.slow_m[1] + white_lateral_m * normal(&mut self.rng));
             detections.push(Detection {
@@ -212,7 +211,7 @@ fn a_track_keeps_its_id_through_a_lane_change() {
         for step in 0..100 {
             let progress = f64::from(step) / 100.0;
             let lateral_mps = 3.75 / 4.0 * 30.0 * progress * progress * (1.0 - progress) * (1.0 - progress);
-            bench.others[0].state.heading_rad = (lateral_mps / 32.0).atan();
+            bench.others[0].state.heading_rad = maths::atan(lateral_mps / 32.0);
             bench.advance(false);
             let tracks = bench.scan(|_| true);
             assert_eq!((tracks.len(), tracks[0].id), (1, id), "scan {step} of run {sample}");
@@ -252,14 +251,14 @@ fn braking_and_turning_of_the_ego_does_not_disturb_other_tracks() {
     bench.audit = TrackAudit::default();
     for step in 0..25 {
         bench.ego.state.speed_mps -= 8.0 * PERIOD_S;
-        bench.ego.state.heading_rad = 0.04 * (f64::from(step) * 0.3).sin();
+        bench.ego.state.heading_rad = 0.04 * maths::sin(f64::from(step) * 0.3);
         bench.advance(false);
         bench.scan(|_| true);
     }
     assert!(bench.audit.speed_rmse_mps().unwrap() < 0.5, "{:?}", bench.audit.speed_rmse_mps());
     let track = bench.list.tracks[0].clone();
     assert_eq!(track.status, TrackStatus::Confirmed);
-    assert!(track.vy_mps().hypot(track.vx_mps() - 30.0) < 30.0 * 0.05, "{:?}", track.state);
+    assert!(maths::hypot(track.vy_mps(), track.vx_mps() - 30.0) < 30.0 * 0.05, "{:?}", track.state);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The same faults of each kind of object-level sensor: the front radar, the surround sensors and the one behind.
 
 use super::*;
+use closecall_traffic::maths;
 
 /// A sensor, with a car that it sees.
 struct Kind {
@@ -198,7 +199,7 @@ fn a_mounting_turned_to_the_left_moves_vehicles_to_the_right() {
         let to_left = if kind.looks_ahead() { -1.0 } else { 1.0 };
         for yaw_deg in [-2.0_f64, 1.0, 2.0] {
             let shift_m = y_m(&format!("{yaw_deg:?}")) - right_m;
-            let expected_m = to_left * (kind.gap_m + 2.3 + mount_m) * yaw_deg.to_radians().sin();
+            let expected_m = to_left * (kind.gap_m + 2.3 + mount_m) * maths::sin(yaw_deg.to_radians());
             assert!((shift_m - expected_m).abs() < 0.05, "{} {yaw_deg}: {shift_m} {expected_m}", kind.key);
         }
     }

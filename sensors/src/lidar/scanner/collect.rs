@@ -1,6 +1,6 @@
 //! The solids and the spray of a scene that a sweep may hit.
 
-use closecall_traffic::{PlanePose, Roadside};
+use closecall_traffic::{PlanePose, Roadside, maths};
 use nalgebra::{Isometry3, Point3};
 
 use super::super::material::asphalt;
@@ -102,13 +102,13 @@ impl Scanner {
     /// Returns how long before its end the sweep crosses the origin of a body's frame (s).
     fn crossing_before_end_s(&self, view: &Viewpoint, plane_from_thing: &Isometry3<f64>) -> f64 {
         let middle = view.sensor_from_plane(0.0) * (plane_from_thing * Point3::origin());
-        self.sweep_s() - self.pattern.kind().sweep_offset_s(middle.y.atan2(middle.x).to_degrees())
+        self.sweep_s() - self.pattern.kind().sweep_offset_s(maths::atan2(middle.y, middle.x).to_degrees())
     }
 }
 
 /// Returns the pose of a vehicle `before_end_s` earlier, extrapolated at its current speed and heading.
 fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_end_s: f64) -> PlanePose {
     let distance_m = vehicle.state.speed_mps * before_end_s;
-    let (sin, cos) = pose.yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(pose.yaw_rad);
     PlanePose { x_m: pose.x_m - distance_m * cos, y_m: pose.y_m - distance_m * sin, ..pose }
 }

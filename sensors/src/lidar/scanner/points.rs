@@ -3,6 +3,7 @@
 use super::super::PointBeam;
 use super::super::false_alarms::FalseAlarms;
 use super::{Scanner, Sweep};
+use closecall_traffic::maths;
 
 impl Scanner {
     /// Returns the beam of a point of the latest scan, and the range that was measured along it.
@@ -25,7 +26,7 @@ impl Scanner {
         let (ahead_m, left_m) = (to.cos * x_m + to.sin * y_m, to.cos * y_m - to.sin * x_m);
         let up_m = at_m[2] - f64::from(sweep.pose.sensor_z_m());
         let left_m = left_m - f64::from(sweep.pose.sensor_y_m());
-        (ahead_m - f64::from(sweep.pose.sensor_x_m())).hypot(left_m).hypot(up_m) as f32
+        maths::hypot(maths::hypot(ahead_m - f64::from(sweep.pose.sensor_x_m()), left_m), up_m) as f32
     }
 
     /// Returns true if the sensor has a mirror with two sides.

@@ -1,6 +1,6 @@
 //! Numbers of points on a vehicle, compared with the scan pattern, with real scans and with the link budget.
 
-use closecall_traffic::{Environment, VehicleClass};
+use closecall_traffic::{Environment, VehicleClass, maths};
 
 use super::*;
 
@@ -9,8 +9,8 @@ fn hand_count(mirror_side: MirrorSide, distance_m: f64, half_width_m: f64, [low_
     let pattern = Pattern::new(LidarModel::Scala2.kind());
     let meets = |&beam: &u16| {
         let (azimuth, elevation) = pattern.direction_rad(mirror_side, beam);
-        let height = 0.6 + distance_m / azimuth.cos() * elevation.tan();
-        (distance_m * azimuth.tan()).abs() < half_width_m && height > low_m && height < high_m
+        let height = 0.6 + distance_m / maths::cos(azimuth) * maths::tan(elevation);
+        (distance_m * maths::tan(azimuth)).abs() < half_width_m && height > low_m && height < high_m
     };
     (0..u16::try_from(10_448).unwrap()).filter(meets).count()
 }
