@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use closecall_traffic::{ClassScores, Light, Stream};
+use closecall_traffic::{ClassScores, Light, Stream, maths};
 use rand::RngExt;
 
 use super::DatasetSummary;
@@ -113,7 +113,7 @@ fn vehicle_cluster_box(scene: &RandomScene, vehicle: &SceneVehicle, rng: &mut St
     let mut truth = ego_box(scene, vehicle);
     let face = truth.length_m / 2.0;
     truth.length_m = if rng.random_bool(0.5) { rng.random_range(1.5..6.0) } else { truth.length_m };
-    let (sin, cos) = truth.heading_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(truth.heading_rad);
     let back = face - truth.length_m / 2.0 + rng.random_range(-0.3..0.3);
     let aside = rng.random_range(-0.2..0.2) * truth.width_m;
     truth.x_m += back * cos - aside * sin;
@@ -128,7 +128,7 @@ fn vehicle_cluster_box(scene: &RandomScene, vehicle: &SceneVehicle, rng: &mut St
 fn ego_box(scene: &RandomScene, vehicle: &SceneVehicle) -> GroundBox {
     let pose = |of: &SceneVehicle| scene.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
     let (ego, other) = (pose(&scene.ego), pose(vehicle));
-    let (sin, cos) = ego.yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(ego.yaw_rad);
     let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
     let size = vehicle.vehicle.dimensions;
     GroundBox {
