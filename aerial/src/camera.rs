@@ -16,6 +16,7 @@
 //! Krajewski et al., *The highD Dataset*, ITSC 2018). The default covers 0.13 m per pixel, so that a frame takes a tenth of a
 //! second to render and to search.
 
+use closecall_traffic::maths;
 use serde::Serialize;
 
 /// Focal length of a wide-angle lens of 24 mm (35 mm equivalent), as usual drones have it, on [`WIDTH_PX`] columns (px).
@@ -85,11 +86,11 @@ pub struct AerialCamera {
 impl AerialCamera {
     /// Creates the camera of a view.
     pub fn new(view: View) -> Self {
-        let (sin_nu, cos_nu) = view.off_nadir_rad.sin_cos();
-        let (sin_az, cos_az) = view.azimuth_rad.sin_cos();
+        let (sin_nu, cos_nu) = maths::sin_cos(view.off_nadir_rad);
+        let (sin_az, cos_az) = maths::sin_cos(view.azimuth_rad);
         let forward = [sin_nu * cos_az, sin_nu * sin_az, -cos_nu];
         let right = [sin_az, -cos_az, 0.0];
-        let back_m = view.altitude_m * view.off_nadir_rad.tan();
+        let back_m = view.altitude_m * maths::tan(view.off_nadir_rad);
         let centre_m = [view.target_m[0] - back_m * cos_az, view.target_m[1] - back_m * sin_az, view.altitude_m];
         Self { view, centre_m, right, down: cross(forward, right), forward }
     }
@@ -160,7 +161,7 @@ mod tests {
             for point in [[250.0, -5.0], [210.0, 3.0], [290.0, -20.0]] {
                 let pixel = camera.project([point[0], point[1], 0.0]).unwrap();
                 let back = camera.ground_at(pixel).unwrap();
-                assert!((back[0] - point[0]).hypot(back[1] - point[1]) < 1e-9, "{back:?} {point:?}");
+                assert!(maths::hypot(back[0] - point[0], back[1] - point[1]) < 1e-9, "{back:?} {point:?}");
             }
         }
     }

@@ -5,7 +5,7 @@
 //! centre, the logarithms of its sizes, and sine and cosine of twice its angle.
 
 use closecall_camera::{Backend, CHANNELS, Image, Network};
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{VehicleClass, maths};
 
 use crate::error::AerialError;
 use crate::image_box::ImageBox;
@@ -86,7 +86,7 @@ fn decode(output: &[f32], [rows, columns]: [usize; 2], from: f64) -> Vec<ImageDe
         for row in 0..rows {
             for column in 0..columns {
                 let logit = at(kind, row, column);
-                let score = 1.0 / (1.0 + (-f64::from(logit)).exp());
+                let score = 1.0 / (1.0 + maths::exp(-f64::from(logit)));
                 let around = (row.saturating_sub(1)..(row + 2).min(rows))
                     .flat_map(|y| (column.saturating_sub(1)..(column + 2).min(columns)).map(move |x| (y, x)));
                 if score < from || around.into_iter().any(|(y, x)| at(kind, y, x) > logit) {
@@ -96,9 +96,9 @@ fn decode(output: &[f32], [rows, columns]: [usize; 2], from: f64) -> Vec<ImageDe
                 let centre = |cell: usize, offset: f64| (cell as f64 + 0.5 + offset) * STRIDE as f64;
                 let image_box = ImageBox {
                     centre_px: [centre(column, value(2)), centre(row, value(3))],
-                    length_px: LENGTH_PX * value(4).exp(),
-                    width_px: WIDTH_PX * value(5).exp(),
-                    angle_rad: 0.5 * value(6).atan2(value(7)),
+                    length_px: LENGTH_PX * maths::exp(value(4)),
+                    width_px: WIDTH_PX * maths::exp(value(5)),
+                    angle_rad: 0.5 * maths::atan2(value(6), value(7)),
                 };
                 found.push(ImageDetection { image_box, class, score });
             }
@@ -147,7 +147,9 @@ mod tests {
         assert_eq!(found.len(), 1);
         let ImageDetection { image_box, class, score } = found[0];
         assert_eq!((class, image_box.centre_px), (VehicleClass::Truck, [22.0, 8.0]));
-        assert!((image_box.length_px - 32.0).abs() < 1e-9 && (image_box.width_px - 16.0 * 0.5_f64.exp()).abs() < 1e-9);
+        assert!(
+            (image_box.length_px - 32.0).abs() < 1e-9 && (image_box.width_px - 16.0 * maths::exp(0.5)).abs() < 1e-9
+        );
         assert!((image_box.angle_rad - std::f64::consts::FRAC_PI_4).abs() < 1e-9 && score > 0.9);
     }
 }

@@ -7,7 +7,8 @@ use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_traffic::{
     ActorId, BodyShape, Dimensions, Lane, Stream, Time, Trajectory, TrajectoryPoint, Vehicle, VehicleClass, stream,
 };
-use rand_distr::{Distribution, Normal};
+use closecall_traffic::{StandardNormal, maths};
+use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -216,7 +217,7 @@ fn scene_at(data: &TrajectoryData, edges_m: &[f64], time: Time, options: &Flight
         id: track.track_id,
         vehicle: body(track, options.seed),
         at_m: [point.s_m, point.d_m],
-        yaw_rad: point.lateral_speed_mps.atan2(point.speed_mps.max(1.0)),
+        yaw_rad: maths::atan2(point.lateral_speed_mps, point.speed_mps.max(1.0)),
         livery: None,
     });
     let ground = Ground::new(edges_m.to_vec(), options.seed);
@@ -271,7 +272,7 @@ fn camera_above(scene: &AerialScene, edges_m: &[f64], options: &FlightOptions) -
 /// Returns the error of georeferencing of each picture (m).
 fn georeferencing(options: &FlightOptions, frames: usize) -> Result<Vec<[f64; 2]>, AerialError> {
     let mut rng = stream(options.seed, 0, &ActorId::new("ego")?, "georeferencing");
-    let normal = |sigma_m: f64, rng: &mut Stream| Normal::new(0.0, sigma_m).map_or(0.0, |normal| normal.sample(rng));
+    let normal = |sigma_m: f64, rng: &mut Stream| sigma_m * rng.sample::<f64, _>(StandardNormal);
     let offset = [0, 1].map(|_| normal(options.offset_sigma_m, &mut rng));
     Ok((0..frames).map(|_| offset.map(|offset| offset + normal(options.jitter_sigma_m, &mut rng))).collect())
 }

@@ -12,6 +12,7 @@
 //! same displacement by the height of their test vehicle.
 
 use closecall_traffic::geometry::OrientedBox;
+use closecall_traffic::maths;
 use nalgebra::Vector2;
 
 use crate::camera::AerialCamera;
@@ -34,7 +35,7 @@ pub fn raw(camera: &AerialCamera, image_box: &ImageBox) -> Option<OrientedBox> {
     Some(OrientedBox {
         x_m: centre.x,
         y_m: centre.y,
-        yaw_rad: forward.y.atan2(forward.x),
+        yaw_rad: maths::atan2(forward.y, forward.x),
         length_m: along.norm(),
         width_m: across.norm(),
     })
@@ -45,7 +46,7 @@ pub fn seen(camera: &AerialCamera, footprint: &OrientedBox, height_m: f64) -> Or
     let altitude_m = camera.view().altitude_m;
     let growth = altitude_m / (altitude_m - height_m);
     let relief = Vector2::from(camera.relief_m([footprint.x_m, footprint.y_m], height_m));
-    let (sin, cos) = footprint.yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(footprint.yaw_rad);
     let (forward, left) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
     let along = covered(footprint.length_m, relief.dot(&forward), growth);
     let across = covered(footprint.width_m, relief.dot(&left), growth);
@@ -95,7 +96,7 @@ mod tests {
         let camera = camera();
         let footprint = truck(250.0, -5.0);
         let found = seen(&camera, &footprint, HEIGHT_M);
-        let relief_m = ALTITUDE_M * OFF_NADIR_RAD.tan() * HEIGHT_M / (ALTITUDE_M - HEIGHT_M);
+        let relief_m = ALTITUDE_M * maths::tan(OFF_NADIR_RAD) * HEIGHT_M / (ALTITUDE_M - HEIGHT_M);
         let growth = ALTITUDE_M / (ALTITUDE_M - HEIGHT_M);
         let expected_m = 0.5 * (relief_m + 0.5 * (growth - 1.0) * footprint.width_m);
         assert!((found.y_m - footprint.y_m - expected_m).abs() < 1e-9, "{found:?}");
@@ -134,7 +135,7 @@ mod tests {
             let footprint = OrientedBox { yaw_rad, ..truck(x_m, y_m) };
             let visible = seen(&camera, &footprint, HEIGHT_M);
             let back = corrected(&camera, &visible, HEIGHT_M);
-            assert!((back.x_m - x_m).hypot(back.y_m - y_m) < 1e-6, "{back:?}");
+            assert!(maths::hypot(back.x_m - x_m, back.y_m - y_m) < 1e-6, "{back:?}");
             assert!((back.length_m - 16.5).abs() < 1e-6 && (back.width_m - 2.55).abs() < 1e-6, "{back:?}");
         }
     }

@@ -1,6 +1,7 @@
 //! Oriented boxes in an image.
 
 use closecall_traffic::geometry::OrientedBox;
+use closecall_traffic::maths;
 
 /// A rectangle in an image, turned by an angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +20,7 @@ pub struct ImageBox {
 impl ImageBox {
     /// Returns the smallest box of this direction around `points`; `None` without points.
     pub fn around(points: &[[f64; 2]], angle_rad: f64) -> Option<Self> {
-        let (sin, cos) = angle_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(angle_rad);
         let along = |point: &[f64; 2]| point[0] * cos + point[1] * sin;
         let across = |point: &[f64; 2]| point[1] * cos - point[0] * sin;
         let [a0, a1] = extent(points.iter().map(along))?;

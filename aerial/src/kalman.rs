@@ -87,13 +87,14 @@ impl AxisModel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use closecall_traffic::maths;
 
     #[test]
     fn a_constant_acceleration_is_recovered_and_the_smoother_is_not_worse() {
         let (model, dt_s) = (AxisModel { jerk_density: 0.1, sigma_m: 0.2 }, 0.08);
         let truth = |k: usize| 25.0 * k as f64 * dt_s + 0.5 * (k as f64 * dt_s).powi(2);
         // A fixed disturbance with a mean of 0.
-        let measured = |k: usize| truth(k) + 0.2 * (k as f64 * 2.4).sin();
+        let measured = |k: usize| truth(k) + 0.2 * maths::sin(k as f64 * 2.4);
         let mut filtered = vec![model.first(measured(0), 0.0)];
         for k in 1..100 {
             let predicted = model.predicted(&filtered[k - 1], dt_s);

@@ -8,7 +8,7 @@ use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
 use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_statistics::quantiles::median;
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{VehicleClass, maths};
 use serde::Serialize;
 
 use crate::flight::Flight;
@@ -154,8 +154,9 @@ impl Sum {
             let is_wanted = track.class == class;
             self.vehicles += usize::from(is_wanted);
             for point in &track.points {
-                let distance =
-                    |other: &closecall_traffic::TrajectoryPoint| (other.s_m - point.s_m).hypot(other.d_m - point.d_m);
+                let distance = |other: &closecall_traffic::TrajectoryPoint| {
+                    maths::hypot(other.s_m - point.s_m, other.d_m - point.d_m)
+                };
                 let near = found.trajectories.iter().filter_map(|other| {
                     let at = other.at(point.time).filter(|at| distance(at) < SAME_VEHICLE_M)?;
                     Some((other.track_id, at))

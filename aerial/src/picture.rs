@@ -1,7 +1,7 @@
 //! The picture that an aerial camera takes of vehicles on a road, with labels.
 
 use closecall_camera::{BodyTriangle, CHANNELS, Image, body_triangles};
-use closecall_traffic::Vehicle;
+use closecall_traffic::{Vehicle, maths};
 
 use crate::camera::{AerialCamera, Vec3};
 use crate::ground::{Ground, unit};
@@ -34,7 +34,7 @@ pub struct GroundVehicle {
 impl GroundVehicle {
     /// Returns a point of the vehicle's frame in the ground frame (m).
     fn place(&self, [x, y, z]: Vec3) -> Vec3 {
-        let (sin, cos) = self.yaw_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(self.yaw_rad);
         [self.at_m[0] + cos * x - sin * y, self.at_m[1] + sin * x + cos * y, z]
     }
 }
@@ -57,7 +57,8 @@ impl Light {
     pub const NOON: Self = Self { azimuth_rad: -1.2, elevation_rad: 0.9, direct: 0.6, exposure: 1.0 };
 
     fn to_sun(self) -> Vec3 {
-        let ((sin_az, cos_az), (sin_el, cos_el)) = (self.azimuth_rad.sin_cos(), self.elevation_rad.sin_cos());
+        let ((sin_az, cos_az), (sin_el, cos_el)) =
+            (maths::sin_cos(self.azimuth_rad), maths::sin_cos(self.elevation_rad));
         [cos_el * cos_az, cos_el * sin_az, sin_el]
     }
 }
@@ -175,7 +176,7 @@ fn shaded([a, b, c]: [Vec3; 3], albedo: [f64; 3], light: Light) -> [f64; 3] {
 fn label_box(vehicle: &GroundVehicle, triangles: &[BodyTriangle], camera: &AerialCamera) -> Option<ImageBox> {
     let at = camera.project(vehicle.place([0.0; 3]))?;
     let ahead = camera.project(vehicle.place([1.0, 0.0, 0.0]))?;
-    let angle_rad = (ahead[1] - at[1]).atan2(ahead[0] - at[0]);
+    let angle_rad = maths::atan2(ahead[1] - at[1], ahead[0] - at[0]);
     let corners = triangles.iter().flat_map(|triangle| triangle.corners_m);
     let pixels: Option<Vec<[f64; 2]>> =
         corners.map(|corner| camera.project(vehicle.place(corner.map(f64::from)))).collect();
