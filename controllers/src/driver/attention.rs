@@ -5,9 +5,8 @@
 //! time that the scenario gives, or at random times with a given mean interval, drawn from the driver's own random
 //! stream.
 
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Stream, Time};
-use rand::RngExt;
-use rand_distr::{Distribution, StandardNormal};
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, StandardNormal, Stream, Time, maths};
+use rand::{RngExt, distr::Distribution};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -117,7 +116,7 @@ impl Lapse {
         let begin = match self.timing {
             LapseTiming::Once { at_s } => Time::from_s(at_s),
             // The intervals of a Poisson process are exponential. The argument 1 − u is never 0.
-            LapseTiming::AtRandom { every_s } => now + Time::from_s(-every_s * (1.0 - rng.random::<f64>()).ln()),
+            LapseTiming::AtRandom { every_s } => now + Time::from_s(-every_s * maths::ln(1.0 - rng.random::<f64>())),
         };
         (begin, begin + Time::from_s(self.draw_duration_s(rng)))
     }
@@ -128,7 +127,7 @@ impl Lapse {
     fn draw_duration_s(&self, rng: &mut Stream) -> f64 {
         let Some(sigma) = self.duration_sigma else { return self.duration_s };
         let normal: f64 = StandardNormal.sample(rng);
-        (self.duration_s * (sigma * normal).exp()).min(MAX_LAPSE_S)
+        (self.duration_s * maths::exp(sigma * normal)).min(MAX_LAPSE_S)
     }
 }
 
@@ -182,7 +181,7 @@ mod tests {
         let mut drawn: Vec<f64> = (0..4001).map(|_| lapse.draw_duration_s(&mut rng)).collect();
         drawn.sort_by(f64::total_cmp);
         assert!((drawn[2000] - 0.9).abs() < 0.03, "{}", drawn[2000]);
-        assert!((drawn[3366] / drawn[2000] - 0.5_f64.exp()).abs() < 0.05);
+        assert!((drawn[3366] / drawn[2000] - maths::exp(0.5)).abs() < 0.05);
         let wrong = LapseConfig { duration_sigma: Some(3.0.into()), ..config };
         assert_eq!(wrong.check(&Parameters::default()).unwrap_err().path.to_string(), "lapse.duration-sigma");
     }

@@ -15,8 +15,8 @@
 
 use std::fmt;
 
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
-use rand_distr::{Distribution, StandardNormal};
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, StandardNormal, Stream, maths};
+use rand::distr::Distribution;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, IntoDeserializer, MapAccess, Visitor};
@@ -154,7 +154,7 @@ impl Reaction {
             Self::Fixed(value) => value,
             Self::LogNormal { median_s, sigma, later_s } => {
                 let normal: f64 = StandardNormal.sample(rng);
-                (median_s * (sigma * normal).exp() + later_s).min(MAX_REACTION_S)
+                (median_s * maths::exp(sigma * normal) + later_s).min(MAX_REACTION_S)
             }
         }
     }
@@ -194,7 +194,7 @@ mod tests {
         drawn.sort_by(f64::total_cmp);
         assert!((drawn[2000] - 0.9).abs() < 0.02, "{}", drawn[2000]);
         // The 84th percentile of a log-normal lies one sigma above the median in the logarithm.
-        assert!((drawn[3366] / drawn[2000] - 0.3_f64.exp()).abs() < 0.03);
+        assert!((drawn[3366] / drawn[2000] - maths::exp(0.3)).abs() < 0.03);
     }
 
     #[test]

@@ -10,9 +10,9 @@
 //! covariance (Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, ch. 4). A quintic polynomial
 //! interpolates between two knots; it meets value and derivatives at both.
 
-use closecall_traffic::{Quintic, Stream};
+use closecall_traffic::{Quintic, StandardNormal, Stream};
 use nalgebra::{Matrix3, Vector3};
-use rand_distr::{Distribution, StandardNormal};
+use rand::distr::Distribution;
 
 /// Time between two knots (s), less than the shortest lag in use.
 const KNOT_SPACING_S: f64 = 0.25;

@@ -176,6 +176,7 @@ impl ArrivalPrediction {
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::maths;
     use proptest::prelude::*;
 
     use super::super::tests::{REFERENCE, encounters};
@@ -199,7 +200,7 @@ mod tests {
         let (mut commanded, mut braking) = (response.commanded_mps2, response.braking_mps2);
         let (mut ego_mps, mut front_m, mut rear_m) = (encounter.ego_mps, encounter.front_gap_m, encounter.rear_gap_m);
         let rear_mps = encounter.ego_mps + encounter.closing_mps;
-        let decay = (-step_s / response.lag_s).exp();
+        let decay = maths::exp(-step_s / response.lag_s);
         for _ in 0..100_000 {
             if ego_mps <= 0.0 || rear_mps <= ego_mps {
                 return None;

@@ -13,6 +13,8 @@
 //! Without this model, the plan would assume that braking takes effect at once. The half second of ramp and lag costs
 //! 0.3 s of the 2 s of headway gain at the closing speed of the reference point, and more at higher closing speeds.
 
+use closecall_traffic::maths;
+
 /// The build-up of the ego's braking from now on. Braking is positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakingResponse {
@@ -108,7 +110,7 @@ impl BrakingResponse {
         ];
         // The response to a line c₀ + s·t lags behind it by τ; the initial deviation decays.
         let lagged = |at_s: f64| commanded_mps2 + slope_mps3 * (at_s - self.lag_s);
-        let decay = if self.lag_s > 0.0 { (-time_s / self.lag_s).exp() } else { 0.0 };
+        let decay = if self.lag_s > 0.0 { maths::exp(-time_s / self.lag_s) } else { 0.0 };
         Segment { commanded, braking_mps2: lagged(time_s) + (braking_mps2 - lagged(0.0)) * decay }
     }
 }
