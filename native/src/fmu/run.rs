@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use closecall_traffic::CONTROL_STEP;
+use closecall_traffic::{CONTROL_STEP, maths};
 use libloading::Library as Module;
 
 use super::archive::{Unpacked, unpack};
@@ -196,7 +196,7 @@ impl Run for FmuRun {
         let tracks = input.tracks();
         self.nearest.clear();
         self.nearest.extend(0..tracks.len());
-        let distance_m = |index: &usize| tracks[*index].x_m.hypot(tracks[*index].y_m);
+        let distance_m = |index: &usize| maths::hypot(tracks[*index].x_m, tracks[*index].y_m);
         self.nearest.sort_by(|one, other| distance_m(one).total_cmp(&distance_m(other)));
         let start_s = input.values().time_s;
         if !self.has_started {
