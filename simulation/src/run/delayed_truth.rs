@@ -9,7 +9,7 @@
 use std::collections::VecDeque;
 
 use closecall_sensors::{GroundTruth, Perception, Scene, SceneVehicle, SensorError, SensorHealth};
-use closecall_traffic::{CONTROL_STEP, Source, Track};
+use closecall_traffic::{CONTROL_STEP, Source, Track, maths};
 
 /// True tracks with the latencies of the sensors.
 pub(super) struct DelayedTruth {
@@ -53,7 +53,7 @@ impl Perception for DelayedTruth {
 /// Returns a vehicle `steps` control steps later, at constant speed along the road.
 fn predicted(vehicle: &SceneVehicle, steps: usize, scene: &Scene<'_>) -> SceneVehicle {
     let travelled_m = vehicle.state.speed_mps * steps as f64 * CONTROL_STEP.s();
-    let (sin, cos) = vehicle.state.heading_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(vehicle.state.heading_rad);
     let mut later = *vehicle;
     later.state.s_m += travelled_m * cos / (1.0 - scene.road.curvature_per_m() * vehicle.state.d_m);
     later.state.d_m += travelled_m * sin;

@@ -4,7 +4,7 @@ use closecall_camera::Pipeline;
 use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_traffic::{Check, ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road};
+use closecall_traffic::{Check, ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road, maths};
 
 use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
 use super::intervention::FaultConfig;
@@ -90,7 +90,7 @@ fn refuse_glare(
 ) -> Result<(), ConfigError> {
     let sun = sensors.camera().sun;
     // On a curved road, the sun is behind the ego sooner or later.
-    let is_ahead = road.curvature_per_m() == 0.0 && sun.azimuth_rad.cos() * sun.elevation_rad.cos() >= 0.0;
+    let is_ahead = road.curvature_per_m() == 0.0 && maths::cos(sun.azimuth_rad) * maths::cos(sun.elevation_rad) >= 0.0;
     let is_day = environment.light == Light::Day;
     for (index, entry) in fault.rear_camera.iter().enumerate() {
         let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, .. } = entry.clone();

@@ -12,13 +12,12 @@
 //! `draw`: as a parameter of the scenario it is sampled, recorded and fixed like any other.
 
 use closecall_controllers::{CheckedDriver, DriverConfig};
-use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{
     ActorId, Check, ConfigError, KeyPath, Lane, Num, Parameters, Problem, Range, Road, Segment, Stream, Vehicle,
     VehicleClass, VehicleState, stream,
 };
+use closecall_traffic::{Exp1, StandardNormal, metrics::touching_distance_m};
 use rand::RngExt;
-use rand_distr::{Exp1, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! except the rounding of the written numbers. Robustness studies add noise of their own, from a seed.
 
 use closecall_scenarios::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
-use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState};
+use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState, maths};
 
 use crate::scenario::{ActorConfig, Scenario, ScenarioConfig};
 use crate::{CONTROL_STEP, Observer, RunEvent, StepView};
@@ -142,7 +142,7 @@ impl InCarRecorder {
 
     /// Updates the current manoeuvre and, when it ends, the true lane changes.
     fn update_manoeuvre(&mut self, time: Time, lane: Lane, state: &VehicleState) {
-        let lateral_speed_mps = state.speed_mps * state.heading_rad.sin();
+        let lateral_speed_mps = state.speed_mps * maths::sin(state.heading_rad);
         let side = if lateral_speed_mps > 0.0 { Side::Left } else { Side::Right };
         let moves_laterally = lateral_speed_mps.abs() > MIN_LATERAL_SPEED_MPS;
         if self.run.manoeuvre.is_some_and(|manoeuvre| !moves_laterally || manoeuvre.side != side) {

@@ -1,7 +1,7 @@
 //! Simulated traffic as trajectory data, in the layout in which recorded traffic is read.
 
 use closecall_scenarios::trajectory_data::TrajectoryData;
-use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
+use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint, maths};
 
 use crate::scenario::Scenario;
 use crate::{CONTROL_STEP, Observer, RunEvent, StepView};
@@ -50,7 +50,7 @@ impl Observer for TrafficRecorder {
         self.end = time;
         for (vehicle, trajectory) in view.vehicles.iter().zip(&mut self.trajectories[self.first_index..]) {
             let state = &vehicle.state;
-            let (sin, cos) = state.heading_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(state.heading_rad);
             let Lane(lane) = view.scenario.road.lane_at(state.d_m);
             trajectory.points.push(TrajectoryPoint {
                 time,

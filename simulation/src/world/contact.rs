@@ -1,6 +1,7 @@
 //! Detects when two vehicles first touch, on which sides, and which of them closed the gap.
 
 use closecall_traffic::geometry::{BoxSide, OrientedBox, first_contact};
+use closecall_traffic::maths;
 use nalgebra::Vector2;
 
 use super::search::FEW;
@@ -131,7 +132,7 @@ fn reach_m(before: &OrientedBox, after: &OrientedBox) -> [f64; 2] {
 
 /// Returns the outward normal of a side of a box, in the plane.
 fn outward(shape: &OrientedBox, side: BoxSide) -> Vector2<f64> {
-    let (sin, cos) = shape.yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(shape.yaw_rad);
     match side {
         BoxSide::Front => Vector2::new(cos, sin),
         BoxSide::Rear => Vector2::new(-cos, -sin),

@@ -7,7 +7,7 @@
 //! No other force acts during an impact, so that momentum is conserved; afterwards the tyres slide. The velocities after
 //! an impact are read at its end, as in accident reconstruction.
 
-use closecall_traffic::GRAVITY_MPS2;
+use closecall_traffic::{GRAVITY_MPS2, maths};
 use nalgebra::Vector2;
 use rapier2d::prelude::*;
 
@@ -164,7 +164,7 @@ impl Wreckage {
             let speed = body.linvel().length();
             let left = if speed > slowing_mps { (speed - slowing_mps) / speed } else { 0.0 };
             body.set_linvel(body.linvel() * left, true);
-            let radius_m = GYRATION_SHARE * spec.length_m.hypot(spec.width_m);
+            let radius_m = GYRATION_SHARE * maths::hypot(spec.length_m, spec.width_m);
             let slowing_radps = slowing_mps / radius_m as f32;
             let turning = body.angvel();
             let left = if turning.abs() > slowing_radps { turning - slowing_radps * turning.signum() } else { 0.0 };
@@ -230,8 +230,10 @@ mod tests {
 
     /// Does the same with the rear vehicle rotated by `yaw_rad`.
     fn collide_at(rear: Vehicle, front: Vehicle, offset_m: f64, yaw_rad: f64) -> Impact {
-        let distance_m =
-            0.5 * (rear.spec.length_m * yaw_rad.cos() + rear.spec.width_m * yaw_rad.sin() + front.spec.length_m);
+        let distance_m = 0.5
+            * (rear.spec.length_m * maths::cos(yaw_rad)
+                + rear.spec.width_m * maths::sin(yaw_rad)
+                + front.spec.length_m);
         let rotated = Motion { yaw_rad, ..moving(1_000.0, 0.0, rear.speed_mps) };
         let motions = [rotated, moving(1_000.0 + distance_m, offset_m, front.speed_mps)];
         let mut wreckage = Wreckage::new(motions[0].position_m, 0.9);

@@ -2,7 +2,7 @@
 
 use closecall_controllers::{LaneNeighbours, Looks, Neighbour, Neighbours};
 use closecall_traffic::metrics::bumper_gap_m;
-use closecall_traffic::{Lane, Road, Side};
+use closecall_traffic::{Lane, Road, Side, maths};
 
 use super::World;
 
@@ -27,7 +27,7 @@ impl Extent {
         let half_width_m = if state.heading_rad == 0.0 {
             0.5 * size.width_m
         } else {
-            let (sin, cos) = state.heading_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(state.heading_rad);
             0.5 * (size.length_m * sin.abs() + size.width_m * cos.abs())
         };
         Self { s_m: state.s_m, d_m: state.d_m, length_m: size.length_m, half_width_m }

@@ -15,7 +15,7 @@
 //! check of a scenario rejects weaving that would.
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
-use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState, maths};
 
 use super::path::{LanePath, LateralState};
 
@@ -115,7 +115,7 @@ impl Plant {
             brake_light_from_mps2: vehicle.brake_light_from_mps2,
             wheelbase_m: WHEELBASE_SHARE * vehicle.dimensions.length_m,
             friction,
-            lag_share: 1.0 - (-step_s / capability.lag_s).exp(),
+            lag_share: 1.0 - maths::exp(-step_s / capability.lag_s),
             step_s,
             state,
             lane_change: None,
@@ -196,7 +196,7 @@ impl Plant {
     fn steer(&mut self, distance_m: f64, road: &Road) {
         // Path and weaving are functions of the distance in the direction of the lane.
         // The functions below are exact at zero: most vehicles drive straight on.
-        let along_m = if self.course_rad == 0.0 { distance_m } else { distance_m * self.course_rad.cos() };
+        let along_m = if self.course_rad == 0.0 { distance_m } else { distance_m * maths::cos(self.course_rad) };
         self.distance_m += along_m;
         if let Some(weave) = &mut self.weave {
             self.deviation = weave.at(self.distance_m);
@@ -212,12 +212,12 @@ impl Plant {
         let (course_rad, curvature_per_m) = if slope == 0.0 {
             (slope, second_derivative_per_m)
         } else {
-            (slope.atan(), second_derivative_per_m / (1.0 + slope * slope).powf(1.5))
+            (maths::atan(slope), second_derivative_per_m / maths::powf(1.0 + slope * slope, 1.5))
         };
         self.course_rad = course_rad;
         // Slip angle at the centre of the box, half a wheelbase ahead of the rear axle.
         let slip_sin = (0.5 * self.wheelbase_m * curvature_per_m).clamp(-0.5, 0.5);
-        let slip_rad = if slip_sin == 0.0 { slip_sin } else { slip_sin.asin() };
+        let slip_rad = if slip_sin == 0.0 { slip_sin } else { maths::asin(slip_sin) };
         self.state.d_m = d_m;
         self.state.heading_rad = course_rad - slip_rad;
         self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_per_m());
@@ -351,7 +351,7 @@ mod tests {
             for _ in 0..400 {
                 car.step(0.0, Indicator::Left, &road);
                 let lateral_mps = (car.state().d_m - previous) / STEP_S;
-                let course_rad = (lateral_mps / 30.0).asin();
+                let course_rad = maths::asin(lateral_mps / 30.0);
                 assert!((course_rad - car.state().heading_rad).abs() < 0.01);
                 previous = car.state().d_m;
             }

@@ -8,7 +8,7 @@ use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
-use closecall_traffic::{Lane, PHYSICS_STEP, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{Lane, PHYSICS_STEP, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState, maths};
 
 /// Time constant with which the acceleration of a car follows the command in the simulation's plant (s).
 const CAR_LAG_S: f64 = 0.15;
@@ -110,7 +110,7 @@ driver = {{ ego-stack = {{ acc = {{ time-gap-s = 1.0, set-speed-mps = 10.0 }} }}
     /// the lag of the plant gives the recorded accelerations. This holds while the jerk limit of the plant, 40 m/s³,
     /// does not act.
     pub(crate) fn commands(&self, actor: usize) -> impl Iterator<Item = (f64, f64)> {
-        let lag_share = 1.0 - (-PHYSICS_STEP.s() / CAR_LAG_S).exp();
+        let lag_share = 1.0 - maths::exp(-PHYSICS_STEP.s() / CAR_LAG_S);
         self.instants.windows(2).map(move |pair| {
             let [before_mps2, after_mps2] = [0, 1].map(|index: usize| pair[index].vehicles[actor].acceleration_mps2);
             (pair[0].time.s(), before_mps2 + (after_mps2 - before_mps2) / lag_share)

@@ -1,4 +1,5 @@
 use closecall_scenarios::following::{FollowingInstant, read};
+use closecall_traffic::maths;
 
 use super::*;
 
@@ -9,7 +10,7 @@ fn synthetic(name: &str, model: FollowingModel, values: &[f64]) -> FollowingPair
     let instants = (0..600).map(|index| {
         let time_s = 0.1 * f64::from(index);
         let wave = 0.3 * time_s + phase;
-        let (leader_mps, leader_mps2) = (12.0 + 5.0 * wave.sin(), 1.5 * wave.cos());
+        let (leader_mps, leader_mps2) = (12.0 + 5.0 * maths::sin(wave), 1.5 * maths::cos(wave));
         let instant = FollowingInstant {
             time_s,
             leader_rear_m,
