@@ -177,6 +177,7 @@ fn stream(seed: u64, quantity: Quantity) -> Stream {
 #[cfg(test)]
 mod tests {
     use closecall_statistics::normal::TruncatedStandardNormal;
+    use closecall_traffic::maths;
     use rand::RngExt;
     use rayon::prelude::*;
 
@@ -195,7 +196,7 @@ mod tests {
 
     fn drawn(n: usize, [median, sigma]: [f64; 2], rng: &mut Stream) -> Vec<f64> {
         let normal = TruncatedStandardNormal::new(-6.0, 6.0).unwrap();
-        let mut values: Vec<f64> = (0..n).map(|_| median * (sigma * normal.quantile(rng.random())).exp()).collect();
+        let mut values: Vec<f64> = (0..n).map(|_| median * maths::exp(sigma * normal.quantile(rng.random()))).collect();
         values.sort_by(f64::total_cmp);
         values
     }
