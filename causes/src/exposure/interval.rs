@@ -1,5 +1,6 @@
 //! The intervals of a rate, of a difference of shares, and of their product.
 
+use closecall_traffic::maths;
 use statrs::distribution::{ContinuousCDF, Gamma};
 
 /// Two-sided 95 % quantile of the standard normal distribution.
@@ -36,7 +37,7 @@ pub fn share_difference(first: u64, second: u64, samples: u64) -> (f64, [f64; 2]
 /// Returns the product of a positive and any independent quantity, and its interval, from their values with intervals.
 pub fn product((rate, rate_95): (f64, [f64; 2]), (effect, effect_95): (f64, [f64; 2])) -> (f64, [f64; 2]) {
     let bound =
-        |rate_bound: f64, effect_bound: f64| (effect * (rate - rate_bound)).hypot(rate * (effect - effect_bound));
+        |rate_bound: f64, effect_bound: f64| maths::hypot(effect * (rate - rate_bound), rate * (effect - effect_bound));
     let value = rate * effect;
     // A smaller rate brings the product nearer to zero.
     let [toward_low, toward_high] = if effect >= 0.0 { rate_95 } else { [rate_95[1], rate_95[0]] };
@@ -59,7 +60,7 @@ mod tests {
     fn poisson(mean: f64, rng: &mut Stream) -> u64 {
         let (mut time, mut count) = (0.0, 0);
         loop {
-            time -= (1.0 - rng.random::<f64>()).ln() / mean;
+            time -= maths::ln(1.0 - rng.random::<f64>()) / mean;
             if time > 1.0 {
                 return count;
             }

@@ -1,12 +1,14 @@
 //! Readable values of a parameter.
 
+use closecall_traffic::maths;
+
 /// Number of steps of the grid in the middle 95 % of a distribution, at least.
 const STEPS: f64 = 100.0;
 
 /// Returns the step of the grid: the largest of 1, 2 and 5 times a power of ten that divides `span` into 100 steps or more.
 pub(super) fn step(span: f64) -> f64 {
     let finest = span / STEPS;
-    let power = 10_f64.powf(finest.log10().floor());
+    let power = maths::powf(10.0, maths::log10(finest).floor());
     [5.0, 2.0].into_iter().map(|factor| factor * power).find(|step| *step <= finest).unwrap_or(power)
 }
 

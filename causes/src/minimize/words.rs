@@ -1,6 +1,6 @@
 //! Values and changes in the units of a reader.
 
-use closecall_traffic::Value;
+use closecall_traffic::{Value, maths};
 
 use super::Offset;
 use crate::attribution::{Attribution, phase_word};
@@ -39,7 +39,7 @@ impl Named<'_> {
     /// needs, or more if the two numbers would look the same. The difference is that of the numbers as they are written.
     fn numbers(&self, values: [f64; 2], step: Option<f64>) -> [String; 3] {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "steps are above 1e-12")]
-        let needed = |step: f64| (-(step * self.factor).log10()).ceil().max(0.0) as usize;
+        let needed = |step: f64| (-maths::log10(step * self.factor)).ceil().max(0.0) as usize;
         let least = step.map_or(self.decimals, needed);
         let written = |decimals: i32| values.map(|value| (value * self.factor * 10_f64.powi(decimals)).round());
         let differ = |decimals: &usize| {
