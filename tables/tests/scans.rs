@@ -8,6 +8,7 @@ use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, RunKey, simulate};
 use closecall_tables::RunTables;
+use closecall_traffic::maths;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 /// Returns a scenario of the library with these sensors, cut to a second.
@@ -77,7 +78,7 @@ fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
             );
             assert_eq!(x_m.value(row) < 0.0, is_rear, "the rear sensor sees what is behind the ego's origin");
             // The left of the rear sensor's axis is the right of the ego.
-            let left_m = range_m.value(row) * elevation_rad.value(row).cos() * azimuth_rad.value(row).sin();
+            let left_m = range_m.value(row) * maths::cos(elevation_rad.value(row)) * maths::sin(azimuth_rad.value(row));
             let y_error_m = y_m.value(row) - if is_rear { -left_m } else { left_m };
             assert!(y_error_m.abs() < 0.1 + 0.01 * range_m.value(row), "{y_error_m} at {left_m}");
             assert_eq!(side.is_valid(row), is_rear, "the OS1 has no mirror");
