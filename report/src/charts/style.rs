@@ -12,6 +12,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use crate::campaign::overview::Fate;
+use closecall_traffic::maths;
 
 /// The surface that a chart is drawn on.
 pub(crate) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -128,7 +129,7 @@ impl ChartAxis<'_> {
 /// Returns a text for values between `low` and `high`, with as many digits as a hundredth of the range needs.
 pub(crate) fn number_text(low: f64, high: f64) -> impl Fn(&f64) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few digits")]
-    let digits = (2.0 - (high - low).log10().floor()).clamp(0.0, 6.0) as usize;
+    let digits = (2.0 - maths::log10(high - low).floor()).clamp(0.0, 6.0) as usize;
     move |value| {
         let text = format!("{value:.digits$}");
         let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

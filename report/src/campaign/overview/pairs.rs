@@ -1,6 +1,6 @@
 //! The pair of parameters that the outcome depends on most.
 
-use closecall_traffic::Parameters;
+use closecall_traffic::{Parameters, maths};
 
 use super::Axis;
 
@@ -59,7 +59,7 @@ impl PairBins {
 
 /// Returns the entropy of an event that has this probability (nat).
 fn entropy_nat(probability: f64) -> f64 {
-    let term = |p: f64| if p > 0.0 { -p * p.ln() } else { 0.0 };
+    let term = |p: f64| if p > 0.0 { -p * maths::ln(p) } else { 0.0 };
     term(probability) + term(1.0 - probability)
 }
 

@@ -1,6 +1,7 @@
 //! A line chart: axes with round ticks, curves with gaps, reference levels, and the marked moments of the encounter.
 
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
+use closecall_traffic::maths;
 
 /// Colour of text and axes.
 pub(super) const INK: &str = "#222222";
@@ -138,7 +139,7 @@ pub(super) fn ticks([low, high]: Range) -> Vec<f64> {
     if !(rough > 0.0 && rough.is_finite()) {
         return Vec::new();
     }
-    let power = 10.0_f64.powf(rough.log10().floor());
+    let power = maths::powf(10.0, maths::log10(rough).floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * power).find(|step| *step >= rough);
     let step = step.unwrap_or(rough);
     let mut ticks = Vec::new();

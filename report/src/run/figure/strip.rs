@@ -1,6 +1,6 @@
 //! A road strip: the road from above at one instant, in a frame that moves with the ego.
 
-use closecall_traffic::{Lane, Measured, VehicleState};
+use closecall_traffic::{Lane, Measured, VehicleState, maths};
 
 use super::chart::tick_text;
 use super::colours::colour;
@@ -207,7 +207,7 @@ impl Strip<'_> {
         const SPIKES: i32 = 8;
         let burst: Vec<[f64; 2]> = (0..2 * SPIKES)
             .map(|spike| {
-                let (sin, cos) = (std::f64::consts::PI * f64::from(spike) / f64::from(SPIKES)).sin_cos();
+                let (sin, cos) = maths::sin_cos(std::f64::consts::PI * f64::from(spike) / f64::from(SPIKES));
                 let radius = if spike % 2 == 0 { 13.0 } else { 6.0 };
                 [x + radius * cos, y + radius * sin]
             })

@@ -7,7 +7,7 @@ use closecall_controllers::EgoCommand;
 use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
-use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState};
+use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState, maths};
 
 use closecall_simulation::outcome::{Collision, Outcome, Phase};
 use closecall_simulation::{CurrentMargins, RunEvent};
@@ -243,7 +243,7 @@ impl Film {
         let state = &frame.states[actor];
         let size = &self.actors[actor].vehicle.dimensions;
         let pose = self.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
-        let (sin, cos) = pose.yaw_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(pose.yaw_rad);
         Moving {
             shape: OrientedBox {
                 x_m: pose.x_m,
@@ -283,7 +283,7 @@ impl Film {
     pub(in crate::run) fn in_ego_frame(&self, frame: &Frame, actor: usize) -> [f64; 3] {
         let pose = |state: &VehicleState| self.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
         let (own, other) = (pose(&frame.states[self.ego]), pose(&frame.states[actor]));
-        let (sin, cos) = own.yaw_rad.sin_cos();
+        let (sin, cos) = maths::sin_cos(own.yaw_rad);
         let (dx, dy) = (other.x_m - own.x_m, other.y_m - own.y_m);
         [cos * dx + sin * dy, cos * dy - sin * dx, other.yaw_rad - own.yaw_rad]
     }

@@ -13,7 +13,7 @@ use closecall_scenarios::filters::{PERIOD, SmoothedTrajectoryData};
 use closecall_traffic::metrics::{CRITICAL_THW_S, time_headway_s, time_to_collision_s};
 use closecall_traffic::{
     Absent, Check, ConfigError, Environment, Num, Parameters, Road, RoadConfig, Side, Time, Trajectory,
-    TrajectoryPoint, Vehicle, VehicleState,
+    TrajectoryPoint, Vehicle, VehicleState, maths,
 };
 
 use super::{Film, FilmActor, Frame, Level, Part};
@@ -188,11 +188,11 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
 
 fn state(point: TrajectoryPoint) -> VehicleState {
     let (along, across) = (point.speed_mps, point.lateral_speed_mps);
-    let speed_mps = along.hypot(across);
+    let speed_mps = maths::hypot(along, across);
     VehicleState {
         s_m: point.s_m,
         d_m: point.d_m,
-        heading_rad: if speed_mps < MIN_HEADING_SPEED_MPS { 0.0 } else { across.atan2(along) },
+        heading_rad: if speed_mps < MIN_HEADING_SPEED_MPS { 0.0 } else { maths::atan2(across, along) },
         speed_mps,
         acceleration_mps2: point.acceleration_mps2,
         ..VehicleState::default()

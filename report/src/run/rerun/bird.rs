@@ -16,7 +16,7 @@
 
 mod names;
 
-use closecall_traffic::{Indicator, Lane, Measured, Source, Time, TrackStatus};
+use closecall_traffic::{Indicator, Lane, Measured, Source, Time, TrackStatus, maths};
 use rerun::{LineStrips2D, Points2D};
 
 use super::RecordingError;
@@ -206,7 +206,7 @@ fn write_speeds(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Res
             let frame: &Frame = &film.frames[row];
             let state = &frame.states[actor];
             let front_m = 0.5 * film.actors[actor].vehicle.dimensions.length_m;
-            let (sin, cos) = state.heading_rad.sin_cos();
+            let (sin, cos) = maths::sin_cos(state.heading_rad);
             let arrow_end_m = front_m + ARROW_S * state.speed_mps;
             [
                 canvas.at(frame, state.s_m + front_m * cos, state.d_m + front_m * sin),

@@ -12,7 +12,7 @@ use closecall_camera::{
     Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
 };
 use closecall_sensors::rear_exposures;
-use closecall_traffic::{Time, VehicleClass};
+use closecall_traffic::{Time, VehicleClass, maths};
 use rerun::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
 
 use super::RecordingError;
@@ -41,7 +41,7 @@ const IMAGE_DISTANCE_M: f32 = 1.2;
 /// body is left out.
 fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
     let ahead_m = camera.mount_from_rear_m - 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
-    let (sin, cos) = camera.pitch_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(camera.pitch_rad);
     // The axes of the camera in the ego frame: right, down, and backward along the road.
     let axes = [[0.0, 1.0, 0.0], [sin, 0.0, -cos], [-cos, 0.0, -sin]].map(|axis| axis.map(|value| value as f32));
     let position_m = [ahead_m as f32, 0.0, camera.mount_height_m as f32];

@@ -3,6 +3,7 @@
 //! After Koschmieder, contrast falls with the distance r as exp(-3.912·r/V), with the meteorological visibility V at which 2 %
 //! of it are left. Each curtain takes the share that its distance from the one before accounts for.
 
+use closecall_traffic::maths;
 use nalgebra::Vector3;
 use rerun::{Mesh3D, Transform3D};
 
@@ -39,7 +40,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         return Ok(());
     }
     let step_m = (FARTHEST * visibility_m).min(MAX_DISTANCE_M) / f64::from(CURTAINS);
-    let opacity = 1.0 - (-KOSCHMIEDER * step_m / visibility_m).exp();
+    let opacity = 1.0 - maths::exp(-KOSCHMIEDER * step_m / visibility_m);
     let colour = palette::with_opacity(palette::through_fog(palette::SKY, 0.0), (255.0 * opacity) as u8);
     for curtain in 1..=CURTAINS {
         let x_m = step_m * f64::from(curtain);

@@ -3,7 +3,7 @@
 //! off.
 
 use closecall_sensors::FieldOfView;
-use closecall_traffic::{Source, Time, Track, TrackStatus};
+use closecall_traffic::{Source, Time, Track, TrackStatus, maths};
 use nalgebra::{Matrix2, SymmetricEigen};
 use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 
@@ -124,12 +124,12 @@ fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<
 
 /// Returns the outline of the field of view: from the sensor along one side, along the arc, and back to the sensor.
 fn edge(field: &FieldOfView, bumper_m: f64) -> Vec<[f32; 3]> {
-    let half_rad = field.half_angle_tan.atan();
+    let half_rad = maths::atan(field.half_angle_tan);
     let [x_m, y_m] = [bumper_m + field.inset_m, field.left_m];
     let sensor = [x_m as f32, y_m as f32, FIELD_Z_M as f32];
     let arc = (0..=ARC_PIECES).map(|piece| {
         let angle_rad = half_rad * (2.0 * f64::from(piece) / f64::from(ARC_PIECES) - 1.0);
-        let (sin, cos) = (field.azimuth_rad + angle_rad).sin_cos();
+        let (sin, cos) = maths::sin_cos(field.azimuth_rad + angle_rad);
         [(x_m - field.range_m * cos) as f32, (y_m + field.range_m * sin) as f32, FIELD_Z_M as f32]
     });
     [sensor].into_iter().chain(arc).chain([sensor]).collect()
@@ -185,7 +185,7 @@ fn ellipse(track: &Track) -> ([f32; 3], Quaternion) {
     let axes = SymmetricEigen::new(position);
     let half_m = |index: usize| (ELLIPSE_SIGMAS * axes.eigenvalues[index].max(0.0).sqrt()) as f32;
     let first = axes.eigenvectors.column(0);
-    ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], yaw_rotation(first[1].atan2(first[0])))
+    ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], yaw_rotation(maths::atan2(first[1], first[0])))
 }
 
 /// Returns the colour of a track by its status. A track that is probably no vehicle is inconspicuous.

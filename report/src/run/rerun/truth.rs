@@ -4,7 +4,7 @@
 //! within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts as missed, even if another vehicle hides it.
 
 use closecall_sensors::FieldOfView;
-use closecall_traffic::{Source, Time, Track, TrackStatus};
+use closecall_traffic::{Source, Time, Track, TrackStatus, maths};
 use rerun::{Boxes3D, FillMode, Quaternion};
 
 use super::RecordingError;
@@ -133,7 +133,7 @@ fn track_shape(track: &Track) -> Shape {
 /// Returns the centre of the face of a box that is nearest to the ego (m).
 fn face_m([x_m, y_m, yaw_rad]: [f64; 3], length_m: f64) -> [f64; 2] {
     let ahead_m = if x_m < 0.0 { 0.5 * length_m } else { -0.5 * length_m };
-    let (sin, cos) = yaw_rad.sin_cos();
+    let (sin, cos) = maths::sin_cos(yaw_rad);
     [x_m + ahead_m * cos, y_m + ahead_m * sin]
 }
 
@@ -144,7 +144,7 @@ fn track_face_m(track: &Track) -> [f64; 2] {
 
 /// Returns true if two faces are close enough for a track to belong to a vehicle.
 fn are_close(one: [f64; 2], other: [f64; 2]) -> bool {
-    (one[0] - other[0]).hypot(one[1] - other[1]) <= MATCH_DISTANCE_M
+    maths::hypot(one[0] - other[0], one[1] - other[1]) <= MATCH_DISTANCE_M
 }
 
 /// Returns true if a point in the ego frame lies in one of the fields of view, or if their limits are not simulated.

@@ -1,7 +1,7 @@
 //! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around the ego.
 
 use closecall_traffic::geometry::BoxSide;
-use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
+use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState, maths};
 use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 
 use super::RecordingError;
@@ -135,7 +135,7 @@ fn write_motion(
 
 /// Returns a rotation about the vertical axis.
 pub(super) fn yaw_rotation(yaw_rad: f64) -> Quaternion {
-    let (sin, cos) = (0.5 * yaw_rad).sin_cos();
+    let (sin, cos) = maths::sin_cos(0.5 * yaw_rad);
     Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
 }
 
