@@ -2,7 +2,7 @@
 
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorError, Sensors, TrackAudit};
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Road, Source, Stream, Track, TrackStatus, Vehicle, VehicleClass, VehicleState, stream,
+    ActorId, CONTROL_STEP, Road, Source, Stream, Track, TrackStatus, Vehicle, VehicleClass, VehicleState, maths, stream,
 };
 use rand::RngExt;
 
@@ -305,7 +305,7 @@ fn position_m(track: &Track) -> [f64; 2] {
 }
 
 fn distance_m([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
-    (x - to_x).hypot(y - to_y)
+    maths::hypot(x - to_x, y - to_y)
 }
 
 /// Returns the nearest track within the cut-off.

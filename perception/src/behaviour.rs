@@ -8,7 +8,7 @@
 //! Both sensors are measured by the same code on the same drives.
 
 use closecall_sensors::Sensors;
-use closecall_traffic::{CONTROL_STEP, Road};
+use closecall_traffic::{CONTROL_STEP, Road, maths};
 use rayon::prelude::*;
 
 use crate::approach::Address;
@@ -127,7 +127,7 @@ fn correlation_times_s(series: &[Vec<Step>]) -> [f64; 3] {
         }
         let [low, high] = CORRELATION_BOUNDS;
         let correlation = if square > 0.0 { (product / square).clamp(low, high) } else { low };
-        -(LAG_STEPS as f64) * CONTROL_STEP.s() / correlation.ln()
+        -(LAG_STEPS as f64) * CONTROL_STEP.s() / maths::ln(correlation)
     })
 }
 

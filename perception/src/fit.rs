@@ -183,7 +183,7 @@ impl Fitter<'_> {
                     let found = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
                     let [centre_m, classified_m] = means_m(&found);
                     if class == VehicleClass::Car {
-                        squares += found.iter().map(|it| (it.confirmed_m / centre_m).ln().powi(2)).sum::<f64>();
+                        squares += found.iter().map(|it| maths::ln(it.confirmed_m / centre_m).powi(2)).sum::<f64>();
                         count += found.len() as f64 - 1.0;
                     }
                     let range_m = rounded(centre_m + delay_m, 10.0);

@@ -1,7 +1,7 @@
 //! What the sensors show of a vehicle, step by step: on an approach, after it appears, and while it brakes and changes lanes.
 
 use closecall_sensors::{Perception, Scene, SensorError, Sensors};
-use closecall_traffic::{CONTROL_STEP, Road, Track, TrackStatus};
+use closecall_traffic::{CONTROL_STEP, Road, Track, TrackStatus, maths};
 
 use super::{APPEARS_AT_M, Address, GAPS_M, Traffic, WAIT_STEPS, build, confirmed, errors, follow, nearest};
 use crate::cases::Case;
@@ -75,7 +75,7 @@ pub(crate) fn steps(
 fn seen(track: &Track, traffic: &Traffic) -> Seen {
     let found = errors(track, traffic.truths_m()[0], &traffic.others[0]);
     let state = &traffic.others[0].state;
-    let across_mps = state.speed_mps * state.heading_rad.sin();
+    let across_mps = state.speed_mps * maths::sin(state.heading_rad);
     Seen {
         errors: [found.position_m[0], found.position_m[1], found.speed_mps, track.vy_mps() - across_mps],
         is_coasting: track.status == TrackStatus::Coasting,
@@ -157,7 +157,7 @@ pub(crate) fn lags_s(
         if step >= before {
             let slower_mps = BRAKING_MPS2 * CONTROL_STEP.s();
             (state.speed_mps, state.acceleration_mps2) = (state.speed_mps - slower_mps, -BRAKING_MPS2);
-            state.heading_rad = (ACROSS_MPS / state.speed_mps).asin();
+            state.heading_rad = maths::asin(ACROSS_MPS / state.speed_mps);
             state.d_m += ACROSS_MPS * CONTROL_STEP.s();
         }
         traffic.advance();

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use closecall_sensors::SensorMode;
 use closecall_simulation::scenario::source;
-use closecall_traffic::{ActorId, Stream, stream};
+use closecall_traffic::{ActorId, StandardNormal, Stream, maths, stream};
 
 use super::*;
 
@@ -23,7 +22,7 @@ fn rng(of: &str) -> Stream {
 
 /// Returns an approach with errors of a first-order Gauss–Markov process each.
 fn approach(rng: &mut Stream) -> Vec<Step> {
-    let decays = TIME_S.map(|time_s| (-CONTROL_STEP.s() / time_s).exp());
+    let decays = TIME_S.map(|time_s| maths::exp(-CONTROL_STEP.s() / time_s));
     let mut errors = SD.map(|sd| sd * rng.sample::<f64, _>(StandardNormal));
     (0..STEPS)
         .map(|step| {

@@ -14,7 +14,7 @@
 //! A slow error stands for all that lasts longer than a scan: noise, and what the full chain errs in the same way at the same distance.
 
 use closecall_sensors::{ErrorGrid, ErrorGrids, FittedErrors, NamedGrid, RearFit, SensorMode, Sensors};
-use closecall_traffic::{Appearance, CONTROL_STEP, Plate, Vehicle, VehicleClass};
+use closecall_traffic::{Appearance, CONTROL_STEP, Plate, Vehicle, VehicleClass, maths};
 use rayon::prelude::*;
 
 use super::{Fitter, extinctions_per_m, mean, rounded};
@@ -218,13 +218,13 @@ impl Ratios {
 
     /// Returns the sum of the squared logarithms.
     fn distance(&self) -> f64 {
-        self.near.iter().chain(&self.far).map(|ratio| ratio.ln().powi(2)).sum()
+        self.near.iter().chain(&self.far).map(|ratio| maths::ln(*ratio).powi(2)).sum()
     }
 
     /// Returns errors that bring the figures of the tracks nearer to the goal.
     fn adapted(&self, errors: &FittedErrors, goal: &Figures) -> FittedErrors {
         let [low, high] = RATIO_BOUNDS;
-        let damped = |ratio: f64| ratio.clamp(low, high).powf(ADAPTED_SHARE);
+        let damped = |ratio: f64| maths::powf(ratio.clamp(low, high), ADAPTED_SHARE);
         let [along, across, speed, speed_across, along_time, across_time] = self.near.map(damped);
         let [far_along, far_across, far_speed, far_speed_across] = self.far.map(damped);
         let FittedErrors { white_sd_m, far_white_sd_m, slow_sd_m, far_slow_sd_m, slow_time_s, .. } = errors;
@@ -290,7 +290,7 @@ fn correlation_time_s(errors: &[Vec<[f64; 4]>], axis: usize) -> f64 {
         product / square
     };
     let mut before = 1.0;
-    let level = (-1.0_f64).exp();
+    let level = maths::exp(-1.0);
     for lag in 1..=LONGEST_LAG_STEPS {
         let now = correlation(lag);
         if now <= level {
@@ -300,7 +300,7 @@ fn correlation_time_s(errors: &[Vec<[f64; 4]>], axis: usize) -> f64 {
         before = now;
     }
     let [low, high] = CORRELATION_BOUNDS;
-    -(LONGEST_LAG_STEPS as f64) * CONTROL_STEP.s() / before.clamp(low, high).ln()
+    -(LONGEST_LAG_STEPS as f64) * CONTROL_STEP.s() / maths::ln(before.clamp(low, high))
 }
 
 /// Which scans lose a vehicle.

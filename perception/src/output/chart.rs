@@ -6,6 +6,7 @@ use maud::{Markup, PreEscaped, html};
 
 use crate::approach::GAPS_M;
 use crate::figures::{CurvePoint, PointErrors};
+use closecall_traffic::maths;
 
 /// Size of a chart (px), and of its margins: left, right, above, below.
 const SIZE_PX: [f64; 2] = [430.0, 240.0];
@@ -209,7 +210,7 @@ fn nice(largest: f64) -> f64 {
     if !(largest > 0.0) {
         return 1.0;
     }
-    let power = 10.0_f64.powf(largest.log10().floor());
+    let power = maths::powf(10.0, maths::log10(largest).floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * power).find(|end| *end >= largest - 1e-12).unwrap_or(largest)
 }
 

@@ -2,7 +2,7 @@
 
 use closecall_sensors::Health;
 use closecall_sensors::faults::NOTICED_AFTER_SCANS;
-use closecall_traffic::{Source, Track, TrackStatus, VehicleClass};
+use closecall_traffic::{Source, Track, TrackStatus, VehicleClass, maths};
 
 use crate::watch::{Car, Of, Pair, Step, pair};
 
@@ -213,7 +213,7 @@ impl Effect {
                 let moved_m = settled(&faulty, Track::y_m) - settled(&usual, Track::y_m);
                 let mount_m = if of.source() == Source::Surround { 0.0 } else { HALF_EGO_M };
                 let apart_m = settled(&usual, |track| track.x_m().abs()) - mount_m;
-                let expected_m = apart_m * by_deg.to_radians().sin();
+                let expected_m = apart_m * maths::sin(by_deg.to_radians());
                 is_about(moved_m, expected_m, 0.25 * expected_m.abs())
             }
             Self::Faster { by_mps } => {
