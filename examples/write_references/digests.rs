@@ -5,7 +5,6 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
@@ -14,6 +13,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, RunKey};
+use closecall_traffic::maths;
 use serde::{Deserialize, Serialize};
 
 /// The file with the digests, relative to the root of the repository.
@@ -46,21 +46,46 @@ fn short(hasher: &blake3::Hasher) -> String {
     hasher.finalize().to_hex().chars().take(DIGITS).collect()
 }
 
-/// Returns the digest of the values of the functions that would differ between C libraries and processors.
+/// Returns the digest of the values of the mathematical functions.
 ///
 /// The arguments cover the sizes at which the simulation calls them: angles, speeds, distances and probabilities.
 pub(crate) fn functions() -> String {
     let mut hasher = blake3::Hasher::new();
     for step in 1..=ARGUMENTS {
-        // Black boxes keep the compiler from computing them itself.
-        let x = black_box(f64::from(step) * 1.234_567e-3);
-        let unit = black_box(f64::from(step) / f64::from(ARGUMENTS));
-        let values = [x.exp(), (-x).exp(), x.ln(), x.sin(), x.cos(), x.tan(), x.atan(), x.powf(unit), x.powf(0.35)];
-        let more = [unit.asin(), unit.acos(), x.atan2(unit), x.tanh(), x.exp_m1(), x.ln_1p(), x.log10(), x.hypot(unit)];
+        let x = f64::from(step) * 1.234_567e-3;
+        let unit = f64::from(step) / f64::from(ARGUMENTS);
+        let values = [
+            maths::exp(x),
+            maths::exp(-x),
+            maths::ln(x),
+            maths::sin(x),
+            maths::cos(x),
+            maths::tan(x),
+            maths::atan(x),
+            maths::powf(x, unit),
+            maths::powf(x, 0.35),
+        ];
+        let more = [
+            maths::asin(unit),
+            maths::acos(unit),
+            maths::atan2(x, unit),
+            maths::tanh(x),
+            maths::exp_m1(x),
+            maths::ln_1p(x),
+            maths::log10(x),
+            maths::hypot(x, unit),
+        ];
         values.iter().chain(&more).for_each(|value| _ = hasher.update(&value.to_bits().to_le_bytes()));
         #[expect(clippy::cast_possible_truncation, reason = "the functions of single precision are meant")]
-        let single = black_box(x as f32);
-        let values = [(-single).exp(), single.ln(), single.sin(), single.cos(), single.tan(), single.powf(0.35)];
+        let single = x as f32;
+        let values = [
+            maths::exp(-single),
+            maths::ln(single),
+            maths::sin(single),
+            maths::cos(single),
+            maths::tan(single),
+            maths::powf(single, 0.35),
+        ];
         values.iter().for_each(|value| _ = hasher.update(&value.to_bits().to_le_bytes()));
     }
     short(&hasher)

@@ -1,7 +1,7 @@
 //! What a stepped run shows to a learning algorithm, as numbers in a fixed order. Nothing of it is the truth.
 
 use closecall_controllers::{EgoInput, Front};
-use closecall_traffic::{Source, Track, TrackStatus};
+use closecall_traffic::{Source, Track, TrackStatus, maths};
 
 /// The numbers of the ego, its road, its sensors and its lead vehicle, in their order.
 pub(crate) const ODOMETRY_KEYS: [&str; 18] = [
@@ -91,7 +91,7 @@ pub(crate) fn write(input: &EgoInput<'_>, front: Option<Front>, max_tracks: usiz
 }
 
 fn distance_m(track: &Track) -> f64 {
-    track.x_m().hypot(track.y_m())
+    maths::hypot(track.x_m(), track.y_m())
 }
 
 fn flag(is_set: bool) -> f64 {

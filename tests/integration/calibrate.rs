@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::support::{closecall, code, folder, json, message, stdout};
+use closecall_traffic::maths;
 
 /// Returns a table of pairs whose followers keep 1.5 s and 2 m behind a leader that drives in waves.
 fn table() -> String {
@@ -10,8 +11,8 @@ fn table() -> String {
         "pair_id,time_s,follower_front_y_m,follower_speed_mps,leader_front_y_m,leader_length_m,leader_speed_mps\n"
             .to_owned();
     for pair in 0..8 {
-        let leader_m = |time_s: f64| 10.0 * time_s - 20.0 * (0.2 * time_s + f64::from(pair)).cos();
-        let leader_mps = |time_s: f64| 10.0 + 4.0 * (0.2 * time_s + f64::from(pair)).sin();
+        let leader_m = |time_s: f64| 10.0 * time_s - 20.0 * maths::cos(0.2 * time_s + f64::from(pair));
+        let leader_mps = |time_s: f64| 10.0 + 4.0 * maths::sin(0.2 * time_s + f64::from(pair));
         for step in 0..400 {
             let time_s = 0.1 * f64::from(step);
             // The follower does what the leader did 1.5 s ago, 2 m behind it (Newell).

@@ -10,7 +10,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
-use closecall_traffic::{ParameterName, Time, Value};
+use closecall_traffic::{ParameterName, Time, Value, maths};
 use statrs::distribution::{ContinuousCDF, LogNormal};
 
 use crate::support::{closecall, folder, library, stdout};
@@ -36,7 +36,7 @@ fn kolmogorov_smirnov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f
         .fold(0.0, f64::max);
     // Stephens' form of the asymptotic distribution (Journal of the Royal Statistical Society B 32 (1970) 115–122).
     let lambda = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
-    let term = |k: i32| 2.0 * f64::from(k % 2 * 2 - 1) * (-2.0 * f64::from(k * k) * lambda * lambda).exp();
+    let term = |k: i32| 2.0 * f64::from(k % 2 * 2 - 1) * maths::exp(-2.0 * f64::from(k * k) * lambda * lambda);
     (distance, (1..=100).map(term).sum::<f64>().clamp(0.0, 1.0))
 }
 
@@ -125,7 +125,7 @@ fn the_delay_between_brake_light_and_deceleration_follows_the_reaction_time_of_t
             (light.rear_decelerates.unwrap() - on).s()
         })
         .collect();
-    let expected = LogNormal::new(0.9_f64.ln(), 0.3).unwrap();
+    let expected = LogNormal::new(maths::ln(0.9), 0.3).unwrap();
     assert_follows("delay between the ego's brake light and the rear vehicle's deceleration", delays, |delay_s| {
         expected.cdf(delay_s)
     });
