@@ -52,9 +52,6 @@
 //! | - | passing lane | - | The lane next to the ego in which a rear vehicle overtakes. |
 //! | - | road frame `s_m`, `d_m` | - | Position along the road, and across it to the left. |
 
-// Links the mathematical functions into every program that simulates.
-use closecall_mathematics as _;
-
 mod absent;
 mod actor;
 pub mod bodies;
