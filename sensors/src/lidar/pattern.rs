@@ -14,6 +14,8 @@
 //!
 //! A [`LidarKind`] says where the layers and the columns lie. A beam has a footprint. 2 × 4 sub-rays of equal weight sample it.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::{LidarKind, MirrorSide};
 use closecall_traffic::maths;
 
@@ -118,6 +120,21 @@ pub struct Pattern {
 }
 
 impl Pattern {
+    /// Returns the pattern of a kind of LiDAR, which all scanners of this kind share. A process sees few kinds, so that the patterns are
+    /// never released.
+    pub(crate) fn shared(kind: &'static LidarKind) -> &'static Self {
+        static PATTERNS: Mutex<Vec<&'static Pattern>> = Mutex::new(Vec::new());
+        let mut patterns = PATTERNS.lock().unwrap_or_else(PoisonError::into_inner);
+        match patterns.iter().find(|pattern| std::ptr::eq(pattern.kind, kind)) {
+            Some(pattern) => pattern,
+            None => {
+                let pattern: &'static Self = Box::leak(Box::new(Self::new(kind)));
+                patterns.push(pattern);
+                pattern
+            }
+        }
+    }
+
     /// Returns the pattern of a kind of LiDAR.
     pub fn new(kind: &'static LidarKind) -> Self {
         let columns: Vec<Column> = kind.azimuths_deg.iter().map(|azimuth_deg| column(kind, *azimuth_deg)).collect();

@@ -55,7 +55,7 @@ enum Extent {
 #[derive(Clone, Debug)]
 pub struct Scanner {
     lidar: Lidar,
-    pattern: Pattern,
+    pattern: &'static Pattern,
     /// The vector registers in which a sweep runs.
     level: Level,
     /// Distance up to which the road may give returns (m).
@@ -93,7 +93,7 @@ impl Scanner {
     pub fn new(lidar: Lidar) -> Self {
         Self {
             lidar,
-            pattern: Pattern::new(lidar.kind),
+            pattern: Pattern::shared(lidar.kind),
             level: fastest_level(),
             ground_reach_m: ground_reach_m(&lidar),
             targets: Targets::default(),
@@ -214,7 +214,7 @@ impl Scanner {
             fault,
             noise: sweep.noise.of_faults(),
             pose: &sweep.pose,
-            pattern: &self.pattern,
+            pattern: self.pattern,
             mirror_side: sweep.mirror_side,
             rails: rails.as_ref(),
         };

@@ -53,7 +53,7 @@ impl Scanner {
         for (solid, pose) in &self.guard_rails {
             let placed = plane_from_body(*pose, 0.0);
             let frozen = view.sensor_from_plane(self.crossing_before_end_s(view, &placed)) * placed;
-            self.targets.push(Beams { pattern: &self.pattern, mirror_side }, solid, &frozen, surface);
+            self.targets.push(Beams { pattern: self.pattern, mirror_side }, solid, &frozen, surface);
         }
     }
 
@@ -77,7 +77,7 @@ impl Scanner {
             append_rear_plate(&other.vehicle, &mut self.solids);
         }
         for solid in &self.solids {
-            self.targets.push(Beams { pattern: &self.pattern, mirror_side }, solid, &frozen, surface);
+            self.targets.push(Beams { pattern: self.pattern, mirror_side }, solid, &frozen, surface);
         }
     }
 
@@ -94,7 +94,7 @@ impl Scanner {
         }
         let water = |_| 0.0;
         let surface = Surface { source: PointSource::Spray, reflectivity: &water };
-        let columns = Targets::columns_of(&self.pattern, &solid, &placed);
+        let columns = Targets::columns_of(self.pattern, &solid, &placed);
         let faces = self.targets.push_faces(&solid, &placed, surface);
         self.plumes.push(Plume::new((faces, columns), (&solid, &placed), extinction_per_m));
     }

@@ -45,7 +45,7 @@ impl Scanner {
                 reach_m: (self.lidar.nominal_range_m as f32).min(sweep.link.max_range_m),
                 gain_m2: sweep.link.gain_m2,
                 noise: sweep.noise.of_false_alarms(),
-                pattern: &self.pattern,
+                pattern: self.pattern,
             };
             let deskew = |offset_ns: u32| sweep.viewpoint.deskew(sweep_s - f64::from(offset_ns) * 1e-9);
             alarms.append(|offset_ns| sweep.pose.deskewed(deskew(offset_ns)), (&mut self.scan, &mut self.truth));
