@@ -20,7 +20,7 @@ use fearless_simd::Simd;
 use super::cast::{ColumnHits, SubRays};
 use super::ground::{GROUND_M, GROUND_SLOPE};
 use super::noise::MAX_NORMAL;
-use super::pattern::{CentreLines, Column, Elevation, ROAD_LAYERS};
+use super::pattern::{CentreLines, Column, Elevation, LineBounds, ROAD_LAYERS};
 use super::power::{LinkBudget, MIN_POWER};
 use super::receiver::SensorPoseEstimate;
 use super::targets::{FaceRange, Targets};
@@ -34,6 +34,11 @@ const MAX_SLOPE: f32 = 0.24;
 const LEVEL_SHARE: f32 = 0.97;
 /// Margin for rounding in single precision (m).
 const MARGIN_M: f32 = 0.002;
+/// Further margins for bounds of a block of columns: for the heights (m), for the slopes, and for the distances, relative to the sum of the
+/// components of the road's vector.
+const BLOCK_MARGIN_M: f32 = 0.001;
+const BLOCK_SLOPE: f32 = 1e-5;
+const BLOCK_SHARE: f32 = 1e-6;
 /// Factor on the power for rounding in single precision.
 const POWER_MARGIN: f32 = 1.01;
 
@@ -88,6 +93,38 @@ impl BareRoad {
                 per_distance * lines.lowest_cosine[layer],
             );
             *kept = road.is_detectable(per_distance) & (!counts | (layer + 1 == ROAD_LAYERS));
+        }
+        kept == [false; ROAD_LAYERS]
+    }
+
+    /// Returns true if [`BareRoad::covers`] surely returns true for all columns of a block. False for a turned sensor.
+    ///
+    /// The inverse distance at which the lowest sub-ray of a layer meets the road is at most `most`, so that the nearest point is at least
+    /// `nearest_m` away. Per metre of range, a centre line rises by `slopes` times the cosine of its elevation. The height falls
+    /// below that of the ground if `nearest_m` times `gain` exceeds what the sensor is above it.
+    #[inline(always)]
+    pub(crate) fn covers_block(&self, bounds: &LineBounds, road: &Road) -> bool {
+        if self.pose.is_turned() {
+            return false;
+        }
+        let [x, y, z] = road.inverse;
+        let slack = BLOCK_SHARE * (x.abs() + y.abs() + z.abs());
+        let above_m = self.pose.sensor_z_m() - GROUND_M + GROUND_SLOPE * self.max_shift_m + MARGIN_M + BLOCK_MARGIN_M;
+        let [along, up] = self.pose.level_slopes();
+        let mut kept = [false; ROAD_LAYERS];
+        for (layer, kept) in kept.iter_mut().enumerate() {
+            let least = |factor: f32, of: &[[f32; ROAD_LAYERS]; 2]| (factor * of[0][layer]).min(factor * of[1][layer]);
+            let most = |factor: f32, of: &[[f32; ROAD_LAYERS]; 2]| (factor * of[0][layer]).max(factor * of[1][layer]);
+            let inverse = most(x, &bounds.cos) + most(y, &bounds.sin) + most(z, &bounds.lowest_tan) + slack;
+            let nearest_m = 1.0 / (inverse * bounds.lowest_cosine[1][layer]) - self.max_error_m - MARGIN_M;
+            let slopes = [
+                least(along, &bounds.cos) + least(up, &bounds.tan) - BLOCK_SLOPE,
+                most(along, &bounds.cos) + most(up, &bounds.tan) + BLOCK_SLOPE,
+            ];
+            let gain = GROUND_SLOPE * LEVEL_SHARE - slopes[1] * bounds.cosine[0][layer];
+            // The comparisons are false for NaN.
+            let counts = (nearest_m > 0.0) & (slopes[1] < 0.0) & (slopes[0] > -MAX_SLOPE) & (nearest_m * gain > above_m);
+            *kept = road.is_detectable(inverse) & (!counts | (layer + 1 == ROAD_LAYERS));
         }
         kept == [false; ROAD_LAYERS]
     }

@@ -174,6 +174,8 @@ pub(crate) struct ActiveParts {
     queue: Vec<usize>,
     next: usize,
     parts: Vec<usize>,
+    /// Column from which on other parts are active.
+    change: usize,
 }
 
 impl ActiveParts {
@@ -184,10 +186,19 @@ impl ActiveParts {
         self.queue.sort_unstable_by_key(|&part| (targets.parts[part].columns.start, part));
         self.next = 0;
         self.parts.clear();
+        self.change = 0;
+    }
+
+    /// Returns the column up to which no part is active, as of the latest column.
+    pub(crate) fn idle_until(&self) -> usize {
+        if self.parts.is_empty() { self.change } else { 0 }
     }
 
     /// Advances to `column` and returns the parts whose bounds contain it, in order of their index.
     pub(crate) fn advance_to(&mut self, column: usize, targets: &Targets) -> &[usize] {
+        if column < self.change {
+            return &self.parts;
+        }
         self.parts.retain(|&part| targets.parts[part].columns.end > column);
         while let Some(&part) = self.queue.get(self.next)
             && targets.parts[part].columns.start <= column
@@ -196,6 +207,8 @@ impl ActiveParts {
             self.parts.insert(position, part);
             self.next += 1;
         }
+        let start = self.queue.get(self.next).map_or(usize::MAX, |&part| targets.parts[part].columns.start);
+        self.change = self.parts.iter().map(|&part| targets.parts[part].columns.end).fold(start, usize::min);
         &self.parts
     }
 }

@@ -103,6 +103,46 @@ impl CentreLines {
     }
 }
 
+/// Number of successive columns that share bounds.
+pub(crate) const BLOCK_COLUMNS: usize = 16;
+
+/// Bounds of the [`CentreLines`] of a block of columns: the least and the greatest value of each layer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LineBounds {
+    /// Cosines of the azimuths.
+    pub(crate) cos: [[f32; ROAD_LAYERS]; 2],
+    /// Sines of the azimuths.
+    pub(crate) sin: [[f32; ROAD_LAYERS]; 2],
+    /// Tangents of the elevations of the centre lines.
+    pub(crate) tan: [[f32; ROAD_LAYERS]; 2],
+    /// Cosines of the elevations of the centre lines.
+    pub(crate) cosine: [[f32; ROAD_LAYERS]; 2],
+    /// Tangents of the elevations of the lowest sub-rays.
+    pub(crate) lowest_tan: [[f32; ROAD_LAYERS]; 2],
+    /// Cosines of the elevations of the lowest sub-rays.
+    pub(crate) lowest_cosine: [[f32; ROAD_LAYERS]; 2],
+}
+
+impl LineBounds {
+    /// Returns the bounds of the lines of a block.
+    fn new(lines: &[CentreLines]) -> Self {
+        let of = |value: fn(&CentreLines) -> &[f32; ROAD_LAYERS]| {
+            let fold = |from, pick: fn(f32, f32) -> f32| {
+                std::array::from_fn(|layer| lines.iter().map(|of| value(of)[layer]).fold(from, pick))
+            };
+            [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)]
+        };
+        Self {
+            cos: of(|lines| &lines.cos),
+            sin: of(|lines| &lines.sin),
+            tan: of(|lines| &lines.tan),
+            cosine: of(|lines| &lines.cosine),
+            lowest_tan: of(|lines| &lines.lowest_tan),
+            lowest_cosine: of(|lines| &lines.lowest_cosine),
+        }
+    }
+}
+
 /// The scan pattern: all beams of both mirror sides, in the sensor's frame.
 ///
 /// A direction is stored as (cos φ, sin φ, tan θ). The horizontal part of this vector has length 1: multiplied by a
@@ -115,6 +155,8 @@ pub struct Pattern {
     elevations: Vec<Vec<Elevation>>,
     /// Centre lines of all columns, for each mirror side.
     centre_lines: Vec<Vec<CentreLines>>,
+    /// Their bounds in each block of columns, for each mirror side.
+    line_bounds: Vec<Vec<LineBounds>>,
     /// Bounds of the mirror's contribution to the elevation (°).
     mirror_bounds_deg: [f64; 2],
 }
@@ -155,11 +197,13 @@ impl Pattern {
             let of_columns = columns.iter().zip(elevations.chunks_exact(kind.layers()));
             of_columns.map(|(column, elevations)| CentreLines::new(column, elevations)).collect()
         };
-        let centre_lines = elevations.iter().map(of_side).collect();
+        let centre_lines: Vec<Vec<CentreLines>> = elevations.iter().map(of_side).collect();
+        let bounds = |lines: &Vec<CentreLines>| lines.chunks(BLOCK_COLUMNS).map(LineBounds::new).collect();
         Self {
             kind,
             columns,
             elevations,
+            line_bounds: centre_lines.iter().map(bounds).collect(),
             centre_lines,
             mirror_bounds_deg: mirror_bounds_deg(kind.mirror_cubic_deg, &kind.azimuths_deg),
         }
@@ -179,6 +223,11 @@ impl Pattern {
     /// Returns the centre lines of the lowest beams of a column.
     pub(crate) fn centre_lines(&self, mirror_side: MirrorSide, column: usize) -> &CentreLines {
         &self.centre_lines[mirror_side as usize % self.centre_lines.len()][column]
+    }
+
+    /// Returns the bounds of the centre lines of a block of [`BLOCK_COLUMNS`] columns.
+    pub(crate) fn line_bounds(&self, mirror_side: MirrorSide, block: usize) -> &LineBounds {
+        &self.line_bounds[mirror_side as usize % self.line_bounds.len()][block]
     }
 
     /// Returns the range of columns whose footprints may touch azimuths from `low_deg` to `high_deg`.

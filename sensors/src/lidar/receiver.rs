@@ -103,6 +103,11 @@ impl SensorPoseEstimate {
         self.at_end([ahead, left, above])
     }
 
+    /// Returns by how much a sensor that is not turned sees a point higher for each metre along its axis, and for each metre above it.
+    pub(crate) fn level_slopes(&self) -> [f32; 2] {
+        [self.sin, self.cos]
+    }
+
     /// Turns a direction of a sensor that is not turned from its frame to the ego's frame at the end of the sweep.
     #[inline(always)]
     pub(crate) fn level_direction(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {

@@ -12,7 +12,7 @@ use super::cast::{ActiveParts, ColumnHits};
 use super::ground::ground_reach_m;
 use super::kind::Resolution;
 use super::noise::Noise;
-use super::pattern::Pattern;
+use super::pattern::{BLOCK_COLUMNS, Pattern};
 use super::power::LinkBudget;
 use super::rail_returns::RailReturns;
 use super::receiver::{Receiver, SensorPoseEstimate};
@@ -238,8 +238,21 @@ impl Scanner {
         let road = Road::new(&self.targets, &of.link);
         let in_air = !self.plumes.is_empty() || of.link.has_fog();
         self.active.start(&self.targets);
-        for index in 0..self.pattern.columns.len() {
+        let columns = self.pattern.columns.len();
+        let mut is_block_covered = false;
+        let mut next = 0;
+        while next < columns {
+            let index = next;
+            next += 1;
+            if index % BLOCK_COLUMNS == 0 {
+                let bounds = self.pattern.line_bounds(of.mirror_side, index / BLOCK_COLUMNS);
+                is_block_covered = omitted.is_some_and(|bare| bare.covers_block(bounds, &road));
+            }
             let parts = self.active.advance_to(index, &self.targets);
+            if is_block_covered && !in_air && parts.is_empty() {
+                next = self.active.idle_until().min(index - index % BLOCK_COLUMNS + BLOCK_COLUMNS);
+                continue;
+            }
             let column = &self.pattern.columns[index];
             let elevations = self.pattern.elevations(of.mirror_side, index);
             let before_end_s = sweep_s - f64::from(column.offset_ns) * 1e-9;
@@ -248,8 +261,8 @@ impl Scanner {
                 of.rails
                     .is_some_and(|rails| rails.are_discarded(simd, (column, elevations), &pose, parts, &self.targets))
             };
-            let is_covered = omitted
-                .is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road))
+            let is_covered = (is_block_covered
+                || omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road)))
                 && (parts.is_empty() || !in_air && has_rails_alone());
             if is_covered && !in_air {
                 continue;

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::pattern::Pattern;
+use super::pattern::{BLOCK_COLUMNS, Pattern};
 use super::silhouette::Silhouette;
 use super::solid::{MAX_FACES, Solid, SolidFace};
 use super::{Material, MirrorSide, PointSource};
@@ -31,9 +31,6 @@ pub(super) const BOUND_MARGIN_DEG: f64 = 0.02;
 const DISTANCE_MARGIN: f64 = 0.98;
 /// Minimum horizontal distance in the bounds of elevation (m).
 const MIN_DISTANCE_M: f64 = 0.05;
-
-/// Number of successive columns that share bounds of elevation.
-const BLOCK_COLUMNS: usize = 16;
 
 /// A face, prepared for the ray cast.
 #[derive(Clone, Copy, Debug)]
