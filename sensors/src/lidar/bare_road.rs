@@ -123,7 +123,8 @@ impl BareRoad {
             ];
             let gain = GROUND_SLOPE * LEVEL_SHARE - slopes[1] * bounds.cosine[0][layer];
             // The comparisons are false for NaN.
-            let counts = (nearest_m > 0.0) & (slopes[1] < 0.0) & (slopes[0] > -MAX_SLOPE) & (nearest_m * gain > above_m);
+            let counts =
+                (nearest_m > 0.0) & (slopes[1] < 0.0) & (slopes[0] > -MAX_SLOPE) & (nearest_m * gain > above_m);
             *kept = road.is_detectable(inverse) & (!counts | (layer + 1 == ROAD_LAYERS));
         }
         kept == [false; ROAD_LAYERS]
@@ -192,13 +193,14 @@ impl Road {
 ///
 /// The layers are tried from the lowest up to the first whose return would be too weak to be detected. Beams that may
 /// also hit a solid are intersected with the road here. For the others the receiver computes the return directly, since
-/// the road, with nothing below it, occludes nothing; `omitted` decides which of these returns are left out.
+/// the road, with nothing below it, occludes nothing; `omitted` decides which of these returns are left out. All returns of layers
+/// that are not `wanted` (a bit mask) are left out.
 #[inline(always)]
 pub(crate) fn cast_ground<S: Simd>(
     simd: S,
     (column, elevations): (&Column, &[Elevation]),
     (targets, road): (&Targets, &Road),
-    omitted: Option<&BareRoad>,
+    (omitted, wanted): (Option<&BareRoad>, u64),
     hits: &mut ColumnHits,
 ) {
     for (layer, elevation) in elevations.iter().enumerate() {
@@ -209,7 +211,9 @@ pub(crate) fn cast_ground<S: Simd>(
             break;
         }
         hits.ground_below = layer + 1;
-        if hits.is_tested(layer) {
+        if wanted >> layer & 1 == 0 {
+            hits.bare |= 1 << layer;
+        } else if hits.is_tested(layer) {
             hits.intersect(layer, &SubRays::new(simd, column, elevation), GROUND_FACES, targets);
         } else if omitted
             .is_some_and(|bare| bare.is_ground(column.centre[group], elevation.centre, per_distance * elevation.cos[0]))

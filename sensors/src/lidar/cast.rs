@@ -10,7 +10,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 
 use super::pattern::{Column, Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
-use super::targets::{FaceRange, Part, Targets};
+use super::targets::{FaceRange, Part, Targets, layers_below};
 
 /// The face index of a sub-ray that hits nothing.
 pub(crate) const NO_FACE: u32 = u32::MAX;
@@ -63,27 +63,25 @@ impl ColumnHits {
         self.tested >> layer & 1 == 1
     }
 
-    /// Returns true if no layer needs echoes.
-    pub(crate) fn is_bare(&self) -> bool {
-        self.tested == 0 && self.bare.count_ones() as usize == self.ground_below
+    /// Returns a bit mask of the layers that may receive a return from a solid or from the road that must not be left out.
+    pub(crate) fn need_echoes(&self) -> u64 {
+        self.tested | layers_below(self.ground_below) & !self.bare
     }
 
-    /// Returns true if a layer may receive a return from a solid or from the road that must not be left out.
-    pub(crate) fn needs_echoes(&self, layer: usize) -> bool {
-        self.is_tested(layer) || (layer < self.ground_below && self.bare >> layer & 1 == 0)
-    }
-
-    /// Intersects the beams of a column with a solid.
+    /// Intersects the beams of a column with a solid, in those layers that are `wanted` (a bit mask).
     #[inline(always)]
     pub(crate) fn cast<S: Simd>(
         &mut self,
         simd: S,
         (column, elevations): (&Column, &[Elevation]),
-        part: &Part,
+        (part, wanted): (&Part, u64),
         targets: &Targets,
     ) {
-        for layer in part.layers.clone() {
+        let mut layers = part.layers & wanted;
+        while layers != 0 {
+            let layer = layers.trailing_zeros() as usize;
             self.intersect(layer, &SubRays::new(simd, column, &elevations[layer]), part.faces, targets);
+            layers &= layers - 1;
         }
     }
 
@@ -176,6 +174,10 @@ pub(crate) struct ActiveParts {
     parts: Vec<usize>,
     /// Column from which on other parts are active.
     change: usize,
+    /// Bit mask of the layers that may hit an active part that is none of a guard rail.
+    solid_layers: u64,
+    /// Whether an active part is one of a guard rail.
+    has_rails: bool,
 }
 
 impl ActiveParts {
@@ -189,15 +191,30 @@ impl ActiveParts {
         self.change = 0;
     }
 
+    /// Returns the active parts, in order of their index.
+    pub(crate) fn parts(&self) -> &[usize] {
+        &self.parts
+    }
+
+    /// Returns a bit mask of the layers that may hit an active part that is none of a guard rail.
+    pub(crate) fn solid_layers(&self) -> u64 {
+        self.solid_layers
+    }
+
+    /// Returns whether an active part is one of a guard rail.
+    pub(crate) fn has_rails(&self) -> bool {
+        self.has_rails
+    }
+
     /// Returns the column up to which no part is active, as of the latest column.
     pub(crate) fn idle_until(&self) -> usize {
         if self.parts.is_empty() { self.change } else { 0 }
     }
 
-    /// Advances to `column` and returns the parts whose bounds contain it, in order of their index.
-    pub(crate) fn advance_to(&mut self, column: usize, targets: &Targets) -> &[usize] {
+    /// Advances to `column`: the active parts are then those whose bounds contain it.
+    pub(crate) fn advance_to(&mut self, column: usize, targets: &Targets) {
         if column < self.change {
-            return &self.parts;
+            return;
         }
         self.parts.retain(|&part| targets.parts[part].columns.end > column);
         while let Some(&part) = self.queue.get(self.next)
@@ -207,9 +224,13 @@ impl ActiveParts {
             self.parts.insert(position, part);
             self.next += 1;
         }
-        let start = self.queue.get(self.next).map_or(usize::MAX, |&part| targets.parts[part].columns.start);
-        self.change = self.parts.iter().map(|&part| targets.parts[part].columns.end).fold(start, usize::min);
-        &self.parts
+        self.change = self.queue.get(self.next).map_or(usize::MAX, |&part| targets.parts[part].columns.start);
+        (self.solid_layers, self.has_rails) = (0, false);
+        for part in self.parts.iter().map(|&part| &targets.parts[part]) {
+            self.change = self.change.min(part.columns.end);
+            self.has_rails |= part.is_guard_rail;
+            self.solid_layers |= if part.is_guard_rail { 0 } else { part.layers };
+        }
     }
 }
 
@@ -218,8 +239,9 @@ impl ActiveParts {
 pub(crate) fn by_brute_force(column: &Column, elevations: &[Elevation], targets: &Targets) -> ColumnHits {
     let mut hits = ColumnHits::new(elevations.len());
     for part in &targets.parts {
-        let part = Part { columns: 0..usize::MAX, layers: 0..elevations.len(), ..*part };
-        fearless_simd::dispatch!(fearless_simd::Level::baseline(), simd => hits.cast(simd, (column, elevations), &part, targets));
+        let part = Part { columns: 0..usize::MAX, layers: layers_below(elevations.len()), ..*part };
+        let of = (&part, u64::MAX);
+        fearless_simd::dispatch!(fearless_simd::Level::baseline(), simd => hits.cast(simd, (column, elevations), of, targets));
     }
     hits
 }

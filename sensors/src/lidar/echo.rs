@@ -5,8 +5,8 @@
 
 use std::ops::Mul;
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, u32x8};
 
 use super::cast::{BeamHits, of_rows};
 use super::pattern::{Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
@@ -66,17 +66,30 @@ impl Echoes {
         faces: &[Face],
         link: &LinkBudget,
     ) {
-        // A sub-ray that hits nothing has the strength of some face, but no inverse range, and so no power.
-        let last = faces.len() - 1;
-        let strength_m = f32x8::load_array(simd, hits.face.map(|face| faces[last.min(face as usize)].strength_m));
-        let per_range = f32x8::load_array_ref(simd, &hits.inverse) * of_rows(simd, elevation.cos);
+        self.count = 0;
+        let inverse = f32x8::load_array_ref(simd, &hits.inverse);
+        let is_hit = inverse.simd_gt(f32x8::splat(simd, 0.0)).to_bitmask() as u8;
+        if is_hit == 0 {
+            return;
+        }
+        // A sub-ray that hits nothing has the strength of some face, but no inverse range, and so no power. Usually all others hit the
+        // same face.
+        let first = hits.face[is_hit.trailing_zeros() as usize];
+        let met = u32x8::load_array_ref(simd, &hits.face);
+        let strength_m = match met.simd_eq(u32x8::splat(simd, first)).to_bitmask() as u8 & is_hit == is_hit {
+            true => f32x8::splat(simd, faces[first as usize].strength_m),
+            false => {
+                let last = faces.len() - 1;
+                f32x8::load_array(simd, hits.face.map(|face| faces[last.min(face as usize)].strength_m))
+            }
+        };
+        let per_range = inverse * of_rows(simd, elevation.cos);
         let range_m = f32x8::splat(simd, 1.0) / per_range;
         let power = received_power(per_range, strength_m * (SHARE * link.gain_m2));
         // A sub-ray that hits nothing has an infinite range, and no power.
         let zero = f32x8::splat(simd, 0.0);
         let reached_m = range_m.simd_lt(f32x8::splat(simd, f32::INFINITY)).select(range_m, zero);
         let (nearest_m, farthest_m) = (range_m.reduce_min(), reached_m.reduce_max());
-        self.count = 0;
         // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to the sums.
         if farthest_m <= nearest_m + PULSE_M {
             if farthest_m > 0.0 {

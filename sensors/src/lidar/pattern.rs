@@ -157,6 +157,8 @@ pub struct Pattern {
     centre_lines: Vec<Vec<CentreLines>>,
     /// Their bounds in each block of columns, for each mirror side.
     line_bounds: Vec<Vec<LineBounds>>,
+    /// Least cosine of the elevation of a beam.
+    pub(crate) least_cosine: f32,
     /// Bounds of the mirror's contribution to the elevation (°).
     mirror_bounds_deg: [f64; 2],
 }
@@ -202,6 +204,7 @@ impl Pattern {
         Self {
             kind,
             columns,
+            least_cosine: elevations.iter().flatten().map(|elevation| elevation.centre[1]).fold(1.0, f32::min),
             elevations,
             line_bounds: centre_lines.iter().map(bounds).collect(),
             centre_lines,

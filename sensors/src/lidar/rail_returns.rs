@@ -17,14 +17,13 @@
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
+use super::LaneGeometry;
 use super::echo::PULSE_M;
 use super::noise::MAX_NORMAL;
 use super::pattern::{Column, Elevation, GROUPS, SUBRAY_COLUMNS};
 use super::power::LinkBudget;
 use super::receiver::SensorPoseEstimate;
 use super::targets::{Part, Targets};
-use super::{LaneGeometry, PointSource};
-use closecall_traffic::maths;
 
 /// Height of the lower edge of a rail (m).
 const BELOW_RAIL_M: f64 = 0.44;
@@ -67,8 +66,8 @@ impl RailReturns {
         })
     }
 
-    /// Returns true if all parts belong to guard rails, and the detector would discard every point that the column may give of
-    /// them. `pose` is the ego's estimate at the time of the column.
+    /// Returns true if the detector would discard every point that the column may give of the guard rails among these parts. `pose` is
+    /// the ego's estimate at the time of the column.
     #[inline(always)]
     pub(crate) fn are_discarded<S: Simd>(
         &self,
@@ -82,11 +81,7 @@ impl RailReturns {
         let tans = [lowest.tan[0], highest.tan[highest.tan.len() - 1]];
         let azimuths = Azimuths::new(simd, column);
         let mut inverse = f32x8::splat(simd, 0.0);
-        for &part in parts {
-            let part = &targets.parts[part];
-            if !is_guard_rail(part, targets) {
-                return false;
-            }
+        for part in parts.iter().map(|&part| &targets.parts[part]).filter(|part| part.is_guard_rail) {
             inverse = inverse.max(azimuths.greatest_inverses(simd, tans, part, targets));
         }
         let inverse = inverse.reduce_max();
@@ -112,10 +107,6 @@ impl RailReturns {
         });
         is_beyond == [true; GROUPS]
     }
-}
-
-fn is_guard_rail(part: &Part, targets: &Targets) -> bool {
-    targets.faces[part.faces.first as usize].source == PointSource::GuardRail
 }
 
 /// The azimuths of all sub-rays of a column, in the lanes of vector registers.

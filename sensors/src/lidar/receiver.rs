@@ -10,7 +10,7 @@ use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
 use super::pattern::{Column, Elevation};
 use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE};
-use super::soft::{self, BeamIndex, DropletEffect, Plume, SoftEcho};
+use super::soft::{self, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
@@ -152,10 +152,6 @@ pub(crate) struct Receiver<'a> {
     pub(crate) pose: SensorPoseEstimate,
     pub(crate) targets: &'a Targets,
     pub(crate) plumes: &'a [Plume],
-    /// See [`soft::greatest_depth`].
-    pub(crate) greatest_depth: f32,
-    /// See [`soft::bound_clumps`].
-    pub(crate) clumps: &'a [f32],
     pub(crate) link: &'a LinkBudget,
     pub(crate) noise: Noise,
     /// Share of returns that are lost regardless of their power.
@@ -163,18 +159,22 @@ pub(crate) struct Receiver<'a> {
 }
 
 impl Receiver<'_> {
-    /// Appends the detected returns of this column to the scan and to its ground truth.
+    /// Appends the detected returns of these layers (a bit mask) of this column to the scan and to its ground truth.
     #[inline(always)]
-    pub(crate) fn receive<S: Simd>(&self, simd: S, hits: &ColumnHits, (scan, truth): (&mut LidarScan, &mut ScanTruth)) {
+    pub(crate) fn receive<S: Simd>(
+        &self,
+        simd: S,
+        (hits, droplets, layers): (&ColumnHits, &ColumnDroplets, u64),
+        (scan, truth): (&mut LidarScan, &mut ScanTruth),
+    ) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         let mut echoes = Echoes::NONE;
-        for (layer, elevation) in self.elevations.iter().enumerate() {
-            let needs_echoes = hits.needs_echoes(layer);
-            let droplets =
-                (in_air && (needs_echoes || self.may_have_droplet_return(layer))).then(|| self.droplet_effect(layer));
-            if !needs_echoes && !droplets.is_some_and(|droplets| droplets.is_detectable()) {
-                continue;
-            }
+        let mut left = layers;
+        while left != 0 {
+            let layer = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let elevation = &self.elevations[layer];
+            let droplets = in_air.then(|| droplets.computed(layer).unwrap_or_else(|| self.droplet_effect(layer)));
             if hits.is_tested(layer) {
                 echoes.set(simd, (&hits.beams[layer], elevation), &self.targets.faces, self.link);
             } else if layer < hits.ground_below {
@@ -195,34 +195,21 @@ impl Receiver<'_> {
     }
 
     /// Returns the effect of the droplets in the air on a beam.
-    fn droplet_effect(&self, layer: usize) -> DropletEffect {
+    pub(crate) fn droplet_effect(&self, layer: usize) -> DropletEffect {
         let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let centre = [cos, sin, self.elevations[layer].centre[0]];
         let at = BeamIndex { column: self.column_index, layer, layers: self.elevations.len() };
         soft::droplet_effect(at, centre, self.plumes, (self.targets, self.link, self.noise))
     }
 
-    /// Returns true if droplets give a return on some beam of this column that may be detected.
-    pub(crate) fn has_droplet_returns(&self) -> bool {
-        let is_detectable = |layer| self.droplet_effect(layer).is_detectable();
-        (0..self.elevations.len()).any(|layer| self.may_have_droplet_return(layer) && is_detectable(layer))
-    }
-
-    /// Returns false if droplets surely give no return on a beam that can be detected.
-    fn may_have_droplet_return(&self, layer: usize) -> bool {
-        let beam = self.column_index * self.elevations.len() + layer;
-        let bounds = || [self.greatest_depth, self.elevations[layer].centre[1], self.clumps[layer]];
-        self.greatest_depth > 0.0 && soft::may_return_from_spray(beam, bounds(), self.noise)
-            || self.link.has_fog() && soft::may_return_from_fog(beam, self.link, self.noise)
-    }
-
-    /// Returns the number of beams on which droplets give a return that may be detected, and of those that are looked at closely.
+    /// Returns the number of beams on which droplets give a return that may be detected, and of those that are looked at closely, whose
+    /// layers are given (a bit mask).
     #[cfg(test)]
-    pub(crate) fn droplet_returns(&self) -> [usize; 2] {
+    pub(crate) fn droplet_returns(&self, looked_at: u64) -> [usize; 2] {
         let mut counts = [0; 2];
         for layer in 0..self.elevations.len() {
             let is_found = self.droplet_effect(layer).is_detectable();
-            let is_looked_at = self.may_have_droplet_return(layer);
+            let is_looked_at = looked_at >> layer & 1 == 1;
             assert!(is_looked_at || !is_found, "column {}, layer {layer}", self.column_index);
             counts[0] += usize::from(is_found);
             counts[1] += usize::from(is_looked_at);

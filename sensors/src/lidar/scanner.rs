@@ -17,7 +17,7 @@ use super::power::LinkBudget;
 use super::rail_returns::RailReturns;
 use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::PlacedSolid;
-use super::soft::{self, Plume};
+use super::soft::{self, AirColumn, ColumnDroplets, Plume};
 use super::solid::Solid;
 use super::spoil::{Added, Spoiler};
 use super::targets::Targets;
@@ -68,6 +68,7 @@ pub struct Scanner {
     guard_rails: Vec<PlacedSolid>,
     active: ActiveParts,
     hits: ColumnHits,
+    droplets: ColumnDroplets,
     scan: LidarScan,
     truth: ScanTruth,
     /// The points that a fault adds.
@@ -103,6 +104,7 @@ impl Scanner {
             guard_rails: Vec::new(),
             active: ActiveParts::default(),
             hits: ColumnHits::new(lidar.kind.layers()),
+            droplets: ColumnDroplets::new(lidar.kind.layers()),
             // One return per beam. What is not used is never touched.
             scan: LidarScan::with_capacity(lidar.kind.beams()),
             truth: ScanTruth { points: Vec::with_capacity(lidar.kind.beams()) },
@@ -248,7 +250,8 @@ impl Scanner {
                 let bounds = self.pattern.line_bounds(of.mirror_side, index / BLOCK_COLUMNS);
                 is_block_covered = omitted.is_some_and(|bare| bare.covers_block(bounds, &road));
             }
-            let parts = self.active.advance_to(index, &self.targets);
+            self.active.advance_to(index, &self.targets);
+            let parts = self.active.parts();
             if is_block_covered && !in_air && parts.is_empty() {
                 next = self.active.idle_until().min(index - index % BLOCK_COLUMNS + BLOCK_COLUMNS);
                 continue;
@@ -256,46 +259,63 @@ impl Scanner {
             let column = &self.pattern.columns[index];
             let elevations = self.pattern.elevations(of.mirror_side, index);
             let before_end_s = sweep_s - f64::from(column.offset_ns) * 1e-9;
-            let has_rails_alone = || {
-                let pose = of.pose.deskewed(of.viewpoint.deskew(before_end_s));
-                of.rails
-                    .is_some_and(|rails| rails.are_discarded(simd, (column, elevations), &pose, parts, &self.targets))
+            let pose = || of.pose.deskewed(of.viewpoint.deskew(before_end_s));
+            let is_road_discarded = is_block_covered
+                || omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road));
+            let are_rails_discarded = || {
+                let are_discarded =
+                    |of: RailReturns| of.are_discarded(simd, (column, elevations), &pose(), parts, &self.targets);
+                !self.active.has_rails() || of.rails.is_some_and(are_discarded)
             };
-            let is_covered = (is_block_covered
-                || omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road)))
-                && (parts.is_empty() || !in_air && has_rails_alone());
-            if is_covered && !in_air {
+            // Where the detector would discard all returns of the road and of guard rails, those beams are left that may meet something
+            // else.
+            let solid = match is_road_discarded && are_rails_discarded() {
+                true => self.active.solid_layers(),
+                false => u64::MAX,
+            };
+            let with_droplets = if in_air {
+                if !self.plumes.is_empty() {
+                    soft::bound_clumps(index, elevations.len(), of.noise, &mut self.clumps);
+                }
+                let air = AirColumn {
+                    first_beam: index * elevations.len(),
+                    layers: elevations.len(),
+                    greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
+                    least_cosine: self.pattern.least_cosine,
+                    clumps: &self.clumps,
+                };
+                air.layers_with_returns(&of.link, of.noise)
+            } else {
+                0
+            };
+            if solid | with_droplets == 0 {
                 continue;
-            }
-            if !self.plumes.is_empty() {
-                soft::bound_clumps(index, elevations.len(), of.noise, &mut self.clumps);
             }
             let receiver = Receiver {
                 column_index: index,
                 beams: self.pattern.kind().beams(),
                 column,
                 elevations,
-                pose: of.pose.deskewed(of.viewpoint.deskew(before_end_s)),
+                pose: pose(),
                 targets: &self.targets,
                 plumes: &self.plumes,
-                greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
-                clumps: &self.clumps,
                 link: &of.link,
                 noise: of.noise,
                 dropout: self.lidar.dropout as f32,
             };
-            if is_covered && !receiver.has_droplet_returns() {
+            self.droplets.compute(with_droplets, |layer| receiver.droplet_effect(layer));
+            let wanted = solid | self.droplets.detectable;
+            if wanted == 0 {
                 continue;
             }
             self.hits.clear();
             for &part in parts {
-                self.hits.cast(simd, (column, elevations), &self.targets.parts[part], &self.targets);
+                let part = &self.targets.parts[part];
+                self.hits.cast(simd, (column, elevations), (part, wanted), &self.targets);
             }
-            cast_ground(simd, (column, elevations), (&self.targets, &road), omitted, &mut self.hits);
-            if !in_air && self.hits.is_bare() {
-                continue;
-            }
-            receiver.receive(simd, &self.hits, (&mut self.scan, &mut self.truth));
+            cast_ground(simd, (column, elevations), (&self.targets, &road), (omitted, wanted), &mut self.hits);
+            let layers = self.hits.need_echoes() & wanted | self.droplets.detectable;
+            receiver.receive(simd, (&self.hits, &self.droplets, layers), (&mut self.scan, &mut self.truth));
             if extent == Extent::UntilFirst && !self.scan.is_empty() {
                 return;
             }

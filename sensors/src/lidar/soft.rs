@@ -25,7 +25,7 @@ use super::echo::PULSE_M;
 use super::noise::{Noise, Purpose};
 use super::power::{LinkBudget, MIN_POWER};
 use super::solid::Solid;
-use super::targets::{FaceRange, Targets};
+use super::targets::{FaceRange, Targets, layers_below};
 use super::{Material, PointSource};
 
 /// Ratio of extinction to backscatter of water droplets at 905 nm (sr).
@@ -207,29 +207,125 @@ pub(crate) fn greatest_depth(plumes: &[Plume], column: usize, sine: f32) -> f32 
     crossed.map(|plume| plume.extinction_per_m * path_m(plume)).sum()
 }
 
-/// Sets, for each layer, a bound of the density of the clump in spray that the beams of a column meet, relative to the mean.
+/// The effects of droplets on the beams of a column.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ColumnDroplets {
+    /// Effect on the beam of each layer, if it has been computed.
+    effects: Vec<DropletEffect>,
+    /// Bit mask of the layers whose effect has been computed.
+    computed: u64,
+    /// Bit mask of the layers whose beams get a return from droplets that may be detected.
+    pub(crate) detectable: u64,
+}
+
+impl ColumnDroplets {
+    /// Returns the effects for a pattern of so many layers, before they are computed.
+    pub(crate) fn new(layers: usize) -> Self {
+        let none = DropletEffect { echo: None, near_m: f32::INFINITY, optical_depth: 0.0 };
+        Self { effects: vec![none; layers], ..Self::default() }
+    }
+
+    /// Computes the effects on the beams of these layers (a bit mask) anew. The other beams must get no return from droplets that may be
+    /// detected.
+    #[inline(always)]
+    pub(crate) fn compute(&mut self, layers: u64, effect: impl Fn(usize) -> DropletEffect) {
+        (self.computed, self.detectable) = (layers, 0);
+        let mut left = layers;
+        while left != 0 {
+            let layer = left.trailing_zeros() as usize;
+            self.effects[layer] = effect(layer);
+            self.detectable |= u64::from(self.effects[layer].is_detectable()) << layer;
+            left &= left - 1;
+        }
+    }
+
+    /// Returns the effect on the beam of a layer, if it has been computed.
+    pub(crate) fn computed(&self, layer: usize) -> Option<DropletEffect> {
+        (self.computed >> layer & 1 == 1).then(|| self.effects[layer])
+    }
+}
+
+/// Number of layers that are tested side by side.
+const LANES: usize = 8;
+
+/// What bounds the returns from droplets on the beams of a column.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AirColumn<'a> {
+    /// Number of the lowest beam in the scan.
+    pub(crate) first_beam: usize,
+    /// Number of layers.
+    pub(crate) layers: usize,
+    /// See [`greatest_depth`].
+    pub(crate) greatest_depth: f32,
+    /// Least cosine of the elevation of a beam.
+    pub(crate) least_cosine: f32,
+    /// See [`bound_clumps`].
+    pub(crate) clumps: &'a [f32],
+}
+
+impl AirColumn<'_> {
+    /// Returns a bit mask of the layers on whose beams droplets may give a return that can be detected. On the others they surely do
+    /// not.
+    ///
+    /// Written without branches, so that the layers are tested side by side in vector registers.
+    #[inline(always)]
+    pub(crate) fn layers_with_returns(&self, link: &LinkBudget, noise: Noise) -> u64 {
+        let (has_spray, has_fog) = (self.greatest_depth > 0.0, link.has_fog());
+        if !has_spray && !has_fog {
+            return 0;
+        }
+        let mut mask = 0;
+        for first in (0..self.layers).step_by(LANES) {
+            let mut may = [false; LANES];
+            if has_spray && let Some(clumps) = self.clumps[first..].first_chunk::<LANES>() {
+                for (lane, may) in may.iter_mut().enumerate() {
+                    let bounds = [self.greatest_depth, self.least_cosine, clumps[lane]];
+                    *may = may_return_from_spray(self.first_beam + first + lane, bounds, noise);
+                }
+            }
+            if has_fog {
+                for (lane, may) in may.iter_mut().enumerate() {
+                    *may |= may_return_from_fog(self.first_beam + first + lane, link, noise);
+                }
+            }
+            for (lane, may) in may.into_iter().enumerate() {
+                mask |= u64::from(may) << (first + lane);
+            }
+        }
+        mask & layers_below(self.layers)
+    }
+}
+
+/// Sets, for each layer, a bound of the density of the clump in spray that the beams of a column meet, relative to the mean. There are
+/// bounds for a multiple of [`LANES`] layers; those beyond the pattern mean nothing.
 ///
 /// Neighbouring columns share clumps: nothing happens except at the first of them.
+#[inline(always)]
 pub(crate) fn bound_clumps(column: usize, layers: usize, noise: Noise, bounds: &mut Vec<f32>) {
     if column.is_multiple_of(CLUMP_COLUMNS) {
         let clump = |layer| noise.uniform(BeamIndex { column, layer, layers }.clump(), Purpose::Plume);
         bounds.clear();
-        bounds.extend((0..layers).map(|layer| most_logarithm(clump(layer)) * ROUNDING));
+        for first in (0..layers).step_by(LANES) {
+            let chunk: [f32; LANES] = std::array::from_fn(|lane| most_logarithm(clump(first + lane)) * ROUNDING);
+            bounds.extend_from_slice(&chunk);
+        }
     }
 }
 
-/// Returns false if spray surely gives no return on the beam, whose column has this [`greatest_depth`], whose elevation has this cosine,
-/// and whose clump has this bound.
+/// Returns false if spray surely gives no return on the beam, whose column has this [`greatest_depth`], whose elevation has at least this
+/// cosine, and whose clump has this bound.
 ///
 /// It does not know which plumes the beam crosses, and takes no logarithm: most beams need nothing else.
-pub(crate) fn may_return_from_spray(beam: usize, [greatest_depth, cosine, clump]: [f32; 3], noise: Noise) -> bool {
+#[inline(always)]
+fn may_return_from_spray(beam: usize, [greatest_depth, cosine, clump]: [f32; 3], noise: Noise) -> bool {
     // −ln u ≥ 2·(1 − u)/(1 + u)
     let depth = noise.uniform(beam, Purpose::Depth);
     (1.0 - depth) * cosine < greatest_depth * clump * (1.0 + depth)
 }
 
 /// Returns false if the return from fog on the beam is surely too weak to be detected.
-pub(crate) fn may_return_from_fog(beam: usize, link: &LinkBudget, noise: Noise) -> bool {
+#[inline(always)]
+fn may_return_from_fog(beam: usize, link: &LinkBudget, noise: Noise) -> bool {
     let depth = noise.uniform(beam, Purpose::FogDepth);
     let from_m = NEAREST_M + (1.0 - depth) / ((1.0 + depth) * link.extinction_per_m);
     let clump = most_logarithm(noise.uniform(beam, Purpose::FogClump)) * ROUNDING;
@@ -242,6 +338,7 @@ pub(crate) fn may_return_from_fog(beam: usize, link: &LinkBudget, noise: Noise) 
 const ROUNDING: f32 = 1.001;
 
 /// Returns an upper bound of −ln u, for u between 0 and 1, by at most 0.06 too great.
+#[inline(always)]
 fn most_logarithm(u: f32) -> f32 {
     // The bits of a number, read as an integer, are its exponent and what its mantissa exceeds 1 by, which is at most the logarithm of
     // the mantissa to the base of two.
@@ -268,6 +365,7 @@ fn soft_power(extinction_per_m: f32, range_m: f32, link: &LinkBudget) -> f32 {
 }
 
 /// Returns what [`soft_power`] returns if the air before the clump takes no light.
+#[inline(always)]
 fn power_in_clear_air(extinction_per_m: f32, range_m: f32, link: &LinkBudget) -> f32 {
     let reflectivity = std::f32::consts::PI * extinction_per_m * PULSE_M / LIDAR_RATIO_SR;
     let square = range_m * range_m;
@@ -282,7 +380,11 @@ fn fog(beam: usize, link: &LinkBudget, noise: Noise) -> Option<SoftEcho> {
     }
     let depth = -0.5 * maths::ln(noise.uniform(beam, Purpose::FogDepth));
     let range_m = NEAREST_M + depth / link.extinction_per_m;
-    let clump = -maths::ln(noise.uniform(beam, Purpose::FogClump));
-    let power = soft_power(link.extinction_per_m * FOG_CLUMPINESS * clump, range_m, link);
+    // The power of a return that surely is too weak needs no logarithm.
+    let power = || {
+        let clump = -maths::ln(noise.uniform(beam, Purpose::FogClump));
+        soft_power(link.extinction_per_m * FOG_CLUMPINESS * clump, range_m, link)
+    };
+    let power = if may_return_from_fog(beam, link, noise) { power() } else { 0.0 };
     Some(SoftEcho { range_m, power, source: PointSource::Fog })
 }

@@ -73,8 +73,16 @@ pub(crate) struct Part {
     pub(crate) faces: FaceRange,
     /// Columns that may hit the solid.
     pub(crate) columns: Range<usize>,
-    /// Layers that may hit the solid.
-    pub(crate) layers: Range<usize>,
+    /// Bit mask of the layers that may hit the solid.
+    pub(crate) layers: u64,
+    /// Whether the solid belongs to a guard rail.
+    pub(crate) is_guard_rail: bool,
+}
+
+/// Returns the bit mask of the lowest layers, up to this number of them.
+#[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 64 layers")]
+pub(crate) fn layers_below(end: usize) -> u64 {
+    1_u64.checked_shl(end as u32).map_or(u64::MAX, |next| next - 1)
 }
 
 /// The surface properties that all faces of an object have in common.
@@ -120,8 +128,13 @@ impl Targets {
         if faces.front_facing().is_empty() {
             return;
         }
+        let is_guard_rail = surface.source == PointSource::GuardRail;
+        let part = |columns, layers: Range<usize>| {
+            let layers = layers_below(layers.end) & !layers_below(layers.start);
+            Part { faces, columns, layers, is_guard_rail }
+        };
         if columns.len() <= BLOCK_COLUMNS {
-            self.parts.push(Part { faces, columns, layers });
+            self.parts.push(part(columns, layers));
             return;
         }
         // A long solid, such as a guard rail, covers few layers in each column, but other layers in other columns.
@@ -132,7 +145,7 @@ impl Targets {
                 let narrow = beams.pattern.layers_between(beams.mirror_side, low_deg, high_deg);
                 let layers = narrow.start.max(layers.start)..narrow.end.min(layers.end);
                 if !layers.is_empty() {
-                    self.parts.push(Part { faces, columns: block, layers });
+                    self.parts.push(part(block, layers));
                 }
             }
         }

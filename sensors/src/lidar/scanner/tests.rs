@@ -40,8 +40,9 @@ impl Scanner {
         for (index, column) in self.pattern.columns.iter().enumerate() {
             let elevations = self.pattern.elevations(mirror_side, index);
             self.hits.clear();
-            for &part in self.active.advance_to(index, &self.targets) {
-                let part = &self.targets.parts[part];
+            self.active.advance_to(index, &self.targets);
+            for &part in self.active.parts() {
+                let part = (&self.targets.parts[part], u64::MAX);
                 fearless_simd::dispatch!(Level::new(), simd => self.hits.cast(simd, (column, elevations), part, &self.targets));
             }
             let brute = by_brute_force(column, elevations, &self.targets);
@@ -64,7 +65,15 @@ impl Scanner {
         let of = self.latest.unwrap();
         let mut counts = [0; 2];
         for (index, column) in self.pattern.columns.iter().enumerate() {
-            soft::bound_clumps(index, self.pattern.kind().layers(), of.noise, &mut self.clumps);
+            let layers = self.pattern.kind().layers();
+            soft::bound_clumps(index, layers, of.noise, &mut self.clumps);
+            let air = AirColumn {
+                first_beam: index * layers,
+                layers,
+                greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
+                least_cosine: self.pattern.least_cosine,
+                clumps: &self.clumps,
+            };
             let receiver = Receiver {
                 column_index: index,
                 beams: self.pattern.kind().beams(),
@@ -73,13 +82,11 @@ impl Scanner {
                 pose: of.pose,
                 targets: &self.targets,
                 plumes: &self.plumes,
-                greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
-                clumps: &self.clumps,
                 link: &of.link,
                 noise: of.noise,
                 dropout: 0.0,
             };
-            let [returns, looked_at] = receiver.droplet_returns();
+            let [returns, looked_at] = receiver.droplet_returns(air.layers_with_returns(&of.link, of.noise));
             counts = [counts[0] + returns, counts[1] + looked_at];
         }
         counts
