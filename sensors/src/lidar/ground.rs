@@ -33,6 +33,9 @@ const DROPLET_INTENSITY: f32 = 0.02;
 /// Distance up to which returns are checked for droplets (m).
 const DROPLET_REACH_M: f32 = 15.0;
 
+/// Number of points that are tested side by side.
+const LANES: usize = 16;
+
 /// Returns the distance from this sensor up to which a dry road may give returns (m), in whole metres.
 #[expect(clippy::cast_possible_truncation, reason = "distances are in single precision")]
 pub(crate) fn ground_reach_m(lidar: &Lidar) -> f32 {
@@ -72,21 +75,33 @@ pub(crate) fn select_candidates(
     let (slope, bend, [left_end_m, right_end_m]) =
         (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32, lane.region_m.map(|end_m| end_m as f32));
     let max_side_tan = maths::tan(MAX_SIDE_AZIMUTH_RAD) as f32;
-    let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
-    for ((((&x, &y), &z), &intensity), index) in points.zip(0..) {
-        if !(x + y + z + intensity).is_finite() {
+    let is_straight = scan.axis_azimuth_rad == 0.0;
+    let position_m = |x: f32, y: f32| [scan.sensor_x_m - x, y - (slope + bend * x) * x];
+    // Written without branches, so that the points are tested side by side in vector registers.
+    for first in (0..scan.len()).step_by(LANES) {
+        let chunk = first..scan.len().min(first + LANES);
+        let points = scan.x_m[chunk.clone()].iter().zip(&scan.y_m[chunk.clone()]);
+        let points = points.zip(&scan.z_m[chunk.clone()]).zip(&scan.intensity[chunk]);
+        let (mut kept, mut are_finite) = ([false; LANES], true);
+        for ((((&x, &y), &z), &intensity), kept) in points.zip(&mut kept) {
+            are_finite &= (x + y + z + intensity).is_finite();
+            let [back_m, left_m] = position_m(x, y);
+            let inside = (back_m > 0.0) & (back_m < REACH_M) & (left_m < left_end_m) & (left_m > right_end_m);
+            let beside_m = y - scan.sensor_y_m;
+            let range_m = (back_m * back_m + beside_m * beside_m).sqrt();
+            let ground = (range_m < scan.resolution.ground_reach_m) & (z < GROUND_M + GROUND_SLOPE * range_m);
+            let droplet = (range_m < DROPLET_REACH_M) & (intensity < DROPLET_INTENSITY);
+            // A sensor that is turned to a side also sees along the ego's flank, where a vehicle has no front that it could see.
+            let is_behind = is_straight | (beside_m.abs() <= max_side_tan * back_m);
+            *kept = inside & is_behind & !ground & !droplet;
+        }
+        if !are_finite {
             return Err(SensorError::NotFinite { what: "a LiDAR point", time });
         }
-        let back_m = scan.sensor_x_m - x;
-        let left_m = y - (slope + bend * x) * x;
-        let inside = back_m > 0.0 && back_m < REACH_M && left_m < left_end_m && left_m > right_end_m;
-        let beside_m = y - scan.sensor_y_m;
-        let range_m = (back_m * back_m + beside_m * beside_m).sqrt();
-        let ground = range_m < scan.resolution.ground_reach_m && z < GROUND_M + GROUND_SLOPE * range_m;
-        let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
-        // A sensor that is turned to a side also sees along the ego's flank, where a vehicle has no front that it could see.
-        let is_behind = scan.axis_azimuth_rad == 0.0 || beside_m.abs() <= max_side_tan * back_m;
-        if inside && is_behind && !ground && !droplet {
+        for (lane, _) in kept.iter().enumerate().filter(|(_, kept)| **kept) {
+            let [back_m, left_m] = position_m(scan.x_m[first + lane], scan.y_m[first + lane]);
+            #[expect(clippy::cast_possible_truncation, reason = "a scan has at most two points per beam")]
+            let index = (first + lane) as u32;
             candidates.push(Candidate { index, back_m, left_m });
         }
     }

@@ -100,11 +100,13 @@ impl RailReturns {
         let sensor_m = left_of_road(pose.level_point_m([0.0; 3]));
         let [left_end_m, right_end_m] = self.region_m;
         // All groups are tested side by side.
-        let is_beyond = azimuths.map(|[cos, sin]| {
-            let outward = left_of_road(pose.level_direction([cos, sin, 0.0]));
+        let mut is_beyond = [false; GROUPS];
+        for ([cos, sin], is_beyond) in azimuths.iter().zip(&mut is_beyond) {
+            let outward = left_of_road(pose.level_direction([*cos, *sin, 0.0]));
             let near_m = sensor_m + nearest_m * outward;
-            ((near_m > left_end_m + MARGIN_M) & (outward > 0.0)) | ((near_m < right_end_m - MARGIN_M) & (outward < 0.0))
-        });
+            *is_beyond = ((near_m > left_end_m + MARGIN_M) & (outward > 0.0))
+                | ((near_m < right_end_m - MARGIN_M) & (outward < 0.0));
+        }
         is_beyond == [true; GROUPS]
     }
 }

@@ -306,7 +306,10 @@ pub(crate) fn bound_clumps(column: usize, layers: usize, noise: Noise, bounds: &
         let clump = |layer| noise.uniform(BeamIndex { column, layer, layers }.clump(), Purpose::Plume);
         bounds.clear();
         for first in (0..layers).step_by(LANES) {
-            let chunk: [f32; LANES] = std::array::from_fn(|lane| most_logarithm(clump(first + lane)) * ROUNDING);
+            let mut chunk = [0.0; LANES];
+            for (lane, bound) in chunk.iter_mut().enumerate() {
+                *bound = most_logarithm(clump(first + lane)) * ROUNDING;
+            }
             bounds.extend_from_slice(&chunk);
         }
     }
@@ -350,12 +353,16 @@ fn most_logarithm(u: f32) -> f32 {
 /// Returns the ranges at which a beam enters and leaves a plume (m), or `None` if it does not cross the plume.
 fn plume_interval_m([cos, sin, tan]: [f32; 3], faces: FaceRange, targets: &Targets) -> Option<[f32; 2]> {
     let slant = (1.0 + tan * tan).sqrt();
-    let along = |face: usize| {
-        let inverse = targets.faces[face].inverse;
-        inverse[0] * cos + inverse[1] * sin + inverse[2] * tan
-    };
-    let nearest = faces.front_facing().map(along).fold(1.0 / NEAREST_M, f32::min);
-    let farthest = faces.back_facing().map(along).fold(0.0, f32::max);
+    let along = |[x, y, z]: [f32; 3]| x * cos + y * sin + z * tan;
+    let (mut nearest, mut farthest) = (1.0 / NEAREST_M, 0.0);
+    for face in &targets.faces[faces.front_facing()] {
+        let inverse = along(face.inverse);
+        nearest = if inverse < nearest { inverse } else { nearest };
+    }
+    for face in &targets.faces[faces.back_facing()] {
+        let inverse = along(face.inverse);
+        farthest = if inverse > farthest { inverse } else { farthest };
+    }
     (nearest > farthest && farthest > 0.0).then(|| [slant / nearest, slant / farthest])
 }
 

@@ -29,6 +29,25 @@ impl Scanner {
         levels().into_iter().map(of).collect()
     }
 
+    /// Asserts that all columns of a block of which the road counts as ground count as ground one by one, in this scene. Returns the
+    /// number of columns of these blocks, and of all columns that count as ground.
+    pub(crate) fn columns_of_bare_road(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> [usize; 2] {
+        self.scan(scene, rng);
+        let of = self.latest.unwrap();
+        let limits_m = [of.viewpoint.max_shift_m(self.sweep_s()) as f32, self.ground_reach_m];
+        let Some(bare_road) = BareRoad::new(&self.targets, &of.link, of.pose, limits_m) else { return [0; 2] };
+        let road = Road::new(&self.targets, &of.link);
+        let mut counts = [0; 2];
+        for index in 0..self.pattern.columns.len() {
+            let bounds = self.pattern.line_bounds(of.mirror_side, index / BLOCK_COLUMNS);
+            let is_block_covered = bare_road.covers_block(bounds, &road);
+            let is_covered = bare_road.covers(self.pattern.centre_lines(of.mirror_side, index), &road);
+            assert!(is_covered || !is_block_covered, "column {index}");
+            counts = [counts[0] + usize::from(is_block_covered), counts[1] + usize::from(is_covered)];
+        }
+        counts
+    }
+
     /// Asserts that three ray casts of a scene agree: the fast one, the one by brute force, and one in double
     /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
     /// differ at edges.

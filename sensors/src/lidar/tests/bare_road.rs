@@ -69,6 +69,24 @@ proptest! {
     }
 }
 
+proptest! {
+    #[test]
+    fn a_block_of_columns_counts_as_ground_only_if_each_of_its_columns_does((mut setup, model) in setup(), index in 0..1_000_i64) {
+        setup.time = CONTROL_STEP * index;
+        Scanner::new(model).columns_of_bare_road(&setup.scene(), &mut random(index.unsigned_abs()));
+    }
+}
+
+#[test]
+fn nearly_all_columns_of_an_empty_road_count_as_ground_in_blocks() {
+    for pitch_rad in [-0.005, 0.0, 0.005] {
+        let mut setup = TestScene::new();
+        setup.ego.pitch_rad = pitch_rad;
+        let [in_blocks, all] = Scanner::new(Lidar::default()).columns_of_bare_road(&setup.scene(), &mut random(0));
+        assert!(all > 600 && in_blocks > all - 50, "{pitch_rad}: {in_blocks} of {all}");
+    }
+}
+
 #[test]
 fn nearly_all_points_of_an_empty_road_are_left_out() {
     let mut lidar = RearLidar::new(Lidar::default());
