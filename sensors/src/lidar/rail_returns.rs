@@ -17,6 +17,8 @@
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
+use closecall_traffic::maths;
+
 use super::LaneGeometry;
 use super::echo::PULSE_M;
 use super::noise::MAX_NORMAL;
