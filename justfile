@@ -19,9 +19,9 @@ format:
 check:
     bash .ci/run
 
-# Checks the lints.
+# Checks the lints. Their settings lie in .ci/clippy.toml.
 lint:
-    cargo clippy --release --workspace --all-targets -- -D warnings
+    CLIPPY_CONF_DIR={{justfile_directory()}}/.ci cargo clippy --release --workspace --all-targets -- -D warnings
 
 # Checks the spelling. Needs `typos` (`pip install typos`).
 spell:

@@ -2,7 +2,7 @@
 //!
 //! `f64::sin` and its like are calls of the C library, which may have several versions of a function and select one by what the processor can do.
 //! The GNU C library selects by fused multiply-add and AVX2. The last digits of the versions differ. The functions of this module are those of the
-//! crate [`libm`], which consists of IEEE 754 operations only. `clippy.toml` forbids the others in the whole workspace.
+//! crate [`libm`], which consists of IEEE 754 operations only. `.ci/clippy.toml` forbids the others in the whole workspace.
 //!
 //! Functions whose results are exact, such as `sqrt`, `floor` and `mul_add`, are those of the standard library: IEEE 754 leaves no choice.
 
