@@ -1,6 +1,6 @@
 /* The built-in controller `acc` (cruise control and emergency braking) as a shared library, to the last bit.
  *
- *   cc -std=c11 -O2 -ffp-contract=off -shared -fPIC -I include -o acc_controller.so examples/acc_controller.c -lm
+ *   cc -std=c11 -O2 -ffp-contract=off -shared -fPIC -I controllers/include -o acc_controller.so examples/acc_controller.c -lm
  *   closecall run low-thw-overtake --controller lib:./acc_controller.so
  *
  * Without -ffp-contract=off, compilers for processors with fused multiply-add round differently, and so the last bits differ. */

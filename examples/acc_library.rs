@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A library of your own is a crate with `crate-type = ["cdylib"]` that needs nothing of Closecall: the types below are those of
-//! `include/closecall_controller.h`, which documents them.
+//! `controllers/include/closecall_controller.h`, which documents them.
 
 #![expect(unsafe_code, reason = "the interface passes pointers")]
 

@@ -28,7 +28,7 @@ with tempfile.TemporaryDirectory() as temporary:
     binary = pathlib.Path(temporary) / f"acc{suffix}"
     # Without contraction, the last bits are the same on every processor.
     options = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-DFMI={given.fmi}"]
-    include = HERE.parent.parent / "include"
+    include = HERE.parent.parent / "controllers/include"
     subprocess.run(["cc", *options, "-I", include, "-o", binary, given.source, "-lm"], check=True)
     with zipfile.ZipFile(given.fmu, "w", zipfile.ZIP_DEFLATED) as archive:
         description = given.description or HERE / f"modelDescription-fmi{given.fmi}.xml"

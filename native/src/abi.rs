@@ -1,4 +1,4 @@
-//! The types of `include/closecall_controller.h`, which documents their fields and units.
+//! The types of `controllers/include/closecall_controller.h`, which documents their fields and units.
 
 use std::ffi::{c_char, c_void};
 use std::mem::size_of;

@@ -13,7 +13,7 @@
 //! The code of a library can do anything to the process that loads it. So this crate is used in worker processes, and the
 //! program that starts them learns of a crash from their end.
 //!
-//! `include/closecall_controller.h` is the interface of a library. The interface of an FMU is the Functional Mock-up Interface
+//! `controllers/include/closecall_controller.h` is the interface of a library. The interface of an FMU is the Functional Mock-up Interface
 //! for co-simulation, versions 2.0 and 3.0 (<https://fmi-standard.org>).
 
 pub mod abi;

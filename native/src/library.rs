@@ -1,4 +1,4 @@
-//! A controller that is a shared library with the functions of `include/closecall_controller.h`.
+//! A controller that is a shared library with the functions of `controllers/include/closecall_controller.h`.
 
 #![expect(unsafe_code, reason = "functions of a loaded library are called")]
 

@@ -152,7 +152,7 @@ def compiled(fault: str, folder: Path, kind: str) -> str:
     setting = f'setenv("FAULT", "{fault}", 1); setenv("FAULT_ALWAYS", "1", 1);'
     source.write_text(f'#include "{original}"\n__attribute__((constructor)) static void set(void) {{ {setting} }}\n')
     if kind == "lib":
-        options = ["-std=c11", "-O2", "-fexceptions", "-shared", "-fPIC", "-I", str(ROOT / "include")]
+        options = ["-std=c11", "-O2", "-fexceptions", "-shared", "-fPIC", "-I", str(ROOT / "controllers/include")]
         subprocess.run(["cc", *options, "-o", to, source, "-lm"], check=True)
     else:
         subprocess.run([sys.executable, ROOT / "examples/fmu/build.py", "2", to, "--source", source], check=True)
@@ -238,7 +238,7 @@ def test_libraries_and_fmus_with_a_relative_path_are_shipped(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own").mkdir()
-    include = ["-I", str(ROOT / "include"), "-I", str(ROOT / "examples")]
+    include = ["-I", str(ROOT / "controllers/include"), "-I", str(ROOT / "examples")]
     options = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", *include]
     subprocess.run(["cc", *options, "-o", "own/acc.so", ROOT / "examples/acc_controller.c", "-lm"], check=True)
     # An FMU with a name of its own, which the scenario maps to a quantity.

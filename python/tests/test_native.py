@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def compiled(source: str, to: Path) -> str:
-    options = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-I", "include"]
+    options = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-I", "controllers/include"]
     subprocess.run(["cc", *options, "-o", to, source, "-lm"], cwd=ROOT, check=True)
     return f"lib:{to}"
 

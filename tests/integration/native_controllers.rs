@@ -16,7 +16,17 @@ use crate::support::{ROOT, code, folder, json, message, program, stderr, stdout}
 pub(crate) fn compile(source: &str, to: &Path, options: &[&str]) -> PathBuf {
     let output = Command::new("cc")
         .current_dir(ROOT)
-        .args(["-std=c11", "-O2", "-fexceptions", "-ffp-contract=off", "-shared", "-fPIC", "-I", "include", "-o"])
+        .args([
+            "-std=c11",
+            "-O2",
+            "-fexceptions",
+            "-ffp-contract=off",
+            "-shared",
+            "-fPIC",
+            "-I",
+            "controllers/include",
+            "-o",
+        ])
         .arg(to)
         .args(options)
         .args([source, "-lm"])
@@ -182,21 +192,21 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
 #[test]
 fn the_header_and_the_examples_in_c_compile_without_warnings() {
     let check = |compiler: &str, arguments: &[&str]| {
-        let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-fsyntax-only", "-I", "include"];
+        let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-fsyntax-only", "-I", "controllers/include"];
         Command::new(compiler).current_dir(ROOT).args(strict).args(arguments).output()
     };
     let sources: [&[&str]; 4] = [
         &["-std=c11", "examples/acc_controller.c"],
         &["-std=c11", "-DFMI=2", "examples/fmu/acc.c"],
         &["-std=c11", "-DFMI=3", "examples/fmu/acc.c"],
-        &["-std=c99", "-x", "c", "include/closecall_controller.h"],
+        &["-std=c99", "-x", "c", "controllers/include/closecall_controller.h"],
     ];
     for source in sources {
         let output = check("cc", source).unwrap();
         assert!(output.status.success(), "{source:?}: {}", stderr(&output));
     }
     // The header is for C++, too. Not every machine has a compiler for it.
-    if let Ok(output) = check("c++", &["-std=c++11", "-x", "c++", "include/closecall_controller.h"]) {
+    if let Ok(output) = check("c++", &["-std=c++11", "-x", "c++", "controllers/include/closecall_controller.h"]) {
         assert!(output.status.success(), "{}", stderr(&output));
     }
 }
