@@ -29,20 +29,32 @@ spell:
 
 # Writes docs/reference/scenario.md and docs/evidence/determinism.json from the code.
 references:
-    cargo run --release --example write_references
+    cargo run --release -p closecall-xtask -- write-references
 
 # Writes the results that the documentation shows (hours).
 evidence: references
-    cargo run --release --example write_mis -- -n 2000 --member-samples 400 --seed 1001
+    cargo run --release -p closecall-xtask -- write-mis -n 2000 --member-samples 400 --seed 1001
 
 # Measures the peak memory of each mode.
 memory: build
-    cargo run --release --example validate_memory -- modes
+    cargo run --release -p closecall-xtask -- validate-memory modes
 
 # Measures the speed of each mode.
 speed:
-    cargo run --release --example throughput
+    cargo run --release -p closecall-xtask -- throughput
 
 # Builds the book in target/book. Needs mdBook (`cargo install mdbook`).
 book:
     mdbook build docs
+
+# `xtask` depends on the whole program, so its dependencies have the features of `cargo build --release` and are not built again.
+
+# Runs a task of the repository: `just xtask --help` lists them.
+[positional-arguments]
+xtask *arguments:
+    cargo run --release -p closecall-xtask -- "$@"
+
+# Runs a benchmark: camera, lidar, perception, recording, simulation or stages.
+[positional-arguments]
+bench *arguments:
+    cargo bench -p closecall-xtask --bench "$@"

@@ -1,6 +1,6 @@
 //! The detector of vehicles in aerial pictures: a trained network without anchors.
 //!
-//! `training/aerial_train.py` trains and exports it, and `models/MODEL_CARD.md` states how well it finds cars and trucks. The
+//! `xtask/training/aerial_train.py` trains and exports it, and `models/MODEL_CARD.md` states how well it finds cars and trucks. The
 //! network returns eight numbers for each cell of 8 px: the logits that a car or a truck has its centre there, the offset of the
 //! centre, the logarithms of its sizes, and sine and cosine of twice its angle.
 

@@ -5,7 +5,7 @@
 //! classifier decides which. A session runs one crop at a time, so each worker thread has its own.
 //!
 //! The network takes pixel values from 0 to 255 and returns probabilities: scaling, calibration (by a temperature) and
-//! softmax are part of the graph. `training/train.py` trained and exported it, and `models/MODEL_CARD.md` reports its
+//! softmax are part of the graph. `xtask/training/train.py` trained and exported it, and `models/MODEL_CARD.md` reports its
 //! accuracy.
 
 use std::path::{Path, PathBuf};

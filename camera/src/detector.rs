@@ -25,7 +25,7 @@ use super::pinhole::{HEIGHT_PX, WIDTH_PX};
 use super::sampling::Sampling;
 use super::vector_registers::clear_upper_parts;
 
-/// The ONNX file of the Mask R-CNN that ships with Closecall. `training/mask_rcnn_train.py` trained it, and
+/// The ONNX file of the Mask R-CNN that ships with Closecall. `xtask/training/mask_rcnn_train.py` trained it, and
 /// `models/MASK_RCNN_CARD.md` reports its precision.
 pub const SHIPPED_MASK_RCNN: &[u8] = include_bytes!("../models/rear-mask-rcnn.onnx");
 

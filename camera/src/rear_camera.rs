@@ -145,7 +145,7 @@ mod tests {
         (road, environment, others)
     }
 
-    /// Returns the pixels in the middle of the cells between knots, which lie at these cells and pixels, as `training/mask_rcnn_sampling.py`
+    /// Returns the pixels in the middle of the cells between knots, which lie at these cells and pixels, as `xtask/training/mask_rcnn_sampling.py`
     /// chooses those of the Mask R-CNN.
     fn between(knots: [(f64, f64); 6]) -> Vec<i32> {
         let cells = (0..).map(|cell| f64::from(cell) + 0.5).take_while(|cell| *cell < knots[5].0);

@@ -90,7 +90,7 @@ fn a_network_with_another_layout_is_refused_with_what_it_has_and_what_is_wanted(
 /// The first pixel of the picture for other networks: red, green and blue.
 const FIRST_PIXEL: [u8; 3] = [51, 102, 204];
 
-/// Returns what a network of `training/mask_rcnn_layouts.py` finds in a black picture whose first pixel is [`FIRST_PIXEL`].
+/// Returns what a network of `xtask/training/mask_rcnn_layouts.py` finds in a black picture whose first pixel is [`FIRST_PIXEL`].
 fn found_by(file: &str, input: MaskRcnnInput, backend: &Backend) -> Vec<Instance> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mask_rcnn_layouts");
     let bytes = std::fs::read(folder.join(file)).unwrap();

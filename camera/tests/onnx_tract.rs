@@ -1,6 +1,6 @@
 //! Tests that tract in this process gives the same probabilities as ONNX Runtime in Python for the same crops.
 //!
-//! `training/golden.py` writes the crops and Python's probabilities to `onnx_golden/`. Another backend needs another
+//! `xtask/training/golden.py` writes the crops and Python's probabilities to `onnx_golden/`. Another backend needs another
 //! process, and therefore another test binary: `onnx_runtime.rs`.
 
 #[path = "onnx_golden/agreement.rs"]

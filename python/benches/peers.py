@@ -2,7 +2,7 @@
 
     pip install eclipse-sumo==1.28.0 libsumo==1.28.0 highway-env==1.12.1     # in one environment
     pip install metadrive-simulator==0.4.3                                   # in another one
-    cargo build --release --example throughput
+    cargo build --release -p closecall-xtask
     taskset -c 0 python python/benches/peers.py run ROUNDS PYTHON_OF_METADRIVE
 
 Every round starts each program anew and runs each case once, so that what else the machine does disturbs all of them alike. A case times itself
@@ -28,7 +28,7 @@ EPISODES = 3
 # Physics steps of MetaDrive (s) in one step of its environment.
 METADRIVE_STEP_S = 0.02
 METADRIVE_REPEAT = 5
-# Closecall's modes, by their names in `examples/throughput`.
+# Closecall's modes, by their names in `xtask/src/throughput`.
 MODES = [
     "ground-truth",
     "object",
@@ -38,7 +38,7 @@ MODES = [
     *(f"{mode}, {vehicles} vehicles" for vehicles in (3, 60) for mode in ("ground-truth", "object", "full")),
 ]
 # The program that times them.
-THROUGHPUT = os.path.join(os.path.dirname(__file__), "..", "..", "target", "release", "examples", "throughput")
+XTASK = os.path.join(os.path.dirname(__file__), "..", "..", "target", "release", "xtask")
 PEERS = ["sumo 3", "sumo 60", "highway-env"]
 
 
@@ -189,7 +189,7 @@ def run(rounds, metadrive_python):
             python = metadrive_python if case == "metadrive" else sys.executable
             done = subprocess.run([python, __file__, "case", case], check=True, stdout=subprocess.PIPE, text=True)
             figures.setdefault(case, []).append(float(done.stdout.splitlines()[-1]))
-        done = subprocess.run([THROUGHPUT, "1", *MODES], check=True, stdout=subprocess.PIPE, text=True)
+        done = subprocess.run([XTASK, "throughput", "1", *MODES], check=True, stdout=subprocess.PIPE, text=True)
         for line in map(json.loads, done.stdout.splitlines()):
             if "mode" in line:
                 figures.setdefault(line["mode"], []).append(line["simulated_s_per_cpu_s"])

@@ -7,7 +7,7 @@ use closecall::simulation::scenario::ScenarioFile;
 
 use crate::support::{ROOT, library};
 
-#[path = "../../examples/write_references/digests.rs"]
+#[path = "../../xtask/src/write_references/digests.rs"]
 mod generator;
 
 use generator::{DIGESTS, Digests, SEED};
@@ -30,7 +30,7 @@ fn outcomes_of_the_library_have_the_stated_bits() {
         now.outcomes.iter().filter(|(name, of)| stated.outcomes.get(*name) != Some(of)).map(|(name, _)| name).collect();
     assert!(
         changed.is_empty() && now == stated,
-        "other outcomes than before: {changed:?}. If that is meant, `cargo run --release --example write_references` writes {DIGESTS}; \
+        "other outcomes than before: {changed:?}. If that is meant, `cargo run --release -p closecall-xtask -- write-references` writes {DIGESTS}; \
          say in the change log what changes"
     );
 }

@@ -111,7 +111,7 @@ const GAIN_S: f64 = 2.0;
 /// The shortfall of the gain that is tolerated (s).
 const SHORT_BY_S: f64 = 0.1;
 
-/// `cargo run --release --example validate_mis` does the same with more samples.
+/// `cargo run --release -p closecall-xtask -- validate-mis` does the same with more samples.
 #[test]
 fn a_goal_that_is_in_reach_is_reached_unless_the_lead_vehicle_brakes_first() {
     let mut reached = 0;

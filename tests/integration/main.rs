@@ -58,3 +58,6 @@ mod trajectory_files;
 mod validity;
 mod viewer;
 mod worker_processes;
+
+// `xtask` has this constant, too: its modules that are tested here look for it in the root of their crate.
+use support::ROOT;

@@ -1,4 +1,4 @@
-//! The tables of `docs/evidence/mis.md` are those that `examples/write_mis` writes.
+//! The tables of `docs/evidence/mis.md` are those that `xtask write-mis` writes.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use clap::ValueEnum;
 
 use crate::support::{all_of_library, traffic_of_library};
 
-#[path = "../../examples/write_mis/tables.rs"]
+#[path = "../../xtask/src/write_mis/tables.rs"]
 mod tables;
 
 use tables::{PROVENANCE, Part, Study, between_markers, page_with};
@@ -44,7 +44,7 @@ fn the_committed_tables_have_the_form_that_the_program_writes_and_state_their_co
         };
         assert_eq!(heads(committed).trim(), heads(&written).trim());
         assert!(committed.lines().any(|line| line.starts_with(PROVENANCE) && !line.contains("unknown")), "{part:?}");
-        let (_, command) = committed.split_once("`cargo run --release --example write_mis -- -n ").unwrap();
+        let (_, command) = committed.split_once("`cargo run --release -p closecall-xtask -- write-mis -n ").unwrap();
         let (samples, rest) = command.split_once(" --member-samples ").unwrap();
         let (_, rest) = rest.split_once(" --seed ").unwrap();
         let seed = rest.split_once(' ').unwrap().0;

@@ -1,7 +1,7 @@
 //! The reference models of UN Regulation 157 against published outcomes, and as arms of a campaign.
 
-#[expect(dead_code, reason = "the test calls what `main` of the example calls")]
-#[path = "../../examples/validate_reference_models.rs"]
+#[expect(dead_code, reason = "the test calls what `main` of the task calls")]
+#[path = "../../xtask/src/validate_reference_models.rs"]
 mod validate_reference_models;
 
 use std::fs::File;

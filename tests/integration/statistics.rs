@@ -1,6 +1,6 @@
 //! The statistics of a campaign agree with a scenario whose collision probability is known.
 //!
-//! `examples/validate_statistics.rs` does the same with many more campaigns.
+//! `xtask/src/validate_statistics.rs` does the same with many more campaigns.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;

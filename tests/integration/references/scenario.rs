@@ -4,15 +4,15 @@ use closecall_traffic::{KeyPath, Segment};
 
 use crate::support::{closecall, stdout};
 
-#[path = "../../../examples/write_references/files.rs"]
+#[path = "../../../xtask/src/write_references/files.rs"]
 mod files;
-#[path = "../../../examples/write_references/page.rs"]
+#[path = "../../../xtask/src/write_references/page.rs"]
 mod page;
-#[path = "../../../examples/write_references/probe.rs"]
+#[path = "../../../xtask/src/write_references/probe.rs"]
 mod probe;
-#[path = "../../../examples/write_references/schema.rs"]
+#[path = "../../../xtask/src/write_references/schema.rs"]
 mod schema;
-#[path = "../../../examples/write_references/text.rs"]
+#[path = "../../../xtask/src/write_references/text.rs"]
 mod text;
 
 use files::{ANNOTATED, EVERY_KEY, PAGE, at_root};
@@ -29,7 +29,7 @@ fn the_scenario_reference_is_what_its_generator_writes() {
     let written = scenario_page().unwrap();
     assert!(
         std::fs::read_to_string(at_root(PAGE)).unwrap() == written,
-        "{PAGE} is out of date: run `cargo run --release --example write_references` and commit the file"
+        "{PAGE} is out of date: run `cargo run --release -p closecall-xtask -- write-references` and commit the file"
     );
 }
 

@@ -108,7 +108,7 @@
 //! at a time headway of 0.9 s or more needs no margin.
 //!
 //! # Why 1 m/s², and d_c = 5 m
-//! Both are the values of the paper. `cargo run --release --example validate_margin_increase -- 1000 1` measures what
+//! Both are the values of the paper. `cargo run --release -p closecall-xtask -- validate-margin-increase 1000 1` measures what
 //! other values would change: scenario `low-thw-overtake`, closing speed 10 to 50 km/h, true tracks, 1000 samples of
 //! tuning seed 1. Without the system, 233 samples end in a collision (23.3 %, 95 % interval 20.7 to 26.0 %). With it:
 //!

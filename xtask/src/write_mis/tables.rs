@@ -1,0 +1,302 @@
+//! The campaigns, and the tables that are made of them.
+
+use std::error::Error;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::ValueEnum;
+use closecall_campaign::ensemble::{MemberValue, Quantity, verdicts_of_arm};
+use closecall_campaign::ledger::{ArmCounts, Pairs};
+use closecall_campaign::plan::Plan;
+use closecall_campaign::runner::Sampling;
+use closecall_campaign::summary::Summary;
+use closecall_perception::agreement::{Agreement, Pair};
+use closecall_scenarios::parameters::Variation;
+use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::scenario::member::{ensemble_of, members};
+
+/// The arms, the baseline first. The others are compared with it.
+const ARMS: [(&str, &str); 4] = [
+    ("acc", "the cruise control alone"),
+    ("mis", "the paper's system"),
+    ("mis-extended", "the extended system"),
+    ("gap-1.6", "a constant gap of 1.6 s"),
+];
+
+/// The member of the ensemble that has columns of its own: drivers who see only the vehicle directly ahead.
+const NO_ANTICIPATION: &str = "anticipation-none";
+
+/// A part of the page, which stands between markers of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Part {
+    /// The scenarios with their own drivers and full sensors, and the agreement of the object-level sensors.
+    Scenarios,
+    /// The driver ensemble with object-level sensors.
+    Ensemble,
+}
+
+impl Part {
+    /// Returns the lines before and behind the part.
+    fn markers(self) -> [String; 2] {
+        let name = match self {
+            Self::Scenarios => "scenarios",
+            Self::Ensemble => "ensemble",
+        };
+        [
+            format!("<!-- write_mis {name}: the lines up to the next marker are written by xtask write-mis -->"),
+            format!("<!-- write_mis {name}: end -->"),
+        ]
+    }
+}
+
+/// How many samples of each scenario are run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Study {
+    /// With the drivers of the scenario.
+    pub(crate) samples: u64,
+    /// With each member of the driver ensemble, and in each scenario with surrounding traffic.
+    pub(crate) member_samples: u64,
+    pub(crate) seed: u64,
+}
+
+/// A scenario of the library, with the number of samples that its table rests on.
+struct Entry {
+    file: ScenarioFile,
+    samples: u64,
+}
+
+impl Study {
+    /// Runs every scenario of the library and returns the tables of a part.
+    pub(crate) fn tables(self, part: Part) -> Result<String, Box<dyn Error>> {
+        match part {
+            Part::Scenarios => self.scenarios(),
+            Part::Ensemble => self.ensemble(),
+        }
+    }
+
+    /// Returns how the tables of a part were made.
+    fn head(self, part: &str, sentence: &str) -> String {
+        let Self { samples, member_samples, seed } = self;
+        let arms: Vec<String> = ARMS.iter().map(|(name, what)| format!(" `{name}` is {what}")).collect();
+        format!(
+            "Written by `cargo run --release -p closecall-xtask -- write-mis -n {samples} --member-samples {member_samples} --seed {seed} --part \
+             {part}`.\n\n{}\n\n{sentence} All arms run on the same samples. Intervals are exact (Clopper-Pearson, 95 %). \
+             Shares of prevented collisions refer to the collisions without the system, shares of induced collisions to all samples. \
+             Arms:{}.\n",
+            provenance(),
+            arms.join(",")
+        )
+    }
+
+    /// Returns the table of the scenarios with their own drivers, and the agreement of the sensor modes.
+    fn scenarios(self) -> Result<String, Box<dyn Error>> {
+        let Self { samples, member_samples, seed } = self;
+        let mut text = self.head(
+            "scenarios",
+            &format!(
+                "{samples} samples of each scenario with seed {seed} and `full` sensors; {member_samples} of each scenario with \
+                 surrounding traffic; one of a scenario in which nothing varies."
+            ),
+        );
+        text.push_str(
+            "\n| scenario | arm | samples | collisions without | with | prevented | share of those without | induced | share of all | \
+             both | harm prevented | harm induced | largest speed deficit (m/s) |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        );
+        let library = self.library()?;
+        for Entry { file, samples } in &library {
+            let name = file.config().name.clone();
+            text.push_str(&rows_of(&name, *samples, &self.run(vec![file.clone()], *samples, SensorMode::Full)?)?);
+        }
+        text.push_str(
+            "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the first of the same samples with \
+             `full` and with `object` sensors. κ is Cohen's; it is undefined if no run or every run collides.\n\n\
+             | scenario | samples | collisions: `full` | `object` | samples that differ | κ |\n|---|---|---|---|---|---|\n",
+        );
+        for Entry { file, samples } in &library {
+            let samples = (*samples).min(member_samples);
+            let agreement = Agreement::of(file, seed, samples)?;
+            let collisions = |has: fn(&Pair) -> bool| agreement.pairs.iter().filter(|pair| has(pair)).count();
+            writeln!(
+                text,
+                "| `{}` | {samples} | {} | {} | {} | {} |",
+                file.config().name,
+                collisions(|pair| pair.full.has_collided),
+                collisions(|pair| pair.object.has_collided),
+                collisions(Pair::differs),
+                agreement.kappa().map_or_else(|| "-".to_owned(), |kappa| format!("{kappa:.2}"))
+            )?;
+        }
+        Ok(text)
+    }
+
+    /// Returns the table of the driver ensemble.
+    fn ensemble(self) -> Result<String, Box<dyn Error>> {
+        let Self { member_samples, seed, .. } = self;
+        let mut text = self.head(
+            "ensemble",
+            &format!(
+                "{member_samples} samples of each scenario with each member of the ensemble, with seed {seed} and `object` sensors."
+            ),
+        );
+        writeln!(
+            text,
+            "\nEach column has its own median and worst member, and the drivers who look only at the vehicle directly ahead \
+             (`{NO_ANTICIPATION}`). A scenario without humans whom a member changes has no row.\n\n\
+             | scenario | arm | prevented: median | worst | `{NO_ANTICIPATION}` | induced: median | worst | `{NO_ANTICIPATION}` | change of \
+             harm per sample: median | worst |\n|---|---|---|---|---|---|---|---|---|---|"
+        )?;
+        let members = members(&[])?;
+        for Entry { file, .. } in self.library()? {
+            let ensemble = ensemble_of(&[file], &members)?;
+            if !ensemble.entries.is_empty() {
+                text.push_str(&ensemble_rows(&self.run(ensemble.entries, member_samples, SensorMode::Object)?));
+            }
+        }
+        Ok(text)
+    }
+
+    /// Returns the scenarios of the library in alphabetical order; those with surrounding traffic come last.
+    fn library(self) -> Result<Vec<Entry>, Box<dyn Error>> {
+        let mut entries = Vec::new();
+        for (folder, samples) in [("", self.samples), ("traffic", self.member_samples)] {
+            for path in files_of(folder)? {
+                let file = ScenarioFile::load(&path, &[])?;
+                // If nothing varies, all samples are the same.
+                let is_fixed = file.space().variation() == Variation::None;
+                entries.push(Entry { file, samples: if is_fixed { 1 } else { samples } });
+            }
+        }
+        Ok(entries)
+    }
+
+    /// Runs scenarios in all arms.
+    fn run(self, files: Vec<ScenarioFile>, samples: u64, mode: SensorMode) -> Result<Summary, Box<dyn Error>> {
+        let sampling = Sampling { seed: self.seed, design: Design::Random, samples };
+        let arms = ARMS.iter().map(|(name, _)| name.parse()).collect::<Result<Vec<ControllerChoice>, _>>()?;
+        let mut plan = Plan::new(files, sampling, arms)?;
+        plan.sensors = Some(mode);
+        let summary = plan.campaign().count()?;
+        match summary.scenarios.iter().find(|(_, counts)| counts.errors() > 0) {
+            Some((name, counts)) => Err(format!("{name}: {} runs ended in an error", counts.errors()).into()),
+            None => Ok(summary),
+        }
+    }
+}
+
+/// Returns the rows of the members of one scenario: one for each arm but the baseline.
+fn ensemble_rows(summary: &Summary) -> String {
+    let mut text = String::new();
+    for (tested, arm) in summary.controllers.iter().enumerate().skip(1) {
+        for verdict in verdicts_of_arm(summary, &[], tested) {
+            let of = |quantity: Quantity| verdict.spreads.iter().find(|spread| spread.quantity == quantity);
+            let mut cells = vec![format!("`{}`", verdict.scenario), format!("`{arm}`")];
+            for quantity in [Quantity::Prevented, Quantity::Induced] {
+                let spread = of(quantity);
+                let unseen =
+                    spread.and_then(|spread| spread.values.iter().find(|value| value.member == NO_ANTICIPATION));
+                cells.push(share_cell(spread.map(|spread| &spread.median), true));
+                cells.push(share_cell(spread.map(|spread| &spread.worst), true));
+                cells.push(share_cell(unseen, false));
+            }
+            let harm = |value: Option<&MemberValue>| {
+                value.map_or("-".to_owned(), |found| format!("{:+.5} `{}`", found.value, found.member))
+            };
+            cells.push(harm(of(Quantity::HarmChange).map(|spread| &spread.median)));
+            cells.push(harm(of(Quantity::HarmChange).map(|spread| &spread.worst)));
+            text.push_str(&format!("| {} |\n", cells.join(" | ")));
+        }
+    }
+    text
+}
+
+/// Returns a share with its interval and, if `is_named`, the member that has it.
+fn share_cell(value: Option<&MemberValue>, is_named: bool) -> String {
+    let Some(MemberValue { member, value, interval_95 }) = value else { return "-".to_owned() };
+    let name = if is_named { format!(" `{member}`") } else { String::new() };
+    let interval =
+        interval_95.map_or(String::new(), |[low, high]| format!(" ({:.1} to {:.1})", 100.0 * low, 100.0 * high));
+    format!("{:.1} %{interval}{name}", 100.0 * value)
+}
+
+/// Returns the rows of one scenario: one for each arm but the baseline.
+fn rows_of(name: &str, samples: u64, summary: &Summary) -> Result<String, Box<dyn Error>> {
+    let Some((_, counts)) = summary.scenarios.first() else { return Ok(String::new()) };
+    let mut text = String::new();
+    for pair in counts.arm_pairs.iter().filter(|pair| pair.baseline == 0) {
+        let (without, with) = (counts.arms[0], counts.arms[pair.tested]);
+        let arm = &summary.controllers[pair.tested];
+        writeln!(text, "| `{name}` | `{arm}` | {samples} | {} |", cells(summary, &without, &with, &pair.pairs))?;
+    }
+    Ok(text)
+}
+
+/// Returns the cells of one row behind the name of the arm.
+fn cells(summary: &Summary, without: &ArmCounts, with: &ArmCounts, pairs: &Pairs) -> String {
+    let share = |hits: u64, of: u64| {
+        let [low, high] = summary.inference.interval_95(hits, of).map(|bound| 100.0 * bound);
+        if of == 0 {
+            "-".to_owned()
+        } else {
+            format!("{:.1} % ({low:.1} to {high:.1})", 100.0 * hits as f64 / of as f64)
+        }
+    };
+    [
+        without.collisions.to_string(),
+        with.collisions.to_string(),
+        pairs.prevented.to_string(),
+        share(pairs.prevented, without.collisions),
+        pairs.induced.to_string(),
+        share(pairs.induced, pairs.samples()),
+        pairs.both.to_string(),
+        format!("{:.2}", pairs.prevented_harm),
+        format!("{:.2}", pairs.induced_harm),
+        format!("{:.1}", with.max_speed_deficit_mps),
+    ]
+    .join(" | ")
+}
+
+/// Returns the scenario files of a folder of the library, in alphabetical order.
+fn files_of(folder: &str) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+    let folder = Path::new(crate::ROOT).join("scenarios/library").join(folder);
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+    files.retain(|path| path.extension().is_some_and(|end| end == "toml"));
+    files.sort();
+    Ok(files)
+}
+
+/// The first words of the line that names commit, date and machine.
+pub(crate) const PROVENANCE: &str = "Measured on commit ";
+
+/// Returns the line that names commit, date and machine.
+fn provenance() -> String {
+    let output = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).current_dir(crate::ROOT).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit = output("git", &["describe", "--always", "--dirty"]).unwrap_or_else(|| "unknown".to_owned());
+    let date = output("date", &["+%Y-%m-%d"]).unwrap_or_else(|| "unknown".to_owned());
+    let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpus.lines().find_map(|line| line.strip_prefix("model name")).map_or("unknown processor", |name| name);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{PROVENANCE}{commit}, {date}, {}, {threads} threads.", model.trim_start_matches([' ', '\t', ':']))
+}
+
+/// Returns the lines of a part of the page.
+pub(crate) fn between_markers(page: &str, part: Part) -> Result<&str, String> {
+    let [begin, end] = part.markers();
+    let (_, after) = page.split_once(&begin).ok_or_else(|| format!("the page has no line `{begin}`"))?;
+    let (tables, _) = after.split_once(&end).ok_or_else(|| format!("the page has no line `{end}`"))?;
+    Ok(tables)
+}
+
+/// Returns a page with other tables in one part.
+pub(crate) fn page_with(page: &str, part: Part, tables: &str) -> Result<String, String> {
+    let [begin, end] = part.markers();
+    let old = between_markers(page, part)?;
+    Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}\n\n{tables}\n{end}"), 1))
+}

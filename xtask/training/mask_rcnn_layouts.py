@@ -1,0 +1,86 @@
+"""Writes two small ONNX files with the inputs and outputs of other Mask R-CNNs, for the tests that load such networks.
+
+    python xtask/training/mask_rcnn_layouts.py camera/tests/mask_rcnn_layouts
+
+Neither is trained: both find a car, a truck and a motorcycle in fixed boxes, whose scores are the values that the input has for the
+first pixel, as shares of full brightness. A test thereby sees what the network was given.
+
+- `model-zoo.onnx` has the names, the order and the dynamic sides of `MaskRCNN-10.onnx` of the ONNX model zoo, masks of 28 x 28 cells, and
+  undoes its normalisation: the scores are those of blue, green and red.
+- `torchvision.onnx` has a batch of one image and the names of torchvision, and masks of the size of the image: the scores are those of red,
+  green and blue.
+"""
+
+import pathlib
+import sys
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+OPSET = 17
+# Means of blue, green and red: section "Preprocessing steps" of vision/object_detection_segmentation/mask-rcnn in github.com/onnx/models.
+MEANS = (102.9801, 115.9465, 122.7717)
+FULL = 255.0
+ROWS, COLUMNS, CELLS = 800, 1280, 28
+# Left, top, right, bottom (px).
+BOXES = ((600, 400, 640, 440), (700, 380, 800, 480), (500, 400, 520, 440))
+# Car, truck and motorcycle among the labels of COCO, in which 0 is the background.
+LABELS = (3, 8, 4)
+
+
+def weight(name, values, kind=np.float32):
+    return numpy_helper.from_array(np.asarray(values, kind), name)
+
+
+def model(name, batch, names, mask, means, scale):
+    """Returns a model with an input of rank 4 if `batch`, outputs of these names, and masks [3, 1, *mask]."""
+    first = ([1] if batch else []) + [3, 1, 1]
+    start, end = [0] * len(first), first
+    sides = ([1] if batch else []) + [3, "height", "width"]
+    nodes = [
+        helper.make_node("Slice", ["image", "start", "end"], ["pixel"]),
+        helper.make_node("Reshape", ["pixel", "three"], ["values"]),
+        helper.make_node("Add", ["values", "means"], ["raw"]),
+        helper.make_node("Mul", ["raw", "scale"], [names[2]]),
+        helper.make_node("Identity", ["box_values"], [names[0]]),
+        helper.make_node("Identity", ["label_values"], [names[1]]),
+        helper.make_node("Expand", ["one", "mask_shape"], [names[3]]),
+    ]
+    weights = [
+        weight("start", start, np.int64),
+        weight("end", end, np.int64),
+        weight("three", [3], np.int64),
+        weight("means", means),
+        weight("scale", scale),
+        weight("box_values", BOXES),
+        weight("label_values", LABELS, np.int64),
+        weight("one", [[[[1.0]]]]),
+        weight("mask_shape", [3, 1, *mask], np.int64),
+    ]
+    found = "found"
+    outputs = [
+        helper.make_tensor_value_info(names[0], TensorProto.FLOAT, [found, 4]),
+        helper.make_tensor_value_info(names[1], TensorProto.INT64, [found]),
+        helper.make_tensor_value_info(names[2], TensorProto.FLOAT, [found]),
+        helper.make_tensor_value_info(names[3], TensorProto.FLOAT, [found, 1, "mask_height", "mask_width"]),
+    ]
+    image = helper.make_tensor_value_info("image", TensorProto.FLOAT, sides)
+    graph = helper.make_graph(nodes, name, [image], outputs, weights)
+    result = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="closecall")
+    result.ir_version = 8
+    onnx.checker.check_model(result)
+    return result
+
+
+def main():
+    out = pathlib.Path(sys.argv[1])
+    out.mkdir(parents=True, exist_ok=True)
+    zoo = model("model-zoo", False, ("6568", "6570", "6572", "6887"), (CELLS, CELLS), MEANS, 1.0 / FULL)
+    torchvision = model("torchvision", True, ("boxes", "labels", "scores", "masks"), (ROWS, COLUMNS), (0.0, 0.0, 0.0), 1.0)
+    onnx.save(zoo, out / "model-zoo.onnx")
+    onnx.save(torchvision, out / "torchvision.onnx")
+
+
+if __name__ == "__main__":
+    main()
