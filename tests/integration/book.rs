@@ -67,7 +67,8 @@ fn broken(path: &Path, markdown: &str) -> Vec<String> {
 
 #[test]
 fn every_link_of_the_documents_resolves() {
-    let documents = documents().into_iter().chain([Path::new(ROOT).join(".github/CONTRIBUTING.md")]);
+    let others = [".github/CONTRIBUTING.md", "ARCHITECTURE.md"].map(|path| Path::new(ROOT).join(path));
+    let documents = documents().into_iter().chain(others);
     let wrong: Vec<String> =
         documents.flat_map(|path| broken(&path, &std::fs::read_to_string(&path).unwrap())).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
