@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
 use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
-use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass};
+use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass, maths};
 use rayon::prelude::*;
 
 use crate::approach::{Address, Firsts, firsts, scores};
