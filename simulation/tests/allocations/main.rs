@@ -74,8 +74,8 @@ impl Observer for StepCounter {
     fn moved(&mut self, time: Time, _: &mut dyn Iterator<Item = VehicleState>) {
         let now = allocations();
         // Growing the list is no allocation of the loop.
-        let allocations = now - self.before - std::mem::take(&mut self.apart);
-        self.steps.push(Step { time_s: time.s(), allocations, has_event: self.has_event });
+        let of_step = now - self.before - std::mem::take(&mut self.apart);
+        self.steps.push(Step { time_s: time.s(), allocations: of_step, has_event: self.has_event });
         self.has_event = false;
         self.before = allocations();
     }
