@@ -217,7 +217,7 @@ mod tests {
         let [mut one, mut other] = [7, 7].map(Stream::seed_from_u64);
         for draw in 0..3_000_000 {
             let (x, expected) = (one.sample(&ours), other.sample(&reference));
-            let is_tail = x.abs() > 3.6;
+            let is_tail = x.abs() > tail;
             assert!(
                 x == expected || is_tail && (x - expected).abs() < 4.0 * f64::EPSILON * x.abs(),
                 "{draw}: {x} {expected}"
