@@ -41,7 +41,7 @@ const TESTED: [Quantity; 6] = [
 pub struct Fitted(Vec<(Quantity, Summary)>);
 
 impl Fitted {
-    /// Reads a file that `closecall fit` wrote, or a scenario whose parameters come from one.
+    /// Reads a file that `closecall traffic fit` wrote, or a scenario whose parameters come from one.
     ///
     /// # Errors
     /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.

@@ -23,7 +23,7 @@ def lane_changes(
     layout: Layout | None = None,
     drop_bad_rows: bool = False,
 ) -> list[dict[str, Any]] | dict[str, Any]:
-    """Finds the lane changes in a trajectory file, as ``closecall lane-changes`` does.
+    """Finds the lane changes in a trajectory file, as ``closecall traffic lane-changes`` does.
 
     Each has ``track_id``, ``direction``, ``start_s``, ``crossing_s``, ``end_s``, ``duration_s``, ``speed_mps`` (m/s), ``complete`` and
     more. With ``reference``, a list of known lane changes (CSV), the result is a dictionary with recall and precision.
@@ -43,7 +43,7 @@ def criticality(
     layout: Layout | None = None,
     drop_bad_rows: bool = False,
 ) -> list[dict[str, Any]]:
-    """Computes how critical each lane change of a trajectory file is, as ``closecall criticality`` does.
+    """Computes how critical each lane change of a trajectory file is, as ``closecall traffic criticality`` does.
 
     ``speed_limit_mps`` (m/s) is 120 km/h by default. Each lane change has the keys of :func:`lane_changes` and ``metrics``
     with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``.
@@ -64,7 +64,7 @@ def fit(
     layout: Layout | None = None,
     drop_bad_rows: bool = False,
 ) -> dict[str, Any]:
-    """Fits the distributions of a logical scenario to trajectory files, as ``closecall fit`` does.
+    """Fits the distributions of a logical scenario to trajectory files, as ``closecall traffic fit`` does.
 
     ``output`` is the scenario part to write (TOML). The result has ``fitted``: for each parameter ``name``, ``median``,
     ``interval_95``, ``quantiles``, ``n`` and ``goodness_of_fit``.
@@ -85,7 +85,7 @@ def _path(path: PathLike | None) -> str | None:
 
 
 def _json(command: str, files: Sequence[PathLike], options: dict[str, object]) -> Any:
-    """Runs a command on trajectory files, and returns its output."""
+    """Runs a command of the group ``traffic`` on trajectory files, and returns its output."""
     words = [word for name, value in options.items() for word in option(name, value)]
-    _, output = call([command, "--format=json", *words, "--", *(os.fspath(file) for file in files)])
+    _, output = call(["traffic", command, "--format=json", *words, "--", *(os.fspath(file) for file in files)])
     return json.loads(output)

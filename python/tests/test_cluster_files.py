@@ -111,7 +111,7 @@ def test_the_parts_of_the_workflow_are_those_of_one_machine(tmp_path: Path) -> N
         out = str(tmp_path / f"part-{part}")
         assert command("campaign", *words, "--no-gate", "--partition", f"{part}/{len(parts)}", "--out", out).returncode == 0
     folders = [str(tmp_path / f"part-{part}") for part in parts]
-    merged = command("merge", *folders, "--gate", "upper(induced) <= 0.9", "--out", str(tmp_path / "merged"))
+    merged = command("tool", "merge", *folders, "--gate", "upper(induced) <= 0.9", "--out", str(tmp_path / "merged"))
     whole = command("campaign", *words, "--gate", "upper(induced) <= 0.9", "--out", str(tmp_path / "whole"))
     # The gates of the scenario itself need more samples than these.
     assert merged.returncode == whole.returncode == 4, merged.stderr + whole.stderr

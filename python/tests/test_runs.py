@@ -88,11 +88,11 @@ def test_wrong_arguments_are_refused(arguments: dict[str, object], message: str)
 
 def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> None:
     file = tmp_path / "traffic.csv"
-    assert command("record", SCENARIO, "-n", "3", "--seed", "1", "--sensors", "object", "-o", file).returncode == 0
+    assert command("traffic", "record", SCENARIO, "-n", "3", "--seed", "1", "--sensors", "object", "-o", file).returncode == 0
     for found, words in [
-        (cc.lane_changes(file), ["lane-changes"]),
-        (cc.criticality(file, speed_limit_mps=30.0), ["criticality", "--speed-limit-mps", "30"]),
-        (cc.fit(file, seed=2), ["fit", "--seed", "2"]),
+        (cc.lane_changes(file), ["traffic", "lane-changes"]),
+        (cc.criticality(file, speed_limit_mps=30.0), ["traffic", "criticality", "--speed-limit-mps", "30"]),
+        (cc.fit(file, seed=2), ["traffic", "fit", "--seed", "2"]),
     ]:
         assert found == json.loads(command(*words, file, "--format", "json").stdout)
     rows = file.read_text().splitlines()

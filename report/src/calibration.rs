@@ -141,7 +141,7 @@ pub fn member(calibration: &Calibration, data: &FollowingData) -> String {
         })
         .collect();
     let source = format!(
-        "closecall calibrate --model {model}: {} pairs of {}, RMSE of the gap {:.2} m, on {} held-out pairs {}",
+        "closecall traffic calibrate --model {model}: {} pairs of {}, RMSE of the gap {:.2} m, on {} held-out pairs {}",
         calibration.pairs.len(),
         files.join(", "),
         calibration.errors_of_pooled.rmse_m,

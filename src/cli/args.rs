@@ -11,6 +11,7 @@ use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting, sourc
 
 use super::CliError;
 use super::arms::ArmArgs;
+use super::help::heading;
 use super::output::print_error;
 
 /// The format of the output.
@@ -48,7 +49,7 @@ impl SensorsChoice {
 #[derive(Clone, Debug, Args)]
 pub(super) struct SimulationArgs {
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     pub(super) seed: u64,
     #[command(flatten)]
     pub(super) arm: ArmArgs,
@@ -65,7 +66,7 @@ pub(super) enum Layout {
     Highd,
     /// CommonRoad XML
     Commonroad,
-    /// Plain CSV, as `closecall record` writes it
+    /// Plain CSV, as `closecall traffic record` writes it
     Csv,
     /// Log of a vehicle that measures its distances to the lane markings
     InCar,
@@ -95,10 +96,10 @@ impl FilesArgs {
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct ReadArgs {
     /// Layout of the trajectory file [default: recognised by its content]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::DATA)]
     layout: Option<Layout>,
     /// Skip and count rows that cannot be used, instead of refusing the file
-    #[arg(long)]
+    #[arg(long, help_heading = heading::DATA)]
     pub(super) drop_bad_rows: bool,
 }
 
@@ -120,7 +121,7 @@ impl ReadArgs {
 pub(super) struct SetArgs {
     /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`) or by a parameter
     /// (`brake-mps2=6`); can be given more than once
-    #[arg(long = "set", value_name = "KEY=VALUE", help_heading = clap::builder::Resettable::Reset)]
+    #[arg(long = "set", value_name = "KEY=VALUE", help_heading = heading::SCENARIO)]
     pub(super) settings: Vec<Setting>,
 }
 
@@ -148,9 +149,9 @@ pub(super) struct SavedSampleArgs {
     /// Number of the sample
     pub(super) sample: u64,
     /// Name of the scenario; required if the campaign has several
-    #[arg(long)]
+    #[arg(long, help_heading = heading::SAMPLES)]
     pub(super) scenario: Option<String>,
     /// Controller of the arm to run again [default: the controller under test]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = heading::CONTROLLER)]
     pub(super) controller: Option<String>,
 }

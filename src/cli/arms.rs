@@ -8,6 +8,7 @@ use closecall_simulation::controller::{ArmList, ControllerChoice};
 
 use super::CliError;
 use super::args::SensorsChoice;
+use super::help::heading;
 use super::protect::of_controller;
 
 /// The controller under test.
@@ -17,13 +18,13 @@ pub(super) struct ControllerArgs {
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
     /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a
     /// program of your own, which reads a line per control step and answers with a line
-    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", default_value = "mis")]
+    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
     /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000))]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000), help_heading = heading::CONTROLLER)]
     controller_timeout_ms: Option<u64>,
     /// Memory limit of each process of an `exec`, `lib` or `fmu` controller [default: 1024]
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576))]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576), help_heading = heading::CONTROLLER)]
     controller_memory_mib: Option<u64>,
 }
 
@@ -56,7 +57,7 @@ pub(super) struct ArmArgs {
     #[command(flatten)]
     pub(super) controller: ControllerArgs,
     /// Depth of the sensor simulation [default: that of the scenario]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     pub(super) sensors: Option<SensorsChoice>,
 }
 
@@ -76,12 +77,12 @@ impl ArmArgs {
 pub(super) struct ComparisonArgs {
     /// Also run every sample with the baseline controller `acc`, on the same random numbers: short for
     /// `--arms acc,CONTROLLER`
-    #[arg(long)]
+    #[arg(long, help_heading = heading::CONTROLLER)]
     pub(super) paired: bool,
     /// Controllers that run on the same samples and random numbers. The first is the baseline, the last is the one under
     /// test, those between are references. An `exec:COMMAND` takes the rest of its list: let it stand last, or give --arms
     /// several times
-    #[arg(long, value_name = "CONTROLLER,CONTROLLER…", conflicts_with_all = ["paired", "controller"])]
+    #[arg(long, value_name = "CONTROLLER,CONTROLLER…", conflicts_with_all = ["paired", "controller"], help_heading = heading::CONTROLLER)]
     pub(super) arms: Vec<ArmList>,
 }
 

@@ -12,11 +12,17 @@ use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall baseline`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall baseline save closecall-results baseline.json",
+    "closecall baseline compare closecall-results baseline.json",
+    "closecall baseline compare closecall-results baseline.json --format json",
+]))]
 pub(super) struct BaselineArgs {
     #[command(subcommand)]
     action: Action,
@@ -25,6 +31,11 @@ pub(super) struct BaselineArgs {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// Write the results of a campaign to a small file, to be committed with the scenarios
+    #[command(after_help = examples([
+        "closecall baseline save closecall-results baseline.json",
+        "closecall baseline save results/nightly scenarios/baseline.json",
+        "closecall baseline save /tmp/merged merged.json",
+    ]))]
     Save {
         /// Folder of the campaign
         dir: PathBuf,
@@ -33,16 +44,21 @@ enum Action {
     },
     /// Name what newly fails, what is fixed, and which margins shrank since the baseline was saved. The exit code of a
     /// regression is 1
+    #[command(after_help = examples([
+        "closecall baseline compare closecall-results baseline.json",
+        "closecall baseline compare closecall-results baseline.json --tolerance 0.1",
+        "closecall baseline compare closecall-results baseline.json --format json",
+    ]))]
     Compare {
         /// Folder of the campaign
         dir: PathBuf,
         /// File that `closecall baseline save` has written
         file: PathBuf,
         /// Share (0 to 1) by which a quantile of a margin may fall
-        #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
+        #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, help_heading = heading::GATES)]
         tolerance: f64,
         /// Output format
-        #[arg(long, value_enum, default_value_t)]
+        #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
         format: Format,
     },
 }

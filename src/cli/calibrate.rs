@@ -1,4 +1,4 @@
-//! `closecall calibrate`: fits car-following models to recorded pairs.
+//! `closecall traffic calibrate`: fits car-following models to recorded pairs.
 
 use std::path::PathBuf;
 
@@ -7,25 +7,31 @@ use closecall_report::{calibration, json::stamped};
 use closecall_scenarios::{atomic::write_file, following::read};
 use closecall_simulation::calibration::{FollowingModel, calibrate as fit};
 
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use super::protect::protect;
 use super::{CliError, args::Format};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall calibrate`.
+/// Arguments of `closecall traffic calibrate`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic calibrate pairs.csv",
+    "closecall traffic calibrate pairs.csv.gz --model wiedemann99",
+    "closecall traffic calibrate one.csv two.csv -o member.toml --format json",
+]))]
 pub(super) struct CalibrateArgs {
     /// Files of recorded pairs: a table of pairs, or a platoon of the OpenACC database; plain or gzip
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Car-following model
-    #[arg(long, value_enum, default_value_t = Model::Idm)]
+    #[arg(long, value_enum, default_value_t = Model::Idm, help_heading = heading::METHOD)]
     model: Model,
     /// File for the pooled parameters, as a member of a driver ensemble (`closecall campaign --ensemble FILE`)
-    #[arg(short, long, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -34,6 +34,7 @@ use super::backend::{check_backend, check_cameras};
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
+use super::help::{examples, heading};
 use super::output::{heartbeat, out, outln, print_error};
 use super::plan::PlanArgs;
 use super::results::{Place, Results, ResultsArgs, print_results, selection};
@@ -41,6 +42,11 @@ use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall campaign low-thw-overtake",
+    "closecall campaign scenarios --preset pr --out results",
+    "closecall campaign low-thw-overtake -n 500 --sensors object --arms acc,gap-1.6,mis --gate 'upper(induced) <= 0.01'",
+]))]
 pub(super) struct CampaignArgs {
     /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input
     #[arg(required = true)]
@@ -48,37 +54,37 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     plan: PlanArgs,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     seed: u64,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`
-    #[arg(long, default_value_t = Design::Random)]
+    #[arg(long, default_value_t = Design::Random, help_heading = heading::SAMPLES)]
     design: Design,
     #[command(flatten)]
     controller: ControllerArgs,
     /// Depth of the sensor simulation [default: that of the scenario]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     #[command(flatten)]
     comparison: ComparisonArgs,
     /// Number of worker threads [default: one per processor]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
     /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local` (start one here). Needs the
     /// Python package: pip install "closecall[ray]"
-    #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs")]
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs", help_heading = heading::EXECUTION)]
     ray: Option<String>,
     /// Longest wall time of a sample with one controller; a sample that takes longer ends in an error
-    #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive, help_heading = heading::EXECUTION)]
     sample_timeout_s: f64,
     #[command(flatten)]
     results: ResultsArgs,
-    /// With --out: run only part I of N of the samples; `closecall merge` merges the parts
-    #[arg(long, value_name = "I/N", requires = "out")]
+    /// With --out: run only part I of N of the samples; `closecall tool merge` merges the parts
+    #[arg(long, value_name = "I/N", requires = "out", help_heading = heading::EXECUTION)]
     partition: Option<Partition>,
     /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
     /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
     /// scenarios [default: each-kind]
-    #[arg(long, alias = "recordings", value_name = "KIND:N,…")]
+    #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
     gates: GateArgs,
@@ -89,7 +95,7 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     set: SetArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

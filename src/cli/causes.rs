@@ -1,4 +1,4 @@
-//! `closecall explain`, `minimize`, `map` and `exposure`: from a collision to its cause, and how often it matters.
+//! `closecall explain` and `minimize`, `closecall study map` and `exposure`: from a collision to its cause, and how often it matters.
 
 use std::path::PathBuf;
 
@@ -24,25 +24,31 @@ use serde_json::json;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs};
+use super::help::{examples, heading};
 use super::output::{outln, print_written};
 use super::protect::{of_campaign, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall explain`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall explain closecall-results",
+    "closecall explain closecall-results 17",
+    "closecall explain closecall-results --scenario low-thw-overtake --most 10",
+]))]
 pub(super) struct ExplainArgs {
     /// Folder of the campaign
     dir: PathBuf,
     /// Number of a failing sample [default: all failing samples, up to --most]
     sample: Option<u64>,
     /// Name of the scenario; required if a sample is named and the campaign has several
-    #[arg(long)]
+    #[arg(long, help_heading = heading::SAMPLES)]
     scenario: Option<String>,
     /// Largest number of samples to explain: induced failures first, then those with the most harm
-    #[arg(long, value_name = "N", value_parser = count, default_value = "100", conflicts_with = "sample")]
+    #[arg(long, value_name = "N", value_parser = count, default_value = "100", conflicts_with = "sample", help_heading = heading::SAMPLES)]
     most: u64,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
@@ -63,15 +69,20 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
 
 /// Arguments of `closecall minimize`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall minimize closecall-results 17",
+    "closecall minimize closecall-results 17 -o smallest.toml",
+    "closecall minimize closecall-results 17 --scenario low-thw-overtake --controller mis --format json",
+]))]
 pub(super) struct MinimizeArgs {
     #[command(flatten)]
     of: SavedSampleArgs,
     /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is written beside it, with
     /// `-passes` at the end of its name
-    #[arg(short, long, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
@@ -90,31 +101,36 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Arguments of `closecall map`.
+/// Arguments of `closecall study map`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study map",
+    "closecall study map --controller mis-extended --out map",
+    "closecall study map --speed-mps 33 --closing-kmh 10,20,30 --detection-m 80,120 --front-thw-s 0.7,0.9",
+]))]
 pub(super) struct MapArgs {
     /// Speed of the ego and of the lead vehicle
-    #[arg(long, value_name = "M/S", value_parser = positive, default_value = "30")]
+    #[arg(long, value_name = "M/S", value_parser = positive, default_value = "30", help_heading = heading::METHOD)]
     speed_mps: f64,
     /// Speed differences of the rear vehicle
-    #[arg(long, value_name = "KM/H,…", value_delimiter = ',', value_parser = positive, default_value = "10,15,20,22.5,25,27.5,30,40,50")]
+    #[arg(long, value_name = "KM/H,…", value_delimiter = ',', value_parser = positive, default_value = "10,15,20,22.5,25,27.5,30,40,50", help_heading = heading::METHOD)]
     closing_kmh: Vec<f64>,
     /// Gaps at which the system may engage
-    #[arg(long, value_name = "M,…", value_delimiter = ',', value_parser = positive, default_value = "60,80,100,120,150")]
+    #[arg(long, value_name = "M,…", value_delimiter = ',', value_parser = positive, default_value = "60,80,100,120,150", help_heading = heading::METHOD)]
     detection_m: Vec<f64>,
     /// Front time headways at the start
-    #[arg(long, value_name = "S,…", value_delimiter = ',', value_parser = positive, default_value = "0.5,0.7,0.9,1.2")]
+    #[arg(long, value_name = "S,…", value_delimiter = ',', value_parser = positive, default_value = "0.5,0.7,0.9,1.2", help_heading = heading::METHOD)]
     front_thw_s: Vec<f64>,
     /// Engage at the gaps of the paper's system or of the extended one, and brake as hard: `mis` or `mis-extended`
-    #[arg(long, default_value = "mis")]
+    #[arg(long, default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
     /// Folder for the page, the pictures (SVG) and the points (CSV, JSON)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     #[command(flatten)]
     set: SetArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
@@ -133,8 +149,13 @@ pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Arguments of `closecall exposure`.
+/// Arguments of `closecall study exposure`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study exposure traffic.csv --campaign closecall-results",
+    "closecall study exposure --counted 20/5000 --campaign closecall-results",
+    "closecall study exposure --per-million-km 100..10000 --campaign closecall-results --scenario low-thw-overtake",
+]))]
 pub(super) struct ExposureArgs {
     /// Trajectory files, in which the encounters are counted
     #[arg(value_name = "TRAJECTORY_FILE")]
@@ -142,22 +163,22 @@ pub(super) struct ExposureArgs {
     #[command(flatten)]
     read: ReadArgs,
     /// Deceleration in m/s² from which the lead vehicle counts as braking
-    #[arg(long, value_name = "M/S²", value_parser = positive, default_value = "4")]
+    #[arg(long, value_name = "M/S²", value_parser = positive, default_value = "4", help_heading = heading::METHOD)]
     braking_mps2: f64,
     /// Encounters per 10^6 km, as a range that is stated: for want of files that show one
-    #[arg(long, value_name = "LOW..HIGH", conflicts_with = "counted")]
+    #[arg(long, value_name = "LOW..HIGH", conflicts_with = "counted", help_heading = heading::METHOD)]
     per_million_km: Option<StatedRange>,
     /// Encounters that were counted elsewhere, and the distance in km
-    #[arg(long, value_name = "EVENTS/KM", conflicts_with = "files")]
+    #[arg(long, value_name = "EVENTS/KM", conflicts_with = "files", help_heading = heading::METHOD)]
     counted: Option<Counted>,
     /// Folder of a paired campaign: what the system prevents and induces, given an encounter
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::METHOD)]
     campaign: Option<PathBuf>,
     /// Name of the scenario, in which the lead vehicle brakes; required if the campaign has several
-    #[arg(long, value_name = "NAME", requires = "campaign")]
+    #[arg(long, value_name = "NAME", requires = "campaign", help_heading = heading::METHOD)]
     scenario: Option<String>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -1,8 +1,8 @@
-//! `closecall check`: checks scenario files without running them.
+//! `closecall check`: checks scenario files without running them, or one of them at every change.
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Arg, Args};
 use closecall_report::json::stamped;
 use closecall_simulation::scenario::source::expand;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
@@ -10,23 +10,47 @@ use serde_json::{Value, json};
 
 use super::CliError;
 use super::args::{Format, SetArgs};
+use super::help::{examples, heading};
 use super::output::{outln, print_error};
+use super::watching::{WatchingArgs, watch};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall check`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall check scenarios",
+    "closecall check late-braking.toml --set brake-mps2=6 --format json",
+    "closecall check late-braking.toml --watch -n 3 --sensors object",
+]))]
+#[command(mut_args(only_with_watch))]
 pub(super) struct CheckArgs {
     /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
     set: SetArgs,
+    #[command(flatten)]
+    watching: WatchingArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
+/// Refuses the options about samples unless a file is watched: a check runs none.
+fn only_with_watch(arg: Arg) -> Arg {
+    match arg.get_id().as_str() {
+        "scenarios" | "settings" | "format" | "watch" => arg,
+        _ => arg.requires("watch"),
+    }
+}
+
 pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
+    if args.watching.watch {
+        let [scenario] = &args.scenarios[..] else {
+            return Err(CliError::usage("--watch is for one scenario file"));
+        };
+        return watch(scenario, &args.set, &args.watching);
+    }
     let checked: Vec<_> = expand(&args.scenarios)?.into_iter().map(|path| (args.set.load(&path), path)).collect();
     let codes: Vec<ExitCode> =
         checked.iter().filter_map(|(file, _)| Some(ExitCode::from(file.as_ref().err()?))).collect();

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
@@ -9,12 +10,10 @@ use closecall_campaign::session::{Printed, Session, set_arguments};
 use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 
 use super::backend::choose_backend;
+use super::groups::{Study, Tool, Traffic};
+use super::help::heading;
 use super::output::{announce, print_error};
-use super::{
-    CliError, baseline, calibrate, campaign, causes, check, compare, drift, generate, inspect, library, merge, new,
-    paper, plot, record, reenact, render, replay, robustness, run, sample, schema, sensors, statistics, study,
-    trajectories, view, watching,
-};
+use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
 use crate::exit_code::ExitCode;
 
 /// A closed-loop software-in-the-loop testbed for highway ADAS.
@@ -23,17 +22,18 @@ use crate::exit_code::ExitCode;
 /// sensors, controller and world, and reports with numbers, pictures and an exit code whether the margin increase
 /// system (MIS) prevents collisions or causes them.
 #[derive(Debug, Parser)]
-#[command(name = "closecall", version, after_help = EXIT_CODES)]
+#[command(name = "closecall", version, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the built-in
     /// backend tract. It is loaded only if the network is used
-    #[arg(long, global = true, value_name = "PATH", env = "ORT_DYLIB_PATH")]
+    #[arg(long, global = true, value_name = "PATH", env = "ORT_DYLIB_PATH", help_heading = heading::EXECUTION)]
     onnxruntime: Option<PathBuf>,
 }
 
-const EXIT_CODES: &str = "\
+/// The end of the program's help.
+const AFTER_HELP: &str = "\
 Exit codes:
   0  pass
   1  fail: a gate is not met, for example more collisions than allowed
@@ -44,29 +44,20 @@ Exit codes:
   6  a file or folder cannot be read or written
   7  invalid: a validity check of the simulator failed
   130  ended by Ctrl-C (SIGINT)
-  143  ended by SIGTERM";
+  143  ended by SIGTERM
+
+Examples:
+  closecall run low-thw-overtake
+  closecall campaign low-thw-overtake -n 500 --paired
+  closecall traffic lane-changes traffic.csv";
 
 #[derive(Debug, Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 enum Command {
-    /// Write a commented scenario to start from
-    New(new::NewArgs),
-    /// Write the files of a repository of scenarios, with CI jobs for GitHub and GitLab. No file is overwritten
-    Init(new::InitArgs),
-    /// List the scenarios of the library with their questions, requirements and gates
-    List(library::ListArgs),
-    /// Check a scenario at every change of its file, and run a few samples of it
-    Watch(watching::WatchingArgs),
     /// Run one sample of a scenario
     Run(run::RunArgs),
     /// Run many samples of one or more scenarios, and judge the result by gates
     Campaign(campaign::CampaignArgs),
-    /// Find the assumption that moves the result of a scenario most
-    Sensitivity(study::SensitivityArgs),
-    /// Compare settings of a system: what each prevents, induces, and costs in speed
-    Frontier(study::FrontierArgs),
-    /// Merge the parts of a campaign that ran on several machines, and judge the result
-    Merge(merge::MergeArgs),
     /// Compare a campaign with an earlier one, sample by sample
     Compare(compare::CompareArgs),
     /// Keep the results of a campaign in a small file, and compare later campaigns with it
@@ -77,53 +68,75 @@ enum Command {
     Explain(causes::ExplainArgs),
     /// Find the smallest failing case near a failing sample of a campaign, and the nearest case that passes
     Minimize(causes::MinimizeArgs),
-    /// Map the margin that the system reaches, over approach speed, detection distance and front time headway
-    Map(causes::MapArgs),
-    /// Count how often the encounter happens in trajectory files, and state the net effect of the system per 10^6 km
-    Exposure(causes::ExposureArgs),
-    /// Study the rear sensors without a controller: detection, errors, classes and consistency over distance and conditions
-    Sensors(sensors::SensorsArgs),
-    /// Check scenario files without running them
-    Check(check::CheckArgs),
-    /// Print the JSON Schema of scenario files
-    Schema,
-    /// Report the flaws of a trajectory file: gaps, jumps, overlaps, and rows that cannot be used
-    Inspect(inspect::InspectArgs),
-    /// Find the lane changes in a trajectory file
-    LaneChanges(trajectories::LaneChangesArgs),
-    /// Compute how critical each lane change of a trajectory file is
-    Criticality(trajectories::CriticalityArgs),
-    /// Simulate an encounter of recorded traffic with the controller under test in the ego vehicle, and compare the two
-    Reenact(reenact::ReenactArgs),
-    /// Sample a recorded lane change: the other vehicles drive as recorded, a parameter of a driver varies
-    Sample(sample::SampleArgs),
-    /// Fit the distributions of a logical scenario to trajectory files
-    Fit(trajectories::FitArgs),
-    /// Check whether new trajectory files still match the distributions that a scenario was fitted to
-    Drift(drift::DriftArgs),
-    /// Compute durations, speeds, counts and correlations of recorded lane changes
-    Statistics(statistics::StatisticsArgs),
-    /// Calibrate a car-following model on recorded pairs, and judge it on pairs that were held out
-    Calibrate(calibrate::CalibrateArgs),
-    /// Study how much noise and offset the criteria for lane changes tolerate
-    Robustness(robustness::RobustnessArgs),
-    /// Draw the figures of the published method on any set of trajectory files, with one page of all
-    Paper(paper::PaperArgs),
-    /// Simulate samples of a scenario, and write their traffic as a trajectory file
-    Record(record::RecordArgs),
-    /// Draw an encounter as a static figure, SVG or PNG
-    Plot(plot::PlotArgs),
     /// Show recordings in the browser, with the web build of an installed Rerun viewer
     View(view::ViewArgs),
-    /// Render labelled images of the rear camera, or of an aerial one
-    Render(render::RenderArgs),
+    /// Draw an encounter as a static figure, SVG or PNG
+    Plot(plot::PlotArgs),
+    /// Write a commented scenario to start from
+    New(new::NewArgs),
+    /// Write the files of a repository of scenarios, with CI jobs for GitHub and GitLab. No file is overwritten
+    Init(new::InitArgs),
+    /// List the scenarios of the library with their questions, requirements and gates
+    List(library::ListArgs),
+    /// Check scenario files without running them; with --watch, check a file at every change and run a few samples of it
+    Check(check::CheckArgs),
+    /// Turn recorded traffic into scenarios: quality, lane changes, criticality, distributions, encounters
+    #[command(subcommand)]
+    Traffic(Traffic),
+    /// Compute from many runs, without a verdict: what moves a result, what a system reaches, where perception ends
+    #[command(subcommand)]
+    Study(Study),
+    /// Write what other programs read: schema, completions, manual pages, labelled images, merged campaigns
+    #[command(subcommand)]
+    Tool(Tool),
     /// Run samples with a library or an FMU, for another process of this program
     #[command(hide = true)]
     Host { arguments: Vec<String> },
-    /// Print a script that completes commands and options in a shell
-    Completions(generate::CompletionsArgs),
-    /// Print the manual page, or write one for each command
-    Man(generate::ManArgs),
+}
+
+/// The commands that belong to a group or to another command, each with its whole name. A user may know them by their name alone.
+const GROUPED: [(&str, &str); 23] = [
+    ("calibrate", "traffic calibrate"),
+    ("completions", "tool completions"),
+    ("criticality", "traffic criticality"),
+    ("drift", "traffic drift"),
+    ("exposure", "study exposure"),
+    ("fit", "traffic fit"),
+    ("frontier", "study frontier"),
+    ("inspect", "traffic inspect"),
+    ("lane-changes", "traffic lane-changes"),
+    ("man", "tool man"),
+    ("map", "study map"),
+    ("merge", "tool merge"),
+    ("paper", "traffic paper"),
+    ("record", "traffic record"),
+    ("reenact", "traffic reenact"),
+    ("render", "tool render"),
+    ("robustness", "traffic robustness"),
+    ("sample", "traffic sample"),
+    ("schema", "tool schema"),
+    ("sensitivity", "study sensitivity"),
+    ("sensors", "study sensors"),
+    ("statistics", "traffic statistics"),
+    ("watch", "check --watch"),
+];
+
+/// Returns the commands and options of the program, from which help, manual pages and completions are made.
+pub fn command() -> clap::Command {
+    Cli::command()
+}
+
+/// Parses the arguments. The name of a command that belongs to a group is answered with its whole name.
+fn parse(arguments: &[std::ffi::OsString]) -> Result<Cli, clap::Error> {
+    Cli::try_parse_from(arguments).map_err(|error| match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(name)) => match GROUPED.iter().find(|(alone, _)| alone == name) {
+            Some((_, whole)) => {
+                command().error(ErrorKind::InvalidSubcommand, format!("the command is now `closecall {whole}`"))
+            }
+            None => error,
+        },
+        _ => error,
+    })
 }
 
 /// Runs the program with these arguments, of which the first is the program's name.
@@ -135,7 +148,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     };
     // If a hook is already set, the program that uses this crate as a library has set it: it stays.
     drop(miette::set_hook(Box::new(handler)));
-    let cli = match Cli::try_parse_from(arguments) {
+    let cli = match parse(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors: clap prints them to standard output.
@@ -162,7 +175,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
 /// of the arguments is the program's name.
 pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<ExitCode, CliError>, Printed) {
     session.run(arguments, || {
-        let cli = Cli::try_parse_from(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
+        let cli = parse(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
         choose_backend(cli.onnxruntime.as_deref());
         dispatch(cli.command)
     })
@@ -170,40 +183,22 @@ pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<Exit
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {
     match command {
-        Command::New(args) => new::new(&args),
-        Command::Init(args) => new::init(&args),
-        Command::List(args) => library::list(&args),
-        Command::Watch(args) => watching::watch(&args),
         Command::Run(args) => run::run(&args),
         Command::Campaign(args) => campaign::campaign(&args),
-        Command::Sensitivity(args) => study::sensitivity(&args),
-        Command::Frontier(args) => study::frontier(&args),
-        Command::Merge(args) => merge::merge(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Baseline(args) => baseline::baseline(&args),
         Command::Replay(args) => replay::replay(&args),
         Command::Explain(args) => causes::explain(&args),
         Command::Minimize(args) => causes::minimize(&args),
-        Command::Map(args) => causes::map(&args),
-        Command::Exposure(args) => causes::exposure(&args),
-        Command::Sensors(args) => sensors::sensors(&args),
-        Command::Check(args) => check::check(&args),
-        Command::Schema => Ok(schema::schema()),
-        Command::Inspect(args) => inspect::inspect(&args),
-        Command::LaneChanges(args) => trajectories::lane_changes(&args),
-        Command::Criticality(args) => trajectories::criticality(&args),
-        Command::Reenact(args) => reenact::reenact(&args),
-        Command::Sample(args) => sample::sample(&args),
-        Command::Fit(args) => trajectories::fit(&args),
-        Command::Drift(args) => drift::drift(&args),
-        Command::Statistics(args) => statistics::statistics(&args),
-        Command::Calibrate(args) => calibrate::calibrate(&args),
-        Command::Robustness(args) => robustness::robustness(&args),
-        Command::Paper(args) => paper::paper(&args),
-        Command::Record(args) => record::record(&args),
-        Command::Plot(args) => plot::plot(&args),
         Command::View(args) => view::view(&args),
-        Command::Render(args) => render::render(&args),
+        Command::Plot(args) => plot::plot(&args),
+        Command::New(args) => new::new(&args),
+        Command::Init(args) => new::init(&args),
+        Command::List(args) => library::list(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Traffic(command) => command.run(),
+        Command::Study(command) => command.run(),
+        Command::Tool(command) => command.run(),
         Command::Host { arguments } => Ok(host::serve(&arguments).map_or_else(
             |message| {
                 print_error(format_args!("{message}\n"));
@@ -211,7 +206,5 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
             },
             |()| ExitCode::Pass,
         )),
-        Command::Completions(args) => generate::completions(&args, Cli::command()),
-        Command::Man(args) => generate::man(&args, Cli::command()),
     }
 }

@@ -11,24 +11,30 @@ use closecall_report::json::{self, stamped};
 
 use super::CliError;
 use super::args::Format;
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall compare`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall compare before after",
+    "closecall compare before after --max-newly-failing 2",
+    "closecall compare before after --tolerance 0.1 --format json",
+]))]
 pub(super) struct CompareArgs {
     /// Folder of the earlier campaign
     baseline: PathBuf,
     /// Folder of the campaign to be judged; it must have the same samples
     dir: PathBuf,
     /// Largest number of newly failing samples that does not count as a regression
-    #[arg(long, default_value_t = 0, value_name = "K")]
+    #[arg(long, default_value_t = 0, value_name = "K", help_heading = heading::GATES)]
     max_newly_failing: u64,
     /// Share (0 to 1) by which a quantile of a margin may fall
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, help_heading = heading::GATES)]
     tolerance: f64,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

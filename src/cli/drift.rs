@@ -1,4 +1,4 @@
-//! `closecall drift`: whether new traffic still matches fitted distributions.
+//! `closecall traffic drift`: whether new traffic still matches fitted distributions.
 
 use std::path::PathBuf;
 
@@ -9,22 +9,28 @@ use closecall_report::traffic::drift::DriftText;
 
 use super::CliError;
 use super::args::{FilesArgs, Format};
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall drift`.
+/// Arguments of `closecall traffic drift`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic drift fitted.toml new.csv",
+    "closecall traffic drift late-braking.toml new-1.csv new-2.csv",
+    "closecall traffic drift fitted.toml new.csv --seed 1 --format json",
+]))]
 pub(super) struct DriftArgs {
-    /// File that `closecall fit` wrote, or a scenario with parameters from one
+    /// File that `closecall traffic fit` wrote, or a scenario with parameters from one
     #[arg(value_name = "FITTED.toml")]
     fitted: PathBuf,
     #[command(flatten)]
     data: FilesArgs,
     /// Seed of the simulated distances
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

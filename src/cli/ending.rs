@@ -12,6 +12,7 @@ use closecall_campaign::summary::Summary;
 use closecall_report::campaign::CountsText;
 
 use super::args::Format;
+use super::help::heading;
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
@@ -20,13 +21,13 @@ use crate::exit_code::ExitCode;
 pub(super) struct EndArgs {
     /// End at the first failing sample: the ego collides under the controller under test, or a controller ends in an
     /// error. There is then no verdict
-    #[arg(long)]
+    #[arg(long, help_heading = heading::EXECUTION)]
     fail_fast: bool,
     /// End as soon as more than N samples have ended in an error. There is then no verdict
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::EXECUTION)]
     max_errors: Option<u64>,
     /// With --resume: run the samples that ended in an error again
-    #[arg(long, requires = "resume")]
+    #[arg(long, requires = "resume", help_heading = heading::EXECUTION)]
     pub(super) retry_errors: bool,
 }
 

@@ -7,6 +7,7 @@ use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::scenario::member::{Ensemble, ensemble_of, members};
 
 use super::CliError;
+use super::help::heading;
 use super::output::print_error;
 
 /// The driver ensemble of a campaign.
@@ -15,7 +16,7 @@ pub(super) struct EnsembleArgs {
     /// Run each scenario with each member of a driver ensemble, as an entry SCENARIO@MEMBER of its own on the same samples,
     /// and state the verdict over the members: median and worst. Members are files, folders of them, or names (`closecall
     /// list` shows them) [default: all members of the program]
-    #[arg(long, value_name = "DIR|FILE|NAME", num_args = 0..)]
+    #[arg(long, value_name = "DIR|FILE|NAME", num_args = 0.., help_heading = heading::SCENARIO)]
     ensemble: Option<Vec<PathBuf>>,
 }
 

@@ -150,7 +150,7 @@ pub enum CliError {
     Plan(#[from] PlanError),
     /// A sensitivity study cannot be planned.
     #[error(transparent)]
-    #[diagnostic(help("see `closecall sensitivity --help`"))]
+    #[diagnostic(help("see `closecall study sensitivity --help`"))]
     Sensitivity(#[from] PlanFailure),
     /// A saved campaign cannot provide what was requested.
     #[error(transparent)]

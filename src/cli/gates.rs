@@ -9,56 +9,56 @@ use closecall_scenarios::sampling::Design;
 use closecall_simulation::criteria::Expression;
 
 use super::CliError;
+use super::help::heading;
 
 /// The gates of a campaign.
 #[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Gates")]
 pub(super) struct GateArgs {
     /// Require this of the samples of each scenario, such as "p1(min_ttc_rear_s) >= 1.0" or
     /// "lower(prevented | baseline.ego_collided) >= 0.5"; can be repeated. docs/reference/criteria.md lists aggregates and measures
-    #[arg(long = "gate", value_name = "CRITERION")]
+    #[arg(long = "gate", value_name = "CRITERION", help_heading = heading::GATES)]
     require: Vec<Expression>,
     /// Measure only: no gate is judged, and there is no verdict
     #[arg(long, conflicts_with_all = ["require", "max_collisions", "max_other_collisions", "max_probability", "max_induced",
-        "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk"])]
+        "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk"], help_heading = heading::GATES)]
     no_gate: bool,
     /// Fail if the ego collides in more than K samples
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_collisions: Option<u64>,
     /// Fail if vehicles other than the ego collide with each other in more than K samples
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_other_collisions: Option<u64>,
     /// Pass only if the samples show, for every scenario, that the probability of a collision of the ego is at most P.
     /// The verdict is inconclusive if they show neither that nor the opposite
-    #[arg(long, value_name = "P", value_parser = probability)]
+    #[arg(long, value_name = "P", value_parser = probability, help_heading = heading::GATES)]
     pub(super) max_probability: Option<f64>,
     /// Confidence with which --max-probability is to be shown, above 0.5 and below 1 [default: 0.95]
-    #[arg(long, value_name = "C", value_parser = confidence, requires = "max_probability")]
+    #[arg(long, value_name = "C", value_parser = confidence, requires = "max_probability", help_heading = heading::GATES)]
     confidence: Option<f64>,
     /// Fail if the ego collides in more than K samples in which it does not collide with the baseline; needs --paired
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", help_heading = heading::GATES)]
     pub(super) max_induced: Option<u64>,
     /// Pass only if, in every scenario, at least this share (0 to 1) of the baseline's collisions is prevented, with 95 %
     /// confidence; needs --paired
-    #[arg(long, value_name = "SHARE", value_parser = share)]
+    #[arg(long, value_name = "SHARE", value_parser = share, help_heading = heading::GATES)]
     min_prevented: Option<f64>,
     /// Fail if the harm of all samples of any scenario exceeds this, in expected driver deaths
-    #[arg(long, value_name = "HARM", value_parser = positive)]
+    #[arg(long, value_name = "HARM", value_parser = positive, help_heading = heading::GATES)]
     max_harm: Option<f64>,
     /// Fail if the time headway of the rear vehicle falls below this in any sample
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", value_parser = positive, help_heading = heading::GATES)]
     min_rear_thw: Option<f64>,
     /// Fail if the margin increase system engages in a larger share (0 to 1) of the samples of any scenario
-    #[arg(long, value_name = "SHARE", value_parser = share)]
+    #[arg(long, value_name = "SHARE", value_parser = share, help_heading = heading::GATES)]
     max_engagement_rate: Option<f64>,
     /// Fail if the ego is slower than the lead vehicle by more than this, in any sample
-    #[arg(long, value_name = "M/S", value_parser = positive)]
+    #[arg(long, value_name = "M/S", value_parser = positive, help_heading = heading::GATES)]
     max_speed_deficit_mps: Option<f64>,
     /// Fail if the ego's jerk exceeds this in any sample, before a collision of its own
-    #[arg(long, value_name = "M/S³", alias = "max-jerk-mps3", value_parser = positive)]
+    #[arg(long, value_name = "M/S³", alias = "max-jerk-mps3", value_parser = positive, help_heading = heading::GATES)]
     max_jerk: Option<f64>,
     /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at half the time step
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE)]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE, help_heading = heading::GATES)]
     max_flip_rate: f64,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall completions` and `closecall man`: files for shells and for the manual, made from the command line itself.
+//! `closecall tool completions` and `closecall tool man`: files for shells and for the manual, made from the command line itself.
 
 use std::path::PathBuf;
 
@@ -7,25 +7,36 @@ use clap_complete::Shell;
 use closecall_scenarios::atomic::WriteError;
 
 use super::CliError;
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
 /// The name of the program.
 const PROGRAM: &str = "closecall";
 
-/// Arguments of `closecall completions`.
+/// Arguments of `closecall tool completions`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall tool completions bash > ~/.local/share/bash-completion/completions/closecall",
+    "closecall tool completions zsh > _closecall",
+    "closecall tool completions fish > ~/.config/fish/completions/closecall.fish",
+]))]
 pub(super) struct CompletionsArgs {
     /// The shell that reads the script
     #[arg(value_enum)]
     shell: Shell,
 }
 
-/// Arguments of `closecall man`.
+/// Arguments of `closecall tool man`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall tool man",
+    "closecall tool man > closecall.1",
+    "closecall tool man --out man1",
+]))]
 pub(super) struct ManArgs {
     /// Folder for one page per command; without it, the page of the program is printed
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
 }
 

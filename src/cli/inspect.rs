@@ -1,4 +1,4 @@
-//! `closecall inspect`: reports the flaws of a trajectory file.
+//! `closecall traffic inspect`: reports the flaws of a trajectory file.
 
 use std::path::PathBuf;
 
@@ -9,11 +9,17 @@ use closecall_scenarios::trajectory_data::{BadRows, QualityInspector, ReadOption
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
+use super::help::{examples, heading};
 use super::output::{out, outln, print_error};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall inspect`.
+/// Arguments of `closecall traffic inspect`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic inspect traffic.csv",
+    "closecall traffic inspect traffic.csv --drop-bad-rows",
+    "closecall traffic inspect drive.csv.gz --layout in-car --format json",
+]))]
 pub(super) struct InspectArgs {
     /// Trajectory file
     #[arg(value_name = "TRAJECTORY_FILE")]
@@ -21,7 +27,7 @@ pub(super) struct InspectArgs {
     #[command(flatten)]
     read: ReadArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

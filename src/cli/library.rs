@@ -8,14 +8,20 @@ use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
+use super::help::{examples, heading};
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall list`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall list",
+    "closecall list --format json",
+    "closecall list --format json > library.json",
+]))]
 pub(super) struct ListArgs {
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

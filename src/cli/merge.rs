@@ -1,4 +1,4 @@
-//! `closecall merge`: merges the parts of a campaign, and judges the result.
+//! `closecall tool merge`: merges the parts of a campaign, and judges the result.
 
 use std::path::PathBuf;
 
@@ -13,28 +13,34 @@ use closecall_report::json;
 use super::CliError;
 use super::args::Format;
 use super::gates::GateArgs;
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use super::results::{print_results, selection};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall merge`.
+/// Arguments of `closecall tool merge`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall tool merge part-1 part-2 --out merged",
+    "closecall tool merge part-* --out merged --gate 'upper(induced) <= 0.01'",
+    "closecall tool merge part-1 part-2 --out merged --record worst:3 --format json",
+]))]
 pub(super) struct MergeArgs {
     /// Folders of all parts of one campaign, each made with `campaign --partition I/N`
     #[arg(required = true, value_name = "DIR")]
     parts: Vec<PathBuf>,
     /// Folder for the whole campaign; it must be new or empty
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: PathBuf,
     /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
     /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
     /// scenarios [default: each-kind]
-    #[arg(long, alias = "recordings", value_name = "KIND:N,…")]
+    #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
     gates: GateArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -16,6 +16,8 @@ mod ensemble;
 mod error;
 mod gates;
 mod generate;
+mod groups;
+mod help;
 mod inspect;
 mod library;
 mod merge;
@@ -42,5 +44,5 @@ mod view;
 mod watch;
 mod watching;
 
-pub use command::{call, main};
+pub use command::{call, command, main};
 pub use error::CliError;

@@ -10,34 +10,45 @@ use closecall_simulation::scenario::library::copy_of;
 use closecall_simulation::scenario::source::SCENARIOS;
 
 use super::CliError;
+use super::help::{examples, heading};
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall new`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall new late-braking",
+    "closecall new late-braking --from low-thw-overtake",
+    "closecall new late-braking -o scenarios/late-braking.toml",
+]))]
 pub(super) struct NewArgs {
     /// Name of the scenario: lower-case letters, digits and hyphens
     #[arg(value_parser = scenario_name)]
     name: String,
     /// Start from a scenario of the library, which `closecall list` names, instead of the commented template
-    #[arg(long, value_name = "LIBRARY_NAME")]
+    #[arg(long, value_name = "LIBRARY_NAME", help_heading = heading::SCENARIO)]
     from: Option<String>,
     /// File to write [default: NAME.toml; in a repository with closecall.toml, scenarios/NAME.toml]
-    #[arg(short, long, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
 }
 
 /// Arguments of `closecall init`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall init",
+    "closecall init my-scenarios",
+    "closecall init --url https://example.org/closecall.git --rev v0.1.0",
+]))]
 pub(super) struct InitArgs {
     /// Folder of the repository
     #[arg(default_value = ".")]
     dir: PathBuf,
     /// Git URL from which the CI job installs Closecall
-    #[arg(long, value_name = "URL", default_value = "https://example.org/closecall.git")]
+    #[arg(long, value_name = "URL", default_value = "https://example.org/closecall.git", help_heading = heading::CI)]
     url: String,
     /// Commit or tag that the CI job installs
-    #[arg(long, value_name = "REV", default_value = concat!("v", env!("CARGO_PKG_VERSION")))]
+    #[arg(long, value_name = "REV", default_value = concat!("v", env!("CARGO_PKG_VERSION")), help_heading = heading::CI)]
     rev: String,
 }
 
@@ -55,7 +66,7 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
     }
     let shown = path.display();
     outln!("written: {shown}");
-    outln!("next: closecall watch {shown}, closecall campaign {shown} -n 200 --paired");
+    outln!("next: closecall check {shown} --watch, closecall campaign {shown} -n 200 --paired");
     Ok(ExitCode::Pass)
 }
 

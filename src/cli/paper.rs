@@ -1,4 +1,4 @@
-//! `closecall paper`: the figures of the published method on any set of trajectory files.
+//! `closecall traffic paper`: the figures of the published method on any set of trajectory files.
 
 use std::path::PathBuf;
 
@@ -14,27 +14,33 @@ use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
 use super::args::FilesArgs;
+use super::help::{examples, heading};
 use super::output::{print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::robustness::refused;
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall paper`.
+/// Arguments of `closecall traffic paper`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic paper traffic.csv -o figures",
+    "closecall traffic paper one.csv two.csv -o figures --repetitions 0",
+    "closecall traffic paper traffic.csv -o figures --speed-limit-mps 27.8",
+]))]
 pub(super) struct PaperArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// Speed limit in m/s [default: 120 km/h]
-    #[arg(long, value_name = "M/S", value_parser = positive)]
+    #[arg(long, value_name = "M/S", value_parser = positive, help_heading = heading::METHOD)]
     speed_limit_mps: Option<f64>,
     /// Seed of the noise of figure 3
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     /// Number of draws of the noise at each level; 0 leaves figure 3 out
-    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(0..=10_000), help_heading = heading::METHOD)]
     repetitions: u64,
     /// Folder for the pictures and `index.html`
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     output: PathBuf,
 }
 

@@ -10,6 +10,7 @@ use closecall_campaign::stop::duration;
 use closecall_campaign::validity::CheckPlan;
 
 use super::CliError;
+use super::help::heading;
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;
@@ -49,14 +50,14 @@ impl Preset {
 pub(super) struct PlanArgs {
     /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the largest number
     /// [default: 1000000]
-    #[arg(short = 'n', long = "samples", allow_negative_numbers = true, value_parser = count)]
+    #[arg(short = 'n', long = "samples", allow_negative_numbers = true, value_parser = count, help_heading = heading::SAMPLES)]
     samples: Option<u64>,
     /// Number of samples for a purpose, paired with the baseline unless the controller under test is the baseline
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::SAMPLES)]
     preset: Option<Preset>,
     /// With --max-probability: stop each scenario as soon as its samples show whether its probability is low enough.
     /// The bounds (confidence sequences) are valid although they are evaluated after every sample
-    #[arg(long, requires = "max_probability", conflicts_with_all = ["partition", "max_collisions", "max_induced"])]
+    #[arg(long, requires = "max_probability", conflicts_with_all = ["partition", "max_collisions", "max_induced"], help_heading = heading::SAMPLES)]
     pub(super) until_certain: bool,
     /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only the samples before
     /// the first unfinished one are judged
@@ -64,18 +65,19 @@ pub(super) struct PlanArgs {
         long,
         value_name = "TIME",
         value_parser = duration,
-        conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"]
+        conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"],
+        help_heading = heading::SAMPLES
     )]
     pub(super) time_budget: Option<Duration>,
     /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1. The first two
     /// samples of each scenario are always checked
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE)]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE, help_heading = heading::VALIDITY)]
     check_share: f64,
     /// Largest number of samples of each scenario that are checked, besides the first two
-    #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST)]
+    #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST, help_heading = heading::VALIDITY)]
     check_at_most: u64,
     /// Check the validity of the simulator in no sample, for measurements of speed. Every report says so
-    #[arg(long, conflicts_with_all = ["check_share", "check_at_most"])]
+    #[arg(long, conflicts_with_all = ["check_share", "check_at_most"], help_heading = heading::VALIDITY)]
     no_validity_checks: bool,
 }
 

@@ -16,12 +16,18 @@ use super::CliError;
 use super::args::SetArgs;
 use super::arms::{ArmArgs, ComparisonArgs, arm};
 use super::backend::check_backend_of;
+use super::help::{examples, heading};
 use super::output::outln;
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall plot low-thw-overtake -o encounter.svg",
+    "closecall plot closecall-results 17 -o sample-17.pdf",
+    "closecall plot low-thw-overtake --sample 7 --paired --width-mm 160 -o pair.png",
+]))]
 pub(super) struct PlotArgs {
     /// Scenario file, name of a scenario of the library, or the folder of a campaign
     source: PathBuf,
@@ -29,13 +35,13 @@ pub(super) struct PlotArgs {
     #[arg(value_name = "SAMPLE")]
     number: Option<u64>,
     /// Number of the sample, as an option
-    #[arg(long, conflicts_with = "number")]
+    #[arg(long, conflicts_with = "number", help_heading = heading::SAMPLES)]
     sample: Option<u64>,
     /// Seed of the random numbers [default: 0; a campaign has its own seed]
-    #[arg(long)]
+    #[arg(long, help_heading = heading::SAMPLES)]
     seed: Option<u64>,
     /// Name of the scenario; required if the campaign has several
-    #[arg(long)]
+    #[arg(long, help_heading = heading::SAMPLES)]
     scenario: Option<String>,
     #[command(flatten)]
     comparison: ComparisonArgs,
@@ -44,10 +50,10 @@ pub(super) struct PlotArgs {
     #[command(flatten)]
     set: SetArgs,
     /// File to write; its extension, .svg, .png or .pdf, determines the format
-    #[arg(short, long, value_name = "FILE.svg|FILE.png|FILE.pdf", value_parser = PictureFile::parse)]
+    #[arg(short, long, value_name = "FILE.svg|FILE.png|FILE.pdf", value_parser = PictureFile::parse, help_heading = heading::OUTPUT)]
     output: PictureFile,
     /// Width on paper in mm, from 50 to 1200; of a PNG file at 300 pixels per inch [default: 900 px of CSS, 238 mm]
-    #[arg(long, value_name = "MM", value_parser = parse_width_mm)]
+    #[arg(long, value_name = "MM", value_parser = parse_width_mm, help_heading = heading::OUTPUT)]
     width_mm: Option<f32>,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall record`: writes simulated traffic as a trajectory file.
+//! `closecall traffic record`: writes simulated traffic as a trajectory file.
 
 use std::path::PathBuf;
 
@@ -14,26 +14,32 @@ use closecall_simulation::{Observer, RunKey};
 use super::CliError;
 use super::args::SimulationArgs;
 use super::backend::check_backend_of;
+use super::help::{examples, heading};
 use super::output::outln;
 use super::protect::{of_scenario, protect};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall record`.
+/// Arguments of `closecall traffic record`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic record low-thw-overtake -o traffic.csv",
+    "closecall traffic record overtake-without-brake -n 40 --controller acc --seed 1 -o traffic.csv",
+    "closecall traffic record overtake-without-brake --in-car=rear -o drive.csv",
+]))]
 pub(super) struct RecordArgs {
     /// Scenario file, name of a scenario of the library, or `-` for standard input
     scenario: PathBuf,
     /// Number of samples; their traffic follows one after the other in the file
-    #[arg(short = 'n', long = "samples", default_value_t = 20, allow_negative_numbers = true, value_parser = sample_count)]
+    #[arg(short = 'n', long = "samples", default_value_t = 20, allow_negative_numbers = true, value_parser = sample_count, help_heading = heading::SAMPLES)]
     samples: u64,
     #[command(flatten)]
     sim: SimulationArgs,
     /// Write the in-car log of one vehicle, and its true lane changes in `FILE.truth.csv`. ACTOR is the id of the
     /// vehicle [default: the first actor with an overtaking driver]
-    #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true)]
+    #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true, help_heading = heading::OUTPUT)]
     in_car: Option<Option<String>>,
     /// Trajectory file to write, in the plain CSV layout; with --in-car in the in-car layout
-    #[arg(short, long, value_name = "FILE.csv")]
+    #[arg(short, long, value_name = "FILE.csv", help_heading = heading::OUTPUT)]
     output: PathBuf,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall reenact`: simulates a recorded encounter with the controller under test in the ego vehicle.
+//! `closecall traffic reenact`: simulates a recorded encounter with the controller under test in the ego vehicle.
 
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,7 @@ use closecall_simulation::{CONTROL_STEP, RunKey};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs};
+use super::help::{examples, heading};
 use super::output::{made_by, out, outln};
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
@@ -44,8 +45,13 @@ impl From<RearChoice> for RearDriver {
     }
 }
 
-/// Arguments of `closecall reenact`.
+/// Arguments of `closecall traffic reenact`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic reenact traffic.csv",
+    "closecall traffic reenact traffic.csv --track 3 --record beside.rrd",
+    "closecall traffic reenact traffic.csv --rear recorded --controller acc -o encounter.toml",
+]))]
 pub(super) struct ReenactArgs {
     /// Trajectory file
     #[arg(value_name = "TRAJECTORY_FILE")]
@@ -53,20 +59,20 @@ pub(super) struct ReenactArgs {
     #[command(flatten)]
     read: ReadArgs,
     /// Track of the rear vehicle, which changes lanes [default: the most critical lane change that can be re-enacted]
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", help_heading = heading::DATA)]
     track: Option<u64>,
     /// What controls the rear vehicle
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     rear: RearChoice,
     #[command(flatten)]
     sim: SimulationArgs,
     #[command(flatten)]
     watch: WatchArgs,
     /// Save the scenario of the encounter, for further runs and variations
-    #[arg(short, long, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall render`: renders labelled images of the rear camera or of an aerial one, to train and to test networks.
+//! `closecall tool render`: renders labelled images of the rear camera or of an aerial one, to train and to test networks.
 
 use std::path::PathBuf;
 
@@ -11,35 +11,41 @@ use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
+use super::help::{examples, heading};
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall render`.
+/// Arguments of `closecall tool render`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall tool render -o images",
+    "closecall tool render -n 300 --set held-out --vehicles 6..10 -o crowded",
+    "closecall tool render --aerial -n 100 --seed 1 -o aerial",
+]))]
 pub(super) struct RenderArgs {
     /// Folder for the images
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Number of random scenes
-    #[arg(short = 'n', long = "scenes", default_value_t = 20, allow_negative_numbers = true, value_parser = scene_count)]
+    #[arg(short = 'n', long = "scenes", default_value_t = 20, allow_negative_numbers = true, value_parser = scene_count, help_heading = heading::SCENES)]
     scenes: u32,
     /// Seed of the random scenes
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SCENES)]
     seed: u64,
     /// Body shapes and paints of the vehicles: those for training, or those that are not used for training
-    #[arg(long, value_parser = ["training", "held-out"], default_value = "training")]
+    #[arg(long, value_parser = ["training", "held-out"], default_value = "training", help_heading = heading::SCENES)]
     set: String,
     /// Number of vehicles in a scene, or the least and the largest one such as 6..10: 0 for empty roads; fewer where there is no room
-    #[arg(long, value_name = "COUNT", default_value = "1..5", conflicts_with = "aerial", value_parser = vehicles)]
+    #[arg(long, value_name = "COUNT", default_value = "1..5", conflicts_with = "aerial", value_parser = vehicles, help_heading = heading::SCENES)]
     vehicles: [usize; 2],
     /// Render oblique aerial images with oriented boxes, in the layout of DOTA, instead of images of the rear camera
-    #[arg(long, conflicts_with = "crops")]
+    #[arg(long, conflicts_with = "crops", help_heading = heading::OUTPUT)]
     aerial: bool,
     /// Write the crops that are the classifier's input, instead of whole images with COCO annotations
-    #[arg(long)]
+    #[arg(long, help_heading = heading::OUTPUT)]
     crops: bool,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -6,6 +6,7 @@ use closecall_campaign::saved::SavedCampaign;
 
 use super::CliError;
 use super::args::{Format, SavedSampleArgs, SetArgs};
+use super::help::{examples, heading};
 use super::output::print_error;
 use super::protect::{of_campaign, of_controller, protect};
 use super::run::print;
@@ -14,18 +15,23 @@ use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall replay`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall replay closecall-results 17",
+    "closecall replay closecall-results 17 --paired --record pair.rrd",
+    "closecall replay closecall-results 17 --scenario low-thw-overtake --set environment.friction=0.5",
+]))]
 pub(super) struct ReplayArgs {
     #[command(flatten)]
     of: SavedSampleArgs,
     /// Run every arm of the campaign again; --record saves all of them in one file
-    #[arg(long, conflicts_with = "controller")]
+    #[arg(long, conflicts_with = "controller", help_heading = heading::CONTROLLER)]
     paired: bool,
     #[command(flatten)]
     set: SetArgs,
     #[command(flatten)]
     watch: WatchArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

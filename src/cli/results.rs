@@ -20,6 +20,7 @@ use closecall_report::run::rerun::is_recording_enabled;
 use closecall_scenarios::atomic::WriteError;
 
 use super::CliError;
+use super::help::heading;
 use super::output::{print_error, print_report_files};
 use super::protect::{of_controller, of_scenario};
 
@@ -39,13 +40,13 @@ const OPEN: &str = if cfg!(target_os = "macos") {
 pub(super) struct ResultsArgs {
     /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and recordings. It must be new or empty
     /// [default: closecall-results, which replaces the last results there; these become closecall-results.previous]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Keep no results, only print them
-    #[arg(long, conflicts_with_all = ["out", "resume"])]
+    #[arg(long, conflicts_with_all = ["out", "resume"], help_heading = heading::OUTPUT)]
     no_out: bool,
     /// Resume the interrupted campaign in the folder of --out, or in closecall-results
-    #[arg(long)]
+    #[arg(long, help_heading = heading::EXECUTION)]
     resume: bool,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall robustness`: studies how much noise and offset each criterion for lane changes tolerates.
+//! `closecall traffic robustness`: studies how much noise and offset each criterion for lane changes tolerates.
 
 use std::path::PathBuf;
 
@@ -10,26 +10,32 @@ use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
 use super::args::{FilesArgs, Format};
+use super::help::{examples, heading};
 use super::output::{out, outln, print_error, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall robustness`.
+/// Arguments of `closecall traffic robustness`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic robustness traffic.csv",
+    "closecall traffic robustness one.csv two.csv --plot charts",
+    "closecall traffic robustness traffic.csv --repetitions 5 --seed 1",
+]))]
 pub(super) struct RobustnessArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// Seed of the noise
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     /// Number of draws of the noise at each level
-    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(1..=10_000), help_heading = heading::METHOD)]
     repetitions: u64,
     /// Folder for the charts `noise.svg` and `offset.svg`
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     plot: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

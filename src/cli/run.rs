@@ -14,6 +14,7 @@ use closecall_simulation::scenario::Setting;
 use super::CliError;
 use super::args::{Format, SimulationArgs};
 use super::arms::ComparisonArgs;
+use super::help::{examples, heading};
 use super::output::{out, outln};
 use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
@@ -21,11 +22,16 @@ use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall run`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall run low-thw-overtake",
+    "closecall run low-thw-overtake --sample 7 --paired --record pair.rrd",
+    "closecall run late-braking.toml --sensors object --set brake-mps2=6 --trace run.csv",
+]))]
 pub(super) struct RunArgs {
     /// Scenario file, name of a scenario of the library, or `-` for standard input
     scenario: PathBuf,
     /// Number of the sample
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, help_heading = heading::SAMPLES)]
     sample: u64,
     #[command(flatten)]
     sim: SimulationArgs,
@@ -34,7 +40,7 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     watch: WatchArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

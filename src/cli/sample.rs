@@ -1,4 +1,4 @@
-//! `closecall sample`: samples a recorded lane change by a parameter of a driver.
+//! `closecall traffic sample`: samples a recorded lane change by a parameter of a driver.
 
 use std::path::{Path, PathBuf};
 
@@ -11,13 +11,19 @@ use closecall_simulation::scenario::{ScenarioFile, Variation, sampled};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
+use super::help::{examples, heading};
 use super::output::{made_by, out, outln, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::chosen;
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall sample`.
+/// Arguments of `closecall traffic sample`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3",
+    "closecall traffic sample traffic.csv --lane-change 3 --vary cc1 --from 1.5 --to 0.3 -o sampled",
+    "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3 --steps 9 --transfer -o sampled",
+]))]
 pub(super) struct SampleArgs {
     /// Trajectory file
     #[arg(value_name = "TRAJECTORY_FILE")]
@@ -25,34 +31,34 @@ pub(super) struct SampleArgs {
     #[command(flatten)]
     read: ReadArgs,
     /// Track whose lane change is sampled [default: that of the most critical lane change that can be re-enacted]
-    #[arg(long, value_name = "TRACK")]
+    #[arg(long, value_name = "TRACK", help_heading = heading::DATA)]
     lane_change: Option<u64>,
     /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario
-    #[arg(long, value_name = "PARAMETER")]
+    #[arg(long, value_name = "PARAMETER", help_heading = heading::METHOD)]
     vary: String,
     /// Its first value
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, help_heading = heading::METHOD)]
     from: f64,
     /// Its last value
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, help_heading = heading::METHOD)]
     to: f64,
     /// Number of values, in equal steps: 2 to 100
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, help_heading = heading::METHOD)]
     steps: usize,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     #[command(flatten)]
     set: SetArgs,
     /// Folder for `sample.svg`, `sample.rrd` (a Rerun file) and the scenario of each step, `step-1.toml` and so on
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Also write each step as an encounter with the margin increase system, `transferred-1.toml` and so on: the vehicle that
     /// changes lanes becomes the rear vehicle, the vehicle that it overtakes the ego, and the next one the lead vehicle
-    #[arg(long, requires = "output")]
+    #[arg(long, requires = "output", help_heading = heading::OUTPUT)]
     transfer: bool,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall schema`: prints the JSON Schema of scenario files.
+//! `closecall tool schema`: prints the JSON Schema of scenario files.
 
 use closecall_simulation::scenario::strict_schema;
 

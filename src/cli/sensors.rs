@@ -1,4 +1,4 @@
-//! `closecall sensors`: a study of perception without a controller.
+//! `closecall study sensors`: a study of perception without a controller.
 
 use std::path::PathBuf;
 
@@ -10,37 +10,43 @@ use closecall_perception::{Extent, Study};
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
 use super::backend::{check_backend, check_camera};
+use super::help::{examples, heading};
 use super::output::{out, outln, print_written};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall sensors`.
+/// Arguments of `closecall study sensors`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study sensors --quick",
+    "closecall study sensors late-braking.toml --out sensors",
+    "closecall study sensors low-thw-overtake --compare own-sensors.toml -n 40",
+]))]
 pub(super) struct SensorsArgs {
     /// Scenario file, or name of a scenario of the library, whose sensors are studied, at the nominal values of its parameters
     #[arg(default_value = "low-thw-overtake")]
     scenario: PathBuf,
     /// Study the sensors of another scenario, too, and show both side by side
-    #[arg(long, value_name = "SCENARIO")]
+    #[arg(long, value_name = "SCENARIO", help_heading = heading::SCENARIO)]
     compare: Option<PathBuf>,
     /// Depth of the sensor simulation [default: full]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     /// Few approaches: a first look within a minute
-    #[arg(long, conflicts_with = "approaches")]
+    #[arg(long, conflicts_with = "approaches", help_heading = heading::SAMPLES)]
     quick: bool,
     /// Number of approaches of each case [default: 120; with --quick: 8]
-    #[arg(short = 'n', long, value_name = "N", value_parser = count)]
+    #[arg(short = 'n', long, value_name = "N", value_parser = count, help_heading = heading::SAMPLES)]
     approaches: Option<u64>,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     seed: u64,
     /// Folder for the page (sensors.html), the figures (JSON, Parquet) and the curves (Parquet)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     #[command(flatten)]
     set: SetArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

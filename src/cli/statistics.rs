@@ -1,4 +1,4 @@
-//! `closecall statistics`: computes durations, speeds, counts and correlations of recorded lane changes.
+//! `closecall traffic statistics`: computes durations, speeds, counts and correlations of recorded lane changes.
 
 use std::path::PathBuf;
 
@@ -12,23 +12,29 @@ use closecall_scenarios::trajectory_data::TrajectoryData;
 
 use super::CliError;
 use super::args::{FilesArgs, Format};
+use super::help::{examples, heading};
 use super::output::{out, outln, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall statistics`.
+/// Arguments of `closecall traffic statistics`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic statistics traffic.csv",
+    "closecall traffic statistics one.csv two.csv --plot box-plots",
+    "closecall traffic statistics traffic.csv --speed-limit-mps 27.8 --format json",
+]))]
 pub(super) struct StatisticsArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// Speed limit in m/s [default: 120 km/h]
-    #[arg(long, value_name = "M/S", value_parser = positive)]
+    #[arg(long, value_name = "M/S", value_parser = positive, help_heading = heading::METHOD)]
     speed_limit_mps: Option<f64>,
     /// Folder for the box plots `duration.svg`, `width.svg` and `speed.svg`
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     plot: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall sensitivity` and `closecall frontier`: studies that vary the assumptions, or the system, of a scenario.
+//! `closecall study sensitivity` and `closecall study frontier`: studies that vary the assumptions, or the system, of a scenario.
 
 use std::path::PathBuf;
 
@@ -23,6 +23,7 @@ use super::args::{Format, SensorsChoice, SetArgs};
 use super::arms::ControllerArgs;
 use super::backend::{check_backend, check_cameras};
 use super::campaign::progress_bar;
+use super::help::{examples, heading};
 use super::output::{heartbeat, out, outln, print_written};
 use crate::exit_code::ExitCode;
 
@@ -32,62 +33,72 @@ pub(super) struct StudyArgs {
     /// Scenario file, or name of a scenario of the library
     scenario: PathBuf,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     seed: u64,
     #[command(flatten)]
     controller: ControllerArgs,
     /// Depth of the sensor simulation [default: that of the scenario]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     /// Number of worker threads [default: one per processor]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
     /// Folder for the page, the charts (SVG) and the figures (JSON)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     #[command(flatten)]
     set: SetArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
-/// Arguments of `closecall sensitivity`.
+/// Arguments of `closecall study sensitivity`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study sensitivity low-thw-overtake",
+    "closecall study sensitivity low-thw-overtake --seed 1 --sensors object --out study",
+    "closecall study sensitivity low-thw-overtake --factor environment.friction=0.3..0.9 --method morris",
+]))]
 pub(super) struct SensitivityArgs {
     #[command(flatten)]
     study: StudyArgs,
     /// Vary a value of the scenario uniformly, named as for --set; can be given more than once
-    #[arg(long = "factor", value_name = "KEY=LOW..HIGH")]
+    #[arg(long = "factor", value_name = "KEY=LOW..HIGH", help_heading = heading::METHOD)]
     factors: Vec<FactorRange>,
     /// Vary only the sampled parameters and those of --factor, not the list for driver, sensor and controller
-    #[arg(long)]
+    #[arg(long, help_heading = heading::METHOD)]
     no_default_factors: bool,
     /// `morris`: only a screening; `sobol`: only a decomposition, by all factors; `both`: by the factors that matter
-    #[arg(long, value_name = "morris|sobol|both", default_value = "both")]
+    #[arg(long, value_name = "morris|sobol|both", default_value = "both", help_heading = heading::METHOD)]
     method: Method,
     /// Number of trajectories of the screening, each with a run for every factor
-    #[arg(long, value_name = "N", default_value = "40", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value = "40", value_parser = clap::value_parser!(u64).range(1..=10_000), help_heading = heading::METHOD)]
     trajectories: u64,
     /// Number of rows of the decomposition, each with a run for every factor
-    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = clap::value_parser!(u64).range(1..=1 << 21))]
+    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = clap::value_parser!(u64).range(1..=1 << 21), help_heading = heading::METHOD)]
     rows: u64,
     /// Number of factors that the decomposition keeps apart after the screening
-    #[arg(long, value_name = "N", default_value = "8", value_parser = clap::value_parser!(u64).range(1..=128))]
+    #[arg(long, value_name = "N", default_value = "8", value_parser = clap::value_parser!(u64).range(1..=128), help_heading = heading::METHOD)]
     top: u64,
 }
 
-/// Arguments of `closecall frontier`.
+/// Arguments of `closecall study frontier`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study frontier low-thw-overtake",
+    "closecall study frontier low-thw-overtake -n 500 --sensors object --out frontier",
+    "closecall study frontier low-thw-overtake --vary actor.ego.driver.ego-stack.mis.hold-s=1,2",
+]))]
 pub(super) struct FrontierArgs {
     #[command(flatten)]
     study: StudyArgs,
     /// Values of a key, named as for --set, of which all combinations are run; can be given more than once [default:
     /// braking, engagement distance, goal and critical gap of the margin increase system]
-    #[arg(long = "vary", value_name = "KEY=a,b,…")]
+    #[arg(long = "vary", value_name = "KEY=a,b,…", help_heading = heading::METHOD)]
     vary: Vec<Grid>,
     /// Number of samples, the same for every combination
-    #[arg(short = 'n', long = "samples", default_value = "200", value_parser = count)]
+    #[arg(short = 'n', long = "samples", default_value = "200", value_parser = count, help_heading = heading::SAMPLES)]
     samples: u64,
 }
 

@@ -1,4 +1,4 @@
-//! `closecall lane-changes`, `criticality` and `fit`: from trajectory files to distributions.
+//! `closecall traffic lane-changes`, `criticality` and `fit`: from trajectory files to distributions.
 
 use std::path::PathBuf;
 
@@ -21,6 +21,7 @@ use closecall_scenarios::trajectory_data::{Layout, open, read_with};
 
 use super::CliError;
 use super::args::{FilesArgs, Format, ReadArgs};
+use super::help::{examples, heading};
 use super::output::{command_line, out, outln, print_error, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
@@ -57,32 +58,42 @@ pub(super) enum LanesChoice {
     None,
 }
 
-/// Arguments of `closecall lane-changes`.
+/// Arguments of `closecall traffic lane-changes`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic lane-changes traffic.csv",
+    "closecall traffic lane-changes traffic.csv --lanes none --format json",
+    "closecall traffic lane-changes traffic.csv --criterion distance --reference known.csv",
+]))]
 pub(super) struct LaneChangesArgs {
-    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as `closecall record` writes
+    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as `closecall traffic record` writes
     /// it. The file can be compressed by gzip
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
     /// Criterion by which lane changes are found
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     criterion: CriterionChoice,
     /// Lanes that the peak criterion uses
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     lanes: LanesChoice,
     /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with the columns
     /// recording_id, track_id, time_s, direction, clear
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", help_heading = heading::METHOD)]
     reference: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
-/// Arguments of `closecall criticality`.
+/// Arguments of `closecall traffic criticality`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic criticality traffic.csv",
+    "closecall traffic criticality traffic.csv --speed-limit-mps 27.8 --plot histograms",
+    "closecall traffic criticality traffic.csv --record lane-change.rrd --track 3",
+]))]
 pub(super) struct CriticalityArgs {
     /// Trajectory file
     #[arg(value_name = "TRAJECTORY_FILE")]
@@ -90,48 +101,53 @@ pub(super) struct CriticalityArgs {
     #[command(flatten)]
     read: ReadArgs,
     /// Speed limit in m/s [default: 120 km/h]
-    #[arg(long, value_name = "M/S", value_parser = positive)]
+    #[arg(long, value_name = "M/S", value_parser = positive, help_heading = heading::METHOD)]
     speed_limit_mps: Option<f64>,
     /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or overlapping
-    #[arg(long)]
+    #[arg(long, help_heading = heading::METHOD)]
     all: bool,
     /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which DCE is evaluated
-    #[arg(long)]
+    #[arg(long, help_heading = heading::METHOD)]
     ttce_alone: bool,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
-    #[arg(long, value_name = "FILE.rrd", value_parser = trajectory_path)]
+    #[arg(long, value_name = "FILE.rrd", value_parser = trajectory_path, help_heading = heading::OUTPUT)]
     record: Option<PathBuf>,
     /// Track whose lane change --record saves
-    #[arg(long, value_name = "ID", requires = "record")]
+    #[arg(long, value_name = "ID", requires = "record", help_heading = heading::OUTPUT)]
     track: Option<u64>,
     /// Folder for a histogram of each metric with its threshold: `thw_s.svg`, `dce_m.svg` and so on
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     plot: Option<PathBuf>,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
-/// Arguments of `closecall fit`.
+/// Arguments of `closecall traffic fit`.
 #[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall traffic fit traffic.csv",
+    "closecall traffic fit one.csv two.csv --correlations -o fitted.toml",
+    "closecall traffic fit traffic.csv --provenance 'Measured in May' --format json",
+]))]
 pub(super) struct FitArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// File to write [default: standard output]
-    #[arg(short, long, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Origin of the trajectory files, for the heading of the output
-    #[arg(long, default_value = "")]
+    #[arg(long, default_value = "", help_heading = heading::OUTPUT)]
     provenance: String,
     /// Also write how the quantities of one lane change, or of one pair of vehicles, depend on each other: rank correlations,
     /// by which scenarios sample them together
-    #[arg(long)]
+    #[arg(long, help_heading = heading::METHOD)]
     correlations: bool,
     /// Seed of the bootstrap, which computes the confidence intervals
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     /// Output format; without --output, `human` prints the text of the file
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 

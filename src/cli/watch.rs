@@ -15,6 +15,7 @@ use closecall_tables::RunTables;
 
 use super::CliError;
 use super::backend::check_backend_of;
+use super::help::heading;
 use super::output::print_written;
 use super::protect::Output;
 
@@ -44,17 +45,17 @@ impl From<RecordLevel> for Level {
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct WatchArgs {
     /// Save a recording of the run, to be viewed with Rerun
-    #[arg(long, value_name = "FILE.rrd", value_parser = recording)]
+    #[arg(long, value_name = "FILE.rrd", value_parser = recording, help_heading = heading::OUTPUT)]
     pub(super) record: Option<PathBuf>,
     /// Level of detail of the recording
-    #[arg(long, value_enum, default_value_t, requires = "record")]
+    #[arg(long, value_enum, default_value_t, requires = "record", help_heading = heading::OUTPUT)]
     pub(super) record_level: RecordLevel,
     /// Write a trace: a table with one row per control step and actor. With --paired, of the run of the controller
     /// under test
-    #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
+    #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table, help_heading = heading::OUTPUT)]
     pub(super) trace: Option<PathBuf>,
     /// Write every return of the LiDARs (mode `full`) of the same run: a table with beam, range, position, intensity, time, box and truth, or a new folder with a point cloud for each scan
-    #[arg(long, value_name = "FILE.parquet|FOLDER.pcd")]
+    #[arg(long, value_name = "FILE.parquet|FOLDER.pcd", help_heading = heading::OUTPUT)]
     pub(super) scans: Option<PathBuf>,
 }
 

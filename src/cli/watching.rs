@@ -1,6 +1,6 @@
-//! `closecall watch`: checks a scenario file at every change, and runs a few samples of it.
+//! `closecall check --watch`: checks a scenario file at every change, and runs a few samples of it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use clap::Args;
@@ -12,34 +12,47 @@ use closecall_simulation::scenario::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;
-use super::args::SimulationArgs;
-use super::arms::ComparisonArgs;
+use super::args::SetArgs;
+use super::arms::{ArmArgs, ComparisonArgs};
+use super::help::heading;
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
 
 /// Time between two looks at the file.
 const POLL_INTERVAL: Duration = Duration::from_millis(250);
 
-/// Arguments of `closecall watch`.
+/// How a file is watched. A check without `--watch` refuses the other options.
 #[derive(Debug, Args)]
 pub(super) struct WatchingArgs {
-    /// Scenario file
-    scenario: PathBuf,
+    /// Check the file at every change, and run a few samples of it
+    #[arg(long, conflicts_with = "format", help_heading = heading::WATCH)]
+    pub(super) watch: bool,
     /// Number of samples to run at every change
-    #[arg(short = 'n', long = "samples", default_value = "5", allow_negative_numbers = true, value_parser = count)]
+    #[arg(
+        short = 'n',
+        long = "samples",
+        default_value = "5",
+        allow_negative_numbers = true,
+        value_parser = count,
+        help_heading = heading::WATCH
+    )]
     samples: u64,
+    /// End after this many rounds [default: go on until Ctrl-C]
+    #[arg(long, value_name = "N", help_heading = heading::WATCH)]
+    rounds: Option<u64>,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::WATCH)]
+    seed: u64,
     #[command(flatten)]
-    sim: SimulationArgs,
+    arm: ArmArgs,
     #[command(flatten)]
     comparison: ComparisonArgs,
-    /// End after this many rounds [default: go on until Ctrl-C]
-    #[arg(long, value_name = "N")]
-    rounds: Option<u64>,
 }
 
-pub(super) fn watch(args: &WatchingArgs) -> Result<ExitCode, CliError> {
-    let Some(path) = existing(&args.scenario).filter(|path| path.is_file()) else {
-        let message = format!("there is no file {}: `closecall new NAME` writes one", args.scenario.display());
+/// Checks a scenario file, with the changes of `set`, now and at every change, and runs its first samples.
+pub(super) fn watch(scenario: &Path, set: &SetArgs, args: &WatchingArgs) -> Result<ExitCode, CliError> {
+    let Some(path) = existing(scenario).filter(|path| path.is_file()) else {
+        let message = format!("there is no file {}: `closecall new NAME` writes one", scenario.display());
         return Err(CliError::Usage { message });
     };
     let mut seen = None;
@@ -59,7 +72,7 @@ pub(super) fn watch(args: &WatchingArgs) -> Result<ExitCode, CliError> {
             print_error(format_args!("{} is missing\n", path.display()));
             continue;
         }
-        if let Err(error) = round(args, &path) {
+        if let Err(error) = round(&path, set, args) {
             code = ExitCode::from(&error);
             print_error(format_args!("{:?}\n", miette::Report::new(error)));
         }
@@ -77,17 +90,17 @@ fn state(path: &Path) -> Option<(SystemTime, u64)> {
 }
 
 /// Checks the file, and runs its first samples.
-fn round(args: &WatchingArgs, path: &Path) -> Result<(), CliError> {
-    let file = args.sim.set.load(path)?;
+fn round(path: &Path, set: &SetArgs, args: &WatchingArgs) -> Result<(), CliError> {
+    let file = set.load(path)?;
     let (name, parameters) = (&file.config().name, file.space().iter().len());
     outln!("{}: valid, {name} with {parameters} parameters", path.display());
-    let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.samples };
-    let arms = args.comparison.arms(&args.sim.arm)?;
+    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
+    let arms = args.comparison.arms(&args.arm)?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(&file, sampling, sample).map_err(fail)?;
         for arm in &arms {
-            let key = RunKey { seed: args.sim.seed, sample };
+            let key = RunKey { seed: args.seed, sample };
             let outcome = run_guarded(&scenario, key, arm, &mut NoObserver).map_err(fail)?;
             outln!("  {}", outcome_line(&outcome));
         }

@@ -1,7 +1,7 @@
 //! Exit code, console, JSON, HTML, Markdown and JUnit of a campaign give one verdict, whatever its outcomes and gates are.
 //!
 //! The campaigns are synthetic: the journal of a real one, with collisions, margins, errors and findings of the validity
-//! checks drawn at random, judged by randomly drawn gates through `closecall merge`.
+//! checks drawn at random, judged by randomly drawn gates through `closecall tool merge`.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -111,7 +111,7 @@ fn verdict_of(part: &Path, records: &[Record], gates: &[String], out: &Path) -> 
         journal.append(record).unwrap();
     }
     let merge = |format: &str| {
-        let args = ["merge", part.to_str().unwrap(), "--record", "failures:0", "--out", out.to_str().unwrap()];
+        let args = ["tool", "merge", part.to_str().unwrap(), "--record", "failures:0", "--out", out.to_str().unwrap()];
         let gates = gates.iter().map(String::as_str);
         let output = closecall(args.into_iter().chain(gates).chain(["--format", format]));
         let files = ["junit.xml", "report.html", "summary.md"];

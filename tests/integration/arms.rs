@@ -80,7 +80,7 @@ fn the_bytes_are_the_same_with_any_number_of_threads_resumed_and_merged() {
         ["1/2", "2/2"].map(|part| campaign(folder.path(), &part.replace('/', "-"), ARMS, &["--partition", part]));
     let merged = folder.path().join("merged");
     let [one, two, out] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
-    stdout(&closecall(["merge", one, two, "--no-gate", "--record", "worst:0", "--out", out]), 0);
+    stdout(&closecall(["tool", "merge", one, two, "--no-gate", "--record", "worst:0", "--out", out]), 0);
     for file in ["journal.jsonl", "outcomes.parquet", "arm_pairs.parquet"] {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert_eq!(read(&whole), read(&merged), "{file}");

@@ -1,4 +1,4 @@
-//! `closecall calibrate`, from recorded pairs to a member of an ensemble.
+//! `closecall traffic calibrate`, from recorded pairs to a member of an ensemble.
 
 use std::fmt::Write;
 
@@ -29,7 +29,8 @@ fn a_calibration_gives_a_member_that_a_campaign_takes() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name).display().to_string();
     std::fs::write(at("pairs.csv"), table()).unwrap();
-    let result = json(&closecall(["calibrate", &at("pairs.csv"), "--format=json", "-o", &at("member.toml")]), 0);
+    let result =
+        json(&closecall(["traffic", "calibrate", &at("pairs.csv"), "--format=json", "-o", &at("member.toml")]), 0);
     let pairs = result["pairs"].as_array().unwrap().len() + result["held_out"].as_array().unwrap().len();
     assert_eq!(pairs, 8);
     assert!(result["errors"]["pooled_calibration_pairs"]["rmse_m"].as_f64().unwrap() < 2.0, "{}", result["errors"]);
@@ -40,7 +41,7 @@ fn a_calibration_gives_a_member_that_a_campaign_takes() {
     let args = ["campaign", "rear-follower-stays", "-n", "1", "--sensors=ground-truth", "--no-gate", "--format=json"];
     let campaign = json(&closecall(args.iter().copied().chain(["--ensemble", &at("member.toml")])), 0);
     assert!(campaign["scenarios"]["rear-follower-stays@calibrated-idm"].is_object());
-    let table = stdout(&closecall(["calibrate", &at("pairs.csv")]), 0);
+    let table = stdout(&closecall(["traffic", "calibrate", &at("pairs.csv")]), 0);
     assert!(table.contains("pooled set, calibration pairs") && table.contains("literature:"), "{table}");
 }
 

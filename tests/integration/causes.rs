@@ -149,7 +149,7 @@ fn the_collected_regressions_have_the_outcomes_that_they_state() {
 
 #[test]
 fn the_map_agrees_with_theory_or_says_why() {
-    let grid = ["map", "--closing-kmh", "8,15,24,40", "--detection-m", "80,100", "--front-thw-s", "0.7,1.6"];
+    let grid = ["study", "map", "--closing-kmh", "8,15,24,40", "--detection-m", "80,100", "--front-thw-s", "0.7,1.6"];
     let out = folder();
     let dir = out.path().join("map");
     let found = json(&closecall(grid.iter().copied().chain(["--format", "json", "--out", dir.to_str().unwrap()])), 0);
@@ -165,7 +165,7 @@ fn the_map_agrees_with_theory_or_says_why() {
     let page = std::fs::read_to_string(dir.join("map.html")).unwrap();
     assert!(page.contains("paper: always") && page.contains("paper: never"));
     assert_eq!(std::fs::read_to_string(dir.join("map.csv")).unwrap().lines().count(), 17);
-    let refused = closecall(["map", "--controller", "acc"]);
+    let refused = closecall(["study", "map", "--controller", "acc"]);
     assert_eq!(code(&refused), 2);
     assert!(message(&refused).contains("the map needs `mis` or `mis-extended`"), "{}", message(&refused));
 }
@@ -175,14 +175,15 @@ fn the_net_effect_is_recomputed_from_its_inputs_or_cannot_be_said() {
     let parent = folder();
     let path = campaign(parent.path(), "paired", 100, &["--paired"]);
     let dir = path.to_str().unwrap();
-    let found = json(&closecall(["exposure", "--counted", "20/5000", "--campaign", dir, "--format", "json"]), 0);
+    let found =
+        json(&closecall(["study", "exposure", "--counted", "20/5000", "--campaign", dir, "--format", "json"]), 0);
     let shares = &found["exposure"]["campaign"];
     let of = |key: &str| shares[key].as_f64().unwrap();
     let by_hand = 1e6 * 20.0 / 5_000.0 * (of("prevented") - of("induced")) / of("samples");
     assert!((found["exposure"]["effect"]["net"].as_f64().unwrap() - by_hand).abs() < 1e-6, "{found:#}");
     // The lead vehicle brakes in every sample.
     assert_eq!(found["cost"]["scenarios"][0]["samples"], 0, "{found:#}");
-    let nothing = closecall(["exposure"]);
+    let nothing = closecall(["study", "exposure"]);
     let text = stdout(&nothing, 4);
     assert!(
         text.contains("cannot be said") && text.contains("--per-million-km") && text.contains("--campaign"),

@@ -1,11 +1,14 @@
-//! The commands around a scenario: `new`, `init`, `list`, `watch`, `baseline`, `completions`, `man`; and what all commands
-//! have in common: where scenarios come from, what they say of their own making, and their answers to misspelt words.
+//! The commands around a scenario: `new`, `init`, `list`, `check`, `baseline`, `tool completions`, `tool man`; and what all
+//! commands have in common: their groups and their help, where scenarios come from, what they say of their own making, and
+//! their answers to misspelt words.
 
 use std::io::Write;
 use std::path::Path;
 use std::process::Stdio;
 
-use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
+use clap::Command;
+
+use crate::support::{ROOT, closecall, code, folder, json, library, message, program, stderr, stdout};
 
 /// Runs the program in another folder.
 fn run_in(folder: &Path, args: &[&str]) -> std::process::Output {
@@ -143,11 +146,121 @@ fn a_misspelt_or_negative_value_is_explained() {
 #[test]
 fn set_does_not_stand_under_the_gates_in_the_help() {
     let help = stdout(&closecall(["campaign", "--help"]), 0);
-    let (options, gates) = help.split_once("\nGates:").unwrap();
-    for option in ["--set <KEY=VALUE>", "--format <FORMAT>"] {
-        assert!(options.contains(option) && !gates.contains(option), "{option}");
+    let is_heading = |line: &&str| line.ends_with(':') && !line.starts_with(' ');
+    let under = |heading: &str| {
+        let lines = help.lines().skip_while(|line| line.strip_suffix(':') != Some(heading)).skip(1);
+        lines.take_while(|line| !is_heading(line)).collect::<Vec<_>>().join("\n")
+    };
+    for (heading, option) in
+        [("Scenario", "--set <KEY=VALUE>"), ("Output", "--format <FORMAT>"), ("Gates", "--max-collisions <K>")]
+    {
+        for other in ["Scenario", "Output", "Gates"] {
+            assert_eq!(under(other).contains(option), other == heading, "{option} under {other}");
+        }
     }
-    assert!(gates.contains("--max-collisions"));
+}
+
+/// Returns the commands of the program that its help shows, with the groups, each with its words.
+fn commands() -> Vec<(String, Command)> {
+    let mut all = vec![("closecall".to_owned(), closecall::cli::command())];
+    let mut next = 0;
+    while let Some((words, command)) = all.get(next).cloned() {
+        let shown = command.get_subcommands().filter(|one| !one.is_hide_set());
+        all.extend(shown.map(|one| (format!("{words} {}", one.get_name()), one.clone())));
+        next += 1;
+    }
+    all
+}
+
+/// Returns the names of the commands of the groups, each with its group.
+fn grouped() -> Vec<(String, String)> {
+    let of_group = |group: &str| {
+        let program = closecall::cli::command();
+        let command = program.find_subcommand(group).unwrap();
+        command.get_subcommands().map(|one| (one.get_name().to_owned(), group.to_owned())).collect::<Vec<_>>()
+    };
+    ["traffic", "study", "tool"].into_iter().flat_map(of_group).collect()
+}
+
+#[test]
+fn the_program_has_at_most_sixteen_commands_and_groups() {
+    let count = closecall::cli::command().get_subcommands().filter(|one| !one.is_hide_set()).count();
+    assert!(count <= 16, "{count}");
+    assert_eq!(grouped().len(), 22);
+}
+
+#[test]
+fn each_option_stands_under_a_heading_that_names_its_purpose() {
+    for (words, command) in commands() {
+        for option in command.get_opts() {
+            assert!(option.get_help_heading().is_some(), "{words}: {option}");
+        }
+    }
+}
+
+#[test]
+fn the_help_of_each_command_ends_with_three_examples_that_parse() {
+    for (words, command) in commands() {
+        let end = command.get_after_help().unwrap_or_else(|| panic!("{words}: no examples")).to_string();
+        let (_, examples) = end.split_once("Examples:\n").unwrap_or_else(|| panic!("{words}: no examples"));
+        let examples: Vec<&str> = examples.lines().collect();
+        assert_eq!(examples.len(), 3, "{words}");
+        for example in examples {
+            assert!(example.starts_with(&format!("  {words}")), "{words}: {example}");
+            let line = shlex::split(example).unwrap();
+            let arguments = line.into_iter().take_while(|word| ![">", "|"].contains(&word.as_str()));
+            let parsed = closecall::cli::command().try_get_matches_from(arguments);
+            assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
+        }
+    }
+}
+
+#[test]
+fn the_name_of_a_grouped_command_alone_is_answered_with_its_whole_name() {
+    let whole = grouped().into_iter().map(|(name, group)| (format!("{group} {name}"), name));
+    for (whole, name) in whole.chain([("check --watch".to_owned(), "watch".to_owned())]) {
+        let output = closecall([name.as_str(), "file.csv", "--format", "json"]);
+        assert_eq!(code(&output), 2, "{name}");
+        let said = stderr(&output);
+        assert!(said.starts_with(&format!("error: the command is now `closecall {whole}`\n")), "{said}");
+    }
+    let elsewhere = stderr(&closecall(["traffic", "merge", "a", "b"]));
+    assert!(elsewhere.contains("`closecall tool merge`"), "{elsewhere}");
+    let unknown = stderr(&closecall(["lanechanges"]));
+    assert!(unknown.contains("unrecognized subcommand 'lanechanges'"), "{unknown}");
+}
+
+#[test]
+fn no_text_names_a_grouped_command_without_its_group() {
+    let names: Vec<String> = grouped().into_iter().map(|(name, _)| name).collect();
+    let mut folders = vec![Path::new(ROOT).to_owned()];
+    let mut wrong = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            let name = path.file_name().unwrap().to_str().unwrap();
+            if path.is_dir() {
+                let is_source = name != "target" && (!name.starts_with('.') || [".github", ".ci"].contains(&name));
+                folders.extend(is_source.then_some(path));
+                continue;
+            }
+            // The change log names the commands as they were.
+            let is_text = ["md", "rs", "py", "toml", "yml", "yaml"]
+                .iter()
+                .any(|&end| path.extension().is_some_and(|one| one == end));
+            if !is_text || name == "CHANGELOG.md" {
+                continue;
+            }
+            for line in std::fs::read_to_string(&path).unwrap_or_default().lines() {
+                let words = line
+                    .split("closecall ")
+                    .skip(1)
+                    .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '-').next());
+                let alone = words.into_iter().filter(|word| names.iter().any(|name| name == word));
+                wrong.extend(alone.map(|_| format!("{}: {line}", path.display())));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
@@ -174,30 +287,39 @@ fn a_baseline_names_what_newly_fails() {
 }
 
 #[test]
-fn watch_runs_a_few_samples_of_the_file() {
+fn a_watched_check_runs_a_few_samples_of_the_file() {
     let folder = folder();
     stdout(&run_in(folder.path(), &["new", "mine"]), 0);
-    let text = stdout(&run_in(folder.path(), &["watch", "mine", "-n", "2", "--rounds", "1"]), 0);
+    let text = stdout(&run_in(folder.path(), &["check", "mine", "--watch", "-n", "2", "--rounds", "1"]), 0);
     assert!(text.starts_with("mine.toml: valid, mine with 5 parameters\n  sample 0  mis"), "{text}");
     assert_eq!(text.lines().count(), 3);
-    assert_eq!(code(&run_in(folder.path(), &["watch", "absent", "--rounds", "1"])), 2);
+    for refused in [
+        &["check", "absent", "--watch", "--rounds", "1"][..],
+        &["check", "mine", "mine", "--watch", "--rounds", "1"],
+        &["check", "mine", "--watch", "--format", "json"],
+        // A check without --watch runs no sample.
+        &["check", "mine", "-n", "2"],
+        &["check", "mine", "--controller", "acc"],
+    ] {
+        assert_eq!(code(&run_in(folder.path(), refused)), 2, "{refused:?}");
+    }
 }
 
 #[test]
 fn completions_and_manual_pages_name_every_command() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        assert!(stdout(&closecall(["completions", shell]), 0).contains("lane-changes"), "{shell}");
+        assert!(stdout(&closecall(["tool", "completions", shell]), 0).contains("lane-changes"), "{shell}");
     }
-    assert!(stdout(&closecall(["man"]), 0).starts_with(".ie \\n(.g"));
+    assert!(stdout(&closecall(["tool", "man"]), 0).starts_with(".ie \\n(.g"));
     let folder = folder();
     let pages = folder.path().join("man");
-    stdout(&closecall(["man", "--out", pages.to_str().unwrap()]), 0);
+    stdout(&closecall(["tool", "man", "--out", pages.to_str().unwrap()]), 0);
     assert!(std::fs::read_to_string(pages.join("closecall-campaign.1")).unwrap().contains("max\\-collisions"));
 }
 
 #[test]
 fn the_schema_states_the_ranges_of_the_check() {
-    let schema = json(&closecall(["schema"]), 0);
+    let schema = json(&closecall(["tool", "schema"]), 0);
     let duration = &schema["properties"]["duration-s"];
     assert_eq!((&duration["minimum"], &duration["maximum"]), (&0.1.into(), &3600.0.into()));
     assert_eq!(schema["additionalProperties"], false);

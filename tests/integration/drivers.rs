@@ -309,7 +309,10 @@ fn a_loaded_scenario_holds_the_track_of_a_recorded_vehicle_and_no_longer_needs_t
     let folder = folder();
     let trajectories = folder.path().join("own.csv");
     let library = library("overtake-without-brake");
-    stdout(&closecall(["record", library.to_str().unwrap(), "-n", "1", "-o", trajectories.to_str().unwrap()]), 0);
+    stdout(
+        &closecall(["traffic", "record", library.to_str().unwrap(), "-n", "1", "-o", trajectories.to_str().unwrap()]),
+        0,
+    );
     let actors = pair("{ recorded = { file = \"own.csv\", track-id = 1 } }", "{ wiedemann99 = {} }");
     let ego = "[[actor]]\nid = \"ego\"\nvehicle = { class = \"car\" }\n\
                start = { absolute = { lane = 1, s-m = -900.0, speed-mps = 20.0 } }\n\

@@ -244,7 +244,7 @@ fn partition(folder: &Path, part: &str, more: &[&str]) -> std::path::PathBuf {
 }
 
 fn merge(parts: &[&Path], out: &Path) -> std::process::Output {
-    let mut args: Vec<&str> = vec!["merge"];
+    let mut args: Vec<&str> = vec!["tool", "merge"];
     args.extend(parts.iter().map(|part| part.to_str().unwrap()));
     args.extend(["--out", out.to_str().unwrap(), "--recordings", "1", "--no-gate"]);
     closecall(args)

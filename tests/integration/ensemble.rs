@@ -58,7 +58,7 @@ fn partition_resume_and_replay_know_the_member() {
     }
     let parts = [at("1of2"), at("2of2")].map(|path| path.display().to_string());
     let merged = at("merged").display().to_string();
-    stdout(&closecall(["merge", &parts[0], &parts[1], "--out", &merged, "--no-gate"]), 0);
+    stdout(&closecall(["tool", "merge", &parts[0], &parts[1], "--out", &merged, "--no-gate"]), 0);
     let read = |name: &str| std::fs::read(at(name).join("outcomes.parquet")).unwrap();
     assert_eq!(read("merged"), read("whole"));
     // The same samples for each member: the reaction time is the member's, everything else agrees.

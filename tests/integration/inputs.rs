@@ -13,22 +13,22 @@ fn no_command_overwrites_an_input() {
     let (scenario, traffic, rrd) = (path("sc.toml"), path("traffic.csv"), path("sc.rrd"));
     fs::write(&scenario, &text).unwrap();
     fs::hard_link(&scenario, &rrd).unwrap();
-    stdout(&closecall(["record", &scenario, "-n", "2", "-o", &traffic]), 0);
+    stdout(&closecall(["traffic", "record", &scenario, "-n", "2", "-o", &traffic]), 0);
     let recorded = fs::read(&traffic).unwrap();
     let script = path("ctl.csv");
     fs::write(&script, "x").unwrap();
     let controller = format!("exec:sh {script}");
     let detour = format!("{}/../{}/sc.toml", path(""), folder.path().file_name().unwrap().to_str().unwrap());
     let cases: [&[&str]; 9] = [
-        &["record", &scenario, "-o", &scenario],
-        &["record", &scenario, "-o", &detour],
+        &["traffic", "record", &scenario, "-o", &scenario],
+        &["traffic", "record", &scenario, "-o", &detour],
         &["run", &scenario, "--record", &rrd],
         &["run", &scenario, "--controller", &controller, "--trace", &script],
-        &["fit", &traffic, "-o", &traffic],
-        &["reenact", &traffic, "-o", &traffic],
-        &["reenact", &traffic, "--trace", &traffic],
+        &["traffic", "fit", &traffic, "-o", &traffic],
+        &["traffic", "reenact", &traffic, "-o", &traffic],
+        &["traffic", "reenact", &traffic, "--trace", &traffic],
         &["run", &scenario, "--record", &scenario],
-        &["criticality", &traffic, "--record", &traffic],
+        &["traffic", "criticality", &traffic, "--record", &traffic],
     ];
     for case in cases {
         let output = closecall(case);
@@ -51,16 +51,24 @@ fn an_endless_input_is_refused() {
     let traffic = folder();
     let csv = traffic.path().join("traffic.csv");
     stdout(
-        &closecall(["record", library("low-thw-overtake").to_str().unwrap(), "-n", "1", "-o", csv.to_str().unwrap()]),
+        &closecall([
+            "traffic",
+            "record",
+            library("low-thw-overtake").to_str().unwrap(),
+            "-n",
+            "1",
+            "-o",
+            csv.to_str().unwrap(),
+        ]),
         0,
     );
     let csv = csv.to_str().unwrap();
     let cases: [(&[&str], &str); 5] = [
         (&["check", endless], "larger than 64 MiB"),
         (&["campaign", endless, "-n", "1"], "larger than 64 MiB"),
-        (&["inspect", endless], "this is not text"),
-        (&["criticality", endless], "this is not text"),
-        (&["lane-changes", csv, "--reference", endless], "larger than 64 MiB"),
+        (&["traffic", "inspect", endless], "this is not text"),
+        (&["traffic", "criticality", endless], "this is not text"),
+        (&["traffic", "lane-changes", csv, "--reference", endless], "larger than 64 MiB"),
     ];
     for (case, expected) in cases {
         let output = closecall(case);
@@ -94,8 +102,8 @@ fn a_study_of_no_lane_change_says_so() {
     let (scenario, traffic) = (folder.path().join("sc.toml"), folder.path().join("traffic.csv"));
     fs::write(&scenario, headline_with("duration-s = ", "duration-s = 1.0 # ")).unwrap();
     let (scenario, traffic) = (scenario.to_str().unwrap(), traffic.to_str().unwrap());
-    stdout(&closecall(["record", scenario, "-n", "1", "-o", traffic]), 0);
-    let output = closecall(["robustness", traffic, "--repetitions", "1"]);
+    stdout(&closecall(["traffic", "record", scenario, "-n", "1", "-o", traffic]), 0);
+    let output = closecall(["traffic", "robustness", traffic, "--repetitions", "1"]);
     assert_eq!(code(&output), 4, "{}", stderr(&output));
     assert!(message(&output).contains("there is no lane change in the trajectory files"), "{}", stderr(&output));
 }

@@ -144,7 +144,7 @@ fn the_mis_does_not_engage_in_scenarios_that_give_no_reason_to() {
 
 #[test]
 fn the_schema_has_the_tables_of_a_scenario_file() {
-    let schema = json(&closecall(["schema"]), 0);
+    let schema = json(&closecall(["tool", "schema"]), 0);
     assert_eq!(schema["title"], "ScenarioConfig");
     for key in ["schema-version", "name", "road", "parameters", "actor", "sensors"] {
         assert!(schema["properties"].get(key).is_some(), "{key}");

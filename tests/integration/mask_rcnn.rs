@@ -28,7 +28,7 @@ fn without_onnx_runtime_it_says_how_to_get_it() {
     for args in [
         campaign(scenario, out.to_str().unwrap(), &[]),
         ["run", scenario, "--sensors", "full"].iter().chain(&PIPELINE).copied().collect(),
-        ["sensors", scenario, "--quick"].iter().chain(&PIPELINE).copied().collect::<Vec<&str>>(),
+        ["study", "sensors", scenario, "--quick"].iter().chain(&PIPELINE).copied().collect::<Vec<&str>>(),
     ] {
         let text = refused(&args);
         assert!(text.contains("pip install onnxruntime") && text.contains("--onnxruntime PATH"), "{args:?}: {text}");
@@ -116,7 +116,8 @@ fn the_study_characterises_it() {
     let out = folder.path().join("study");
     let (library_file, out_text) = (library_file.to_str().unwrap(), out.to_str().unwrap());
     let rare = ["--set", "sensors.rear-camera.mask-rcnn.rate-hz=1"];
-    let args = ["sensors", scenario.to_str().unwrap(), "-n", "1", "--onnxruntime", library_file, "--out", out_text];
+    let args =
+        ["study", "sensors", scenario.to_str().unwrap(), "-n", "1", "--onnxruntime", library_file, "--out", out_text];
     let output = closecall(args.iter().chain(&PIPELINE).chain(&rare));
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let study: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("sensors.json")).unwrap()).unwrap();

@@ -35,13 +35,25 @@ fn one_command_draws_all_figures_of_our_own_traffic() {
     for (name, seed) in [("one.csv", "1"), ("two.csv", "2")] {
         let scenario = library("overtake-without-brake");
         let csv = file(name);
-        let args = ["record", scenario.to_str().unwrap(), "-n", "6", "--controller", "acc", "--seed", seed, "-o", &csv];
+        let args = [
+            "traffic",
+            "record",
+            scenario.to_str().unwrap(),
+            "-n",
+            "6",
+            "--controller",
+            "acc",
+            "--seed",
+            seed,
+            "-o",
+            &csv,
+        ];
         stdout(&closecall(args), 0);
     }
     let (one, two, out) = (file("one.csv"), file("two.csv"), file("paper"));
-    stdout(&closecall(["paper", &one, &two, "-o", &out, "--repetitions", "2"]), 0);
+    stdout(&closecall(["traffic", "paper", &one, &two, "-o", &out, "--repetitions", "2"]), 0);
     check_figures(Path::new(&out), &["overtake-without-brake"]);
-    let twice = closecall(["paper", &one, &one, "-o", &out]);
+    let twice = closecall(["traffic", "paper", &one, &one, "-o", &out]);
     assert_eq!(code(&twice), 2, "{}", message(&twice));
 }
 
@@ -52,6 +64,6 @@ fn the_figures_of_recorded_traffic_name_each_trajectory_file() {
     let out = folder.path().join("paper");
     let path = |name: &str| data.join(format!("ngsim_us101/trajectories/{name}.csv")).to_str().unwrap().to_owned();
     let (a, b) = (path("us101_a"), path("us101_b"));
-    stdout(&closecall(["paper", &a, &b, "-o", out.to_str().unwrap(), "--repetitions", "1"]), 0);
+    stdout(&closecall(["traffic", "paper", &a, &b, "-o", out.to_str().unwrap(), "--repetitions", "1"]), 0);
     check_figures(&out, &["us101_a", "us101_b"]);
 }

@@ -13,14 +13,24 @@ use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 fn own_trajectories(folder: &Path) -> PathBuf {
     let csv = folder.join("own.csv");
     let scenario = library("overtake-without-brake");
-    let args = ["record", scenario.to_str().unwrap(), "-n", "4", "--controller", "acc", "-o", csv.to_str().unwrap()];
+    let args = [
+        "traffic",
+        "record",
+        scenario.to_str().unwrap(),
+        "-n",
+        "4",
+        "--controller",
+        "acc",
+        "-o",
+        csv.to_str().unwrap(),
+    ];
     stdout(&closecall(args), 0);
     csv
 }
 
 /// Returns the JSON that `reenact` prints.
 fn reenacted(trajectories: &Path, more: &[&str]) -> Value {
-    let args = ["reenact", trajectories.to_str().unwrap(), "--format", "json"];
+    let args = ["traffic", "reenact", trajectories.to_str().unwrap(), "--format", "json"];
     json(&closecall(args.iter().chain(more)), 0)
 }
 
@@ -76,7 +86,7 @@ fn the_written_scenario_has_the_same_outcome_and_can_be_varied() {
     let found = reenacted(&own, &["--track", "6", "-o", path]);
     assert_eq!(found, reenacted(&own, &["--track", "6"]));
     let text = fs::read_to_string(&toml).unwrap();
-    assert!(text.starts_with("# Made by `closecall reenact") && text.contains("own.csv"), "{text}");
+    assert!(text.starts_with("# Made by `closecall traffic reenact") && text.contains("own.csv"), "{text}");
     let mut run = json(&closecall(["run", path, "--format", "json"]), 0);
     // The JSON of a run says also what wrote it; that of `reenact` says it once, beside the outcome.
     for stamp in ["schema_version", "closecall_version", "settings"] {
@@ -111,7 +121,7 @@ fn an_encounter_that_cannot_be_re_enacted_is_refused_with_the_reason() {
     let drive = folder.path().join("drive.csv");
     let drive = drive.to_str().unwrap();
     let scenario = library("overtake-without-brake");
-    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "--in-car", "-o", drive]), 0);
+    stdout(&closecall(["traffic", "record", scenario.to_str().unwrap(), "-n", "1", "--in-car", "-o", drive]), 0);
     refused(&[drive], 3, &["drive.csv", "no vehicle is ahead of track 1"]);
     // A trajectory file need not hold a lead vehicle.
     let text = fs::read_to_string(own).unwrap();
@@ -128,12 +138,13 @@ fn recorded_traffic_is_re_enacted_or_refused_with_the_reason() {
     let Some(data) = data() else { return };
     let ngsim = ["ngsim_us101/trajectories/us101_a.csv", "ngsim_us101/us101_a_ngsim18col_feet.csv"];
     for trajectories in ngsim.map(|file| data.join(file)) {
-        let changes = json(&closecall(["lane-changes", trajectories.to_str().unwrap(), "--format", "json"]), 0);
+        let changes =
+            json(&closecall(["traffic", "lane-changes", trajectories.to_str().unwrap(), "--format", "json"]), 0);
         let mut count = 0;
         for change in changes.as_array().unwrap() {
             let track = change["track_id"].to_string();
             for rear in ["driver", "recorded"] {
-                let args = ["reenact", trajectories.to_str().unwrap(), "--track", &track, "--rear", rear];
+                let args = ["traffic", "reenact", trajectories.to_str().unwrap(), "--track", &track, "--rear", rear];
                 let output = closecall(args);
                 assert!([0, 3].contains(&code(&output)), "{args:?}: {}", stderr(&output));
                 assert_eq!(code(&output) == 3, stderr(&output).contains("failed to re-enact"), "{}", stderr(&output));

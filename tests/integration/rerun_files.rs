@@ -42,13 +42,13 @@ fn recordings_of_a_pair_a_full_run_and_recorded_traffic_verify() {
     stdout(&closecall(["run", figure.to_str().unwrap(), "--paired", "--record", &pair]), 0);
     stdout(&closecall(["run", headline.to_str().unwrap(), "--sensors", "full", "--record", &full]), 0);
     let own = file("own.csv");
-    stdout(&closecall(["record", headline.to_str().unwrap(), "-n", "2", "-o", &own]), 0);
-    stdout(&closecall(["criticality", &own, "--record", &traffic]), 0);
-    stdout(&closecall(["reenact", &own, "--record", &beside]), 0);
+    stdout(&closecall(["traffic", "record", headline.to_str().unwrap(), "-n", "2", "-o", &own]), 0);
+    stdout(&closecall(["traffic", "criticality", &own, "--record", &traffic]), 0);
+    stdout(&closecall(["traffic", "reenact", &own, "--record", &beside]), 0);
     for file in [pair, full, traffic, beside] {
         verify(&viewer, Path::new(&file));
     }
-    let none = closecall(["criticality", &own, "--record", &file("none.rrd"), "--track", "99999"]);
+    let none = closecall(["traffic", "criticality", &own, "--record", &file("none.rrd"), "--track", "99999"]);
     assert_eq!(code(&none), 2, "{}", stderr(&none));
     assert!(stderr(&none).contains("no lane change of track 99999"), "{}", stderr(&none));
 }

@@ -23,14 +23,28 @@ fn own_trajectories(folder: &Path) -> PathBuf {
     let (scenario, csv) = (folder.join("passing.toml"), folder.join("own.csv"));
     fs::write(&scenario, fs::read_to_string(library("overtake-without-brake")).unwrap() + PASSING).unwrap();
     let [scenario, path] = [&scenario, &csv].map(|path| path.to_str().unwrap());
-    stdout(&closecall(["record", scenario, "-n", "4", "--controller", "acc", "--seed", "1", "-o", path]), 0);
+    stdout(&closecall(["traffic", "record", scenario, "-n", "4", "--controller", "acc", "--seed", "1", "-o", path]), 0);
     csv
 }
 
 /// Returns the words of a command that lets cc1 fall.
 fn falling_cc1<'a>(trajectories: &'a Path, track: &'a str) -> Vec<&'a str> {
     let file = trajectories.to_str().unwrap();
-    vec!["sample", file, "--lane-change", track, "--vary", "cc1", "--from", "1.5", "--to", "0.3", "--steps", "5"]
+    vec![
+        "traffic",
+        "sample",
+        file,
+        "--lane-change",
+        track,
+        "--vary",
+        "cc1",
+        "--from",
+        "1.5",
+        "--to",
+        "0.3",
+        "--steps",
+        "5",
+    ]
 }
 
 /// Checks that the smallest headway to the vehicle that is overtaken falls with each step, and that to the vehicle that has
@@ -98,7 +112,7 @@ fn any_parameter_of_a_driver_can_be_varied_and_a_wrong_one_is_refused() {
     let sample = |vary: &str, values: [&str; 2], steps: &str| {
         let file = own.to_str().unwrap();
         let [from, to] = values;
-        closecall(["sample", file, "--vary", vary, "--from", from, "--to", to, "--steps", steps])
+        closecall(["traffic", "sample", file, "--vary", vary, "--from", from, "--to", to, "--steps", steps])
     };
     for vary in ["cc0", "desired-speed-mps", "actor.opp1.start.absolute.speed-mps"] {
         let table = stdout(&sample(vary, ["20", "18"], "2"), 0);

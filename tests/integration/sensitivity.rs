@@ -30,7 +30,7 @@ const FIXED: [&str; 16] = [
 ];
 
 fn study<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    [&["sensitivity", "low-thw-overtake", "--seed", "5", "--format", "json"], &FIXED[..], more].concat()
+    [&["study", "sensitivity", "low-thw-overtake", "--seed", "5", "--format", "json"], &FIXED[..], more].concat()
 }
 
 /// The share of prevented collisions in a campaign with one more setting.
@@ -117,10 +117,11 @@ fn a_factor_that_cannot_be_used_is_refused_by_name() {
     }
     let twice = ["--factor", "duration-s=50..60", "--factor", "duration-s=40..60"];
     assert!(message(&closecall(study(&twice))).contains("duration-s is given twice"));
-    let refused = closecall(["frontier", "low-thw-overtake", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,99"]);
+    let refused =
+        closecall(["study", "frontier", "low-thw-overtake", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,99"]);
     assert_eq!(code(&refused), 3);
     assert!(message(&refused).contains("hold-s"), "{}", message(&refused));
-    assert_eq!(code(&closecall(["frontier", "low-thw-overtake", "--controller", "acc"])), 2);
+    assert_eq!(code(&closecall(["study", "frontier", "low-thw-overtake", "--controller", "acc"])), 2);
 }
 
 #[test]
@@ -134,7 +135,8 @@ fn runs_that_end_in_an_error_are_counted_and_have_no_result() {
     let text: Vec<&str> = study(&more).into_iter().filter(|word| !["--format", "json"].contains(word)).collect();
     let text = stdout(&closecall(text), 5);
     assert!(text.contains("ended in an ERROR") && text.contains("No assumption was seen"), "{text}");
-    let frontier = ["frontier", "low-thw-overtake", "-n", "3", "--controller", "exec:false", "--format", "json"];
+    let frontier =
+        ["study", "frontier", "low-thw-overtake", "-n", "3", "--controller", "exec:false", "--format", "json"];
     let vary = ["--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
     let found = json(&closecall([&frontier[..], &vary].concat()), 5);
     assert_eq!(found["errors"]["count"], 6);
@@ -147,7 +149,7 @@ fn a_signal_ends_a_study_without_a_result() {
     let out = folder.path().join("out");
     let mut command = program();
     // Without the list of factors there is nothing to check first, and the runs begin at once.
-    let args = ["sensitivity", "low-thw-overtake", "--no-default-factors", "--method", "sobol", "-n", "16384"];
+    let args = ["study", "sensitivity", "low-thw-overtake", "--no-default-factors", "--method", "sobol", "-n", "16384"];
     command.args(args).args(["--out", out.to_str().unwrap()]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(Duration::from_secs(5));
@@ -166,7 +168,9 @@ fn a_frontier_runs_every_combination_on_the_same_samples() {
     let vary = [format!("{mis}.max-deceleration-mps2=1.0,2.0"), format!("{mis}.engage-gap-m=100,150")];
     let more = ["-n", "60", "--seed", "3", "--format", "json", "--out", out.to_str().unwrap()];
     let found = json(
-        &closecall([&["frontier", "low-thw-overtake", "--vary", &vary[0], "--vary", &vary[1]], &more[..]].concat()),
+        &closecall(
+            [&["study", "frontier", "low-thw-overtake", "--vary", &vary[0], "--vary", &vary[1]], &more[..]].concat(),
+        ),
         0,
     );
     let points = found["points"].as_array().unwrap();

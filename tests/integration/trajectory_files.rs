@@ -14,9 +14,9 @@ fn a_trajectory_file_of_the_simulation_gives_its_lane_changes_metrics_and_distri
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
     let scenario = library("overtake-without-brake");
-    let args = ["record", scenario.to_str().unwrap(), "-n", "40", "--controller", "acc", "-o", csv];
+    let args = ["traffic", "record", scenario.to_str().unwrap(), "-n", "40", "--controller", "acc", "-o", csv];
     stdout(&closecall(args), 0);
-    let changes = json(&closecall(["lane-changes", csv, "--format", "json"]), 0);
+    let changes = json(&closecall(["traffic", "lane-changes", csv, "--format", "json"]), 0);
     let changes = changes.as_array().unwrap();
     assert!(changes.len() >= 35, "{}", changes.len());
     // In this scenario every lane change goes from lane 2 to lane 1, and takes the sampled time.
@@ -34,13 +34,13 @@ fn a_trajectory_file_of_the_simulation_gives_its_lane_changes_metrics_and_distri
         }
     }
     assert!(changes.iter().filter(|change| change["complete"] == Value::Bool(true)).count() >= 30);
-    let critical = json(&closecall(["criticality", csv, "--format", "json"]), 0);
+    let critical = json(&closecall(["traffic", "criticality", csv, "--format", "json"]), 0);
     assert_eq!(critical.as_array().unwrap().len(), changes.len());
     assert!(
         critical[0]["metrics"]["thw_s"]["value"].is_number() || critical[0]["metrics"]["thw_s"]["absent"].is_string()
     );
     let fitted = folder.path().join("fitted.toml");
-    stdout(&closecall(["fit", csv, "-o", fitted.to_str().unwrap()]), 0);
+    stdout(&closecall(["traffic", "fit", csv, "-o", fitted.to_str().unwrap()]), 0);
     assert!(fs::read_to_string(fitted).unwrap().contains("lane-change-duration-s"));
 }
 
@@ -50,7 +50,7 @@ fn recorded_traffic_has_the_same_lane_changes_in_both_layouts() {
     let metres = data.join("ngsim_us101/trajectories/us101_a.csv");
     let feet = data.join("ngsim_us101/us101_a_ngsim18col_feet.csv");
     let crossings = |path: &std::path::Path| -> Vec<f64> {
-        let changes = json(&closecall(["lane-changes", path.to_str().unwrap(), "--format", "json"]), 0);
+        let changes = json(&closecall(["traffic", "lane-changes", path.to_str().unwrap(), "--format", "json"]), 0);
         changes.as_array().unwrap().iter().map(|change| change["crossing_s"].as_f64().unwrap()).collect()
     };
     let (one, other) = (crossings(&metres), crossings(&feet));
@@ -63,7 +63,7 @@ fn broken_trajectory_files_are_refused_by_name() {
     let folder = folder();
     let csv = folder.path().join("own.csv");
     let scenario = library("overtake-without-brake");
-    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "-o", csv.to_str().unwrap()]), 0);
+    stdout(&closecall(["traffic", "record", scenario.to_str().unwrap(), "-n", "1", "-o", csv.to_str().unwrap()]), 0);
     let good = fs::read_to_string(&csv).unwrap();
     let cut = &good[..good.len() - 25];
     let nan = good.replacen(",1,", ",nan,", 1);
@@ -76,7 +76,7 @@ fn broken_trajectory_files_are_refused_by_name() {
     ] {
         fs::write(&csv, content).unwrap();
         for command in ["lane-changes", "criticality", "fit"] {
-            let output = closecall([command, csv.to_str().unwrap()]);
+            let output = closecall(["traffic", command, csv.to_str().unwrap()]);
             assert_eq!(code(&output), 3, "{what}, {command}: {}", stderr(&output));
             assert!(stderr(&output).contains("own.csv"), "{what}: {}", stderr(&output));
             assert!(!stderr(&output).contains("panicked"), "{what}");
@@ -105,13 +105,14 @@ fn every_criterion_finds_the_true_lane_changes_of_an_in_car_log_and_two_tolerate
     let csv = folder.path().join("drive.csv");
     let csv = csv.to_str().unwrap();
     let scenario = library("overtake-without-brake");
-    let args = ["record", scenario.to_str().unwrap(), "-n", "12", "--controller", "acc", "--in-car", "-o", csv];
+    let args =
+        ["traffic", "record", scenario.to_str().unwrap(), "-n", "12", "--controller", "acc", "--in-car", "-o", csv];
     stdout(&closecall(args), 0);
     let truth: Vec<_> =
         truth(&folder.path().join("drive.truth.csv")).into_iter().filter(|(.., complete)| *complete).collect();
     assert!(truth.len() >= 8, "{}", truth.len());
     for (criterion, within_s) in [("gradient", 0.05), ("peak", 0.05), ("distance", 0.25)] {
-        let found = json(&closecall(["lane-changes", csv, "--criterion", criterion, "--format", "json"]), 0);
+        let found = json(&closecall(["traffic", "lane-changes", csv, "--criterion", criterion, "--format", "json"]), 0);
         let found = found.as_array().unwrap();
         for (direction, crossing_s, _) in &truth {
             let is_same = |change: &&Value| {
@@ -122,7 +123,8 @@ fn every_criterion_finds_the_true_lane_changes_of_an_in_car_log_and_two_tolerate
         }
     }
     let plots = folder.path().join("plots");
-    let args = ["robustness", csv, "--repetitions", "1", "--format", "json", "--plot", plots.to_str().unwrap()];
+    let args =
+        ["traffic", "robustness", csv, "--repetitions", "1", "--format", "json", "--plot", plots.to_str().unwrap()];
     let found = json(&closecall(args), 0);
     assert_eq!(found["reference_kind"], "gradient");
     assert_eq!(found["criteria"], serde_json::json!(["peak", "distance", "gradient"]));
@@ -147,12 +149,15 @@ fn statistics_count_lane_changes_by_class_and_draw_box_plots() {
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
     let scenario = library("overtake-without-brake");
-    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "30", "--controller", "acc", "-o", csv]), 0);
+    stdout(
+        &closecall(["traffic", "record", scenario.to_str().unwrap(), "-n", "30", "--controller", "acc", "-o", csv]),
+        0,
+    );
     let plots = folder.path().join("plots");
-    let args = ["statistics", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
+    let args = ["traffic", "statistics", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
     let found = json(&closecall(args), 0);
     let classes = found["classes"].as_array().unwrap();
-    let changes = json(&closecall(["lane-changes", csv, "--format", "json"]), 0);
+    let changes = json(&closecall(["traffic", "lane-changes", csv, "--format", "json"]), 0);
     let counted: u64 = classes.iter().map(|class| class["lane_changes"].as_u64().unwrap()).sum();
     assert_eq!(counted, changes.as_array().unwrap().len() as u64);
     assert!(classes.iter().any(|class| class["duration_s"]["n"].as_u64() > Some(5)));
@@ -162,7 +167,7 @@ fn statistics_count_lane_changes_by_class_and_draw_box_plots() {
         let complete: u64 = classes.iter().map(|class| class["complete"].as_u64().unwrap()).sum();
         assert!(chart.contains("car (n = ") && chart.matches("<circle").count() as u64 == complete, "{name}");
     }
-    let args = ["criticality", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
+    let args = ["traffic", "criticality", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
     let output = closecall(args);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     for (name, limit) in
@@ -178,14 +183,14 @@ fn a_criterion_or_a_reference_that_cannot_be_used_is_refused() {
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
     let scenario = library("overtake-without-brake");
-    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "-o", csv]), 0);
-    let refused = closecall(["lane-changes", csv, "--criterion", "gradient"]);
+    stdout(&closecall(["traffic", "record", scenario.to_str().unwrap(), "-n", "1", "-o", csv]), 0);
+    let refused = closecall(["traffic", "lane-changes", csv, "--criterion", "gradient"]);
     assert_eq!(code(&refused), 2);
     assert!(stderr(&refused).contains("own.csv") && stderr(&refused).contains("in-car"), "{}", stderr(&refused));
     let list = folder.path().join("list.csv");
     fs::write(&list, "track_id,time_s\n1,x\n").unwrap();
-    let refused = closecall(["lane-changes", csv, "--reference", list.to_str().unwrap()]);
+    let refused = closecall(["traffic", "lane-changes", csv, "--reference", list.to_str().unwrap()]);
     assert_eq!(code(&refused), 3);
     assert!(stderr(&refused).contains("list.csv"), "{}", stderr(&refused));
-    assert_eq!(code(&closecall(["lane-changes", csv, "--reference", "/no/such/list.csv"])), 6);
+    assert_eq!(code(&closecall(["traffic", "lane-changes", csv, "--reference", "/no/such/list.csv"])), 6);
 }

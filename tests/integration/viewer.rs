@@ -155,7 +155,10 @@ fn every_view_of_recorded_traffic_beside_a_run_shows_content() {
     let folder = folder();
     let [csv, file] = ["own.csv", "beside.rrd"].map(|name| folder.path().join(name));
     let (csv, scenario) = (csv.to_str().unwrap(), library("overtake-without-brake"));
-    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "2", "--controller", "acc", "-o", csv]), 0);
-    stdout(&closecall(["reenact", csv, "--record", file.to_str().unwrap()]), 0);
+    stdout(
+        &closecall(["traffic", "record", scenario.to_str().unwrap(), "-n", "2", "--controller", "acc", "-o", csv]),
+        0,
+    );
+    stdout(&closecall(["traffic", "reenact", csv, "--record", file.to_str().unwrap()]), 0);
     assert_shows(&viewer, &file, &BESIDE);
 }

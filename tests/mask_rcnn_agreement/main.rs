@@ -105,7 +105,7 @@ fn rust_and_python_find_the_same_in_fresh_renders() {
     let folder = tempfile::tempdir().unwrap();
     let images = folder.path().join("images");
     let output = Command::new(env!("CARGO_BIN_EXE_closecall"))
-        .args(["render", "-n", "8", "--seed", "24112026", "--set", "held-out", "-o"])
+        .args(["tool", "render", "-n", "8", "--seed", "24112026", "--set", "held-out", "-o"])
         .arg(&images)
         .output()
         .unwrap();

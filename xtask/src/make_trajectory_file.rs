@@ -2,8 +2,8 @@
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- make-trajectory-file plain 10GB /tmp/big.csv
-//! /usr/bin/time -v closecall lane-changes /tmp/big.csv > /tmp/changes.txt     # peak memory, user time
-//! /usr/bin/time -v closecall inspect /tmp/big.csv
+//! /usr/bin/time -v closecall traffic lane-changes /tmp/big.csv > /tmp/changes.txt     # peak memory, user time
+//! /usr/bin/time -v closecall traffic inspect /tmp/big.csv
 //! ```
 //!
 //! Layouts: `plain` (sorted by vehicle), `plain-by-time`, `ngsim` (18 columns in feet, sorted by vehicle). Each vehicle

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! For each file it writes a folder with `NAME-truth.csv`, `NAME-aerial-raw.csv` and `NAME-aerial-corrected.csv`, which
-//! `closecall lane-changes` reads, and `NAME-truth.png`, a picture from the middle of the flight; and prints the losses over all files.
+//! `closecall traffic lane-changes` reads, and `NAME-truth.png`, a picture from the middle of the flight; and prints the losses over all files.
 #![expect(clippy::print_stdout, reason = "its output is what it is for")]
 
 use std::path::{Path, PathBuf};

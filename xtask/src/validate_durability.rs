@@ -114,7 +114,7 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
         setup.run(out, &["--partition", &format!("{}/{PARTS}", part + 1), "--jobs", jobs])?;
     }
     let mut merge = Command::new(&setup.binary);
-    merge.arg("merge").args(&parts).arg("--out").arg(place("merged")).args(["--recordings", "1"]);
+    merge.args(["tool", "merge"]).args(&parts).arg("--out").arg(place("merged")).args(["--recordings", "1"]);
     let status = merge.stdout(Stdio::null()).status()?;
     if !status.success() {
         return Err(format!("merge: {status}").into());

@@ -1,4 +1,4 @@
-"""Reads data sets of aerial pictures, as `closecall render --aerial` writes them, and compares oriented boxes."""
+"""Reads data sets of aerial pictures, as `closecall tool render --aerial` writes them, and compares oriented boxes."""
 
 import json
 import pathlib
@@ -41,7 +41,7 @@ def read(folder):
     """Reads all pictures of a data set, in the order of their names."""
     names = sorted(path.stem for path in (pathlib.Path(folder) / "images").glob("*.png"))
     if not names:
-        raise SystemExit(f"{folder}: no pictures found in `images`; `closecall render --aerial` writes them")
+        raise SystemExit(f"{folder}: no pictures found in `images`; `closecall tool render --aerial` writes them")
     return [Picture(folder, name) for name in names]
 
 

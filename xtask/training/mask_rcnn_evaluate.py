@@ -1,4 +1,4 @@
-"""Judges the exported Mask R-CNN on held-out images of `closecall render`, and writes its model card.
+"""Judges the exported Mask R-CNN on held-out images of `closecall tool render`, and writes its model card.
 
     python xtask/training/mask_rcnn_evaluate.py --images DIR --empty DIR --crowded DIR --model camera/models/rear-mask-rcnn.onnx \
                                           --card camera/models/MASK_RCNN_CARD.md

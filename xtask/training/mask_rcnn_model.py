@@ -16,7 +16,7 @@ from torchvision.ops import FeaturePyramidNetwork, MultiScaleRoIAlign, nms, roi_
 
 import mask_rcnn_sampling as sampling
 
-# Names of the labels 1, 2, 3; 0 is the background. The order is that of the categories of `closecall render`.
+# Names of the labels 1, 2, 3; 0 is the background. The order is that of the categories of `closecall tool render`.
 CLASSES = ("car", "truck", "motorcycle")
 # Channels of the levels of the backbone, whose cells are 2, 4, 8, 16 and 32 px wide, and of the pyramid.
 CHANNELS, PYRAMID = (16, 24, 48, 96, 128), 40

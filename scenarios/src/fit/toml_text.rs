@@ -147,7 +147,8 @@ mod tests {
 
     #[test]
     fn both_tables_are_valid_scenario_parameters() {
-        let text = to_toml(&result(), &Heading { command: "closecall fit".to_owned(), provenance: String::new() });
+        let text =
+            to_toml(&result(), &Heading { command: "closecall traffic fit".to_owned(), provenance: String::new() });
         let document: toml::Table = text.parse().unwrap();
         for table in ["parameters", "parametric"] {
             let config: ParametersConfig = document[table].clone().try_into().unwrap();

@@ -83,7 +83,7 @@ pub enum TrajectoryFileProblem {
     },
     /// The file has more rows than are read at once.
     #[error(
-        "it has more than {allowed} rows; `lane-changes` and `inspect` read it piece by piece, other commands need a part of it"
+        "it has more than {allowed} rows; `traffic lane-changes` and `traffic inspect` read it piece by piece, other commands need a part of it"
     )]
     TooManyRows {
         /// Maximum number of rows.

@@ -226,40 +226,44 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let csv = at("own.csv");
     let scenario = library("overtake-without-brake");
-    let record =
-        ["record", scenario.to_str().unwrap(), "-n", "20", "--controller", "acc", "-o", &csv].map(str::to_owned);
+    let record = ["traffic", "record", scenario.to_str().unwrap(), "-n", "20", "--controller", "acc", "-o", &csv]
+        .map(str::to_owned);
     stdout(&closecall(record), 0);
-    let changes = program(&["lane-changes", &csv], 0);
+    let changes = program(&["traffic", "lane-changes", &csv], 0);
     hold("lane-changes", each(&changes));
     let list = at("list.csv");
     let first = &changes[0];
     let known = format!("overtake-without-brake,{},{},left,1\n", first["track_id"], first["crossing_s"]);
     std::fs::write(&list, format!("recording_id,track_id,time_s,direction,clear\n{known}")).unwrap();
-    hold("lane-changes-scored", [&program(&["lane-changes", &csv, "--reference", &list], 0)]);
+    hold("lane-changes-scored", [&program(&["traffic", "lane-changes", &csv, "--reference", &list], 0)]);
     // Of few vehicles some metrics have no value, and some quantities too few.
     let few = at("few.csv");
-    let record =
-        ["record", scenario.to_str().unwrap(), "-n", "1", "--controller", "acc", "-o", &few].map(str::to_owned);
+    let record = ["traffic", "record", scenario.to_str().unwrap(), "-n", "1", "--controller", "acc", "-o", &few]
+        .map(str::to_owned);
     stdout(&closecall(record), 0);
     let alone = at("alone.csv");
     alone_in(&few, first["track_id"].as_u64().unwrap(), &alone);
-    let (many, one) = (program(&["criticality", &csv], 0), program(&["criticality", &alone], 0));
+    let (many, one) = (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
     hold("criticality", each(&many).into_iter().chain(each(&one)));
-    hold("reenact", [&program(&["reenact", &csv], 0)]);
-    let sampled = program(&["sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
+    hold("reenact", [&program(&["traffic", "reenact", &csv], 0)]);
+    let sampled =
+        program(&["traffic", "sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
     hold("sample", [&sampled]);
-    let fit = |file: &str| program(&["fit", file, "--correlations"], 0);
+    let fit = |file: &str| program(&["traffic", "fit", file, "--correlations"], 0);
     hold("fit", [&fit(&csv), &fit(&few)]);
     let fitted = at("fitted.toml");
-    stdout(&closecall(["fit", &csv, "-o", &fitted]), 0);
-    hold("drift", [&program(&["drift", &fitted, &csv], 0), &program(&["drift", &fitted, &few], 4)]);
-    hold("statistics", [&program(&["statistics", &csv], 0)]);
-    hold("robustness", [&program(&["robustness", &few, "--repetitions", "1"], 0)]);
+    stdout(&closecall(["traffic", "fit", &csv, "-o", &fitted]), 0);
+    hold(
+        "drift",
+        [&program(&["traffic", "drift", &fitted, &csv], 0), &program(&["traffic", "drift", &fitted, &few], 4)],
+    );
+    hold("statistics", [&program(&["traffic", "statistics", &csv], 0)]);
+    hold("robustness", [&program(&["traffic", "robustness", &few, "--repetitions", "1"], 0)]);
     let broken = at("broken.csv");
     std::fs::write(&broken, BROKEN).unwrap();
-    let dropped = program(&["inspect", &broken, "--drop-bad-rows"], 0);
-    hold("inspect", [&program(&["inspect", &csv], 0), &dropped]);
-    hold("render", [&program(&["render", "-n", "1", "-o", &at("pictures")], 0)]);
+    let dropped = program(&["traffic", "inspect", &broken, "--drop-bad-rows"], 0);
+    hold("inspect", [&program(&["traffic", "inspect", &csv], 0), &dropped]);
+    hold("render", [&program(&["tool", "render", "-n", "1", "-o", &at("pictures")], 0)]);
 }
 
 /// Leaves one vehicle of a trajectory file.
@@ -298,7 +302,13 @@ fn the_measures_of_gates_are_those_documented() {
 #[test]
 fn the_exit_codes_are_those_of_the_help() {
     let help = stdout(&closecall(["--help"]), 0);
-    let listed = help.split_once("Exit codes:").unwrap().1.lines().filter_map(|line| line.split_whitespace().next());
+    let listed = help
+        .split_once("Exit codes:\n")
+        .unwrap()
+        .1
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.split_whitespace().next());
     let text = document();
     let table = text.split_once("## Exit codes").unwrap().1;
     let rows = table.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
@@ -310,15 +320,26 @@ fn the_exit_codes_are_those_of_the_help() {
 #[test]
 fn the_keys_of_studies_are_those_documented() {
     let seeded = |args: &[&str], code| program(&[args, &["--seed", "2", "--set", "duration-s=60"]].concat(), code);
-    let small =
-        ["sensitivity", "low-thw-overtake", "--no-default-factors", "--trajectories", "3", "-n", "32", "--top", "1"];
+    let small = [
+        "study",
+        "sensitivity",
+        "low-thw-overtake",
+        "--no-default-factors",
+        "--trajectories",
+        "3",
+        "-n",
+        "32",
+        "--top",
+        "1",
+    ];
     let both = seeded(&small, 0);
     // No factor of the list applies to all scenarios: some are left out here.
-    let listed = ["sensitivity", "low-thw-overtake", "--method", "morris", "--trajectories", "2"];
+    let listed = ["study", "sensitivity", "low-thw-overtake", "--method", "morris", "--trajectories", "2"];
     let listed = seeded(&listed, 0);
     let sobol = seeded(&[&small[..], &["--method", "sobol", "--controller", "exec:false"]].concat(), 5);
     hold("sensitivity", [&both, &listed, &sobol]);
-    let frontier = ["frontier", "low-thw-overtake", "-n", "20", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
+    let frontier =
+        ["study", "frontier", "low-thw-overtake", "-n", "20", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
     let errors = seeded(&[&frontier[..], &["--controller", "exec:false"]].concat(), 5);
     hold("frontier", [&seeded(&frontier, 0), &errors]);
 }

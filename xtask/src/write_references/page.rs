@@ -44,7 +44,7 @@ const READING: &str = "
 ## How to read the tables
 
 - A scenario file is TOML. Keys are in kebab case, and an unknown key is an error. `closecall check FILE` names the line, the
-  key, the value and what is allowed. An editor can complete and check the file with the JSON Schema of `closecall schema`.
+  key, the value and what is allowed. An editor can complete and check the file with the JSON Schema of `closecall tool schema`.
 - The end of a key is its unit: `gap-m` is in metres, `speed-mps` in metres per second.
 - *number* is a finite number, or `\"$name\"`: the value of the parameter `name` in [`[parameters]`](#parameters-NAME).
   Only parameters are sampled. A *fixed number* cannot be a parameter. *word* is one of the words below the table, or

@@ -1,0 +1,36 @@
+//! The form of each command's help: options under headings that name a purpose, and three examples at the end.
+
+/// The headings of options, each the purpose of what stands under it.
+pub(super) mod heading {
+    /// The scenario, and changes of it.
+    pub(in crate::cli) const SCENARIO: &str = "Scenario";
+    /// Which samples run, and how many.
+    pub(in crate::cli) const SAMPLES: &str = "Samples";
+    /// What drives the ego vehicle, what it perceives, and what it is compared with.
+    pub(in crate::cli) const CONTROLLER: &str = "Controller and sensors";
+    /// Which part of a trajectory file is used, and how it is read.
+    pub(in crate::cli) const DATA: &str = "Trajectory data";
+    /// What a study varies or computes.
+    pub(in crate::cli) const METHOD: &str = "Method";
+    /// The random scenes of labelled images.
+    pub(in crate::cli) const SCENES: &str = "Scenes";
+    /// By what a result is judged.
+    pub(in crate::cli) const GATES: &str = "Gates";
+    /// How the simulator itself is checked.
+    pub(in crate::cli) const VALIDITY: &str = "Validity checks";
+    /// Where, how long and how fast the samples run.
+    pub(in crate::cli) const EXECUTION: &str = "Execution";
+    /// The repetition at every change of a file.
+    pub(in crate::cli) const WATCH: &str = "At every change";
+    /// The files of a continuous integration.
+    pub(in crate::cli) const CI: &str = "CI job";
+    /// The program that shows recordings.
+    pub(in crate::cli) const VIEWER: &str = "Viewer";
+    /// What is printed and written.
+    pub(in crate::cli) const OUTPUT: &str = "Output";
+}
+
+/// Returns the end of a command's help: three command lines, the shortest first.
+pub(super) fn examples(lines: [&str; 3]) -> String {
+    format!("Examples:\n  {}", lines.join("\n  "))
+}
