@@ -45,7 +45,7 @@ use crate::exit_code::ExitCode;
 #[command(after_help = examples([
     "closecall campaign low-thw-overtake",
     "closecall campaign scenarios --preset pr --out results",
-    "closecall campaign low-thw-overtake -n 500 --sensors object --arms acc,gap-1.6,mis --gate 'upper(induced) <= 0.01'",
+    "closecall campaign low-thw-overtake -n 500 --paired --gate 'upper(induced) <= 0.01'",
 ]))]
 pub(super) struct CampaignArgs {
     /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input

@@ -106,7 +106,7 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
 #[command(after_help = examples([
     "closecall study map",
     "closecall study map --controller mis-extended --out map",
-    "closecall study map --speed-mps 33 --closing-kmh 10,20,30 --detection-m 80,120 --front-thw-s 0.7,0.9",
+    "closecall study map --closing-kmh 10,20,30 --detection-m 80,120 --front-thw-s 0.7,0.9",
 ]))]
 pub(super) struct MapArgs {
     /// Speed of the ego and of the lead vehicle
@@ -154,7 +154,7 @@ pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
 #[command(after_help = examples([
     "closecall study exposure traffic.csv --campaign closecall-results",
     "closecall study exposure --counted 20/5000 --campaign closecall-results",
-    "closecall study exposure --per-million-km 100..10000 --campaign closecall-results --scenario low-thw-overtake",
+    "closecall study exposure --per-million-km 100..10000 --campaign closecall-results",
 ]))]
 pub(super) struct ExposureArgs {
     /// Trajectory files, in which the encounters are counted

@@ -22,7 +22,7 @@ use crate::exit_code::ExitCode;
 #[command(after_help = examples([
     "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3",
     "closecall traffic sample traffic.csv --lane-change 3 --vary cc1 --from 1.5 --to 0.3 -o sampled",
-    "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3 --steps 9 --transfer -o sampled",
+    "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3 --transfer -o sampled",
 ]))]
 pub(super) struct SampleArgs {
     /// Trajectory file

@@ -51,11 +51,11 @@ fn a_file_without_a_usable_pair_is_refused() {
     let path = folder.path().join("pairs.csv");
     let short: String = table().lines().take(50).map(|line| format!("{line}\n")).collect();
     std::fs::write(&path, short).unwrap();
-    let output = closecall(["calibrate".as_ref(), path.as_os_str()]);
+    let output = closecall(["traffic".as_ref(), "calibrate".as_ref(), path.as_os_str()]);
     assert_eq!(code(&output), 2, "{}", message(&output));
     assert!(message(&output).contains("p0: it lasts 4.8 s, less than 20 s"), "{}", message(&output));
     std::fs::write(&path, "frame,id\n1,2\n").unwrap();
-    let output = closecall(["calibrate".as_ref(), path.as_os_str()]);
+    let output = closecall(["traffic".as_ref(), "calibrate".as_ref(), path.as_os_str()]);
     assert_eq!(code(&output), 3, "{}", message(&output));
     assert!(message(&output).contains("begins no known layout"), "{}", message(&output));
 }

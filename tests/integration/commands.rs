@@ -207,6 +207,8 @@ fn the_help_of_each_command_ends_with_three_examples_that_parse() {
         assert_eq!(examples.len(), 3, "{words}");
         for example in examples {
             assert!(example.starts_with(&format!("  {words}")), "{words}: {example}");
+            // Longer lines are wrapped, and no longer commands.
+            assert!(example.len() <= 100, "{example}");
             let line = shlex::split(example).unwrap();
             let arguments = line.into_iter().take_while(|word| ![">", "|"].contains(&word.as_str()));
             let parsed = closecall::cli::command().try_get_matches_from(arguments);
@@ -230,9 +232,19 @@ fn the_name_of_a_grouped_command_alone_is_answered_with_its_whole_name() {
     assert!(unknown.contains("unrecognized subcommand 'lanechanges'"), "{unknown}");
 }
 
+/// Returns true if a line names one of these commands behind the name of the program.
+fn names_one_of(line: &str, names: &[String]) -> bool {
+    let word = |rest: &str| rest.split(|c: char| !c.is_alphanumeric() && c != '-').next().map(str::to_owned);
+    line.split("closecall ").skip(1).filter_map(word).any(|word| names.contains(&word))
+}
+
 #[test]
 fn no_text_names_a_grouped_command_without_its_group() {
     let names: Vec<String> = grouped().into_iter().map(|(name, _)| name).collect();
+    for name in &names {
+        assert!(names_one_of(&format!("See `closecall {name}`."), &names), "{name}");
+        assert!(!names_one_of(&format!("See `closecall group {name}`."), &names), "{name}");
+    }
     let mut folders = vec![Path::new(ROOT).to_owned()];
     let mut wrong = Vec::new();
     while let Some(folder) = folders.pop() {
@@ -250,14 +262,9 @@ fn no_text_names_a_grouped_command_without_its_group() {
             if !is_text || name == "CHANGELOG.md" {
                 continue;
             }
-            for line in std::fs::read_to_string(&path).unwrap_or_default().lines() {
-                let words = line
-                    .split("closecall ")
-                    .skip(1)
-                    .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '-').next());
-                let alone = words.into_iter().filter(|word| names.iter().any(|name| name == word));
-                wrong.extend(alone.map(|_| format!("{}: {line}", path.display())));
-            }
+            let text = std::fs::read_to_string(&path).unwrap_or_default();
+            let named = text.lines().filter(|line| names_one_of(line, &names));
+            wrong.extend(named.map(|line| format!("{}: {line}", path.display())));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

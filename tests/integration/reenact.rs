@@ -106,7 +106,7 @@ fn an_encounter_that_cannot_be_re_enacted_is_refused_with_the_reason() {
     let own = own_trajectories(folder.path());
     let own = own.to_str().unwrap();
     let refused = |args: &[&str], expected: i32, words: &[&str]| {
-        let output = closecall(std::iter::once(&"reenact").chain(args));
+        let output = closecall(["traffic", "reenact"].iter().chain(args));
         let said = stderr(&output);
         assert_eq!(code(&output), expected, "{args:?}: {said}");
         assert!(words.iter().all(|word| said.contains(word)), "{args:?}: {said}");
