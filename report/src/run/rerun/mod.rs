@@ -8,7 +8,8 @@
 //! and it opens at the critical moment. Two films share one timeline and the same plots. Each has a 3D scene of its
 //! own, in which the vehicles of the other film appear as outlines.
 //!
-//! This folder is the only one that uses the rerun library: its public interface, and parts of it in `blueprint/archetypes.rs` alone.
+//! This folder is the only one that uses the rerun library: its public interface, and parts of it in
+//! `blueprint/archetypes.rs` and `version.rs` alone.
 
 mod bird;
 mod blueprint;
@@ -29,8 +30,10 @@ mod stream;
 mod summary;
 mod truth;
 mod vehicles;
+mod version;
 mod write;
 
+pub use version::{RerunVersion, VersionError};
 pub(crate) use write::write_recording_of;
 pub use write::{
     RecordingError, check_recording_possible, is_recording_enabled, write_recording, write_recording_unchecked,
