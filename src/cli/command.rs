@@ -68,7 +68,7 @@ enum Command {
     Explain(causes::ExplainArgs),
     /// Find the smallest failing case near a failing sample of a campaign, and the nearest case that passes
     Minimize(causes::MinimizeArgs),
-    /// Show recordings in the browser, with the web build of an installed Rerun viewer
+    /// Open recordings in the installed Rerun viewer, and the report of the last results in the browser
     View(view::ViewArgs),
     /// Draw an encounter as a static figure, SVG or PNG
     Plot(plot::PlotArgs),

@@ -31,9 +31,9 @@ use closecall_simulation::scenario::ScenarioError;
 use closecall_simulation::scenario::library::UnknownScenario;
 use closecall_simulation::scenario::member::{ApplyError, MemberError};
 use closecall_simulation::scenario::source::SourceError;
-use closecall_viewer::{ServeError, ViewerError};
 use miette::Diagnostic;
 
+use super::view::ViewError;
 use crate::exit_code::ExitCode;
 
 /// The reason for which a command has no result.
@@ -89,12 +89,9 @@ pub enum CliError {
     /// A recording (Rerun file) cannot be written.
     #[error(transparent)]
     Record(#[from] RecordingError),
-    /// Recordings cannot be shown in the browser.
+    /// Recordings cannot be shown.
     #[error(transparent)]
-    Serve(#[from] ServeError),
-    /// There is no web viewer.
-    #[error(transparent)]
-    Viewer(#[from] ViewerError),
+    View(#[from] ViewError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] PictureError),
@@ -214,7 +211,7 @@ impl From<&CliError> for ExitCode {
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
             | CliError::Project(_)
-            | CliError::Serve(ServeError::Nothing { .. } | ServeError::Foreign { .. })
+            | CliError::View(ViewError::Nothing { .. } | ViewError::Foreign { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Controller(error) => FailureKind::from(error).into(),
             CliError::Folder(error) | CliError::Results(error) => FailureKind::from(error).into(),
@@ -233,8 +230,7 @@ impl From<&CliError> for ExitCode {
             | CliError::ResultsReport(_)
             | CliError::Chart(_)
             | CliError::Record(_)
-            | CliError::Serve(ServeError::Read { .. } | ServeError::Listen { .. })
-            | CliError::Viewer(_)
+            | CliError::View(ViewError::Read { .. } | ViewError::Viewer(_) | ViewError::Browser { .. })
             | CliError::Figure(_)
             | CliError::WriteRecording(_)
             | CliError::Dataset(_)

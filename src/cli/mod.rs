@@ -41,6 +41,7 @@ mod statistics;
 mod study;
 mod trajectories;
 mod view;
+mod viewer;
 mod watch;
 mod watching;
 

@@ -1,15 +1,26 @@
-//! `closecall view`: shows recordings in the browser.
+//! `closecall view`: opens recordings in the installed Rerun viewer, and the report of the last results in the browser.
+//!
+//! ```text
+//!  PATH ────────▶ recordings ──▶ rerun [--web-viewer] FILE…
+//!  no PATH ─┬───▶ recordings ──▶ rerun [--web-viewer] FILE…
+//!           └───▶ report.html ─▶ browser
+//! ```
+//!
+//! Closecall serves nothing itself. The command ends when the viewer ends.
 
-use std::path::PathBuf;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::folder::{RECORDINGS, REPORT};
-use closecall_viewer::{Server, WebViewer, open_in_browser};
+use closecall_report::run::rerun::{RerunVersion, VersionError};
 
 use super::CliError;
-use super::help::{examples, heading};
 use super::output::{outln, print_error};
 use super::results::last_results;
+use super::help::{examples, heading};
+use super::viewer::{INSTALL, Viewer, ViewerError};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall view`.
@@ -17,46 +28,184 @@ use crate::exit_code::ExitCode;
 #[command(after_help = examples([
     "closecall view",
     "closecall view pair.rrd",
-    "closecall view closecall-results --no-open --port 8080",
+    "closecall view closecall-results --no-open",
 ]))]
 pub(super) struct ViewArgs {
     /// Recording (.rrd), a folder that has some, or the folder of a campaign [default: the report and the recordings of the last
     /// campaign, in closecall-results]
     path: Option<PathBuf>,
-    /// Port on 127.0.0.1; 0 for a free one
-    #[arg(long, default_value_t = 0, help_heading = heading::VIEWER)]
-    port: u16,
-    /// Only print the address, and the path of the report
+    /// Use the web build of the viewer, in the browser, instead of its window
+    #[arg(long, help_heading = heading::VIEWER)]
+    web: bool,
+    /// Port of the viewer, which is 9876 unless stated; with --web the port of its page, which is 9090 unless stated
+    #[arg(long, help_heading = heading::VIEWER)]
+    port: Option<u16>,
+    /// Open nothing, only print the paths of the files, one per line
     #[arg(long, help_heading = heading::VIEWER)]
     no_open: bool,
-    /// Program of the Rerun viewer, which brings its web build, or a folder with that build
+    /// Program of the Rerun viewer
     #[arg(long, value_name = "PATH", env = "CLOSECALL_RERUN", hide_env_values = true, default_value = "rerun", help_heading = heading::VIEWER)]
     viewer: PathBuf,
 }
 
+/// The reason why nothing can be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// The path has no recording.
+    #[error("failed to find a recording in {path}: name a file .rrd, or a folder that has such files")]
+    Nothing {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The file has the name of a recording, but is none.
+    #[error("failed to open {path}: the file is no recording: {reason}")]
+    Foreign {
+        /// The path.
+        path: PathBuf,
+        /// What the library says of it.
+        reason: String,
+    },
+    /// The path cannot be read.
+    #[error("failed to read {path}: {source}")]
+    Read {
+        /// The path.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The viewer shows nothing.
+    #[error(transparent)]
+    Viewer(#[from] ViewerError),
+    /// The report cannot be opened in the browser.
+    #[error("failed to open {path} in the browser: {source}")]
+    Browser {
+        /// The path of the report.
+        path: PathBuf,
+        /// The reason.
+        source: opener::OpenError,
+    },
+}
+
+/// A recording, and the version of Rerun that it was written by.
+#[derive(Debug)]
+struct Recording {
+    path: PathBuf,
+    version: RerunVersion,
+}
+
 pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
-    let path = match &args.path {
-        Some(path) => path.clone(),
+    let (report, recordings) = match &args.path {
+        Some(path) => (None, recordings(path)?),
         None => {
             let results = last_results()?;
-            let report = results.file(REPORT);
-            outln!("{}", report.display());
-            if !args.no_open {
-                open_in_browser(&report.display().to_string());
-            }
-            if !results.file(RECORDINGS).is_dir() {
-                return Ok(ExitCode::Pass);
-            }
-            results.path().to_owned()
+            let recordings = match recordings(results.path()) {
+                // A campaign without a collision has recorded nothing.
+                Err(ViewError::Nothing { .. }) => Vec::new(),
+                recordings => recordings?,
+            };
+            (Some(results.file(REPORT)), recordings)
         }
     };
-    Server::check(&path)?;
-    let server = Server::new(&path, args.port, WebViewer::find(&args.viewer)?)?;
-    outln!("{}", server.address());
-    print_error(format_args!("Ctrl-C ends it\n"));
-    if !args.no_open {
-        open_in_browser(&server.address());
+    for path in report.iter().chain(recordings.iter().map(|recording| &recording.path)) {
+        outln!("{}", path.display());
     }
-    server.run();
+    if args.no_open {
+        return Ok(ExitCode::Pass);
+    }
+    // Without a browser there is still the viewer.
+    let opened = report.map_or(Ok(()), open_in_browser);
+    if !recordings.is_empty() {
+        show(args, &recordings)?;
+    }
+    opened?;
     Ok(ExitCode::Pass)
+}
+
+/// Returns the recordings of a path: the file itself, or those of a folder and of the folder of recordings in it.
+fn recordings(path: &Path) -> Result<Vec<Recording>, ViewError> {
+    let is_recording = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "rrd");
+    let read = |source| ViewError::Read { path: path.to_owned(), source };
+    let mut files = Vec::new();
+    if fs::metadata(path).map_err(read)?.is_dir() {
+        let lower = path.join(RECORDINGS);
+        for folder in [Some(path), Some(lower.as_path()).filter(|lower| lower.is_dir())].into_iter().flatten() {
+            for entry in fs::read_dir(folder).map_err(read)? {
+                files.push(entry.map_err(read)?.path());
+            }
+        }
+    } else {
+        files.push(path.to_owned());
+    }
+    files.retain(is_recording);
+    files.sort();
+    if files.is_empty() {
+        return Err(ViewError::Nothing { path: path.to_owned() });
+    }
+    let with_version = |path: PathBuf| match RerunVersion::of_recording(&path) {
+        Ok(version) => Ok(Recording { path, version }),
+        Err(VersionError::Read(source)) => Err(ViewError::Read { path, source }),
+        Err(VersionError::Foreign { reason }) => Err(ViewError::Foreign { path, reason }),
+    };
+    files.into_iter().map(with_version).collect()
+}
+
+/// Opens the report. The browser is not waited for.
+fn open_in_browser(report: PathBuf) -> Result<(), ViewError> {
+    let opened = std::path::absolute(&report).map_err(opener::OpenError::Io).and_then(opener::open_browser);
+    opened.map_err(|source| ViewError::Browser { path: report, source })
+}
+
+/// Shows recordings in the viewer, and waits for its end.
+fn show(args: &ViewArgs, recordings: &[Recording]) -> Result<(), ViewError> {
+    let viewer = Viewer::find(&args.viewer)?;
+    if let Some(warning) = mismatch(&viewer, recordings) {
+        print_error(format_args!("warning: {warning}\n"));
+    }
+    let files: Vec<&Path> = recordings.iter().map(|recording| recording.path.as_path()).collect();
+    Ok(viewer.show(&files, args.web, args.port)?)
+}
+
+/// Returns what is to be said if the viewer is not made for all recordings.
+fn mismatch(viewer: &Viewer, recordings: &[Recording]) -> Option<String> {
+    let program = viewer.program.display();
+    let Some(version) = viewer.version else {
+        return Some(format!("`{program} --version` names no version; {INSTALL} installs the Rerun viewer"));
+    };
+    let other = recordings.iter().find(|recording| !recording.version.fits(version))?;
+    Some(format!(
+        "the viewer {program} is version {version}, and {} was written by version {}: `pip install rerun-sdk=={1}` installs the \
+         viewer for it",
+        other.path.display(),
+        other.version
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first bytes of a recording of Rerun 0.36.3.
+    const START: &[u8] = b"RRF2\0\x24\x03\0\x01\x02\0\0";
+
+    #[test]
+    fn a_folder_without_recordings_is_refused_and_one_with_them_lists_both_levels() {
+        let folder = tempfile::tempdir().unwrap();
+        let listed = |path: &Path| -> Vec<PathBuf> {
+            let recordings = recordings(path).unwrap().into_iter();
+            recordings.map(|one| one.path.strip_prefix(folder.path()).unwrap().to_owned()).collect()
+        };
+        assert!(matches!(recordings(folder.path()), Err(ViewError::Nothing { .. })));
+        fs::create_dir(folder.path().join(RECORDINGS)).unwrap();
+        assert!(matches!(recordings(folder.path()), Err(ViewError::Nothing { .. })));
+        for name in ["b.rrd", "recordings/a.rrd", "notes.txt"] {
+            fs::write(folder.path().join(name), START).unwrap();
+        }
+        assert_eq!(listed(folder.path()), [Path::new("b.rrd"), Path::new("recordings/a.rrd")]);
+        assert_eq!(listed(&folder.path().join("b.rrd")), [Path::new("b.rrd")]);
+        assert!(matches!(recordings(&folder.path().join("notes.txt")), Err(ViewError::Nothing { .. })));
+        assert!(matches!(recordings(&folder.path().join("none.rrd")), Err(ViewError::Read { .. })));
+        fs::write(folder.path().join("b.rrd"), "RRF2").unwrap();
+        assert!(matches!(recordings(&folder.path().join("b.rrd")), Err(ViewError::Foreign { .. })));
+        assert!(matches!(recordings(folder.path()), Err(ViewError::Foreign { .. })));
+    }
 }

@@ -1,14 +1,12 @@
-//! Recordings are read by programs and shown in the browser as `docs/how-to/looking.md` says.
+//! Recordings are read by programs as `docs/how-to/looking.md` says.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::path::Path;
+use std::process::Command;
 
 use closecall_testing::{python_with_rerun, viewer};
 use serde_json::Value;
 
-use crate::support::{ROOT, closecall, code, folder, library, message, program, stderr, stdout};
+use crate::support::{ROOT, closecall, folder, library, stdout};
 
 /// Writes a recording of the method's reference point, and returns the outcomes of the pair.
 fn record_pair(file: &Path) -> Value {
@@ -101,94 +99,4 @@ fn the_table_of_the_page_names_what_a_recording_holds() {
         }
     }
     assert!(count > 15, "{count} columns");
-}
-
-/// A running server, ended when the value is dropped.
-struct Served(Child, String);
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        drop(self.0.kill());
-        drop(self.0.wait());
-    }
-}
-
-/// Serves a path with a folder that has the web build of a viewer.
-fn serve(path: &Path, viewer: &Path) -> Served {
-    let mut child = program()
-        .args(["view", path.to_str().unwrap(), "--no-open", "--viewer", viewer.to_str().unwrap()])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-    let address = line.trim().trim_start_matches("http://").trim_end_matches('/').to_owned();
-    assert!(address.starts_with("127.0.0.1:"), "{line}");
-    Served(child, address)
-}
-
-impl Served {
-    /// Returns the head and the body of the answer to a request.
-    fn get(&self, path: &str, host: &str) -> (String, Vec<u8>) {
-        let mut stream = TcpStream::connect(&self.1).unwrap();
-        write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).unwrap();
-        let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap();
-        (String::from_utf8(answer[..end].to_vec()).unwrap(), answer[end + 4..].to_vec())
-    }
-}
-
-/// Writes files that stand for the web build of a viewer.
-fn web_build(folder: &Path) -> PathBuf {
-    let build = folder.join("web");
-    std::fs::create_dir(&build).unwrap();
-    for name in ["index.html", "re_viewer.js", "re_viewer_bg.wasm"] {
-        std::fs::write(build.join(name), name).unwrap();
-    }
-    build
-}
-
-#[test]
-fn a_recording_and_the_viewer_are_served_and_nothing_else() {
-    let folder = folder();
-    let (file, build) = (folder.path().join("pair.rrd"), web_build(folder.path()));
-    record_pair(&file);
-    std::fs::write(folder.path().join("secret.rrd"), "no").unwrap();
-    let served = serve(&file, &build);
-    let (head, _) = served.get("/", &served.1);
-    assert!(head.starts_with("HTTP/1.1 302") && head.contains("Location: /viewer/?url=http%3A//127.0.0.1"), "{head}");
-    assert_eq!(served.get("/viewer/", &served.1).1, b"index.html");
-    assert!(served.get("/viewer/re_viewer_bg.wasm", &served.1).0.contains("application/wasm"));
-    assert!(served.get("/files/pair.rrd", &served.1).1 == std::fs::read(&file).unwrap());
-    for other in ["/files/secret.rrd", "/files/../pair.rrd", "/files/%2e%2e/web/index.html", "/viewer/other", "/files/"]
-    {
-        assert!(served.get(other, &served.1).0.starts_with("HTTP/1.1 404"), "{other}");
-    }
-    assert!(served.get("/", "elsewhere.example").0.starts_with("HTTP/1.1 403"));
-}
-
-#[test]
-fn the_web_build_of_the_installed_viewer_is_served() {
-    let Some(viewer) = viewer() else { return };
-    let folder = folder();
-    let file = folder.path().join("pair.rrd");
-    record_pair(&file);
-    let served = serve(folder.path(), &viewer);
-    let page = String::from_utf8(served.get("/viewer/", &served.1).1).unwrap();
-    assert!(page.contains("re_viewer.js"), "{page}");
-    assert_eq!(served.get("/viewer/re_viewer_bg.wasm", &served.1).1[..4], *b"\0asm");
-}
-
-#[test]
-fn a_missing_viewer_and_a_missing_recording_are_named() {
-    let folder = folder();
-    let file = folder.path().join("pair.rrd");
-    let empty = closecall(["view", folder.path().to_str().unwrap(), "--no-open"]);
-    assert_eq!(code(&empty), 3, "{}", stderr(&empty));
-    assert!(message(&empty).contains("name a file .rrd"), "{}", message(&empty));
-    record_pair(&file);
-    let none = closecall(["view", file.to_str().unwrap(), "--no-open", "--viewer", "/nowhere/rerun"]);
-    assert_eq!(code(&none), 6, "{}", stderr(&none));
-    assert!(message(&none).contains("pip install rerun-sdk==0.36.3"), "{}", message(&none));
 }

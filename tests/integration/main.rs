@@ -57,6 +57,7 @@ mod statistics;
 mod support;
 mod trajectory_files;
 mod validity;
+mod view;
 mod viewer;
 mod worker_processes;
 

@@ -469,9 +469,10 @@ fn view_without_arguments_names_the_last_report_and_what_is_missing() {
     stdout(&campaign(folder.path(), &["--record", "failures:0"]), 0);
     assert_eq!(stdout(&view(&[]), 0), "closecall-results/report.html\n");
     stdout(&campaign(folder.path(), &[]), 0);
-    // The report is named although there is no viewer for the recordings.
-    let without_viewer = view(&["--viewer", "/nowhere/rerun"]);
-    assert!(stdout(&without_viewer, 6).starts_with("closecall-results/report.html\n"));
+    let files = stdout(&view(&[]), 0);
+    let (report, recordings) = files.split_once('\n').unwrap();
+    assert_eq!(report, "closecall-results/report.html");
+    assert!(!recordings.is_empty() && recordings.lines().all(|file| folder.path().join(file).is_file()), "{files}");
     fs::remove_file(folder.path().join(RESULTS).join("report.html")).unwrap();
     assert!(message(&view(&[])).contains("has not come to its end"), "{}", stderr(&view(&[])));
 }

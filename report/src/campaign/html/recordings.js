@@ -1,6 +1,3 @@
-if (location.protocol === 'http:') for (const link of document.querySelectorAll('a.in-browser')) {
-  link.href = '/viewer/?url=' + encodeURIComponent(link.href); link.hidden = false;
-}
 const form = document.querySelector('.filters'), entries = [...document.querySelectorAll('.recording')];
 const filter = () => {
   const chosen = [...new FormData(form)].filter(([, value]) => value);

@@ -54,7 +54,10 @@ fn page(entries: &[IndexEntry]) -> Markup {
             "the right, and the road is drawn wider than it is. The recordings open in the Rerun viewer 0.36:"
         }
         pre.command tabindex="0" { "pip install rerun-sdk==0.36.3" }
-        p { "Without an installed viewer window, in the browser: " code { "closecall view DIR" } ", with the campaign's folder." }
+        p {
+            "All of them: " code { "closecall view DIR" } ", with the campaign's folder. "
+            code { "closecall view --web DIR" } " opens them in the browser."
+        }
         (filters(entries))
         @for entry in entries { (section(entry)) }
         script { (PreEscaped(SCRIPT)) }
@@ -62,7 +65,7 @@ fn page(entries: &[IndexEntry]) -> Markup {
     document("Recordings", &body)
 }
 
-/// Shows the links into the web viewer if `closecall view` serves the page, filters the entries, and moves the vehicles.
+/// Filters the entries, and moves the vehicles.
 const SCRIPT: &str = include_str!("recordings.js");
 
 /// Returns the choices by which the entries can be filtered: verdict, scenario, and the arm whose ego collides.
@@ -103,7 +106,6 @@ fn section(entry: &IndexEntry) -> Markup {
                 (numbers(&entry.outcomes))
                 p { "Open it, from this page's folder:" }
                 pre.command tabindex="0" { "rerun " (entry.file) }
-                a.in-browser hidden href=(entry.file) { "Open in this browser" }
                 p { "Run it again, from this page's folder:" }
                 pre.command tabindex="0" { (entry.replay) }
             }
