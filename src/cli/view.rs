@@ -17,9 +17,9 @@ use closecall_campaign::folder::{RECORDINGS, REPORT};
 use closecall_report::run::rerun::{RerunVersion, VersionError};
 
 use super::CliError;
+use super::help::{examples, heading};
 use super::output::{outln, print_error};
 use super::results::last_results;
-use super::help::{examples, heading};
 use super::viewer::{INSTALL, Viewer, ViewerError};
 use crate::exit_code::ExitCode;
 
