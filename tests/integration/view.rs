@@ -5,7 +5,8 @@ use std::io::{BufRead, BufReader};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::thread::sleep;
+use std::sync::mpsc::channel;
+use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant};
 
 use closecall_testing::viewer;
@@ -289,15 +290,18 @@ fn the_installed_viewer_shows_a_recording_in_the_browser() {
         .process_group(0)
         .spawn()
         .unwrap();
-    // The lines end when the viewer ends. It loads the file and serves its page at the same time.
-    let mut lines = BufReader::new(view.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let lines = BufReader::new(view.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let (sender, receiver) = channel();
+    spawn(move || lines.map(|line| sender.send(line)).all(|sent| sent.is_ok()));
+    // The viewer loads the file and serves its page at the same time.
+    let mut missing = vec!["Hosting a web-viewer at http://127.0.0.1:", "/a run.rrd\""];
     let mut said = Vec::new();
-    let mut missing = vec!["Hosting a web-viewer at http://127.0.0.1:", "Loading \"a run.rrd\""];
-    let _ = lines.any(|line| {
+    while !missing.is_empty()
+        && let Ok(line) = receiver.recv_timeout(DEADLINE)
+    {
         missing.retain(|part| !line.contains(part));
         said.push(line);
-        missing.is_empty()
-    });
+    }
     kill_process_group(Pid::from_child(&view), Signal::KILL).unwrap();
     view.wait().unwrap();
     assert!(missing.is_empty(), "{missing:?}: {said:?}");
