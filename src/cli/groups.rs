@@ -17,7 +17,6 @@ use crate::exit_code::ExitCode;
     "closecall traffic fit traffic.csv -o fitted.toml",
     "closecall traffic reenact traffic.csv --record beside.rrd",
 ]))]
-#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 pub(super) enum Traffic {
     /// Report the flaws of a trajectory file: gaps, jumps, overlaps, and rows that cannot be used
     Inspect(inspect::InspectArgs),
@@ -52,7 +51,6 @@ pub(super) enum Traffic {
     "closecall study sensitivity low-thw-overtake --out study",
     "closecall study exposure --counted 20/5000 --campaign closecall-results",
 ]))]
-#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 pub(super) enum Study {
     /// Find the assumption that moves the result of a scenario most
     Sensitivity(study::SensitivityArgs),
@@ -73,6 +71,7 @@ pub(super) enum Study {
     "closecall tool render -n 100 -o images",
     "closecall tool merge part-1 part-2 --out merged",
 ]))]
+#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 pub(super) enum Tool {
     /// Print the JSON Schema of scenario files
     #[command(after_help = examples([
