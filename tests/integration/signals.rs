@@ -119,7 +119,7 @@ fn a_controller_that_leaves_its_process_group_ends_with_its_sample() {
 fn an_interrupted_campaign_is_resumed_by_the_printed_command_to_the_same_bytes() {
     let folder = folder();
     let (whole, out) = (folder.path().join("whole"), folder.path().join("in two parts"));
-    let more = ["--seed", "5", "--jobs", "2", "--paired"];
+    let more = ["--seed", "5", "--jobs", "2", "--paired", "--sensors", "object"];
     let same = args(&whole, None, 1_500, &more);
     let whole_output = closecall(&same);
     let output = interrupted(start(program().args(args(&out, None, 1_500, &more))), &out, Signal::INT);

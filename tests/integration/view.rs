@@ -54,7 +54,10 @@ impl Place {
     /// Returns `closecall view`, ready to run with the stand-ins.
     fn view(&self, args: &[&str]) -> Command {
         let mut view = program();
+        // The machine's own xdg-open may ask its table of programs before $BROWSER.
+        let path = format!("{}:{}", stand_in("desktop").display(), std::env::var("PATH").unwrap_or_default());
         view.current_dir(self.working.path())
+            .env("PATH", path)
             .env("WRITTEN", self.written.path())
             .env("BROWSER", stand_in("browser"))
             .env("CLOSECALL_RERUN", stand_in("rerun"))

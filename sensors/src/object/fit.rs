@@ -285,7 +285,7 @@ mod tests {
     #[test]
     fn the_fit_that_ships_is_read_and_names_its_origin() {
         let fit = RearFit::shipped().unwrap();
-        assert!(fit.origin.command.contains("fit_object_sensors") && !fit.origin.version.is_empty());
+        assert!(fit.origin.command.contains("fit-object-sensors") && !fit.origin.version.is_empty());
         assert_eq!(RearFit::parse(&toml::to_string(fit).unwrap()).as_ref(), Ok(fit));
     }
 

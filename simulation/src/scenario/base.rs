@@ -85,13 +85,12 @@ mod tests {
 
     #[test]
     fn a_file_with_a_base_has_its_keys_but_for_its_own() {
-        let text =
-            "base = \"low-thw-overtake\"\nname = \"own\"\nsensors.mode = \"full\"\n[[fault.rear-lidar]]\ndead = true\n";
+        let text = "base = \"low-thw-overtake\"\nname = \"own\"\nsensors.mode = \"object\"\n[[fault.rear-object]]\ndead = true\n";
         let own = parse(text).unwrap();
         let base = parse(super::library::text("low-thw-overtake").unwrap()).unwrap();
         assert_eq!(own.config().name, "own");
         assert_eq!(own.config().actors, base.config().actors);
-        assert_eq!(own.config().fault.rear_lidar.len(), 1);
+        assert_eq!(own.config().fault.rear_object.len(), 1);
         assert_ne!(own.config().sensors.mode, base.config().sensors.mode);
         assert_eq!(own.config().sensors.tracker, base.config().sensors.tracker);
     }

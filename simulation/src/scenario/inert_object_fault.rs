@@ -82,7 +82,8 @@ mod tests {
 
     /// Returns what the check says of the shipped scenario with these keys added.
     fn check(keys: &str) -> Result<(), String> {
-        let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{keys}");
+        let mode = if keys.contains("sensors.mode") { "" } else { "sensors.mode = \"object\"\n" };
+        let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{mode}{keys}");
         let file = ScenarioFile::parse(&library::path("own"), &text, &[]).map_err(|error| error.to_string())?;
         file.concrete(&file.space().nominal()).map(|_| ()).map_err(|error| error.to_string())
     }

@@ -198,7 +198,8 @@ mod tests {
     use crate::scenario::{Scenario, ScenarioFile, source};
 
     fn with(settings: &[&str]) -> Scenario {
-        let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
+        let object = ["sensors.mode=\"object\""];
+        let settings: Vec<_> = object.iter().chain(settings).map(|text| text.parse().unwrap()).collect();
         let file: ScenarioFile = source::load(Path::new("low-thw-overtake"), &settings).unwrap();
         file.check().unwrap();
         file.concrete(&file.space().nominal()).unwrap()

@@ -4,7 +4,7 @@ use super::*;
 
 fn object(sensor: &str, fault: &str, others: Vec<SceneVehicle>) -> Vec<Step> {
     let text = format!("[[{sensor}]]\n{fault}\n");
-    Drive { sensors: "", faults: &text, others, ..Drive::default() }.run()
+    Drive { sensors: "mode = \"object\"", faults: &text, others, ..Drive::default() }.run()
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn a_latency_that_starts_and_ends_moves_no_track_beyond_its_motion() {
 fn a_ghost_goes_on_while_another_fault_begins() {
     let faults = "[[rear-object]]\nghost-gap-m = 50.0\nghost-closing-mps = 10.0\nfrom-s = 1.0\n\
                   [[rear-object]]\ndelay-s = 0.2\nfrom-s = 2.0\n";
-    let steps = Drive { sensors: "", faults, others: vec![], ..Drive::default() }.run();
+    let steps = Drive { sensors: "mode = \"object\"", faults, others: vec![], ..Drive::default() }.run();
     let [first, last] = [25, 75].map(|step| steps[step].rear().unwrap().x_m());
     assert!((last - first - 10.0 * 50.0 * PERIOD_S).abs() < 1e-9, "{first} {last}");
 }

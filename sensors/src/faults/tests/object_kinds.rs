@@ -38,7 +38,7 @@ impl Kind {
     /// Returns the steps of a drive with this fault.
     fn drive(&self, fault: &str, car: SceneVehicle, steps: i64) -> Vec<Step> {
         let text = format!("[[{}]]\n{fault}\n", self.key);
-        Drive { sensors: "", faults: &text, others: vec![car], steps, ..Drive::default() }.run()
+        Drive { sensors: "mode = \"object\"", faults: &text, others: vec![car], steps, ..Drive::default() }.run()
     }
 
     /// Returns the confirmed track of this sensor in each step.
@@ -86,7 +86,13 @@ fn a_lost_frame_loses_all_vehicles_at_once_and_dropout_each_for_itself() {
     let coasting = |fault: &str| {
         let text = format!("[[rear-object]]\n{fault}\n");
         let other = SceneVehicle { actor: 2, ..behind(40.0, LEFT_LANE_M, 30.0) };
-        let steps = Drive { sensors: "", faults: &text, others: vec![kind.steady(), other], ..Drive::default() }.run();
+        let steps = Drive {
+            sensors: "mode = \"object\"",
+            faults: &text,
+            others: vec![kind.steady(), other],
+            ..Drive::default()
+        }
+        .run();
         let counts = steps.iter().skip(20).map(|step| {
             let of_rear = step.tracks.iter().filter(|track| track.source == Source::Rear);
             of_rear.filter(|track| track.status == TrackStatus::Coasting).count()
@@ -241,7 +247,8 @@ fn added_noise_scatters_what_it_names_and_nothing_else() {
 fn a_ghost_is_ahead_of_the_ego_for_the_front_radar_and_behind_it_for_the_others() {
     for kind in &KINDS {
         let text = format!("[[{}]]\nghost-gap-m = 20.0\nghost-closing-mps = 2.0\nfrom-s = 1.0\n", kind.key);
-        let steps = Drive { sensors: "", faults: &text, others: vec![], steps: 60, ..Drive::default() }.run();
+        let steps =
+            Drive { sensors: "mode = \"object\"", faults: &text, others: vec![], steps: 60, ..Drive::default() }.run();
         assert!(steps[24].tracks.is_empty(), "{}", kind.key);
         let [first, last] = [25, 50].map(|step| steps[step].tracks[0].clone());
         let sign = if kind.looks_ahead() { 1.0 } else { -1.0 };

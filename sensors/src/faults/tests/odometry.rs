@@ -75,7 +75,7 @@ fn errors_of_odometry_and_map_hold_from_their_start_to_their_end() {
         let run = |errors: &str| {
             let faults = format!("[odometry]\n{errors}\n");
             let others = vec![behind(50.0, OWN_LANE_M, 30.0)];
-            let steps = Drive { sensors: "", faults: &faults, others, ..Drive::default() }.run();
+            let steps = Drive { sensors: "mode = \"object\"", faults: &faults, others, ..Drive::default() }.run();
             steps.into_iter().map(|step| step.tracks).collect::<Vec<_>>()
         };
         let (usual, wrong) = (run(""), run(&format!("{errors}\nfrom-s = 1.0\nuntil-s = 1.4")));
@@ -91,7 +91,7 @@ fn errors_of_odometry_and_map_hold_from_their_start_to_their_end() {
 fn a_speed_that_was_wrong_for_a_while_leaves_no_jump_behind() {
     let faults = "[odometry]\nspeed-scale = 0.1\nfrom-s = 1.0\nuntil-s = 3.0";
     let others = vec![behind(50.0, OWN_LANE_M, 30.0)];
-    let steps = Drive { sensors: "", faults, others, ..Drive::default() }.run();
+    let steps = Drive { sensors: "mode = \"object\"", faults, others, ..Drive::default() }.run();
     // The ego believes to have driven 6 m too far.
     assert!((steps[70].rear().unwrap().vx_mps() - 33.0).abs() < 0.3, "{}", steps[70].rear().unwrap().vx_mps());
     for (step, pair) in steps.windows(2).enumerate().skip(30) {
