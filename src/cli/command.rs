@@ -156,7 +156,10 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
             return if error.print().is_ok() { code } else { ExitCode::Io };
         }
     };
-    adopt_orphans();
+    // The browser that `view` opens outlives it.
+    if !matches!(cli.command, Command::View(_)) {
+        adopt_orphans();
+    }
     watch(announce, |signal| std::process::exit(ExitCode::from(signal) as i32));
     choose_backend(cli.onnxruntime.as_deref());
     let result = dispatch(cli.command);
