@@ -16,7 +16,6 @@
 //!
 //! The layout contains only views that have something to show.
 
-pub(super) mod archetypes;
 mod nodes;
 
 use closecall_traffic::Time;
@@ -25,13 +24,13 @@ use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::components::Range1D;
 use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 
-use self::archetypes::{
-    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
-    VisualBounds2D,
-};
 use self::nodes::{Node, View, below, beside, tabs};
 use super::RecordingError;
 use super::palette;
+use super::parts::{
+    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
+    VisualBounds2D,
+};
 use super::plots::Plot;
 use super::recording::Recording;
 use super::stream::OPENING_TIMELINE;

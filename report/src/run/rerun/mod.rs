@@ -9,7 +9,7 @@
 //! own, in which the vehicles of the other film appear as outlines.
 //!
 //! This folder is the only one that uses the rerun library: its public interface, and parts of it in
-//! `blueprint/archetypes.rs` and `version.rs` alone.
+//! `parts.rs` alone.
 
 mod bird;
 mod blueprint;
@@ -20,6 +20,7 @@ mod fog;
 mod ghosts;
 mod log;
 mod palette;
+mod parts;
 mod perceived;
 mod plots;
 mod points;

@@ -55,13 +55,13 @@ fn write_lidar(writer: &Writer<'_>, root: &str, kept: Vec<(Time, &Scan)>) -> Res
     let (times, scans): (Vec<Time>, Vec<&Scan>) = kept.into_iter().unzip();
     let is_clustered = |scan: &Scan, point: usize| scan.clusters[point] != NO_CLUSTER;
     let shade = |scan: &Scan, point: usize| palette::intensity(scan.shade(point));
-    let clusters =
-        layer(&scans, |scan, point| is_clustered(scan, point).then(|| palette::cluster(scan.clusters[point])));
-    write_layer(writer, &format!("{root}/clusters"), &times, &clusters, true)?;
-    let intensity = layer(&scans, |scan, point| is_clustered(scan, point).then(|| shade(scan, point)));
-    write_layer(writer, &format!("{root}/intensity"), &times, &intensity, false)?;
-    let rejected = layer(&scans, |scan, point| (!is_clustered(scan, point)).then(|| shade(scan, point)));
-    write_layer(writer, &format!("{root}/rejected"), &times, &rejected, true)?;
+    let write = |name: &str, layer: Layer, is_measured| {
+        write_layer(writer, &format!("{root}/{name}"), &times, &layer, is_measured)
+    };
+    let of_cluster = |scan: &Scan, point: usize| palette::cluster(scan.clusters[point]);
+    write("clusters", layer(&scans, |scan, point| is_clustered(scan, point).then(|| of_cluster(scan, point))), true)?;
+    write("intensity", layer(&scans, |scan, point| is_clustered(scan, point).then(|| shade(scan, point))), false)?;
+    write("rejected", layer(&scans, |scan, point| (!is_clustered(scan, point)).then(|| shade(scan, point))), true)?;
     write_boxes(writer, &format!("{root}/boxes"), &times, &scans)?;
     Ok(["intensity", "rejected", "boxes"].map(|layer| format!("{root}/{layer}")).to_vec())
 }

@@ -8,7 +8,9 @@
 //! therefore precede the others, whenever they are logged.
 //!
 //! The library's own sink for files writes on a thread, and reports an error of the disk as a line of its log at most.
-//! Here the library encodes into memory, and the caller writes the bytes.
+//! Here the messages stay in memory until the recording is complete. They are then encoded into the file one by one.
+
+use std::io::Write;
 
 use rerun::log::ChunkBatcherConfig;
 use rerun::sink::MemorySinkStorage;
@@ -18,7 +20,7 @@ use rerun::{
 };
 
 use super::RecordingError;
-use super::blueprint::archetypes::BlueprintActivationCommand;
+use super::parts::{BlueprintActivationCommand, EncodeError, Encoder, EncodingOptions};
 
 /// Number of digits of the hash that names a recording.
 const NAME_DIGITS: usize = 32;
@@ -97,14 +99,22 @@ impl Recording {
         Ok(())
     }
 
-    /// Returns the bytes of the file.
-    pub(super) fn encode(self) -> Result<Vec<u8>, RecordingError> {
-        let streams = [&self.layout, &self.fixed, &self.moving];
-        for stream in streams {
-            stream.stream.flush_blocking().map_err(RecordingError::encode)?;
+    /// Waits until the streams have passed on all rows.
+    pub(super) fn complete(&self) -> Result<(), RecordingError> {
+        let mut streams = [&self.layout, &self.fixed, &self.moving].into_iter();
+        streams.try_for_each(|stream| stream.stream.flush_blocking()).map_err(RecordingError::encode)
+    }
+
+    /// Writes the [complete](Self::complete) recording into `file`. Each message is dropped once it is written.
+    pub(super) fn encode(self, file: impl Write) -> Result<(), EncodeError> {
+        let version = rerun::build_info().version;
+        let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, file)?;
+        for stream in [&self.layout, &self.fixed, &self.moving] {
+            for message in stream.storage.take() {
+                encoder.append(&message)?;
+            }
         }
-        MemorySinkStorage::concat_memory_sinks_as_bytes(&streams.map(|stream| &stream.storage))
-            .map_err(RecordingError::encode)
+        encoder.finish()
     }
 }
 

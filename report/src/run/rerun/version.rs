@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use rerun::external::re_log_encoding::{Decodable, StreamHeader};
+use super::parts::{Decodable, StreamHeader};
 
 /// A version of Rerun.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

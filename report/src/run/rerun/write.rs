@@ -6,6 +6,7 @@ use closecall_traffic::Time;
 use rerun::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 
 use super::blueprint::{self, FilmContents};
+use super::parts::EncodeError;
 use super::plots::Role;
 use super::recording::{self, Recording};
 use super::stream::Writer;
@@ -14,7 +15,7 @@ use super::{
     vehicles,
 };
 use crate::run::film::{Film, Level};
-use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
+use closecall_scenarios::atomic::{WriteError, check_writable, write_atomically};
 
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
@@ -79,8 +80,11 @@ pub(crate) fn write_recording_of(path: &Path, films: Vec<Film>) -> Result<(), Re
 }
 
 fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
-    let bytes = recording.encode()?;
-    Ok(write_file(path, |file| file.write_all(&bytes))?)
+    recording.complete()?;
+    write_atomically(path, |file| recording.encode(file)).map_err(|error| match error {
+        EncodeError::Write(source) => WriteError::new(path, source).into(),
+        other => RecordingError::encode(other),
+    })
 }
 
 /// Writes films like [`write_recording_unchecked`], after [`check_recording_possible`].

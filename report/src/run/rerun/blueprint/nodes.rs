@@ -9,7 +9,7 @@ use rerun::{AsComponents, EntityPath, TimeColumn};
 
 use super::super::RecordingError;
 use super::super::recording::Recording;
-use super::archetypes::{
+use super::super::parts::{
     ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
 

@@ -256,7 +256,11 @@ fn all_timelines_span_the_run_and_the_opening_one_begins_with_the_critical_momen
 
 /// Returns the bytes of the recording of the films.
 fn encoded(films: &[Film]) -> Vec<u8> {
-    record(films).unwrap().encode().unwrap()
+    let recording = record(films).unwrap();
+    recording.complete().unwrap();
+    let mut bytes = Vec::new();
+    recording.encode(&mut bytes).unwrap();
+    bytes
 }
 
 #[test]
@@ -291,7 +295,7 @@ fn what_holds_for_the_whole_run_precedes_what_changes() {
 fn the_threads_of_recordings_end() {
     const RECORDINGS: usize = 200;
     for _ in 0..RECORDINGS {
-        Recording::new("closecall-test", "empty").unwrap().encode().unwrap();
+        Recording::new("closecall-test", "empty").unwrap().encode(std::io::sink()).unwrap();
     }
     // A stream has two threads. Other tests run beside this one.
     let threads = std::fs::read_dir("/proc/self/task").unwrap().count();
