@@ -11,8 +11,8 @@
 use std::fmt::{self, Write as _};
 use std::path::Path;
 
-use closecall_camera::Image;
-use closecall_datasets::Set;
+use closecall_sensors::camera::Image;
+use closecall_sensors::datasets::Set;
 use closecall_scenarios::atomic::write_file;
 use closecall_traffic::{ActorId, VehicleClass, stream};
 use rayon::prelude::*;

@@ -4,7 +4,7 @@
 //! network returns eight numbers for each cell of 8 px: the logits that a car or a truck has its centre there, the offset of the
 //! centre, the logarithms of its sizes, and sine and cosine of twice its angle.
 
-use closecall_camera::{Backend, CHANNELS, Image, Network};
+use closecall_sensors::camera::{Backend, CHANNELS, Image, Network};
 use closecall_traffic::{VehicleClass, maths};
 
 use crate::error::AerialError;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use closecall_camera::ClassifierError;
+use closecall_sensors::camera::ClassifierError;
 use closecall_scenarios::atomic::WriteError;
 
 /// The reason why the aerial acquisition fails.

@@ -1,6 +1,6 @@
 //! A flight over traffic: pictures of each instant, detections, and trajectory data from them.
 
-use closecall_camera::Backend;
+use closecall_sensors::camera::Backend;
 use closecall_scenarios::filters::{PERIOD, smooth};
 use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::trajectory_data::TrajectoryData;

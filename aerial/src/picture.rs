@@ -1,6 +1,6 @@
 //! The picture that an aerial camera takes of vehicles on a road, with labels.
 
-use closecall_camera::{BodyTriangle, CHANNELS, Image, body_triangles};
+use closecall_sensors::camera::{BodyTriangle, CHANNELS, Image, body_triangles};
 use closecall_traffic::{Vehicle, maths};
 
 use crate::camera::{AerialCamera, Vec3};

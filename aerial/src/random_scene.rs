@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use closecall_camera::HELD_OUT_SHAPES;
-use closecall_datasets::Set;
+use closecall_sensors::camera::HELD_OUT_SHAPES;
+use closecall_sensors::datasets::Set;
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{BodyShape, Dimensions, Stream, Vehicle, VehicleClass};
 use rand::RngExt;

@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use closecall_camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
+use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;

@@ -2,7 +2,7 @@
 //!
 //! The usual condition has the light, the weather and the road of the scenario whose sensors are studied.
 
-use closecall_camera::Sun;
+use closecall_sensors::camera::Sun;
 use closecall_sensors::faults::Faults;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, library};

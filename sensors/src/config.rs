@@ -1,6 +1,6 @@
 //! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor model.
 
-use closecall_tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
+use crate::tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
 use closecall_traffic::{Check, Choice, ConfigError, Parameters, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use crate::{
     Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
     ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, SensorError, TrackerConfig,
 };
-use closecall_camera::{Camera, CameraConfig, Pipeline, Sun};
+use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).
 const MIN_LIDAR_HEIGHT_M: f64 = 0.1;

@@ -6,7 +6,7 @@
 //! vehicle's *front* may remain unseen. The tracker takes a vehicle that the ego closes on for one that has to react, and expects a
 //! change of its motion sooner than that of a vehicle ahead.
 
-use closecall_tracking::{TrackList, TrackerModel};
+use crate::tracking::{TrackList, TrackerModel};
 use closecall_traffic::Source;
 use closecall_traffic::ego_frame::EgoFrame;
 

@@ -2,7 +2,7 @@
 //!
 //! The ego's own motion is known without error, unless the scenario gives it one ([`crate::faults`]).
 
-use closecall_tracking::{TrackList, TrackerModel};
+use crate::tracking::{TrackList, TrackerModel};
 use closecall_traffic::Track;
 
 use crate::faults::{Belief, Faults};

@@ -13,7 +13,7 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use closecall_camera::{Camera, CameraFault, ExposureKey, WholeImageDetector, fuse};
+use crate::camera::{Camera, CameraFault, ExposureKey, WholeImageDetector, fuse};
 use closecall_traffic::{Stream, Time};
 
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
@@ -131,7 +131,7 @@ impl ImageDetector {
     ) -> Result<(), SensorError> {
         let held = self.held.as_ref().map(|held| (held.scene(), held.key));
         let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
-        let failed = |error: closecall_camera::ClassifierError| SensorError::Classifier { reason: error.to_string() };
+        let failed = |error: crate::camera::ClassifierError| SensorError::Classifier { reason: error.to_string() };
         let (result, instances) = NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
                 *slot = Some((self.camera, WholeImageDetector::new(self.camera, inference_backend()).map_err(failed)?));

@@ -6,8 +6,8 @@
 //!   boxes of the detections ─┘                     └▶ camera only: a place on the road
 //! ```
 
-use closecall_camera::{FOCAL_PX, Instance, RearCamera, is_beside_road, overlap};
-use closecall_tracking::LaneGeometry;
+use crate::camera::{FOCAL_PX, Instance, RearCamera, is_beside_road, overlap};
+use crate::tracking::LaneGeometry;
 use closecall_traffic::{ClassScores, Time, maths};
 
 use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy};
@@ -137,11 +137,11 @@ fn is_hidden(index: usize, own: &[f64; 4], detections: &[Detection], bounds: &[O
 /// side between them is seen.
 fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detection: &Detection) -> Option<f64> {
     let [left, _, right, _] = instance.mask.extent_px()?;
-    if left < 1.0 || right > f64::from(closecall_camera::WIDTH_PX) - 1.0 {
+    if left < 1.0 || right > f64::from(crate::camera::WIDTH_PX) - 1.0 {
         return None;
     }
     let depth_m = camera.depth_m(ego, detection.face_x_m)?;
-    let middle = 0.5 * f64::from(closecall_camera::WIDTH_PX);
+    let middle = 0.5 * f64::from(crate::camera::WIDTH_PX);
     // Rays to the right of the middle of the image have positive slopes, to the ego's left.
     let [low, high] = [left, right].map(|edge| (edge - middle) / FOCAL_PX);
     let at = |slope: f64, is_inner: bool| slope * if is_inner { depth_m + detection.length_m } else { depth_m };
@@ -152,7 +152,7 @@ fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detecti
 /// Returns the detection of an instance that the camera alone sees: where the lowest row of its mask meets a flat road.
 fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &LaneGeometry) -> Option<Detection> {
     let [left, _, right, bottom] = instance.mask.extent_px()?;
-    if bottom > f64::from(closecall_camera::HEIGHT_PX) - 1.0 {
+    if bottom > f64::from(crate::camera::HEIGHT_PX) - 1.0 {
         return None;
     }
     let ([x_m, y_m], below) = camera.on_ground(&scene.ego, [0.5 * (left + right), bottom])?;

@@ -9,7 +9,9 @@
 
 mod alterations;
 mod audit;
+pub mod camera;
 mod config;
+pub mod datasets;
 pub mod faults;
 mod front_lidar;
 mod full;
@@ -26,11 +28,12 @@ mod surroundings;
 mod testing;
 #[cfg(test)]
 mod tests;
+pub mod tracking;
 mod worker_classifier;
 
 pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
-pub use closecall_tracking::{Detection, Extent, SeenBy, TrackerConfig, TrackerModel};
+pub use crate::tracking::{Detection, Extent, SeenBy, TrackerConfig, TrackerModel};
 pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception, MAX_ADDITIONAL_LIDARS};

@@ -16,7 +16,7 @@
 //! slow, dead or badly mounted disturbs no other one's boxes. The alternative, one cloud of all points (the concatenation of
 //! Autoware), gives denser clusters where fields of view overlap.
 
-use closecall_tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
+use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use closecall_traffic::Time;
 use closecall_traffic::ego_frame::EgoFrame;
 

@@ -1,7 +1,7 @@
 //! The interface between the sensors and the simulation loop.
 
-use closecall_camera::Instance;
-use closecall_tracking::RearView;
+use crate::camera::Instance;
+use crate::tracking::RearView;
 use closecall_traffic::{Time, Track};
 
 use crate::lidar::RearLidar;

@@ -2,7 +2,7 @@
 //!
 //! Needs the shared library of the `onnxruntime` wheel.
 
-use closecall_camera::{Backend, ExposureKey, WholeImageDetector};
+use closecall_sensors::camera::{Backend, ExposureKey, WholeImageDetector};
 use closecall_sensors::faults::{CameraFaultConfig, FaultEntries, Faults, LidarFaultConfig};
 use closecall_sensors::{
     Detection, Health, NoiseKey, Perception, Scene, SceneVehicle, SensorsConfig, set_inference_backend,
@@ -125,10 +125,10 @@ fn the_image_that_is_shown_has_what_the_detector_finds_in_the_scene() {
     let sure = found.iter().filter(|instance| instance.score > 0.9);
     let mut compared = 0;
     for instance in sure {
-        let off_px = |other: &closecall_camera::Instance| {
+        let off_px = |other: &closecall_sensors::camera::Instance| {
             instance.box_px.iter().zip(other.box_px).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
         };
-        let same = |other: &&closecall_camera::Instance| other.class == instance.class && off_px(other) < 4.0;
+        let same = |other: &&closecall_sensors::camera::Instance| other.class == instance.class && off_px(other) < 4.0;
         assert!(shown.instances.iter().any(|other| same(&other)), "{instance:?} is not among {:?}", shown.instances);
         compared += 1;
     }

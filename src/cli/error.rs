@@ -1,7 +1,7 @@
 //! The errors of the commands, and the exit code of each.
 
 use closecall_aerial::AerialError;
-use closecall_camera::ClassifierError;
+use closecall_sensors::camera::ClassifierError;
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
@@ -13,7 +13,7 @@ use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_causes::CausesError;
-use closecall_datasets::DatasetError;
+use closecall_sensors::datasets::DatasetError;
 use closecall_perception::StudyError;
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_camera::Pipeline;
+use closecall_sensors::camera::Pipeline;
 use closecall_campaign::arguments::count;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};

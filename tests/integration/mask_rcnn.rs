@@ -77,7 +77,7 @@ fn a_network_with_another_layout_is_refused_before_any_work() {
     let scenario = library("low-thw-overtake");
     let out = folder();
     let out = out.path().join("out");
-    let wrong = "sensors.rear-camera.mask-rcnn.model=camera/models/rear-classifier.onnx";
+    let wrong = "sensors.rear-camera.mask-rcnn.model=sensors/models/rear-classifier.onnx";
     let more = ["--onnxruntime", library_file.to_str().unwrap(), "--set", wrong];
     let text = refused(&campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
     for part in ["rear-classifier.onnx", "wanted are", "masks float [n, 1, height, width]"] {

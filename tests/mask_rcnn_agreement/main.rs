@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use closecall_camera::{Backend, CHANNELS, HEIGHT_PX, Image, Instance, InstanceDetector, Mask, Sampling, WIDTH_PX};
+use closecall_sensors::camera::{Backend, CHANNELS, HEIGHT_PX, Image, Instance, InstanceDetector, Mask, Sampling, WIDTH_PX};
 use serde_json::Value;
 
 /// Folder of the repository.
@@ -68,7 +68,7 @@ fn picture(rgb: &[u8], sampling: &Sampling) -> Image {
 /// Returns what Python finds in images whose bytes these files have.
 fn answers(python: &Path, files: &[PathBuf]) -> Vec<Answer> {
     let script = Path::new(ROOT).join("tests/mask_rcnn_agreement/infer.py");
-    let model = Path::new(ROOT).join("camera/models/rear-mask-rcnn.onnx");
+    let model = Path::new(ROOT).join("sensors/models/rear-mask-rcnn.onnx");
     let output = Command::new(python).arg(script).arg(model).args(files).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();

@@ -5,7 +5,7 @@
 
 use std::hint::black_box;
 
-use closecall_camera::{
+use closecall_sensors::camera::{
     Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, HEIGHT_PX, PixelRect, RearCamera, WIDTH_PX,
 };
 use closecall_sensors::{Scene, SceneVehicle};

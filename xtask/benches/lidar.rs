@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, Scanner};
 use closecall_sensors::{Detection, FullPerception, NoiseKey, Perception, Scene, SceneVehicle, Sensors, SensorsConfig};
-use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
+use closecall_sensors::tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Stream, Time, Vehicle, VehicleClass, VehicleState,
     stream,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
-use closecall_datasets::Set;
+use closecall_sensors::datasets::Set;
 
 pub(crate) fn main(arguments: Vec<String>) -> Result<(), Box<dyn std::error::Error>> {
     let [set, pictures, seed, folder] = arguments.as_slice() else {

@@ -13,8 +13,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use closecall_camera::{Backend, CHANNELS, CROP_PX, Classifier, Crop, LensConfig, Optics};
-use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset};
+use closecall_sensors::camera::{Backend, CHANNELS, CROP_PX, Classifier, Crop, LensConfig, Optics};
+use closecall_sensors::datasets::{CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset};
 use closecall_statistics::interval::clopper_pearson;
 use closecall_traffic::{Check, ClassScores, Num, Parameters};
 

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use closecall::simulation::scenario::source;
-use closecall_camera::Backend;
+use closecall_sensors::camera::Backend;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_perception::agreement::{Verdict, reason};
 use closecall_scenarios::sampling::Design;

@@ -1,7 +1,7 @@
 """Evaluates the exported network on held-out crops and writes its model card.
 
-    python xtask/training/evaluate.py --crops DIR --model camera/models/rear-classifier.onnx \\
-        --card camera/models/MODEL_CARD.md
+    python xtask/training/evaluate.py --crops DIR --model sensors/models/rear-classifier.onnx \\
+        --card sensors/models/MODEL_CARD.md
 
 The held-out crops use body shapes, bands of paint, and seeds that the training crops do not use. The exit code is 1 if
 a target of the card is missed.

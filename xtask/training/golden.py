@@ -1,6 +1,6 @@
 """Writes a few crops and the shipped network's scores for them, for the tests that compare backends.
 
-    python xtask/training/golden.py --crops DIR --model camera/models/rear-classifier.onnx --out camera/tests/onnx_golden
+    python xtask/training/golden.py --crops DIR --model sensors/models/rear-classifier.onnx --out sensors/tests/onnx_golden
 
 For each class, it selects the two least certain and the two most certain crops among the first thousand.
 """

@@ -1,7 +1,7 @@
 """Judges the exported Mask R-CNN on held-out images of `closecall tool render`, and writes its model card.
 
-    python xtask/training/mask_rcnn_evaluate.py --images DIR --empty DIR --crowded DIR --model camera/models/rear-mask-rcnn.onnx \
-                                          --card camera/models/MASK_RCNN_CARD.md
+    python xtask/training/mask_rcnn_evaluate.py --images DIR --empty DIR --crowded DIR --model sensors/models/rear-mask-rcnn.onnx \
+                                          --card sensors/models/MASK_RCNN_CARD.md
 
 Average precisions are those of `pycocotools` at an overlap of one half. A vehicle counts from 20 px of visible width on, and
 what is found narrower and matches none does not count. In a band of distances, light or weather, vehicles outside of it neither

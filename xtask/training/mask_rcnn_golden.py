@@ -1,6 +1,6 @@
 """Writes a few pictures and what the exported Mask R-CNN finds in the whole images, for the test that compares it with Rust.
 
-    python xtask/training/mask_rcnn_golden.py --images DIR --model camera/models/rear-mask-rcnn.onnx --out camera/tests/mask_rcnn_golden
+    python xtask/training/mask_rcnn_golden.py --images DIR --model sensors/models/rear-mask-rcnn.onnx --out sensors/tests/mask_rcnn_golden
 """
 
 import argparse

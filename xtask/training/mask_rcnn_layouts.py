@@ -1,6 +1,6 @@
 """Writes two small ONNX files with the inputs and outputs of other Mask R-CNNs, for the tests that load such networks.
 
-    python xtask/training/mask_rcnn_layouts.py camera/tests/mask_rcnn_layouts
+    python xtask/training/mask_rcnn_layouts.py sensors/tests/mask_rcnn_layouts
 
 Neither is trained: both find a car, a truck and a motorcycle in fixed boxes, whose scores are the values that the input has for the
 first pixel, as shares of full brightness. A test thereby sees what the network was given.

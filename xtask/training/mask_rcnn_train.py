@@ -1,6 +1,6 @@
 """Trains the Mask R-CNN of the rear camera on sampled pictures, calibrates it, and exports it to ONNX.
 
-    python xtask/training/mask_rcnn_train.py --pictures DIR [DIR …] --out camera/models/rear-mask-rcnn.onnx
+    python xtask/training/mask_rcnn_train.py --pictures DIR [DIR …] --out sensors/models/rear-mask-rcnn.onnx
 
 Pictures are mirrored, stretched, and changed in colour and brightness at random, and vehicles of other pictures are pasted into them
 (Ghiasi et al., Simple Copy-Paste, CVPR 2021), so that the network learns vehicles of other proportions, and hidden ones.

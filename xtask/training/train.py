@@ -1,6 +1,6 @@
 """Trains the rear camera's classifier, calibrates it, and exports it to ONNX.
 
-    python xtask/training/train.py --crops DIR --out camera/models/rear-classifier.onnx
+    python xtask/training/train.py --crops DIR --out sensors/models/rear-classifier.onnx
 
 The network is deliberately small, because it runs on one core for every LiDAR cluster of every scan. It has four
 convolutions and one linear layer with about 50,000 weights in total. The export folds batch normalisation and the

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use closecall_camera::Backend;
+use closecall_sensors::camera::Backend;
 use closecall_sensors::inference_backend;
 use closecall_simulation::SampleError;
 use closecall_simulation::controller::exec::{Child, ExecError};

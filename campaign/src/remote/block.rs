@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use closecall_camera::Backend;
+use closecall_sensors::camera::Backend;
 use closecall_sensors::set_inference_backend;
 use tempfile::TempDir;
 

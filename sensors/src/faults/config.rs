@@ -11,7 +11,7 @@ use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
 use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
-use closecall_camera::CameraFault;
+use crate::camera::CameraFault;
 
 /// Longest additional latency (s).
 pub(super) const MAX_DELAY_S: f64 = 0.4;

@@ -3,7 +3,7 @@
 use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
 
 use super::{LidarFault, ObjectFault, OdometryErrors};
-use closecall_camera::CameraFault;
+use crate::camera::CameraFault;
 
 /// Maximum number of entries of one sensor.
 const MAX_ENTRIES: usize = 4;

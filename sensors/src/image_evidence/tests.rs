@@ -1,7 +1,7 @@
 //! The association on instances that are made from the true boxes of vehicles.
 
-use closecall_camera::{CameraConfig, Mask, Pipeline, fuse};
-use closecall_tracking::{RearView, TrackList, Tracker, TrackerConfig, TrackerScan};
+use crate::camera::{CameraConfig, Mask, Pipeline, fuse};
+use crate::tracking::{RearView, TrackList, Tracker, TrackerConfig, TrackerScan};
 use closecall_traffic::{
     CONTROL_STEP, Check, Choice, Environment, Parameters, Road, Track, TrackStatus, VehicleClass, ego_frame::EgoFrame,
 };

@@ -12,7 +12,7 @@
 //! enough of a side is seen, the heading is refined about that direction by the closeness criterion of L-shape fitting
 //! (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape fitting for vehicle detection using laser scanners").
 
-use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
+use crate::tracking::MAX_SIDE_AZIMUTH_RAD;
 use closecall_traffic::maths;
 
 use super::edges::{Edges, edges};

@@ -10,7 +10,7 @@ use closecall_traffic::{ClassScores, VehicleClass, maths};
 use super::LaneGeometry;
 use super::boxes::BoxFit;
 use super::parts::ends_at_plate;
-use closecall_tracking::Gaussian;
+use crate::tracking::Gaussian;
 
 /// The prior and the size distribution of a class.
 struct ClassModel {

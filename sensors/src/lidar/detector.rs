@@ -9,7 +9,7 @@ use super::clustering::{ClusteredPoints, Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
 use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
-use closecall_tracking::SIDE_PROTRUSION_M;
+use crate::tracking::SIDE_PROTRUSION_M;
 
 use crate::{Detection, Extent, SeenBy, SensorError};
 

@@ -5,7 +5,7 @@
 //! that distance a low point is kept, since it can only originate from an object on the road. Its height is that of the beam's
 //! centre, and may be off by half a footprint.
 
-use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
+use crate::tracking::MAX_SIDE_AZIMUTH_RAD;
 use closecall_traffic::{Environment, Time, maths};
 
 use super::bare_road::farthest_road_return_m;

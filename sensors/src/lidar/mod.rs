@@ -49,7 +49,7 @@ mod viewpoint;
 /// Number of clusters in a scan for which memory is reserved. More need more, and no error follows.
 pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
-pub use closecall_tracking::LaneGeometry;
+pub use crate::tracking::LaneGeometry;
 pub use clustering::ClusteredPoints;
 pub(crate) use config::{FRONT_NAME, REAR_NAME, intern_name};
 pub use config::{Lidar, LidarConfig};

@@ -1,6 +1,6 @@
 //! The health of several LiDARs together.
 
-use closecall_tracking::RearView;
+use crate::tracking::RearView;
 
 use super::ChainSensor;
 use crate::Health;

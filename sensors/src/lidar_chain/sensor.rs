@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use rand::RngExt;
 
-use closecall_tracking::RearView;
+use crate::tracking::RearView;
 use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleState, maths};
 
 use super::Seen;

@@ -33,8 +33,8 @@ use super::fit::{ByClass, RearFit};
 use super::{ErrorGrids, FittedErrors};
 use crate::Alterations;
 use crate::lidar::HALF_FIELD_DEG;
-use closecall_tracking::DETECTION_PROBABILITY;
-use closecall_tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
+use crate::tracking::DETECTION_PROBABILITY;
+use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
 /// Maximum latency in control steps: 0.4 s.
 pub(super) const MAX_LATENCY_STEPS: usize = 10;

@@ -6,7 +6,7 @@ use closecall_traffic::{
 use nalgebra::{Matrix4, Vector4};
 use rand::RngExt;
 
-use closecall_tracking::TrackList;
+use crate::tracking::TrackList;
 
 use super::arrivals::Arrivals;
 use super::noise::{MeasurementErrors, NoiseKey};

@@ -6,7 +6,7 @@ use crate::faults::{Belief, Faults};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Perception, Scene, SensorError, SensorHealth};
-use closecall_tracking::TrackList;
+use crate::tracking::TrackList;
 use closecall_traffic::Track;
 
 /// Perception by object-level sensors only.

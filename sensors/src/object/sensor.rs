@@ -23,14 +23,14 @@ use crate::faults::{FaultList, ObjectFault};
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
 use crate::{Health, Scene};
-use closecall_tracking::Gaussian;
-use closecall_tracking::TrackList;
-use closecall_tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
-use closecall_tracking::lifecycle::Lifecycle;
-use closecall_tracking::motion::{
+use crate::tracking::Gaussian;
+use crate::tracking::TrackList;
+use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
+use crate::tracking::lifecycle::Lifecycle;
+use crate::tracking::motion::{
     ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
 };
-use closecall_tracking::road_filter::{
+use crate::tracking::road_filter::{
     LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame,
 };
 use closecall_traffic::ego_frame::EgoFrame;

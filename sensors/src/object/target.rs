@@ -1,7 +1,7 @@
 //! What an object-level sensor keeps for one vehicle.
 
-use closecall_tracking::axis::{AxisEstimate, AxisFilter};
-use closecall_tracking::lifecycle::Lifecycle;
+use crate::tracking::axis::{AxisEstimate, AxisFilter};
+use crate::tracking::lifecycle::Lifecycle;
 use closecall_traffic::{TrackId, TrackStatus};
 
 use super::config::MAX_LATENCY_STEPS;

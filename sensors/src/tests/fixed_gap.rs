@@ -4,7 +4,7 @@
 use rand::RngExt;
 
 use closecall_statistics::consistency::Consistency;
-use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
+use crate::tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, TrackStatus, VehicleClass, stream,

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use closecall_camera::Pipeline;
+use closecall_sensors::camera::Pipeline;
 use closecall_scenarios::parameters::ParameterSpace;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;

@@ -1,6 +1,6 @@
 //! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
 
-use closecall_camera::Pipeline;
+use closecall_sensors::camera::Pipeline;
 use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};

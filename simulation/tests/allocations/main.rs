@@ -6,7 +6,7 @@ mod counting;
 
 use std::path::Path;
 
-use closecall_camera::{Backend, Classifier, Crop};
+use closecall_sensors::camera::{Backend, Classifier, Crop};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_sensors::lidar::ClusteredPoints;

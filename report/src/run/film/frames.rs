@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use closecall_camera::Camera;
+use closecall_sensors::camera::Camera;
 use closecall_controllers::EgoCommand;
 use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle};
 use closecall_traffic::geometry::OrientedBox;

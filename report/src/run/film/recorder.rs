@@ -1,6 +1,6 @@
 //! The observer that records the film of a run.
 
-use closecall_camera::Pipeline;
+use closecall_sensors::camera::Pipeline;
 use closecall_controllers::CheckedDriver;
 use closecall_sensors::lidar::RearLidar;
 use closecall_sensors::{Detection, NoiseKey, SensorMode};

@@ -8,7 +8,7 @@
 //! The instances are those that the network found in the loop, at the moment of the exposure. An image of the Mask R-CNN is therefore
 //! one that was evaluated.
 
-use closecall_camera::{
+use closecall_sensors::camera::{
     Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
 };
 use closecall_sensors::rear_exposures;

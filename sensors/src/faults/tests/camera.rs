@@ -6,7 +6,7 @@ use super::*;
 fn score(fault: &str, environment: Environment, gaps_m: &[f64]) -> f64 {
     let text = format!("[[rear-camera]]\n{fault}\n");
     let fault = faults(&text).unwrap().rear_camera.at(Time::ZERO);
-    let camera = closecall_camera::CameraConfig::default().check(&Parameters::default()).unwrap();
+    let camera = crate::camera::CameraConfig::default().check(&Parameters::default()).unwrap();
     let mut classifier = CropClassifier::new(camera, &Backend::Tract).unwrap();
     let road = Road::straight(3);
     let ego = with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), 30.0);

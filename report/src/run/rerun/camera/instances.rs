@@ -1,6 +1,6 @@
 //! The instances that the Mask R-CNN found in an image: boxes with class and score, and masks.
 
-use closecall_camera::{Instance, MASK_THRESHOLD, PixelRect};
+use closecall_sensors::camera::{Instance, MASK_THRESHOLD, PixelRect};
 use closecall_traffic::{Time, VehicleClass};
 
 use super::{ENTITY, PIXEL_ROWS, PIXEL_STEP, class_colour, fixed_marks, in_picture};

@@ -1,6 +1,6 @@
 //! The windows of the image that the crop classifier evaluates, with the class that it finds in each.
 
-use closecall_camera::{PixelRect, RearCamera};
+use closecall_sensors::camera::{PixelRect, RearCamera};
 use closecall_sensors::Detection;
 
 use super::{class_colour, in_picture};

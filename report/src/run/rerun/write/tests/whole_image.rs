@@ -3,7 +3,7 @@
 //! The instances are given: what the network finds is tested in `sensors/tests/mask_rcnn.rs`.
 
 use arrow::array::{Array, BinaryArray, FixedSizeListArray, Float32Array, ListArray, UInt8Array};
-use closecall_camera::{Instance, Mask, Pipeline};
+use closecall_sensors::camera::{Instance, Mask, Pipeline};
 use closecall_sensors::RearImage;
 use closecall_traffic::VehicleClass;
 

@@ -1,0 +1,270 @@
+//! The pinhole projection: from points in space to pixels and back.
+//!
+//! ```text
+//!   ground frame G                          image
+//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px = 60°
+//!   x along the ego's heading, y left, z up   │
+//!                                             ▼ v, 800 px
+//!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
+//! ```
+//!
+//! The camera axes follow the convention of computer vision: x right, y down, z along the optical axis (the *depth*).
+//! Pixels are square. Unless the lens is configured otherwise ([`Optics`]), it has no distortion.
+
+use closecall_traffic::{Scene, SceneVehicle, maths};
+
+use super::Camera;
+use super::optics::Optics;
+
+/// Width of the image (px).
+pub const WIDTH_PX: u16 = 1280;
+/// Height of the image (px).
+pub const HEIGHT_PX: u16 = 800;
+/// Horizontal field of view (rad): 60°.
+const FIELD_OF_VIEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
+/// Focal length (px): half of the width over the tangent of half of the field of view, 1 / √3.
+pub const FOCAL_PX: f64 = WIDTH_PX as f64 / 2.0 * 1.732_050_807_568_877_2;
+/// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body lies there.
+pub(crate) const NEAR_M: f64 = 0.3;
+
+/// A rectangle of pixels, which may extend beyond the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRect {
+    /// Leftmost column.
+    pub left: i32,
+    /// Topmost row.
+    pub top: i32,
+    /// Number of columns.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+}
+
+impl PixelRect {
+    /// The whole image.
+    pub const IMAGE: Self = Self { left: 0, top: 0, width: WIDTH_PX as u32, height: HEIGHT_PX as u32 };
+
+    /// Returns the share of the rectangle's area that lies in the image (0 to 1).
+    pub fn share_in_image(&self) -> f64 {
+        let overlap = |start: i32, extent: u32, limit: u16| {
+            let end = i64::from(start) + i64::from(extent);
+            (end.min(limit.into()) - i64::from(start.max(0))).max(0) as f64 / f64::from(extent.max(1))
+        };
+        overlap(self.left, self.width, WIDTH_PX) * overlap(self.top, self.height, HEIGHT_PX)
+    }
+}
+
+/// A box that stands on the ground, in the ego's vehicle frame, as a detection describes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundBox {
+    /// Longitudinal position of the box's centre relative to the ego's centre (m), negative behind the ego.
+    pub x_m: f64,
+    /// Lateral position of the box's centre relative to the ego's centre (m), positive to the left.
+    pub y_m: f64,
+    /// Heading relative to the ego's heading (rad).
+    pub heading_rad: f64,
+    /// Length along the heading (m).
+    pub length_m: f64,
+    /// Width across the heading (m).
+    pub width_m: f64,
+    /// Height above the ground (m).
+    pub height_m: f64,
+}
+
+impl GroundBox {
+    /// Returns the eight corners in the ego's vehicle frame (m).
+    pub(crate) fn corners(&self) -> [[f64; 3]; 8] {
+        let (sin, cos) = maths::sin_cos(self.heading_rad);
+        std::array::from_fn(|corner| {
+            let sign = |bit: usize| if corner >> bit & 1 == 0 { -0.5 } else { 0.5 };
+            let (along, across) = (sign(0) * self.length_m, sign(1) * self.width_m);
+            let up = (sign(2) + 0.5) * self.height_m;
+            [self.x_m + along * cos - across * sin, self.y_m + along * sin + across * cos, up]
+        })
+    }
+}
+
+/// The lens at one instant: its position in the ego vehicle and its pitch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lens {
+    /// Focal length (px).
+    pub(crate) focal_px: f64,
+    /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind the centre.
+    pub(crate) ahead_m: f64,
+    /// Height of the lens above the ground (m).
+    pub(crate) height_m: f64,
+    /// Sine of the downward pitch of the optical axis.
+    pub(crate) sin_pitch: f64,
+    /// Cosine of the downward pitch of the optical axis.
+    pub(crate) cos_pitch: f64,
+    /// How the lens differs from a pinhole.
+    pub(crate) optics: Optics,
+    /// Time from the reading of the first row of the image to that of the last (s).
+    pub(crate) readout_s: f64,
+}
+
+impl Lens {
+    /// Creates the lens of the rear camera in `ego`, whose body may be pitched.
+    pub(crate) fn new(camera: &Camera, ego: &SceneVehicle) -> Self {
+        let ahead_m = camera.mount_from_rear_m - ego.vehicle.dimensions.length_m / 2.0;
+        // If the nose of the ego dips, its tail rises: the lens moves up and its axis points higher.
+        let pitch = camera.pitch_rad - ego.pitch_rad;
+        Self {
+            focal_px: f64::from(WIDTH_PX) / 2.0 / maths::tan(FIELD_OF_VIEW_RAD / 2.0),
+            ahead_m,
+            height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
+            sin_pitch: maths::sin(pitch),
+            cos_pitch: maths::cos(pitch),
+            optics: camera.optics,
+            readout_s: camera.readout_s,
+        }
+    }
+
+    /// Converts a point from the ground frame to camera axes (m).
+    pub(crate) fn in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let (s, c) = (self.sin_pitch, self.cos_pitch);
+        let up = z - self.height_m;
+        [y, s * x - c * up, -c * x - s * up]
+    }
+
+    /// Rotates the ray (x, y, 1), given in camera axes, into the ground frame.
+    pub(crate) fn ray_in_ground(&self, [x, y]: [f32; 2]) -> [f32; 3] {
+        let (s, c) = (self.sin_pitch as f32, self.cos_pitch as f32);
+        [s * y - c, x, -c * y - s]
+    }
+
+    /// Projects a point in camera axes to the image (px). The point must lie in front of the lens.
+    pub(crate) fn pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
+        if self.optics.is_straight() {
+            return self.pinhole_pixel([x, y, z]);
+        }
+        let [x, y] = self.optics.distorted([x / z, y / z]);
+        self.pinhole_pixel([x, y, 1.0])
+    }
+
+    /// Projects a point in camera axes to the image of a pinhole camera (px).
+    fn pinhole_pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
+        [f64::from(WIDTH_PX) / 2.0 + self.focal_px * x / z, f64::from(HEIGHT_PX) / 2.0 + self.focal_px * y / z]
+    }
+
+    /// Returns the position in camera axes of a moving point when the row of the image is read in which it appears. The
+    /// velocity is relative to the lens, in the ground frame (m/s).
+    pub(crate) fn when_read(&self, [x, y, z]: [f64; 3], [along, left]: [f64; 2]) -> [f64; 3] {
+        let [_, row] = self.pixel([x, y, z.max(NEAR_M)]);
+        let after_s = self.read_after_s(row);
+        let [dx, dy, dz] = self.direction_in_camera([along, left, 0.0]);
+        [x + after_s * dx, y + after_s * dy, z + after_s * dz]
+    }
+
+    /// Returns when a row of the image is read, relative to the middle row (s).
+    pub(crate) fn read_after_s(&self, row: f64) -> f64 {
+        self.readout_s * (row / f64::from(HEIGHT_PX) - 0.5).clamp(-0.5, 0.5)
+    }
+
+    /// Rotates a direction from the ground frame into camera axes.
+    pub(crate) fn direction_in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let (s, c) = (self.sin_pitch, self.cos_pitch);
+        [y, s * x - c * z, -c * x - s * z]
+    }
+
+    /// Returns the pose of vehicle `other` in the ground frame: the position (x, y) of its centre (m) and its heading
+    /// (rad).
+    pub(crate) fn pose_in_ground(&self, scene: &Scene<'_>, other: &SceneVehicle) -> ([f64; 2], f64) {
+        let pose = |vehicle: &SceneVehicle| {
+            scene.road.plane_pose(vehicle.state.s_m, vehicle.state.d_m, vehicle.state.heading_rad)
+        };
+        let (ego, other) = (pose(&scene.ego), pose(other));
+        let (sin, cos) = maths::sin_cos(ego.yaw_rad);
+        let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
+        ([cos * dx + sin * dy - self.ahead_m, cos * dy - sin * dx], other.yaw_rad - ego.yaw_rad)
+    }
+
+    /// Returns the smallest rectangle `[left, top, right, bottom]` (px) around the visible part of a convex body, given
+    /// its corners in camera axes. Returns `None` if no part of the body lies beyond the near plane.
+    pub(crate) fn bounds(&self, corners: &[[f64; 3]]) -> Option<[f64; 4]> {
+        let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+        let mut include = |point: [f64; 3]| {
+            let [u, v] = self.pinhole_pixel(point);
+            bounds = [bounds[0].min(u), bounds[1].min(v), bounds[2].max(u), bounds[3].max(v)];
+        };
+        for (index, &a) in corners.iter().enumerate() {
+            if a[2] >= NEAR_M {
+                include(a);
+            }
+            // If the body crosses the near plane, some of the lines between two of its corners cross it, too.
+            for &b in &corners[index + 1..] {
+                if (a[2] < NEAR_M) != (b[2] < NEAR_M) {
+                    let part = (NEAR_M - a[2]) / (b[2] - a[2]);
+                    include([a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), NEAR_M]);
+                }
+            }
+        }
+        let is_visible = bounds[0] <= bounds[2];
+        is_visible.then(|| if self.optics.is_straight() { bounds } else { self.optics.bounds(bounds) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Vehicle, VehicleClass, VehicleState};
+
+    use super::*;
+    use crate::camera::CameraConfig;
+    use closecall_traffic::{Check, Parameters};
+
+    fn lens(pitch_rad: f64) -> Lens {
+        let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+        let ego = SceneVehicle {
+            actor: 0,
+            vehicle: Vehicle::typical(VehicleClass::Car),
+            state: VehicleState::default(),
+            pitch_rad,
+        };
+        Lens::new(&camera, &ego)
+    }
+
+    #[test]
+    fn the_focal_length_is_that_of_the_lens() {
+        assert!((FOCAL_PX - lens(0.0).focal_px).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_left_lane_appears_on_the_right_and_near_points_appear_lower() {
+        let lens = lens(0.0);
+        let [u, near] = lens.pixel(lens.in_camera([-20.0, 3.75, 0.0]));
+        assert!(u > f64::from(WIDTH_PX) / 2.0);
+        let [_, far] = lens.pixel(lens.in_camera([-80.0, 3.75, 0.0]));
+        assert!(near > far);
+    }
+
+    #[test]
+    fn a_point_thirty_degrees_off_the_axis_appears_at_the_edge_of_the_image() {
+        let lens = lens(0.0);
+        let [u, _] = lens.pixel([10.0 * maths::tan(FIELD_OF_VIEW_RAD / 2.0), 0.0, 10.0]);
+        assert!((u - f64::from(WIDTH_PX)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn when_the_ego_brakes_its_camera_looks_higher_and_objects_appear_lower() {
+        let at = |lens: Lens| lens.pixel(lens.in_camera([-50.0, 0.0, 1.0]))[1];
+        assert!(at(lens(0.02)) > at(lens(0.0)));
+    }
+
+    #[test]
+    fn a_ray_rotated_into_the_ground_frame_and_back_is_unchanged() {
+        let lens = lens(0.01);
+        let there = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
+        let from_lens = [there[0], there[1], there[2] + lens.height_m];
+        for (got, wanted) in lens.in_camera(from_lens).iter().zip([0.3, -0.2, 1.0]) {
+            assert!((got - wanted).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_body_across_the_near_plane_has_bounds_and_a_body_behind_it_has_none() {
+        let lens = lens(0.0);
+        let body = |z: f64| [[-1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z + 4.0], [1.0, -1.0, z + 4.0]];
+        assert!(lens.bounds(&body(-2.0)).is_some());
+        assert_eq!(lens.bounds(&body(-9.0)), None);
+    }
+}

@@ -1,0 +1,243 @@
+//! The camera in the simulation loop: it adds the evidence of the image to the class scores of each LiDAR detection.
+
+use crate::tracking::{Detection, LaneGeometry};
+use closecall_traffic::{ClassScores, Scene, SceneVehicle};
+
+use super::classifier::{Backend, Classifier, ClassifierError};
+use super::fault::CameraFault;
+use super::image_memory::ImageMemory;
+use super::{Camera, Crop, ExposureKey, Frame, FrameBuffers, GroundBox, PixelRect, RearCamera};
+
+/// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
+pub const MIN_SHARE_IN_IMAGE: f64 = 0.6;
+/// Lower bound that the fusion applies to each score (0 to 1), so that neither the shape nor the image alone can rule
+/// out a class.
+const MIN_SCORE: f64 = 0.02;
+/// Minimum height assumed for a cluster (m), because the LiDAR's beams may have hit only the lower part of the object.
+const MIN_HEIGHT_M: f64 = 0.8;
+
+/// The scene in which detections are classified, and the one that the image shows, which is older if the camera is frozen.
+#[derive(Clone, Copy)]
+pub struct ImagedScene<'a> {
+    /// The scene of the detections.
+    pub now: &'a Scene<'a>,
+    /// The scene that the image shows.
+    pub imaged: &'a Scene<'a>,
+    /// The fault of the camera.
+    pub fault: Option<&'a CameraFault>,
+}
+
+/// The camera and the neural network of one worker thread.
+#[derive(Debug)]
+pub struct CropClassifier {
+    camera: RearCamera,
+    classifier: Classifier,
+    crop: Crop,
+    lists: FrameBuffers,
+    /// The detections that are due, by their index, and their windows.
+    due: Vec<usize>,
+    windows: Vec<PixelRect>,
+}
+
+impl CropClassifier {
+    /// Creates a camera with the network that ships with Closecall.
+    ///
+    /// # Errors
+    /// Returns a [`ClassifierError`] if the backend cannot be set up.
+    pub fn new(camera: Camera, backend: &Backend) -> Result<Self, ClassifierError> {
+        let classifier = Classifier::shipped(backend)?;
+        Ok(Self {
+            camera: RearCamera::new(camera),
+            classifier,
+            crop: Crop::default(),
+            lists: FrameBuffers::default(),
+            due: Vec::new(),
+            windows: Vec::new(),
+        })
+    }
+
+    /// Classifies the detections that lie in the image and on the road, and fuses the network's scores with the class
+    /// scores that a detection has from its shape. Returns the number of crops that the network has classified.
+    ///
+    /// The network's scores of a detection that `memory` knows are those of its latest crop. Detections out of view, and
+    /// those that lie entirely beside the road, keep their scores. `scene` is the scene at the time of the scan, `key`
+    /// the key of the exposure's noise.
+    ///
+    /// # Errors
+    /// Returns a [`ClassifierError`] if the network fails. The scores of the detections before the failure have
+    /// then been updated already.
+    pub fn classify_detections(
+        &mut self,
+        scene: &Scene<'_>,
+        key: ExposureKey,
+        memory: &mut ImageMemory,
+        detections: &mut [Detection],
+    ) -> Result<usize, ClassifierError> {
+        self.classify_with(ImagedScene { now: scene, imaged: scene, fault: None }, key, memory, detections)
+    }
+
+    /// Classifies as [`CropClassifier::classify_detections`] does, with a fault of the camera.
+    ///
+    /// # Errors
+    /// As [`CropClassifier::classify_detections`].
+    pub fn classify_with(
+        &mut self,
+        ImagedScene { now: scene, imaged, fault }: ImagedScene<'_>,
+        key: ExposureKey,
+        memory: &mut ImageMemory,
+        detections: &mut [Detection],
+    ) -> Result<usize, ClassifierError> {
+        let lane = LaneGeometry::from_scene(scene);
+        memory.begin(scene.time);
+        self.due.clear();
+        self.windows.clear();
+        for (index, detection) in detections.iter_mut().enumerate().filter(|(_, at)| !is_beside_road(at, &lane)) {
+            let Some(window) = self.camera.detection_window(&scene.ego, detection) else { continue };
+            match memory.recall(detection) {
+                Some(scores) => detection.class = fuse(&detection.class, &scores),
+                None => {
+                    self.due.push(index);
+                    self.windows.push(window);
+                }
+            }
+        }
+        if self.due.is_empty() {
+            return Ok(0);
+        }
+        let mut frame =
+            Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), imaged, key, &self.windows);
+        if let Some(fault) = fault {
+            frame.add_glare(fault, imaged);
+        }
+        for (index, window) in self.due.iter().zip(&self.windows) {
+            frame.crop(*window, &mut self.crop);
+            if let Some(fault) = fault {
+                fault.apply(&mut self.crop);
+            }
+            let image_scores = self.classifier.classify(&self.crop)?;
+            memory.store(&detections[*index], image_scores);
+            detections[*index].class = fuse(&detections[*index].class, &image_scores);
+        }
+        self.lists = frame.into_buffers();
+        Ok(self.due.len())
+    }
+}
+
+impl RearCamera {
+    /// Returns the window of the image that the network classifies for a detection. Returns `None` if too little of the
+    /// window lies in the image.
+    pub fn detection_window(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
+        self.project(ego, &ground_box(detection)).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
+    }
+}
+
+/// Returns the box of a detection, which stands on the ground.
+pub(super) fn ground_box(detection: &Detection) -> GroundBox {
+    let (x_m, y_m) = detection.centre_m();
+    GroundBox {
+        x_m,
+        y_m,
+        heading_rad: detection.heading_rad,
+        length_m: detection.length_m,
+        width_m: detection.width_m,
+        height_m: detection.top_m.max(MIN_HEIGHT_M),
+    }
+}
+
+/// Returns true if a detection lies entirely beside the road.
+pub fn is_beside_road(detection: &Detection, lane: &LaneGeometry) -> bool {
+    let left_m = detection.face_y_m - lane.path_y_m(detection.face_x_m);
+    let half_m = 0.5 * detection.width_m;
+    left_m - half_m > lane.edges_m[0] || left_m + half_m < lane.edges_m[1]
+}
+
+/// Fuses the scores from shape and image by their normalised product, which assumes that their errors are independent
+/// and that all classes are equally likely a priori.
+pub fn fuse(shape: &ClassScores, image: &ClassScores) -> ClassScores {
+    let product = [0, 1, 2, 3].map(|class| shape.0[class].max(MIN_SCORE) * image.0[class].max(MIN_SCORE));
+    let sum: f64 = product.iter().sum();
+    ClassScores(product.map(|score| score / sum))
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Check, Environment, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+
+    use super::*;
+    use crate::camera::CameraConfig;
+    use crate::tracking::{Extent, SeenBy};
+
+    fn vehicle(class: VehicleClass, s_m: f64) -> SceneVehicle {
+        let state = VehicleState { s_m, d_m: -5.6, speed_mps: 30.0, ..VehicleState::default() };
+        SceneVehicle { actor: 1, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
+    }
+
+    fn detection(face_x_m: f64, width_m: f64, top_m: f64) -> Detection {
+        Detection {
+            time: Time::ZERO,
+            face_x_m,
+            face_y_m: 0.0,
+            range_sd_m: 0.1,
+            lateral_sd_m: 0.1,
+            heading_rad: 0.0,
+            length_m: 4.5,
+            length: Extent::Assumed,
+            width_m,
+            width: Extent::Seen,
+            top_m,
+            seen_by: SeenBy::Lidar,
+            points: 50,
+            is_centred: false,
+            class: ClassScores::UNKNOWN,
+        }
+    }
+
+    fn classify(others: &[SceneVehicle], detections: &mut [Detection]) -> usize {
+        let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+        let (road, environment, ego) = (Road::straight(3), Environment::CLEAR_DAY, vehicle(VehicleClass::Car, 500.0));
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others };
+        let mut pipeline = CropClassifier::new(camera, &Backend::Tract).unwrap();
+        pipeline.classify_detections(&scene, ExposureKey(1), &mut ImageMemory::default(), detections).unwrap()
+    }
+
+    #[test]
+    fn a_detection_beside_the_road_keeps_its_scores() {
+        let mut detections = [detection(-40.0, 1.0, 0.8)];
+        // The ego is 5.6 m to the right of the road's left edge.
+        detections[0].face_y_m = 6.5;
+        assert_eq!(classify(&[], &mut detections), 0);
+        assert_eq!(detections[0].class, ClassScores::UNKNOWN);
+        detections[0].face_y_m = 6.0;
+        assert_eq!(classify(&[], &mut detections), 1);
+    }
+
+    #[test]
+    fn each_vehicle_class_is_recognised_and_an_empty_road_is_background() {
+        for class in VehicleClass::ALL {
+            let other = vehicle(class, 460.0);
+            let size = other.vehicle.dimensions;
+            let mut detections = [detection(-40.0 + size.length_m / 2.0, size.width_m, size.height_m)];
+            assert_eq!(classify(&[other], &mut detections), 1);
+            assert!(detections[0].class.0[class as usize] > 0.8, "{class:?}: {:?}", detections[0].class);
+        }
+        let mut empty_road = [detection(-12.0, 1.0, 0.8)];
+        classify(&[], &mut empty_road);
+        assert!(empty_road[0].class.vehicle() < 0.2, "{:?}", empty_road[0].class);
+    }
+
+    #[test]
+    fn a_detection_out_of_view_keeps_its_scores() {
+        let mut detections = [detection(30.0, 1.8, 1.5)];
+        assert_eq!(classify(&[], &mut detections), 0);
+        assert_eq!(detections[0].class, ClassScores::UNKNOWN);
+    }
+
+    #[test]
+    fn neither_shape_nor_image_alone_rules_out_a_class() {
+        let car = ClassScores::certain(VehicleClass::Car);
+        let truck = ClassScores::certain(VehicleClass::Truck);
+        let scores = fuse(&car, &truck).0;
+        assert!((scores[0] - scores[1]).abs() < 1e-12 && scores[0] > 0.4);
+        assert!((scores.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}

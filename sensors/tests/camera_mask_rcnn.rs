@@ -1,0 +1,156 @@
+//! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in the same images, and other networks are refused.
+//!
+//! Needs the shared library of the `onnxruntime` wheel. Python was given whole images, and Rust the pixels that the network reads.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::{Path, PathBuf};
+
+use closecall_sensors::camera::{
+    Backend, HEIGHT_PX, Image, Instance, InstanceDetector, LabelMap, Mask, MaskRcnnInput, SHIPPED_MODEL, WIDTH_PX,
+};
+use closecall_traffic::VehicleClass;
+
+/// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of two masks.
+const BOX_PX: f64 = 0.5;
+const SCORE: f64 = 1e-3;
+const MASK_OVERLAP: f64 = 0.98;
+/// Side of a mask in cells.
+const CELLS: usize = 28;
+
+fn backend() -> Option<Backend> {
+    closecall_testing::onnxruntime().map(|library: PathBuf| Backend::OnnxRuntime(library))
+}
+
+fn mask_overlap(one: &Mask, other: &Mask) -> f64 {
+    let (one, other) = (one.pixels(), other.pixels());
+    let count = |both: &dyn Fn(bool, bool) -> bool| one.iter().zip(&other).filter(|(a, b)| both(**a, **b)).count();
+    let union = count(&|a, b| a || b);
+    if union == 0 { 1.0 } else { count(&|a, b| a && b) as f64 / union as f64 }
+}
+
+fn assert_same(found: &Instance, (sides, score, cells): (&[f64], f64, &[f32])) {
+    for (own, wanted) in found.box_px.iter().zip(sides) {
+        assert!((own - wanted).abs() <= BOX_PX, "{:?} instead of {sides:?}", found.box_px);
+    }
+    assert!((found.score - score).abs() <= SCORE, "{} instead of {score}", found.score);
+    let area: [f64; 4] = sides.try_into().expect("four sides");
+    let wanted = Mask::new(area, [CELLS, CELLS], cells.to_vec()).expect("a mask");
+    let share = mask_overlap(&found.mask, &wanted);
+    assert!(share >= MASK_OVERLAP, "masks overlap by {share}");
+}
+
+#[test]
+fn rust_and_python_find_the_same() {
+    let Some(backend) = backend() else { return };
+    let mut detector = InstanceDetector::shipped(&backend).unwrap();
+    let [width, height] = [detector.sampling().columns().len(), detector.sampling().rows().len()];
+    let answers: Vec<serde_json::Value> = serde_json::from_str(include_str!("mask_rcnn_golden/answers.json")).unwrap();
+    let masks: Vec<f32> = include_bytes!("mask_rcnn_golden/masks.f32")
+        .chunks_exact(4)
+        .map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap()))
+        .collect();
+    let mut masks = masks.chunks_exact(CELLS * CELLS);
+    let pictures = include_bytes!("mask_rcnn_golden/pictures.rgb").chunks_exact(width * height * 3);
+    assert!(pictures.len() >= 3 && pictures.len() == answers.len());
+    let mut compared = 0;
+    for (rgb, answer) in pictures.zip(&answers) {
+        let numbers = |key: &str| -> Vec<f64> { serde_json::from_value(answer[key].clone()).unwrap() };
+        let picture = Image { width: width as u32, height: height as u32, rgb: rgb.to_vec() };
+        let found = detector.detect(&picture).unwrap();
+        assert_eq!(detector.detect(&picture).unwrap(), found, "the same picture gives the same bits");
+        let (labels, scores) = (numbers("labels"), numbers("scores"));
+        assert_eq!(found.len(), scores.len());
+        let boxes: Vec<Vec<f64>> = serde_json::from_value(answer["boxes"].clone()).unwrap();
+        for (index, instance) in found.iter().enumerate() {
+            assert_eq!(instance.class as usize + 1, labels[index] as usize);
+            assert_same(instance, (&boxes[index], scores[index], masks.next().unwrap()));
+            compared += usize::from(instance.score > 0.5);
+        }
+    }
+    assert!(compared >= 4, "{compared}");
+}
+
+#[test]
+fn a_network_with_another_layout_is_refused_with_what_it_has_and_what_is_wanted() {
+    let Some(backend) = backend() else { return };
+    let error = InstanceDetector::new(SHIPPED_MODEL, None, &backend).unwrap_err().to_string();
+    for part in [
+        "inputs pixels",
+        "outputs scores",
+        "wanted are an input float [3, 800, 1280]",
+        "masks float [n, 1, height, width]",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    let error = InstanceDetector::new(b"no network", None, &backend).unwrap_err().to_string();
+    assert!(error.starts_with("failed to read the classifier's network"), "{error}");
+}
+
+/// The first pixel of the picture for other networks: red, green and blue.
+const FIRST_PIXEL: [u8; 3] = [51, 102, 204];
+
+/// Returns what a network of `xtask/training/mask_rcnn_layouts.py` finds in a black picture whose first pixel is [`FIRST_PIXEL`].
+fn found_by(file: &str, input: MaskRcnnInput, backend: &Backend) -> Vec<Instance> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mask_rcnn_layouts");
+    let bytes = std::fs::read(folder.join(file)).unwrap();
+    let labels = LabelMap::parse("3=car 8=truck 4=motorcycle").unwrap();
+    let mut detector = InstanceDetector::new(&bytes, Some(&labels), backend).unwrap().with_input(input);
+    let [width, height] = [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
+    let mut rgb = vec![0; width * height * 3];
+    rgb[..3].copy_from_slice(&FIRST_PIXEL);
+    detector.detect(&Image { width: width as u32, height: height as u32, rgb }).unwrap()
+}
+
+fn assert_found(found: &[Instance], scores: [f64; 3]) {
+    let classes = [VehicleClass::Car, VehicleClass::Truck, VehicleClass::Motorcycle];
+    assert_eq!(found.iter().map(|instance| instance.class).collect::<Vec<_>>(), classes);
+    for (instance, score) in found.iter().zip(scores) {
+        assert!((instance.score - score).abs() < 1e-4, "{} instead of {score}", instance.score);
+    }
+    assert_eq!(found[1].box_px, [700.0, 380.0, 800.0, 480.0]);
+}
+
+#[test]
+fn the_layout_of_the_model_zoo_is_read_and_gets_blue_green_and_red_less_their_means() {
+    let Some(backend) = backend() else { return };
+    let found = found_by("model-zoo.onnx", MaskRcnnInput::BgrMean, &backend);
+    // The network adds the means again.
+    assert_found(&found, [0.8, 0.4, 0.2]);
+    let inside = found[1].mask.pixels().iter().filter(|inside| **inside).count();
+    assert_eq!(inside, 100 * 100, "cells of 28 x 28 fill the box");
+    let wrong = found_by("model-zoo.onnx", MaskRcnnInput::Rgb, &backend);
+    assert!((wrong[0].score - 0.8).abs() > 0.1, "the input matters");
+}
+
+#[test]
+fn the_layout_of_torchvision_is_read_with_a_batch_and_with_masks_of_the_size_of_the_image() {
+    let Some(backend) = backend() else { return };
+    let found = found_by("torchvision.onnx", MaskRcnnInput::Rgb, &backend);
+    assert_found(&found, [0.2, 0.4, 0.8]);
+    assert_eq!(found[0].mask.extent_px(), Some([0.0, 0.0, 1280.0, 800.0]));
+}
+
+#[test]
+fn a_network_without_labels_is_refused() {
+    let Some(backend) = backend() else { return };
+    let bytes = include_bytes!("mask_rcnn_layouts/model-zoo.onnx");
+    let error = InstanceDetector::new(bytes, None, &backend).unwrap_err().to_string();
+    assert!(error.contains("3=car 4=motorcycle 8=truck"), "{error}");
+}
+
+#[test]
+fn labels_that_are_not_mapped_are_left_out() {
+    let Some(backend) = backend() else { return };
+    let map = LabelMap::parse("2=truck").unwrap();
+    let mut detector = InstanceDetector::new(closecall_sensors::camera::SHIPPED_MASK_RCNN, Some(&map), &backend).unwrap();
+    let [width, height] = [detector.sampling().columns().len(), detector.sampling().rows().len()];
+    let answers: Vec<serde_json::Value> = serde_json::from_str(include_str!("mask_rcnn_golden/answers.json")).unwrap();
+    let pictures = include_bytes!("mask_rcnn_golden/pictures.rgb").chunks_exact(width * height * 3);
+    for (rgb, answer) in pictures.zip(&answers) {
+        let labels: Vec<u64> = serde_json::from_value(answer["labels"].clone()).unwrap();
+        let picture = Image { width: width as u32, height: height as u32, rgb: rgb.to_vec() };
+        let trucks = labels.iter().filter(|label| **label == 2).count();
+        assert_eq!(detector.detect(&picture).unwrap().len(), trucks);
+    }
+}
