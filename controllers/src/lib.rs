@@ -1,4 +1,4 @@
-//! The vehicle controllers: the ego stack (ACC, AEB, MIS) and the human driver models.
+//! The vehicle controllers: the ego stack (ACC, AEB, MIS), the human driver models, and controllers from outside.
 //!
 //! ```text
 //!  ground truth ─▶ driver/  perception (delayed, coarse) ─▶ Wiedemann 99 │ IDM │ overtaker │ prescribed profile
@@ -11,7 +11,8 @@
 //! The types keep the ground truth from the ego: an ego controller receives its own odometry and tracks, never the
 //! ground truth. A human driver model receives the ground truth, and itself models delayed perception.
 //!
-//! [`reference`](mod@reference) holds the performance models of UN Regulation 157.
+//! [`reference`](mod@reference) holds the performance models of UN Regulation 157. [`external`] loads ego controllers that
+//! are shared libraries or functional mock-up units.
 //!
 //! The `driver` table of a scenario file is a [`DriverConfig`]. Checking it yields a [`CheckedDriver`], from which each
 //! run builds a new driver.
@@ -20,6 +21,7 @@ mod braking;
 mod config;
 mod driver;
 mod ego;
+pub mod external;
 pub mod reference;
 
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use closecall_controllers::ControllerError;
-use closecall_native::{Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, watch};
+use closecall_controllers::external::{Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, watch};
 use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::Probe;
 use closecall_simulation::scenario::ScenarioFile;

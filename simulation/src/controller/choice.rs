@@ -5,7 +5,7 @@ use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use closecall_native::Kind;
+use closecall_controllers::external::Kind;
 use closecall_traffic::suggest::hint;
 use serde::{Deserialize, Serialize};
 

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use closecall_controllers::{CheckedDriver, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
-use closecall_native::{Identity, Kind, Loaded, NativeController, VariableTable, Variables};
+use closecall_controllers::external::{Identity, Kind, Loaded, NativeController, VariableTable, Variables};
 use serde::{Deserialize, Serialize};
 
 use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecError, ExecFactory, ExecSettings};

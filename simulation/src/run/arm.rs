@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use closecall_controllers::{EgoController, EgoSettings};
-use closecall_native::VariableTable;
+use closecall_controllers::external::VariableTable;
 use closecall_sensors::SensorMode;
 
 use crate::controller::isolated::Isolated;

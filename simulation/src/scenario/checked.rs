@@ -1,7 +1,7 @@
 //! Concrete scenarios: every value is a number, and every number has been checked.
 
 use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
-use closecall_native::VariableTable;
+use closecall_controllers::external::VariableTable;
 use closecall_sensors::Sensors;
 use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, PHYSICS_STEP, Parameters, Problem, Range, Road, Time, Vehicle,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use closecall_controllers::{DriverConfig, LaneKeepingConfig, SpeedKeepingConfig};
-use closecall_native::VariableTable;
+use closecall_controllers::external::VariableTable;
 use closecall_scenarios::parameters::ParametersConfig;
 use closecall_sensors::SensorsConfig;
 use closecall_traffic::{ActorId, EnvironmentConfig, Lane, Num, RoadConfig, VehicleConfig};

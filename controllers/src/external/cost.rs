@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use crate::abi::Track;
-use crate::exchange::{Input, Setup};
-use crate::fmu::VariableTable;
-use crate::loaded::Loaded;
+use crate::external::abi::Track;
+use crate::external::exchange::{Input, Setup};
+use crate::external::fmu::VariableTable;
+use crate::external::loaded::Loaded;
 use serde_json::json;
 
 /// The settings and the road of the measurement: cruise control and emergency braking with their default values.
@@ -41,7 +41,7 @@ pub fn step_s(loaded: &Loaded, tracks: usize, steps: u32) -> Result<f64, String>
     let mut input = Input::default();
     let started = Instant::now();
     for step in 0..steps {
-        let view = crate::abi::InputView {
+        let view = crate::external::abi::InputView {
             time_ns: i64::from(step) * 40_000_000,
             time_s: f64::from(step) * 0.04,
             speed_mps: 30.0,

@@ -2,11 +2,11 @@
 
 use std::ffi::{CStr, CString};
 
-use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front};
+use crate::{EgoInput, EgoSettings, EgoState, Front};
 use closecall_traffic::{CONTROL_STEP, Road, Side, Source, TrackStatus};
 use serde_json::Value;
 
-use crate::abi::{InputView, Setting, SetupView, Track};
+use crate::external::abi::{InputView, Setting, SetupView, Track};
 
 /// What a controller is told before its first step.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::description::{Causality, Description, Type, Variable};
 use super::quantity::{Number, Quantity};
-use crate::exchange::Setup;
+use crate::external::exchange::Setup;
 
 /// The names of the variables of an FMU, if they are not those of the quantities.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -10,12 +10,12 @@ use super::archive::{Unpacked, unpack};
 use super::description::{Type, Version};
 use super::mapping::{Mapping, VariableTable};
 use super::{fmi2, fmi3};
-use crate::arithmetic::Arithmetic;
-use crate::error::LoadError;
-use crate::exchange::{Answer, Input, Setup};
-use crate::library::open;
-use crate::loaded::{Identity, Run};
-use crate::platform;
+use crate::external::arithmetic::Arithmetic;
+use crate::external::error::LoadError;
+use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::library::open;
+use crate::external::loaded::{Identity, Run};
+use crate::external::platform;
 
 /// An instance of an FMU, of either version. The messages name the function and what the FMU says.
 pub(super) trait Instance: Send {

@@ -8,10 +8,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::error::LoadError;
-use crate::exchange::{Answer, Input, Setup};
-use crate::fmu::{Fmu, VariableTable};
-use crate::library::Library;
+use crate::external::error::LoadError;
+use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::fmu::{Fmu, VariableTable};
+use crate::external::library::Library;
 
 /// The kind of a controller that is a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use object::{Architecture, BinaryFormat, Object, ObjectKind};
 
-use crate::error::LoadError;
+use crate::external::error::LoadError;
 
 /// Largest number of functions that a message lists.
 const MAX_LISTED: usize = 12;

@@ -3,16 +3,16 @@
 
 use std::io::{BufRead, Write};
 
-use closecall_controllers::EgoState;
+use crate::EgoState;
 use closecall_traffic::{Side, Source, TrackStatus};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::abi::{InputView, Track};
-use crate::controller::Session;
-use crate::exchange::{Answer, Input, Setup};
-use crate::fmu::VariableTable;
-use crate::loaded::Loaded;
+use crate::external::abi::{InputView, Track};
+use crate::external::controller::Session;
+use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::fmu::VariableTable;
+use crate::external::loaded::Loaded;
 
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]

@@ -1,14 +1,14 @@
 //! A library or an FMU as an ego controller of the closed loop.
 
-use closecall_controllers::{
+use crate::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, LeadVehicleSelector, Reason,
 };
 use closecall_traffic::Time;
 
-use crate::exchange::{Answer, Input, Setup};
-use crate::fmu::VariableTable;
-use crate::loaded::{Loaded, Run};
-use crate::watch::Call;
+use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::fmu::VariableTable;
+use crate::external::loaded::{Loaded, Run};
+use crate::external::watch::Call;
 
 /// A controller of a library or an FMU in this process. It is created at the first step.
 pub struct NativeController {

@@ -10,7 +10,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::description::{Description, Version};
-use crate::error::LoadError;
+use crate::external::error::LoadError;
 
 /// The name of the description in the archive.
 const DESCRIPTION: &str = "modelDescription.xml";

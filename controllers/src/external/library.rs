@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use libloading::Library as Module;
 
-use crate::abi::{
+use crate::external::abi::{
     ABI, AbiFunction, Command, CreateFunction, DestroyFunction, ErrorFunction, StepFunction, TextFunction,
 };
-use crate::arithmetic::Arithmetic;
-use crate::error::LoadError;
-use crate::exchange::{Answer, Input, Setup};
-use crate::loaded::{Identity, Run};
-use crate::platform;
+use crate::external::arithmetic::Arithmetic;
+use crate::external::error::LoadError;
+use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::loaded::{Identity, Run};
+use crate::external::platform;
 
 /// The functions that a library must export.
 const NEEDED: [&str; 4] = [

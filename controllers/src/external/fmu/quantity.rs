@@ -1,6 +1,6 @@
 //! The quantities that an FMU can get, by their names.
 
-use crate::exchange::{Input, Setup};
+use crate::external::exchange::{Input, Setup};
 
 /// What kind of number a quantity is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub(super) struct TrackField {
     name: &'static str,
     unit: &'static str,
     number: Number,
-    get: fn(&crate::abi::Track) -> f64,
+    get: fn(&crate::external::abi::Track) -> f64,
 }
 
 /// A quantity of a control step, or of the setup.

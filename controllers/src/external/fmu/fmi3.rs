@@ -10,7 +10,7 @@ use libloading::Library as Module;
 
 use super::description::{Description, Type};
 use super::run::Instance;
-use crate::library::{function, text};
+use crate::external::library::{function, text};
 
 type Component = *mut c_void;
 type Status = c_int;
