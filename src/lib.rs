@@ -31,7 +31,7 @@ pub use closecall_report as report;
 pub use closecall_scenarios as scenarios;
 pub use closecall_sensors as sensors;
 pub use closecall_simulation as simulation;
-pub use closecall_statistics as statistics;
+pub use closecall_traffic::statistics as statistics;
 pub use closecall_traffic as traffic;
 
 pub mod cli;

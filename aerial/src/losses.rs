@@ -7,7 +7,7 @@ use closecall_scenarios::criticality::{CriticalLaneChange, ENCOUNTER_HORIZON_S, 
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
 use closecall_scenarios::trajectory_data::TrajectoryData;
-use closecall_statistics::quantiles::median;
+use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{VehicleClass, maths};
 use serde::Serialize;
 

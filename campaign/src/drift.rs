@@ -15,9 +15,9 @@ use closecall_scenarios::fit::{MIN_VALUES, Quantity, Samples, observe};
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
 use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_simulation::scenario::ScenarioError;
-use closecall_statistics::holm;
-use closecall_statistics::quantiles::quantile;
-use closecall_statistics::two_sample::{self, Summary};
+use closecall_traffic::statistics::holm;
+use closecall_traffic::statistics::quantiles::quantile;
+use closecall_traffic::statistics::two_sample::{self, Summary};
 use closecall_traffic::Stream;
 use rand::SeedableRng;
 use serde::Serialize;
@@ -176,7 +176,7 @@ fn stream(seed: u64, quantity: Quantity) -> Stream {
 
 #[cfg(test)]
 mod tests {
-    use closecall_statistics::normal::TruncatedStandardNormal;
+    use closecall_traffic::statistics::normal::TruncatedStandardNormal;
     use closecall_traffic::maths;
     use rand::RngExt;
     use rayon::prelude::*;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use closecall_simulation::outcome::worse;
-use closecall_statistics::{interval, mcnemar, sequence};
+use closecall_traffic::statistics::{interval, mcnemar, sequence};
 
 /// Share of repetitions in which a reported interval covers the true probability, at least.
 const COVERAGE: f64 = 0.95;

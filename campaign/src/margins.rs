@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use closecall_simulation::outcome::Margins;
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::Measured;
 use serde::Serialize;
 

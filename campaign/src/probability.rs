@@ -14,10 +14,10 @@
 use serde::Serialize;
 
 use super::ledger::{ArmCounts, Inference};
-use closecall_statistics::binomial::at_most;
-pub use closecall_statistics::format::percent;
-use closecall_statistics::needed;
-use closecall_statistics::sequence::{evidence_above, evidence_below, is_certain};
+use closecall_traffic::statistics::binomial::at_most;
+pub use closecall_traffic::statistics::format::percent;
+use closecall_traffic::statistics::needed;
+use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
 
 /// The collision probability that is allowed, and how sure one wants to be of keeping it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,7 +15,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use closecall_statistics::format::percent;
+use closecall_traffic::statistics::format::percent;
 use serde::Serialize;
 
 use super::gate::{ExpectationResult, GateResult, GateSource, Judge, RequirementResult, Standing};

@@ -3,8 +3,8 @@
 //! Steps of one approach are correlated, and approaches are not. An interval therefore rests on the scatter of the approaches:
 //! that of Clopper and Pearson for a share of approaches, Student's for a mean of their means, and Garwood's for a rate.
 
-use closecall_statistics::interval::clopper_pearson;
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::interval::clopper_pearson;
+use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::CONTROL_STEP;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 

@@ -2,8 +2,8 @@
 
 use closecall_scenarios::following::FollowingData;
 use closecall_simulation::calibration::{Calibration, Errors, ParameterSpec};
-use closecall_statistics::format::percent;
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::format::percent;
+use closecall_traffic::statistics::quantiles::quantile;
 use serde_json::{Map, Value, json};
 
 /// Probabilities of the quantiles over the calibrated pairs (-).

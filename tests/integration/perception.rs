@@ -6,7 +6,7 @@ use closecall_sensors::{NEES_QUANTILE_95, SensorMode};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
-use closecall_statistics::consistency::{Consistency, Credibility};
+use closecall_traffic::statistics::consistency::{Consistency, Credibility};
 use rayon::prelude::*;
 
 use crate::support::all_of_library;

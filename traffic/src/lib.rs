@@ -1,4 +1,4 @@
-//! The data types that the crates of Closecall share, and the criticality metrics.
+//! The data types that the crates of Closecall share, the criticality metrics, and statistics.
 //!
 //! This crate defines every type that crosses a boundary between crates: time, identifiers, the road, vehicles and
 //! their states, recorded trajectories, the tracks that a sensor reports, the parameters of a scenario, and seeded
@@ -78,6 +78,7 @@ mod trajectory;
 mod vehicle;
 
 pub mod metrics;
+pub mod statistics;
 pub mod suggest;
 
 pub use absent::{Absent, Measured};

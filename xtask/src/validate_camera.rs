@@ -15,7 +15,7 @@ use std::path::Path;
 
 use closecall_sensors::camera::{Backend, CHANNELS, CROP_PX, Classifier, Crop, LensConfig, Optics};
 use closecall_sensors::datasets::{CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset};
-use closecall_statistics::interval::clopper_pearson;
+use closecall_traffic::statistics::interval::clopper_pearson;
 use closecall_traffic::{Check, ClassScores, Num, Parameters};
 
 /// Number of scenes if none is given.

@@ -27,8 +27,8 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError, simulate};
-use closecall_statistics::interval::clopper_pearson;
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::interval::clopper_pearson;
+use closecall_traffic::statistics::quantiles::quantile;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 /// The lead vehicle brakes while the rear vehicle is near.

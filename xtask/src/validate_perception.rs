@@ -32,7 +32,7 @@ use closecall_sensors::{NEES_QUANTILE_95, SensorMode, TrackAudit};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
-use closecall_statistics::consistency::{Consistency, Credibility};
+use closecall_traffic::statistics::consistency::{Consistency, Credibility};
 use rayon::prelude::*;
 
 const SECONDS_PER_HOUR: f64 = 3_600.0;

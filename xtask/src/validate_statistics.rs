@@ -27,7 +27,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
-use closecall_statistics::sequence::{evidence_above, evidence_below, is_certain};
+use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
 
 /// Collision probability of the scenario, by construction.
 const TRUTH: f64 = 0.05;

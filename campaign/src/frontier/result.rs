@@ -1,7 +1,7 @@
 //! What a frontier finds.
 
-use closecall_statistics::interval::{COVERAGE, clopper_pearson};
-use closecall_statistics::sensitivity::jackknife::{Estimate, student};
+use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
+use closecall_traffic::statistics::sensitivity::jackknife::{Estimate, student};
 
 use super::plan::FrontierPlan;
 use crate::ledger::{Pairs, Tally};

@@ -1,7 +1,7 @@
 //! Evaluates one gate over the samples of one scenario.
 
 use closecall_simulation::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::quantiles::quantile;
 
 use crate::ledger::{Inference, PairFate};
 use crate::record::Record;

@@ -10,8 +10,8 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, SettingError};
-use closecall_statistics::sensitivity::jackknife::REPLICATES;
-use closecall_statistics::sensitivity::saltelli::MAX_FACTORS;
+use closecall_traffic::statistics::sensitivity::jackknife::REPLICATES;
+use closecall_traffic::statistics::sensitivity::saltelli::MAX_FACTORS;
 
 use super::defaults::{LeftOut, factors_of};
 use super::factor::{CHANCE, Factor, FactorKind, FactorRange};

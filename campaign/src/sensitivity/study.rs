@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use closecall_statistics::sensitivity::morris::{Effects, Trajectories};
-use closecall_statistics::sensitivity::saltelli::{Design, Indices, MainEffect};
+use closecall_traffic::statistics::sensitivity::morris::{Effects, Trajectories};
+use closecall_traffic::statistics::sensitivity::saltelli::{Design, Indices, MainEffect};
 use closecall_traffic::{ActorId, Stream, stream};
 
 use super::defaults::LeftOut;

@@ -2,7 +2,7 @@
 
 use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::outcome::{Moment, Outcome};
-use closecall_statistics::log_linear::LogLinearHistogram;
+use closecall_traffic::statistics::log_linear::LogLinearHistogram;
 use serde::Serialize;
 
 use super::time_lost::mean_time_lost_s;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::quantiles::quantile;
 
 use super::{Exposure, Observed, Rate};
 

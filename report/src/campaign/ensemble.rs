@@ -3,7 +3,7 @@
 use closecall_campaign::ensemble::{EnsembleVerdict, MemberValue, Quantity, Spread, verdicts};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::summary::Summary;
-use closecall_statistics::format::percent;
+use closecall_traffic::statistics::format::percent;
 use maud::{Markup, html};
 use serde_json::{Map, Value, json};
 

@@ -1,7 +1,7 @@
 //! What moves the result of a campaign, as JSON.
 
 use closecall_scenarios::sampling::Design;
-use closecall_statistics::sensitivity::given_data::Influence;
+use closecall_traffic::statistics::sensitivity::given_data::Influence;
 use serde_json::{Map, Value, json};
 
 use crate::campaign::overview::{EventInfluence, FEW_EVENTS, Overview};

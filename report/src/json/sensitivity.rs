@@ -3,9 +3,9 @@
 use closecall_campaign::sensitivity::{
     Decomposition, Factor, OutputEffects, OutputIndices, RunErrors, Screening, Sensitivity,
 };
-use closecall_statistics::sensitivity::jackknife::Estimate;
-use closecall_statistics::sensitivity::morris::Effects;
-use closecall_statistics::sensitivity::saltelli::MainEffect;
+use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
+use closecall_traffic::statistics::sensitivity::morris::Effects;
+use closecall_traffic::statistics::sensitivity::saltelli::MainEffect;
 use serde_json::{Map, Value, json};
 
 /// Why an index is absent.

@@ -3,8 +3,8 @@
 use std::fmt::{self, Formatter};
 
 use closecall_campaign::sensitivity::{Output, RunErrors};
-use closecall_statistics::format::percent;
-use closecall_statistics::sensitivity::jackknife::Estimate;
+use closecall_traffic::statistics::format::percent;
+use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 
 /// Space between two columns.
 const GAP: &str = "  ";

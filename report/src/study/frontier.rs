@@ -4,7 +4,7 @@ use std::fmt::{self, Display, Formatter};
 use std::io;
 
 use closecall_campaign::frontier::{Frontier, Point};
-use closecall_statistics::sensitivity::jackknife::Estimate;
+use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 
 use super::aligned::{error_lines, share, write_rows};
 use crate::charts::{ScatterPoint, scatter};

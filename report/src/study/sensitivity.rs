@@ -5,8 +5,8 @@ use std::fmt::{self, Display, Formatter};
 use closecall_campaign::sensitivity::{
     Decomposition, FactorKind, OutputEffects, OutputIndices, Screening, Sensitivity,
 };
-use closecall_statistics::sensitivity::morris::Effects;
-use closecall_statistics::sensitivity::saltelli::MainEffect;
+use closecall_traffic::statistics::sensitivity::morris::Effects;
+use closecall_traffic::statistics::sensitivity::saltelli::MainEffect;
 
 use super::aligned::{error_lines, mean, with_interval, write_rows};
 

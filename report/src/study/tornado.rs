@@ -3,7 +3,7 @@
 use std::io;
 
 use closecall_campaign::sensitivity::{Factor, FactorKind, OutputEffects, OutputIndices, Screening, Sensitivity};
-use closecall_statistics::sensitivity::morris::Effects;
+use closecall_traffic::statistics::sensitivity::morris::Effects;
 
 use super::sensitivity::from_to;
 use crate::charts::{TornadoBar, TornadoTexts, tornado};

@@ -1,6 +1,6 @@
 //! Share of critical lane changes, for each metric.
 
-use closecall_statistics::interval::{COVERAGE, clopper_pearson};
+use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
 use serde::Serialize;
 
 use super::CriticalLaneChange;

@@ -9,7 +9,7 @@
 //!   the lane changes for which both quantities have a value, and their number is stated. With fewer than 5 pairs, or
 //!   if a quantity does not vary, there is no coefficient.
 
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::{Side, VehicleClass};
 use serde::Serialize;
 

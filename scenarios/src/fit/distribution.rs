@@ -1,7 +1,7 @@
 //! Empirical quantiles and parametric forms, with their confidence interval and goodness of fit.
 
-use closecall_statistics::normal::TruncatedStandardNormal;
-use closecall_statistics::quantiles::{median, quantile};
+use closecall_traffic::statistics::normal::TruncatedStandardNormal;
+use closecall_traffic::statistics::quantiles::{median, quantile};
 use closecall_traffic::{Stream, maths};
 use rand::{RngExt, SeedableRng};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use closecall_statistics::quantiles::median;
+use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, time_headway_s};
 use closecall_traffic::{Lane, Side, Time, Trajectory, TrajectoryPoint};
 

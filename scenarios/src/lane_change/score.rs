@@ -14,7 +14,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use closecall_statistics::interval::{COVERAGE, clopper_pearson};
+use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
 use closecall_traffic::{Side, Time};
 use serde::{Deserialize, Serialize};
 

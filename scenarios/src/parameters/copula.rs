@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use closecall_statistics::normal::TruncatedStandardNormal;
+use closecall_traffic::statistics::normal::TruncatedStandardNormal;
 use closecall_traffic::{ConfigError, ParameterName, Problem, Range, maths};
 
 use super::space::{SpaceEntry, Variation};

@@ -1,6 +1,6 @@
 //! Correlated parameters: their distributions stay, their ranks correlate, and wrong correlations are refused.
 
-use closecall_statistics::quantiles::median;
+use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{ParameterName, Value};
 
 use super::{ParameterSpace, ParametersConfig};

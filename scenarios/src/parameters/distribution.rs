@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use closecall_statistics::normal::TruncatedStandardNormal;
-use closecall_statistics::quantiles;
+use closecall_traffic::statistics::normal::TruncatedStandardNormal;
+use closecall_traffic::statistics::quantiles;
 use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value, maths};
 
 use super::Variation;

@@ -10,7 +10,7 @@
 use std::f64::consts::SQRT_2;
 use std::sync::{Mutex, PoisonError};
 
-use closecall_statistics::normal::erfc_inv;
+use closecall_traffic::statistics::normal::erfc_inv;
 use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range, Time, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

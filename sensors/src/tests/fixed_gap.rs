@@ -3,7 +3,7 @@
 
 use rand::RngExt;
 
-use closecall_statistics::consistency::Consistency;
+use closecall_traffic::statistics::consistency::Consistency;
 use crate::tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{

@@ -1,6 +1,6 @@
 //! Several rear LiDARs, each with a mounting of its own.
 
-use closecall_statistics::consistency::Consistency;
+use closecall_traffic::statistics::consistency::Consistency;
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass, maths,
     stream,

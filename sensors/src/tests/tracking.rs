@@ -1,6 +1,6 @@
 //! Tests of the tracker on simulated detections against the true states.
 
-use closecall_statistics::consistency::{Consistency, Credibility};
+use closecall_traffic::statistics::consistency::{Consistency, Credibility};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Track, TrackId, TrackStatus,
     VehicleClass, stream,

@@ -1,7 +1,7 @@
 //! Posterior predictive checks: what a population of calibrated drivers predicts for recordings that were held out.
 
 use closecall_scenarios::following::FollowingPair;
-use closecall_statistics::quantiles::quantile;
+use closecall_traffic::statistics::quantiles::quantile;
 use rayon::prelude::*;
 
 use super::calibrate::PairResult;

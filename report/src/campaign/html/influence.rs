@@ -8,8 +8,8 @@ use super::page::{number, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{EventInfluence, FEW_EVENTS, ScenarioOverview};
 use crate::charts::{TornadoBar, TornadoTexts, tornado};
-use closecall_statistics::sensitivity::given_data::Influence;
-use closecall_statistics::sensitivity::jackknife::Estimate;
+use closecall_traffic::statistics::sensitivity::given_data::Influence;
+use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 
 /// Returns the section, with a tornado chart for each event.
 pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> io::Result<Markup> {

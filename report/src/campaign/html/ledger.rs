@@ -11,7 +11,7 @@ use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::summary::{Counts, Summary};
-use closecall_statistics::format::percent;
+use closecall_traffic::statistics::format::percent;
 
 /// Returns the collisions of each arm, and of pairs of arms if the campaign is paired.
 pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {

@@ -11,7 +11,7 @@ use crate::campaign::overview::{Fate, MARGINS, MarginBins, ScenarioOverview};
 use crate::charts;
 use crate::charts::style::{arm_colour, css, fate_colour};
 use crate::units::labelled;
-use closecall_statistics::format::percent;
+use closecall_traffic::statistics::format::percent;
 
 /// Returns the section of one scenario.
 pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> io::Result<Markup> {

@@ -6,7 +6,7 @@ use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
 use closecall_campaign::gate::{Evaluation, Standing};
 use closecall_campaign::verdict::Verdict;
-use closecall_statistics::format::percent;
+use closecall_traffic::statistics::format::percent;
 
 const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     match verdict {

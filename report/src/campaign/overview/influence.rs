@@ -5,8 +5,8 @@ use closecall_campaign::partition::split_mix;
 use closecall_campaign::record::Record;
 use closecall_scenarios::parameters::{Distribution, ParameterSpace, Variation};
 use closecall_scenarios::sampling::Design;
-use closecall_statistics::format::percent;
-use closecall_statistics::sensitivity::given_data::{CLASSES, ClassCounts, Influence};
+use closecall_traffic::statistics::format::percent;
+use closecall_traffic::statistics::sensitivity::given_data::{CLASSES, ClassCounts, Influence};
 use closecall_traffic::{Parameters, Value};
 
 /// What a report says if there are too few events.
@@ -147,7 +147,7 @@ impl InfluenceCounts {
 impl EventInfluence {
     /// Returns the rates of the event in the first and in the last class of a parameter.
     pub fn from_to(&self, influence: &Influence) -> String {
-        let rate = |rate: Option<&closecall_statistics::sensitivity::jackknife::Estimate>| {
+        let rate = |rate: Option<&closecall_traffic::statistics::sensitivity::jackknife::Estimate>| {
             rate.map_or_else(|| "-".to_owned(), |rate| percent(rate.value))
         };
         format!("{} → {}", rate(influence.rates.first()), rate(influence.rates.last()))

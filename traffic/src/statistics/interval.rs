@@ -6,7 +6,7 @@
 //! [`super::sequence`] for that case.
 
 use super::binomial::{at_least, at_most};
-use closecall_traffic::maths;
+use crate::maths;
 
 /// Returns the one-sided upper bound: the smallest probability at which at most `hits` hits in `samples` samples would occur
 /// with a probability of 1 − `confidence` or less. The true probability lies above it in at most a fraction of

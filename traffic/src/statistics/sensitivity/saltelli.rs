@@ -17,7 +17,7 @@
 use rand::Rng;
 
 use super::jackknife::{Estimate, REPLICATES, jackknife};
-use crate::interval::{COVERAGE, clopper_pearson};
+use crate::statistics::interval::{COVERAGE, clopper_pearson};
 
 /// Half the spacing of the numbers in the sequence, which have 23 bits: it keeps each number above 0 and below 1.
 const HALF_CELL: f64 = 1.0 / (1_u32 << 24) as f64;

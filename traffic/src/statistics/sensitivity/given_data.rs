@@ -11,7 +11,7 @@
 //! Sobol' index. If the event depends linearly on the parameter, eight classes hide 1/64 of it.
 
 use super::jackknife::{Estimate, REPLICATES, jackknife};
-use crate::interval::{COVERAGE, clopper_pearson};
+use crate::statistics::interval::{COVERAGE, clopper_pearson};
 
 /// Number of classes of a continuous parameter.
 pub const CLASSES: usize = 8;

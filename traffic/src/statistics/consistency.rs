@@ -81,7 +81,7 @@ impl Consistency {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, StandardNormal, stream};
+    use crate::{ActorId, StandardNormal, stream};
     use rand::distr::Distribution;
 
     use super::*;

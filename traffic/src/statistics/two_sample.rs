@@ -15,8 +15,8 @@
 
 use rand::{Rng, RngExt};
 
-use crate::quantiles::quantile;
-use closecall_traffic::maths;
+use crate::statistics::quantiles::quantile;
+use crate::maths;
 
 /// Number of simulated distances.
 const SIMULATED: usize = 999;
@@ -126,7 +126,7 @@ fn factor(level: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::Stream;
+    use crate::Stream;
     use rand::SeedableRng;
 
     use super::*;

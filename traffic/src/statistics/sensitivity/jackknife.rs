@@ -12,7 +12,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::interval::COVERAGE;
+use crate::statistics::interval::COVERAGE;
 
 /// Number of replicates into which samples are divided. Student's factor is then 4 % above that of infinitely many.
 pub const REPLICATES: usize = 32;

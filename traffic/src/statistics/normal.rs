@@ -8,7 +8,7 @@ mod erfc_inv;
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
-use closecall_traffic::maths::{erfc, exp};
+use crate::maths::{erfc, exp};
 pub use erfc_inv::erfc_inv;
 
 /// Returns the probability below `z`: Φ(z).

@@ -1,9 +1,9 @@
 //! The inverse of the complementary error function, accurate to 11 digits, with the same bits on every processor.
 //!
 //! The fits are those of the crate `statrs` 0.19 (from Math.NET and Boost), which a test compares. That crate calls the logarithm of the C library,
-//! whose last digit depends on the processor; here it is that of [`closecall_traffic::maths`].
+//! whose last digit depends on the processor; here it is that of [`crate::maths`].
 
-use closecall_traffic::maths::ln;
+use crate::maths::ln;
 
 /// A fit by a quotient of two polynomials and an offset.
 struct Fit {
@@ -252,7 +252,7 @@ mod tests {
     fn values_are_those_of_statrs() {
         let inner = (1..40_000).map(|step| f64::from(step) / 20_000.0);
         // Powers of 10, down to the smallest number.
-        let outer = (0..3_200).map(|step| closecall_traffic::maths::powf(10.0, -0.1 * f64::from(step)));
+        let outer = (0..3_200).map(|step| crate::maths::powf(10.0, -0.1 * f64::from(step)));
         for value in inner.chain(outer).chain([0.0, -1.0, 2.0, 3.0, f64::MIN_POSITIVE]) {
             let (x, expected) = (erfc_inv(value), statrs::function::erf::erfc_inv(value));
             // The logarithm of the C library may differ in the last digit.

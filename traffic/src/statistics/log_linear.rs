@@ -28,7 +28,7 @@ impl LogLinearHistogram {
         self.len == 0
     }
 
-    /// Returns the quantile at probability `u` of one or more values, by [`quantile`](crate::quantiles::quantile)'s rule.
+    /// Returns the quantile at probability `u` of one or more values, by [`quantile`](crate::statistics::quantiles::quantile)'s rule.
     ///
     /// # Panics
     /// Panics if there are no values.
@@ -67,7 +67,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::quantiles::quantile;
+    use crate::statistics::quantiles::quantile;
 
     fn histogram(values: &[f64]) -> LogLinearHistogram {
         let mut histogram = LogLinearHistogram::default();

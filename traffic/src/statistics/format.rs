@@ -1,6 +1,6 @@
 //! How probabilities and shares are printed.
 
-use closecall_traffic::maths;
+use crate::maths;
 
 /// Significant digits of a printed share.
 const DIGITS: i32 = 3;

@@ -5,7 +5,7 @@
 //! half of the digits at a million samples. A tail is the sum of single probabilities, each a simple multiple of its
 //! neighbour. The sum has positive terms only, and stops when further terms no longer change it.
 
-use closecall_traffic::maths;
+use crate::maths;
 use std::f64::consts::PI;
 
 /// Smallest n for which Stirling's series is accurate to all digits. Factorials of smaller n are exact in `f64`.

@@ -1,6 +1,6 @@
 //! Functions of the unit cube with known indices.
 
-use closecall_traffic::maths;
+use crate::maths;
 use std::f64::consts::PI;
 
 /// T. Ishigami and T. Homma, *An importance quantification technique in uncertainty analysis for computer models*, ISUMA 1990,
