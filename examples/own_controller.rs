@@ -22,9 +22,9 @@ use closecall_campaign::workers::Workers;
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Reason,
 };
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::TrackStatus;
 

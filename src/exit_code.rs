@@ -3,8 +3,8 @@
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::verdict::{Decision, Judgement};
-use closecall_scenarios::atomic::WriteError;
-use closecall_simulation::scenario::ScenarioError;
+use closecall_scenarios::ScenarioError;
+use closecall_traffic::atomic::WriteError;
 
 /// The exit code of the program.
 ///

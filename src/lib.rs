@@ -27,11 +27,11 @@
 pub use closecall_campaign as campaign;
 pub use closecall_causes as causes;
 pub use closecall_controllers as controllers;
+pub use closecall_recorded as recorded;
 pub use closecall_report as report;
 pub use closecall_scenarios as scenarios;
 pub use closecall_sensors as sensors;
 pub use closecall_simulation as simulation;
-pub use closecall_traffic::statistics as statistics;
 pub use closecall_traffic as traffic;
 
 pub mod cli;

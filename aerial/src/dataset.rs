@@ -13,7 +13,7 @@ use std::path::Path;
 
 use closecall_sensors::camera::Image;
 use closecall_sensors::datasets::Set;
-use closecall_scenarios::atomic::write_file;
+use closecall_traffic::atomic::write_file;
 use closecall_traffic::{ActorId, VehicleClass, stream};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use closecall_sensors::camera::ClassifierError;
-use closecall_scenarios::atomic::WriteError;
+use closecall_traffic::atomic::WriteError;
 
 /// The reason why the aerial acquisition fails.
 #[derive(Debug, thiserror::Error)]

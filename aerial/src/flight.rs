@@ -1,9 +1,9 @@
 //! A flight over traffic: pictures of each instant, detections, and trajectory data from them.
 
+use closecall_recorded::filters::{PERIOD, smooth};
+use closecall_recorded::lane_change::detect;
+use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_sensors::camera::Backend;
-use closecall_scenarios::filters::{PERIOD, smooth};
-use closecall_scenarios::lane_change::detect;
-use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_traffic::{
     ActorId, BodyShape, Dimensions, Lane, Stream, Time, Trajectory, TrajectoryPoint, Vehicle, VehicleClass, stream,
 };

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use closecall_scenarios::criticality::{CriticalLaneChange, ENCOUNTER_HORIZON_S, Judgement, criticality};
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
-use closecall_scenarios::trajectory_data::TrajectoryData;
+use closecall_recorded::criticality::{CriticalLaneChange, ENCOUNTER_HORIZON_S, Judgement, criticality};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
+use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{VehicleClass, maths};
 use serde::Serialize;

@@ -4,9 +4,9 @@
 
 use closecall_aerial::dataset::{AerialDatasetOptions, dataset_picture};
 use closecall_aerial::{Detector, FlightOptions, fly, intersection_over_union, losses};
+use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_sensors::camera::Backend;
 use closecall_sensors::datasets::Set;
-use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 

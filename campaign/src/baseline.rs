@@ -13,8 +13,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::sampling::Design;
+use closecall_traffic::atomic::{WriteError, write_file};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

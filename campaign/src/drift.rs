@@ -10,15 +10,15 @@
 
 use std::path::Path;
 
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::fit::{MIN_VALUES, Quantity, Samples, observe};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::fit::{MIN_VALUES, Quantity, Samples, observe};
+use closecall_recorded::trajectory_data::TrajectoryData;
+use closecall_scenarios::ScenarioError;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
-use closecall_scenarios::trajectory_data::TrajectoryData;
-use closecall_simulation::scenario::ScenarioError;
+use closecall_traffic::Stream;
 use closecall_traffic::statistics::holm;
 use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::statistics::two_sample::{self, Summary};
-use closecall_traffic::Stream;
 use rand::SeedableRng;
 use serde::Serialize;
 
@@ -176,8 +176,8 @@ fn stream(seed: u64, quantity: Quantity) -> Stream {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::statistics::normal::TruncatedStandardNormal;
     use closecall_traffic::maths;
+    use closecall_traffic::statistics::normal::TruncatedStandardNormal;
     use rand::RngExt;
     use rayon::prelude::*;
 

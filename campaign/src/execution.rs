@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use closecall_scenarios::atomic::WriteError;
+use closecall_traffic::atomic::WriteError;
 
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};

@@ -1,7 +1,7 @@
 //! The kind of an error: what a caller can do about it, and so the exit code of a program.
 
+use closecall_scenarios::ScenarioError;
 use closecall_simulation::controller::native::NativeError;
-use closecall_simulation::scenario::ScenarioError;
 
 use super::compare::CompareError;
 use super::execution::CampaignError;

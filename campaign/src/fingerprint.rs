@@ -7,10 +7,10 @@
 use std::path::{Path, PathBuf};
 
 use closecall_controllers::CheckedDriver;
+use closecall_scenarios::Scenario;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{ExecSettings, Identity, identify};
 use closecall_simulation::controller::native::NativeSettings;
-use closecall_simulation::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::file_hash;

@@ -16,8 +16,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::{WriteError, is_temporary, write_file};
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
+use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
 
 use super::journal::{self, Entry, Journal};
 use super::lock::{LOCK, Lock};

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use closecall_scenarios::atomic::WriteError;
+use closecall_traffic::atomic::WriteError;
 
 /// The reason for which a campaign's folder cannot be used. The folder is unchanged.
 #[derive(Debug, thiserror::Error)]

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use closecall_scenarios::trajectory_data::input_files;
+use closecall_recorded::trajectory_data::input_files;
+use closecall_scenarios::ScenarioFile;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::ScenarioFile;
 
 use crate::fingerprint::named_files;
 

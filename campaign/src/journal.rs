@@ -16,7 +16,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use closecall_scenarios::atomic::WriteError;
+use closecall_traffic::atomic::WriteError;
 
 use super::record::Record;
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use closecall_simulation::outcome::worse;
+use closecall_scenarios::outcome::worse;
 use closecall_traffic::statistics::{interval, mcnemar, sequence};
 
 /// Share of repetitions in which a reported interval covers the true probability, at least.

@@ -61,4 +61,4 @@ pub mod verdict;
 pub mod wall_times;
 pub mod workers;
 
-pub use closecall_simulation::harm;
+pub use closecall_scenarios::harm;

@@ -5,10 +5,10 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use closecall_scenarios::{Scenario, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::{Scenario, Setting};
 use object::{Object, ReadCache};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use closecall_simulation::outcome::Margins;
-use closecall_traffic::statistics::quantiles::quantile;
+use closecall_scenarios::outcome::Margins;
 use closecall_traffic::Measured;
+use closecall_traffic::statistics::quantiles::quantile;
 use serde::Serialize;
 
 /// A margin of a run. A smaller value is closer to a collision.

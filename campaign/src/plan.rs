@@ -9,12 +9,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::native::NativeError;
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
 
 use crate::execution::Campaign;
 use crate::fingerprint::Fingerprint;

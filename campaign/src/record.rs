@@ -1,12 +1,12 @@
 //! The record of one sample: what the journal of a campaign keeps.
 
+use closecall_scenarios::outcome::Outcome;
 use closecall_simulation::SampleError;
-use closecall_simulation::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
 use super::ledger::Tally;
 use super::validity::ArmChecks;
-use closecall_simulation::harm::harm;
+use closecall_scenarios::harm::harm;
 
 /// The reason for which a sample has no outcome.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

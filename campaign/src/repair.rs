@@ -9,7 +9,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
 
-use closecall_scenarios::atomic::write_file;
+use closecall_traffic::atomic::write_file;
 
 use super::execution::{Campaign, CampaignError};
 use super::folder::{FolderError, LockedFolder, TornLine};

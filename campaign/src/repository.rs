@@ -5,8 +5,8 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::WriteError;
-use closecall_simulation::scenario::source::{PROJECT_FILE, SCENARIOS};
+use closecall_scenarios::source::{PROJECT_FILE, SCENARIOS};
+use closecall_traffic::atomic::WriteError;
 
 const SCENARIO: &str = include_str!("repository/scenario.toml");
 const PROJECT: &str = include_str!("repository/closecall.toml");
@@ -82,7 +82,7 @@ pub fn create(path: &Path, text: &str) -> Result<bool, WriteError> {
 
 #[cfg(test)]
 mod tests {
-    use closecall_simulation::scenario::ScenarioFile;
+    use closecall_scenarios::ScenarioFile;
 
     use super::*;
 

@@ -19,7 +19,7 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::{WriteError, is_temporary};
+use closecall_traffic::atomic::{WriteError, is_temporary};
 use serde_json::Value;
 
 use crate::folder::{FILES, Folder, LockedFolder, MANIFEST, RECORDINGS, RECORDINGS_PAGE, REPORT};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::robustness::{CriterionCounts, Measured, Robustness, Setup, Study};
-use closecall_scenarios::trajectory_data::{ReadOptions, TrajectoryFileError, open};
+use closecall_recorded::robustness::{CriterionCounts, Measured, Robustness, Setup, Study};
+use closecall_recorded::trajectory_data::{ReadOptions, TrajectoryFileError, open};
 use rayon::prelude::*;
 
 /// The reason why files cannot be studied.

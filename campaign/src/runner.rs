@@ -4,9 +4,9 @@ use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
+use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
 use closecall_traffic::Check;
 

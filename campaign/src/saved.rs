@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting};
+use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting};
 use closecall_simulation::{Arm, RunKey, SampleError};
 
 use crate::folder::{Folder, FolderError};

@@ -15,13 +15,13 @@
 //!
 //! The word `each-kind` stands for at most three samples of the whole campaign: the worst collision that the system
 //! prevented, the worst that it induced, and the worst that happens in both arms. The measure is the harm
-//! ([`closecall_simulation::harm`]) in the arm that collides: the baseline for a prevented collision, else the arm under test.
+//! ([`closecall_scenarios::harm`]) in the arm that collides: the baseline for a prevented collision, else the arm under test.
 //! If no sample is of any of the three kinds, as in a campaign with one controller, the worst sample as above stands for them.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::{ActorId, Measured, stream};
 use rand::RngExt;
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 
 use super::workers::Finished;
 

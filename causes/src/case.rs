@@ -6,11 +6,11 @@ use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::FolderError;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_campaign::saved::{SavedCampaign, SavedError};
-use closecall_scenarios::atomic::WriteError;
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting, SettingError};
 use closecall_sensors::SensorMode;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting, SettingError};
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError};
+use closecall_traffic::atomic::WriteError;
 
 use crate::map::MapError;
 

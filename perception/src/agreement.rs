@@ -5,11 +5,11 @@
 //! the first difference of the two runs that is large enough to matter.
 
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError, simulate};
 use closecall_traffic::VehicleClass;
 use rayon::prelude::*;

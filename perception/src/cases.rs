@@ -2,10 +2,10 @@
 //!
 //! The usual condition has the light, the weather and the road of the scenario whose sensors are studied.
 
+use closecall_scenarios::{ScenarioError, ScenarioFile, library};
 use closecall_sensors::camera::Sun;
 use closecall_sensors::faults::Faults;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, library};
 use closecall_traffic::{BodyShape, Environment, Lane, Light, Plate, Road, Side, VehicleClass};
 
 /// Reflectivity of the usual paint (-).

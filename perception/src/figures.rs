@@ -3,9 +3,9 @@
 //! Steps of one approach are correlated, and approaches are not. An interval therefore rests on the scatter of the approaches:
 //! that of Clopper and Pearson for a share of approaches, Student's for a mean of their means, and Garwood's for a rate.
 
+use closecall_traffic::CONTROL_STEP;
 use closecall_traffic::statistics::interval::clopper_pearson;
 use closecall_traffic::statistics::quantiles::quantile;
-use closecall_traffic::CONTROL_STEP;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use crate::approach::{Approach, GAPS_M, Tracked};

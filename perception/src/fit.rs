@@ -15,8 +15,8 @@
 
 use std::collections::BTreeMap;
 
+use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
-use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
 use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass, maths};
 use rayon::prelude::*;
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_report::json::stamped;
 use closecall_report::table::{Column, write_columns};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use serde_json::{Value, json};
 
 use crate::figures::{CalibrationBin, CurvePoint, Estimate, Figures, PointErrors};

@@ -1,8 +1,8 @@
 //! All approaches of all cases.
 
 use closecall_campaign::failure::FailureKind;
+use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::{SensorError, SensorMode, Sensors};
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
 use closecall_traffic::Road;
 use rayon::prelude::*;
 

@@ -190,8 +190,8 @@ fn is_material(figure: &str, full: f64, object: f64) -> bool {
 mod tests {
     use std::path::Path;
 
+    use closecall_scenarios::source;
     use closecall_sensors::Origin;
-    use closecall_simulation::scenario::source;
 
     use super::*;
 

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use closecall_controllers::external::watch::Call;
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, LeadVehicleSelector, Reason,
 };
-use closecall_controllers::external::watch::Call;
 use closecall_simulation::ControllerFactory;
 use closecall_simulation::controller::hosted::{self, HostedProcess, Registration, register};
 use closecall_simulation::controller::isolated::Isolated;

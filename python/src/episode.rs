@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use closecall_controllers::{EgoCommand, EgoState, LeadVehicleSelector, Reason};
 use closecall_report::json;
+use closecall_scenarios::outcome::EndReason;
 use closecall_sensors::SensorMode;
-use closecall_simulation::outcome::EndReason;
 use closecall_simulation::{NoObserver, RunKey, SampleError, Stepper};
 use closecall_traffic::Measured;
 use pyo3::exceptions::PyRuntimeError;

@@ -2,8 +2,8 @@
 
 use closecall::cli::CliError;
 use closecall::exit_code::ExitCode;
+use closecall_scenarios::ScenarioError;
 use closecall_simulation::SampleError;
-use closecall_simulation::scenario::ScenarioError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

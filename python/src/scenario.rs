@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario as Concrete, ScenarioFile, Setting, library, source};
 use closecall_simulation::SampleError;
-use closecall_simulation::scenario::{Scenario as Concrete, ScenarioFile, Setting, library, source};
 use closecall_traffic::Value;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

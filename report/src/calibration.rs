@@ -1,6 +1,6 @@
 //! The result of a calibration: as text, as JSON, and as a member of a driver ensemble.
 
-use closecall_scenarios::following::FollowingData;
+use closecall_recorded::following::FollowingData;
 use closecall_simulation::calibration::{Calibration, Errors, ParameterSpec};
 use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::quantiles::quantile;
@@ -171,8 +171,8 @@ pub fn member(calibration: &Calibration, data: &FollowingData) -> String {
 
 #[cfg(test)]
 mod tests {
+    use closecall_scenarios::member::Member;
     use closecall_simulation::calibration::{FollowingModel, PairResult};
-    use closecall_simulation::scenario::member::Member;
 
     use super::*;
 

@@ -1,15 +1,61 @@
-//! What Closecall tests: trajectory data, lane changes, parameter distributions, sampling designs and the scenario
-//! library.
+//! Scenarios: from the text of a file to one concrete scenario.
+//!
+//! ```text
+//!  file ─▶ ScenarioFile ─(parameters of one sample)─▶ Scenario ─▶ simulation
+//!          text, checked keys                         numbers, checked ranges
+//! ```
+//!
+//! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled. The parameter values of
+//! one sample turn it into a *concrete* scenario, [`Scenario`], which is valid by construction.
 
-pub mod atomic;
-pub mod criticality;
-pub mod encounter;
-pub mod filters;
-pub mod fit;
-pub mod following;
-pub mod lane_change;
+mod base;
+mod checked;
+mod config;
+pub mod criteria;
+mod edit;
+mod events;
+mod file;
+mod fleet;
+mod grip;
+pub mod harm;
+mod inert_fault;
+mod inert_object_fault;
+mod intervention;
+pub mod library;
+mod lidar_file;
+mod locate;
+pub mod member;
+pub mod outcome;
 pub mod parameters;
-pub mod robustness;
-pub mod same_file;
+mod placement;
+mod recorded;
+mod recorded_values;
+mod reenacted;
+mod run_key;
+mod sampled;
 pub mod sampling;
-pub mod trajectory_data;
+mod schema;
+pub mod source;
+mod step_value;
+mod traffic;
+mod variation;
+
+pub use checked::{Actor, Scenario};
+pub use config::{
+    AbsoluteStartConfig, ActorConfig, RandomNumbersConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig,
+    StartConfig,
+};
+pub use edit::{Setting, SettingError};
+pub use events::{
+    Brake, BrakeConfig, CutOutStartedConfig, Effect, EffectConfig, Event, EventConfig, LaneChangeConfig,
+    NominalEncounterConfig, ThwBelowConfig, Trigger, TriggerConfig,
+};
+pub use file::{ScenarioError, ScenarioFile};
+pub use grip::lateral_grip_mps2;
+pub use intervention::{FaultConfig, IdealConfig, Interventions, MisState};
+pub use reenacted::{RearDriver, actor_name, reenact};
+pub use run_key::RunKey;
+pub use sampled::{SampledEncounter, opp2_of, sampled};
+pub use schema::strict_schema;
+pub use step_value::{StepValue, Variation};
+pub use traffic::{ClassWeightsConfig, TrafficConfig};

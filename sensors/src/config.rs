@@ -5,6 +5,7 @@ use closecall_traffic::{Check, Choice, ConfigError, Parameters, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
 use crate::faults::{Faults, OdometryErrors};
 use crate::image_detector::ImageDetector;
 use crate::lidar::{FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
@@ -13,7 +14,6 @@ use crate::{
     Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
     ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, SensorError, TrackerConfig,
 };
-use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).
 const MIN_LIDAR_HEIGHT_M: f64 = 0.1;

@@ -31,9 +31,9 @@ mod tests;
 pub mod tracking;
 mod worker_classifier;
 
+pub use crate::tracking::{Detection, Extent, SeenBy, TrackerConfig, TrackerModel};
 pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
-pub use crate::tracking::{Detection, Extent, SeenBy, TrackerConfig, TrackerModel};
 pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception, MAX_ADDITIONAL_LIDARS};

@@ -8,11 +8,11 @@ use std::sync::OnceLock;
 
 use closecall_traffic::{Environment, Road, Stream, Time};
 
+use crate::camera::CameraFault;
+use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
 use crate::full::DetectionClassifier;
 use crate::{Detection, Health, NoiseKey, Scene, SceneVehicle, SensorError};
-use crate::camera::CameraFault;
-use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 
 /// Name of the camera's random stream.
 pub(crate) const CHANNEL: &str = "rear-camera";

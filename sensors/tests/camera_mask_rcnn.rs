@@ -143,7 +143,8 @@ fn a_network_without_labels_is_refused() {
 fn labels_that_are_not_mapped_are_left_out() {
     let Some(backend) = backend() else { return };
     let map = LabelMap::parse("2=truck").unwrap();
-    let mut detector = InstanceDetector::new(closecall_sensors::camera::SHIPPED_MASK_RCNN, Some(&map), &backend).unwrap();
+    let mut detector =
+        InstanceDetector::new(closecall_sensors::camera::SHIPPED_MASK_RCNN, Some(&map), &backend).unwrap();
     let [width, height] = [detector.sampling().columns().len(), detector.sampling().rows().len()];
     let answers: Vec<serde_json::Value> = serde_json::from_str(include_str!("mask_rcnn_golden/answers.json")).unwrap();
     let pictures = include_bytes!("mask_rcnn_golden/pictures.rgb").chunks_exact(width * height * 3);

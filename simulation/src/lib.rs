@@ -16,11 +16,7 @@
 
 pub mod calibration;
 pub mod controller;
-pub mod criteria;
-pub mod harm;
-pub mod outcome;
 pub mod run;
-pub mod scenario;
 pub mod trajectories;
 mod world;
 

@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_sensors::lidar::ClusteredPoints;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting};
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_testing::dbscan_by_definition;
 use closecall_traffic::Time;

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_scenarios::trajectory_data::{
+use closecall_recorded::trajectory_data::{
     BadRows, LayoutChoice, ReadOptions, TrajectoryData, read_with, refuse_duplicates,
 };
+use closecall_scenarios::{ScenarioError, ScenarioFile, Setting, source};
 use closecall_sensors::SensorMode;
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting, source};
 
 use super::CliError;
 use super::arms::ArmArgs;

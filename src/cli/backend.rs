@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use closecall_scenarios::Scenario;
 use closecall_sensors::camera::{Backend, Camera, CameraConfig, Classifier, Pipeline};
 use closecall_sensors::{SensorMode, inference_backend, set_inference_backend};
 use closecall_simulation::Arm;
-use closecall_simulation::scenario::Scenario;
 
 use super::CliError;
 

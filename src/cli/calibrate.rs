@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_recorded::following::read;
 use closecall_report::{calibration, json::stamped};
-use closecall_scenarios::{atomic::write_file, following::read};
 use closecall_simulation::calibration::{FollowingModel, calibrate as fit};
+use closecall_traffic::atomic::write_file;
 
 use super::help::{examples, heading};
 use super::output::{out, outln};

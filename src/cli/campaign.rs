@@ -23,8 +23,8 @@ use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText,
 use closecall_report::heartbeat::Heartbeat;
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::source::expand;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::source::expand;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::CliError;

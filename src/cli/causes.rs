@@ -15,10 +15,10 @@ use closecall_causes::exposure::{
 use closecall_causes::failures::explain_failures;
 use closecall_causes::map::{MapGrid, MapText, map as compute_map, write_map};
 use closecall_causes::minimize::{MinimizedText, minimize_sample, output_files, write_files};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::trajectory_data::read_with;
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::trajectory_data::read_with;
 use closecall_simulation::controller::ControllerChoice;
 use serde_json::json;
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
 use closecall_report::json::stamped;
-use closecall_simulation::scenario::source::expand;
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
+use closecall_scenarios::source::expand;
+use closecall_scenarios::{ScenarioError, ScenarioFile};
 use serde_json::{Value, json};
 
 use super::CliError;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_simulation::scenario::ScenarioFile;
-use closecall_simulation::scenario::member::{Ensemble, ensemble_of, members};
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::member::{Ensemble, ensemble_of, members};
 
 use super::CliError;
 use super::help::heading;

@@ -1,7 +1,6 @@
 //! The errors of the commands, and the exit code of each.
 
 use closecall_aerial::AerialError;
-use closecall_sensors::camera::ClassifierError;
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
@@ -13,24 +12,25 @@ use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_causes::CausesError;
-use closecall_sensors::datasets::DatasetError;
 use closecall_perception::StudyError;
+use closecall_recorded::encounter::{NoEncounter, track_suggestion};
+use closecall_recorded::following::FollowingError;
+use closecall_recorded::lane_change::ReferenceError;
+use closecall_recorded::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;
 use closecall_report::run::rerun::RecordingError;
 use closecall_report::traffic::trajectory_charts::ChartError;
-use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::encounter::{NoEncounter, track_suggestion};
-use closecall_scenarios::following::FollowingError;
-use closecall_scenarios::lane_change::ReferenceError;
-use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
+use closecall_scenarios::ScenarioError;
+use closecall_scenarios::library::UnknownScenario;
+use closecall_scenarios::member::{ApplyError, MemberError};
+use closecall_scenarios::source::SourceError;
+use closecall_sensors::camera::ClassifierError;
+use closecall_sensors::datasets::DatasetError;
 use closecall_simulation::SampleError;
 use closecall_simulation::controller::native::NativeError;
-use closecall_simulation::scenario::ScenarioError;
-use closecall_simulation::scenario::library::UnknownScenario;
-use closecall_simulation::scenario::member::{ApplyError, MemberError};
-use closecall_simulation::scenario::source::SourceError;
+use closecall_traffic::atomic::WriteError;
 use miette::Diagnostic;
 
 use super::view::ViewError;

@@ -5,8 +5,8 @@ use closecall_campaign::arguments::{confidence, positive, probability, share};
 use closecall_campaign::gate::{AssemblyError, GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec, Scope};
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::verdict::MAX_FLIP_RATE;
+use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::criteria::Expression;
 
 use super::CliError;
 use super::help::heading;

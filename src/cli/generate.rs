@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Command};
 use clap_complete::Shell;
-use closecall_scenarios::atomic::WriteError;
+use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
 use super::help::{examples, heading};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_recorded::trajectory_data::{BadRows, QualityInspector, ReadOptions, open};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::quality::QualityText;
-use closecall_scenarios::trajectory_data::{BadRows, QualityInspector, ReadOptions, open};
 
 use super::CliError;
 use super::args::{Format, ReadArgs};

@@ -2,8 +2,8 @@
 
 use clap::Args;
 use closecall_report::json::stamped;
-use closecall_simulation::scenario::library::entries;
-use closecall_simulation::scenario::member;
+use closecall_scenarios::library::entries;
+use closecall_scenarios::member;
 use serde_json::json;
 
 use super::CliError;

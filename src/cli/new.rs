@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use closecall_campaign::arguments::scenario_name;
 use closecall_campaign::repository::{Installation, create, repository_files, scenario_path, scenario_template};
-use closecall_simulation::scenario::ScenarioFile;
-use closecall_simulation::scenario::library::copy_of;
-use closecall_simulation::scenario::source::SCENARIOS;
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::library::copy_of;
+use closecall_scenarios::source::SCENARIOS;
 
 use super::CliError;
 use super::help::{examples, heading};

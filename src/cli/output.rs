@@ -8,8 +8,8 @@ use closecall_campaign::folder::{Folder, REPORT_FILES};
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::session;
 use closecall_report::heartbeat::Heartbeat;
-use closecall_scenarios::atomic::{WriteError, write_texts};
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
+use closecall_traffic::atomic::{WriteError, write_texts};
 use indicatif::ProgressBar;
 
 use crate::exit_code::ExitCode;

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::arguments::positive;
 use closecall_campaign::robustness::robustness;
+use closecall_recorded::criticality::{Judgement, criticality};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::robustness::Setup;
 use closecall_report::traffic::paper::Paper;
 use closecall_report::traffic::statistics::RecordedChanges;
-use closecall_scenarios::atomic::write_file;
-use closecall_scenarios::criticality::{Judgement, criticality};
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::robustness::Setup;
+use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::args::FilesArgs;

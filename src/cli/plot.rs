@@ -7,9 +7,9 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_report::run::figure::{PictureFile, encounter, parse_width_mm};
 use closecall_report::run::film::{Film, Level, film_arms};
+use closecall_scenarios::Scenario;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;

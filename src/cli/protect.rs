@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 pub(super) use closecall_campaign::arguments::files_of_campaign as of_campaign;
 pub(super) use closecall_campaign::inputs::{of_controller, of_scenario, of_trajectories};
-pub(super) use closecall_scenarios::same_file::Output;
-use closecall_scenarios::same_file::check_outputs;
+pub(super) use closecall_traffic::same_file::Output;
+use closecall_traffic::same_file::check_outputs;
 
 use super::CliError;
 

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::arguments::sample_count;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_recorded::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::trajectories::{InCarRecorder, TrafficRecorder, recorded_actor};
 use closecall_simulation::{Observer, RunKey};
 

@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_recorded::encounter::{ChoiceError, RecordedEncounter, choose};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::trajectory_data::read_with;
 use closecall_report::json::stamped;
 use closecall_report::run::film::{EncounterComparison, film_encounter};
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::reenactment::Reenactment;
-use closecall_scenarios::atomic::write_file;
-use closecall_scenarios::encounter::{ChoiceError, RecordedEncounter, choose};
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::trajectory_data::read_with;
-use closecall_simulation::scenario::{RearDriver, reenact as scenario_of};
+use closecall_scenarios::{RearDriver, reenact as scenario_of};
 use closecall_simulation::{CONTROL_STEP, RunKey};
+use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs};

@@ -17,7 +17,7 @@ use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
 use closecall_report::campaign::{RecordedSample, ReportError};
 use closecall_report::run::rerun::is_recording_enabled;
-use closecall_scenarios::atomic::WriteError;
+use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
 use super::help::heading;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::robustness::{RobustnessError, robustness as study};
+use closecall_recorded::robustness::Setup;
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, robustness_charts};
-use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
 use super::args::{FilesArgs, Format};

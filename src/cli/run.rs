@@ -6,10 +6,10 @@ use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::json;
 use closecall_report::run::text::OutcomeText;
+use closecall_scenarios::Setting;
+use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::RunKey;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::Setting;
 
 use super::CliError;
 use super::args::{Format, SimulationArgs};

@@ -6,8 +6,8 @@ use clap::Args;
 use closecall_report::json::stamped;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::sampling::{Sampled, SampledRun, StepError, run_step};
-use closecall_scenarios::atomic::write_file;
-use closecall_simulation::scenario::{ScenarioFile, Variation, sampled};
+use closecall_scenarios::{ScenarioFile, Variation, sampled};
+use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};

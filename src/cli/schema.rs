@@ -1,6 +1,6 @@
 //! `closecall tool schema`: prints the JSON Schema of scenario files.
 
-use closecall_simulation::scenario::strict_schema;
+use closecall_scenarios::strict_schema;
 
 use super::output::outln;
 use crate::exit_code::ExitCode;

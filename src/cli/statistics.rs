@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::arguments::positive;
+use closecall_recorded::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_report::json::stamped;
 use closecall_report::traffic::statistics::{RecordedChanges, STATISTICS_CHARTS, StatisticsText, statistics_charts};
-use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::trajectory_data::TrajectoryData;
 
 use super::CliError;
 use super::args::{FilesArgs, Format};

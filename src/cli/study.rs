@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_sensors::camera::Pipeline;
 use closecall_campaign::arguments::count;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};
@@ -13,10 +12,11 @@ use closecall_campaign::session;
 use closecall_campaign::stop::StopFlag;
 use closecall_campaign::workers::Workers;
 use closecall_report::study::{Study, write_study};
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_sensors::camera::Pipeline;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::ScenarioFile;
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};

@@ -4,20 +4,20 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::{positive, recording as trajectory_path};
+use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
+use closecall_recorded::filters::smooth;
+use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
+use closecall_recorded::lane_change::{
+    Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
+};
+use closecall_recorded::trajectory_data::{Layout, open, read_with};
 use closecall_report::json::{self, stamped};
 use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::fit::FitText;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_charts};
-use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
-use closecall_scenarios::lane_change::{
-    Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
-};
-use closecall_scenarios::trajectory_data::{Layout, open, read_with};
+use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
 use super::args::{FilesArgs, Format, ReadArgs};

@@ -8,8 +8,8 @@ use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, Setting};
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{Scenario, Setting};
 use closecall_simulation::{Arm, RunKey};
 use closecall_tables::RunTables;
 

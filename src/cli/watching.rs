@@ -8,7 +8,7 @@ use closecall_campaign::arguments::count;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_report::run::text::outcome_line;
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::scenario::source::existing;
+use closecall_scenarios::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;

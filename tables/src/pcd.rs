@@ -17,9 +17,9 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::parent_folder;
 use closecall_sensors::MountedLidar;
 use closecall_sensors::lidar::RearLidar;
+use closecall_traffic::atomic::parent_folder;
 use tempfile::{Builder, TempDir};
 
 use crate::scan_columns::sign;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use closecall_scenarios::atomic::WriteError;
-use closecall_simulation::scenario::Scenario;
+use closecall_scenarios::Scenario;
 use closecall_simulation::{Arm, Observer, RunEvent, StepView};
 use closecall_traffic::Time;
+use closecall_traffic::atomic::WriteError;
 
 use crate::{ScanWriter, TraceWriter};
 

@@ -20,10 +20,10 @@ use std::fs::File;
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 use closecall_sensors::{MountedLidar, SensorMode};
 use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::Time;
+use closecall_traffic::atomic::{WriteError, check_writable, write_file};
 use parquet::arrow::ArrowWriter;
 
 use crate::pcd::PcdFolder;

@@ -10,9 +10,9 @@ use closecall_traffic::{Measured, Time};
 use parquet::arrow::ArrowWriter;
 
 use crate::table::{field, properties, required};
-use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 use closecall_simulation::trajectories::{TraceRecorder, TraceRow};
 use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_traffic::atomic::{WriteError, check_writable, write_file};
 
 /// The file format of a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

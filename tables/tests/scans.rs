@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use arrow::array::{Array, Float32Array, Float64Array, Int32Array, RecordBatch, StringArray, UInt16Array, UInt32Array};
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, RunKey, simulate};
 use closecall_tables::RunTables;
 use closecall_traffic::maths;

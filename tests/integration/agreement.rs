@@ -10,7 +10,7 @@ use closecall_campaign::journal::Journal;
 use closecall_campaign::record::{Record, SampleFailure};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::validity::{ArmChecks, Invariance};
-use closecall_simulation::outcome::Collision;
+use closecall_scenarios::outcome::Collision;
 use closecall_traffic::ActorId;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use closecall::sensors::SensorMode;
-use closecall::simulation::scenario::ScenarioFile;
+use closecall::scenarios::ScenarioFile;
 
 use crate::support::{ROOT, library};
 

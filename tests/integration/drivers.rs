@@ -6,9 +6,9 @@ use std::path::Path;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{ParameterName, Time, Value, maths};
 use statrs::distribution::{ContinuousCDF, LogNormal};

@@ -3,11 +3,11 @@
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
+use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{CONTROL_STEP, ParameterName, Time, Value};
 

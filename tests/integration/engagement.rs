@@ -4,11 +4,11 @@
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
+use closecall_scenarios::outcome::{Moment, Outcome};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::outcome::{Moment, Outcome};
-use closecall_simulation::scenario::{ScenarioFile, Setting};
 use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 

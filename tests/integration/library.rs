@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig, Provenance};
-use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::{all_of_library, closecall, folder, headline_with, json, library, message, stdout};
 

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use closecall_campaign::folder::Folder;
 use closecall_campaign::record::Record;
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
 use serde_json::Value;
 
 use crate::exec_controller::left_behind;

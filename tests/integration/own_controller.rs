@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
+use closecall_scenarios::ScenarioFile;
 use closecall_simulation::ControllerFactory;
-use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::library;
 

@@ -1,10 +1,10 @@
 //! The scenario `paper-figure` reproduces the figure of the paper: its numbers, and its five moments.
 
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::{ClosedBy, Moment, Outcome};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::outcome::{ClosedBy, Moment, Outcome};
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{ActorId, Time};

@@ -1,10 +1,10 @@
 //! The covariances of the tracks agree with their errors, over the scenario library.
 
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::{NEES_QUANTILE_95, SensorMode};
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
 use closecall_traffic::statistics::consistency::{Consistency, Credibility};
 use rayon::prelude::*;

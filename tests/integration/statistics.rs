@@ -15,10 +15,10 @@ use closecall_campaign::record::Record;
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::validity::CheckPlan;
 use closecall_campaign::workers::Workers;
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 

@@ -14,9 +14,9 @@ use closecall_campaign::validity::{CheckPlan, Invariance};
 use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::Side;
 

@@ -8,7 +8,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use closecall_sensors::camera::{Backend, CHANNELS, HEIGHT_PX, Image, Instance, InstanceDetector, Mask, Sampling, WIDTH_PX};
+use closecall_sensors::camera::{
+    Backend, CHANNELS, HEIGHT_PX, Image, Instance, InstanceDetector, Mask, Sampling, WIDTH_PX,
+};
 use serde_json::Value;
 
 /// Folder of the repository.

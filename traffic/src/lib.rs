@@ -54,6 +54,7 @@
 
 mod absent;
 mod actor;
+pub mod atomic;
 pub mod bodies;
 mod body_shape;
 mod check;
@@ -70,6 +71,7 @@ mod quintic;
 mod random;
 mod road;
 pub mod roadside;
+pub mod same_file;
 mod scene;
 mod seed;
 mod time;

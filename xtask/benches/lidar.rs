@@ -8,8 +8,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, Scanner};
-use closecall_sensors::{Detection, FullPerception, NoiseKey, Perception, Scene, SceneVehicle, Sensors, SensorsConfig};
 use closecall_sensors::tracking::{RearView, TrackList, Tracker, TrackerScan};
+use closecall_sensors::{Detection, FullPerception, NoiseKey, Perception, Scene, SceneVehicle, Sensors, SensorsConfig};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Stream, Time, Vehicle, VehicleClass, VehicleState,
     stream,

@@ -9,9 +9,9 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::run::film::{Level, film_arms};
 use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
 use criterion::{Criterion, criterion_group, criterion_main};
 

@@ -10,9 +10,9 @@ use std::time::Instant;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 

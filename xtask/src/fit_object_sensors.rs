@@ -13,8 +13,8 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall::scenarios::atomic::write_file;
-use closecall::simulation::scenario::source;
+use closecall::traffic::atomic::write_file;
+use closecall::scenarios::source;
 use closecall_perception::fit::{FitPlan, at_bounds, fit, fit_errors};
 use closecall_perception::validation::{Measured, differences, measure, table};
 use closecall_sensors::{Chain, RearFit};

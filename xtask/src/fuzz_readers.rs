@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use closecall_scenarios::trajectory_data::{BadRows, ReadOptions, Tracks, TrajectoryFileError, open, open_from};
+use closecall_recorded::trajectory_data::{BadRows, ReadOptions, Tracks, TrajectoryFileError, open, open_from};
 
 const READERS: [&str; 6] = ["ngsim", "csv", "highd", "exid", "commonroad", "in-car"];
 

@@ -8,7 +8,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use closecall_sensors::camera::Sampling;
-use closecall_sensors::datasets::{CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset, render_sampled};
+use closecall_sensors::datasets::{
+    CameraLooks, Content, DatasetOptions, Set, USUAL_VEHICLES, render_dataset, render_sampled,
+};
 
 const USAGE: &str = "usage: render-dataset crops|images|SAMPLING training|held-out SCENES SEED FOLDER\n\
     SAMPLING: a file with the columns that a network reads in its first line, and the rows in its second";

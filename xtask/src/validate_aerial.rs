@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 
 use closecall_aerial::dataset::write_png;
 use closecall_aerial::{FlightOptions, fly, losses};
+use closecall_recorded::trajectory_data::{read, write_trajectories};
 use closecall_sensors::camera::Backend;
-use closecall_scenarios::trajectory_data::{read, write_trajectories};
 
 pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn std::error::Error>> {
     let (mut options, mut files, mut folder) = (FlightOptions::default(), Vec::new(), None);

@@ -20,11 +20,11 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::lane_change::{
+use closecall_recorded::lane_change::{
     Criterion, HitRate, LaneChange, LaneChangeDetector, LaneReliability, MIN_SHIFT_M, ReferenceChange, Score,
     TrackSpans, read_references, score,
 };
-use closecall_scenarios::trajectory_data::{LaneMarkings, TrajectoryData, read};
+use closecall_recorded::trajectory_data::{LaneMarkings, TrajectoryData, read};
 use closecall_traffic::{Dimensions, Lane, Side, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
 /// The name of a subset of the data, and a predicate that selects lane changes by track number and time (s).

@@ -23,9 +23,9 @@ use std::path::Path;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError, simulate};
 use closecall_traffic::statistics::interval::clopper_pearson;
 use closecall_traffic::statistics::quantiles::quantile;

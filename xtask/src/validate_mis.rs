@@ -23,11 +23,11 @@ use std::process::ExitCode;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::{Moment, Outcome};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::outcome::{Moment, Outcome};
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 use plotters::prelude::*;
@@ -94,7 +94,7 @@ fn seen(outcome: &Outcome, watch: &Watch) -> Seen {
         (_, None) => true,
         (None, Some(_)) => false,
     };
-    let gained = |mis: &closecall_simulation::outcome::MisSummary| {
+    let gained = |mis: &closecall_scenarios::outcome::MisSummary| {
         Some(mis.thw_front_at_critical_s.ok()? - mis.thw_front_at_engagement_s.ok()?)
     };
     Seen {

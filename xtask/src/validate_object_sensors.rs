@@ -11,7 +11,7 @@ use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 use std::process::ExitCode;
 
-use closecall::simulation::scenario::source;
+use closecall::scenarios::source;
 use closecall_perception::agreement::Agreement;
 
 /// The weather: its name and its settings.

@@ -27,10 +27,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::{NEES_QUANTILE_95, SensorMode, TrackAudit};
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
 use closecall_traffic::statistics::consistency::{Consistency, Credibility};
 use rayon::prelude::*;

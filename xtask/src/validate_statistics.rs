@@ -23,10 +23,10 @@ use closecall_campaign::probability::{Answer, ProbabilityGate};
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::validity::CheckPlan;
 use closecall_campaign::workers::Workers;
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
 
 /// Collision probability of the scenario, by construction.

@@ -5,9 +5,9 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use closecall_scenarios::{ScenarioError, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey};
 
 use super::result::{Frontier, Point};
@@ -234,7 +234,7 @@ impl Samples for Unchecked {
 
 #[cfg(test)]
 mod tests {
-    use closecall_simulation::scenario::library;
+    use closecall_scenarios::library;
 
     use super::*;
 

@@ -1,7 +1,7 @@
 //! Assembles the gates of a campaign: those of the command line, of a preset, and of the project file.
 
+use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::criteria::Expression;
 
 use super::{GateSet, GateSource, GateSpec, ProjectError, ProjectFile, Scope};
 

@@ -1,6 +1,6 @@
 //! Evaluates one gate over the samples of one scenario.
 
-use closecall_simulation::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
+use closecall_scenarios::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
 use closecall_traffic::statistics::quantiles::quantile;
 
 use crate::ledger::{Inference, PairFate};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use closecall_scenarios::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
 use closecall_scenarios::parameters::Variation;
-use closecall_simulation::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
 
 use super::evaluate::{Accumulator, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};

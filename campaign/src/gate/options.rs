@@ -1,6 +1,6 @@
 //! Criteria that have an option of their own on the command line.
 
-use closecall_simulation::criteria::Expression;
+use closecall_scenarios::criteria::Expression;
 
 use super::Scope;
 

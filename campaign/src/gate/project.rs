@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_simulation::criteria::GateConfig;
-use closecall_simulation::scenario::source::PROJECT_FILE;
+use closecall_scenarios::criteria::GateConfig;
+use closecall_scenarios::source::PROJECT_FILE;
 use serde::Deserialize;
 
 use super::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};

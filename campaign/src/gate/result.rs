@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_simulation::criteria::{Expression, FlagName};
+use closecall_scenarios::criteria::{Expression, FlagName};
 
 use super::evaluate::{Answer, Evaluation};
 use super::set::GateSource;

@@ -10,8 +10,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use closecall_simulation::criteria::Expression;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::criteria::Expression;
 
 use crate::probability::ProbabilityGate;
 use crate::verdict::MAX_FLIP_RATE;

@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use closecall_controllers::ControllerError;
 use closecall_controllers::external::{Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, watch};
+use closecall_scenarios::ScenarioFile;
 use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::Probe;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, SampleError};
 
 use super::{Answer, REFUSED, Task};

@@ -5,7 +5,7 @@
 //!  one line of the journal for each sample, with its checksum
 //! ```
 
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
 use crate::journal;

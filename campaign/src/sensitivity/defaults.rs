@@ -1,7 +1,7 @@
 //! The factors for driver, sensor and controller that ship with the program: `factors.toml`.
 
 use closecall_controllers::DriverConfig;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
 use serde::Deserialize;
 
 use super::factor::{FactorKind, FactorRange};
@@ -114,7 +114,7 @@ fn value_at<'a>(document: &'a toml::Value, key: &str) -> Found<'a> {
 
 #[cfg(test)]
 mod tests {
-    use closecall_simulation::scenario::library;
+    use closecall_scenarios::library;
 
     use super::*;
 

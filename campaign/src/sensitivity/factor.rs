@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use closecall_simulation::scenario::{Setting, SettingError};
+use closecall_scenarios::{Setting, SettingError};
 
 /// The name of the factor that stands for all that the parameters of a sample leave open.
 pub const CHANCE: &str = "chance";

@@ -6,10 +6,10 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use closecall_scenarios::parameters::Provenance;
+use closecall_scenarios::{ScenarioError, ScenarioFile, SettingError};
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, SettingError};
 use closecall_traffic::statistics::sensitivity::jackknife::REPLICATES;
 use closecall_traffic::statistics::sensitivity::saltelli::MAX_FACTORS;
 

@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::Outcome;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 use closecall_traffic::Check;
 

@@ -3,7 +3,7 @@
 //! Mirroring changes how coordinates are rounded, so that the bits may differ. The colliding vehicles, the sides that
 //! they struck, and the time of the collision must agree.
 
-use closecall_simulation::outcome::{Collision, Outcome};
+use closecall_scenarios::outcome::{Collision, Outcome};
 use closecall_traffic::Time;
 use closecall_traffic::geometry::BoxSide;
 

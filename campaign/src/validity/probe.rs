@@ -2,9 +2,9 @@
 
 use std::thread;
 
+use closecall_scenarios::Scenario;
+use closecall_scenarios::outcome::Outcome;
 use closecall_sensors::SensorMode;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 
 use super::mirror::is_mirror_image;

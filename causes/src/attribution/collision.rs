@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use closecall_controllers::EgoState;
+use closecall_scenarios::outcome::{ClosedBy, Collision, Moment, Outcome, Phase};
+use closecall_scenarios::{Scenario, Setting};
 use closecall_sensors::SensorMode;
-use closecall_simulation::outcome::{ClosedBy, Collision, Moment, Outcome, Phase};
-use closecall_simulation::scenario::{Scenario, Setting};
 use closecall_simulation::{Arm, NoObserver};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{ActorId, GRAVITY_MPS2, PHYSICS_STEP};

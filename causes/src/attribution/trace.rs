@@ -1,7 +1,7 @@
 //! The motion of all vehicles up to the first collision.
 
 use closecall_controllers::EgoState;
-use closecall_simulation::outcome::Collision;
+use closecall_scenarios::outcome::Collision;
 use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::{Time, VehicleState};
 

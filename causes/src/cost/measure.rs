@@ -1,7 +1,7 @@
 //! The cost of each arm of a campaign.
 
 use closecall_campaign::saved::SavedCampaign;
-use closecall_simulation::outcome::{Moment, Outcome};
+use closecall_scenarios::outcome::{Moment, Outcome};
 use closecall_traffic::statistics::log_linear::LogLinearHistogram;
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! The result of an explanation.
 
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::MisState;
+use closecall_scenarios::MisState;
+use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::Measured;
 use serde::{Deserialize, Serialize};
 

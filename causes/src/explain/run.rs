@@ -1,9 +1,9 @@
 //! The runs of an explanation.
 
 use closecall_controllers::CheckedDriver;
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{MisState, Setting, SettingError};
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{MisState, Setting, SettingError};
 use closecall_simulation::{Arm, NoObserver};
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! The stages of the chain, and how each is replaced by the truth.
 
+use closecall_scenarios::{EffectConfig, ScenarioFile};
 use closecall_sensors::SensorMode;
-use closecall_simulation::scenario::{EffectConfig, ScenarioFile};
 use serde::{Deserialize, Serialize};
 
 /// A stage of the chain from the sensors of the ego to the drivers of the other vehicles.
@@ -100,9 +100,9 @@ mod tests {
         for stage in Stage::ALL {
             let setting = stage.setting_text().parse().unwrap();
             let path = std::path::Path::new("low-thw-overtake");
-            let file = closecall_simulation::scenario::source::load(path, &[setting]).unwrap();
+            let file = closecall_scenarios::source::load(path, &[setting]).unwrap();
             file.check().unwrap();
-            assert_ne!(file.config().ideal, closecall_simulation::scenario::IdealConfig::default(), "{stage:?}");
+            assert_ne!(file.config().ideal, closecall_scenarios::IdealConfig::default(), "{stage:?}");
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use closecall_campaign::resume_command::quoted;
-use closecall_simulation::scenario::MisState;
+use closecall_scenarios::MisState;
 
 use super::{Cause, Explanation, MisEffect, StageRun};
 use crate::attribution::phase_word;

@@ -12,8 +12,8 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_scenarios::parameters::Distribution;
+use closecall_scenarios::{Actor, Scenario};
 use closecall_sensors::{ObjectSensorConfig, SensorMode, SensorsConfig, TrackerConfig};
-use closecall_simulation::scenario::{Actor, Scenario};
 use closecall_traffic::{CONTROL_STEP, Check, Environment, ParameterName, Parameters, Range};
 
 use super::Stage;

@@ -5,7 +5,7 @@ use std::fmt;
 use closecall_campaign::ledger::Pairs;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::summary::Summary;
-use closecall_simulation::outcome::Moment;
+use closecall_scenarios::outcome::Moment;
 use serde::Serialize;
 
 use super::interval::{extremes, product, rate_interval, share_difference};

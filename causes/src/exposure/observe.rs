@@ -1,6 +1,6 @@
 //! Encounters in trajectory data: the lead vehicle of a vehicle brakes while another comes near from behind.
 
-use closecall_scenarios::filters::{Presence, SmoothedTrajectoryData};
+use closecall_recorded::filters::{Presence, SmoothedTrajectoryData};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Trajectory, TrajectoryPoint};
 use serde::Serialize;
@@ -121,8 +121,8 @@ fn neighbours<'a>(
 
 #[cfg(test)]
 mod tests {
-    use closecall_scenarios::filters::smooth;
-    use closecall_scenarios::trajectory_data::TrajectoryData;
+    use closecall_recorded::filters::smooth;
+    use closecall_recorded::trajectory_data::TrajectoryData;
     use closecall_traffic::{Dimensions, Lane, Time, VehicleClass};
 
     use super::*;

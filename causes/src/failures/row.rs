@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use closecall_campaign::ledger::PairFate;
 use closecall_campaign::record::Record;
-use closecall_simulation::harm::harm;
-use closecall_simulation::outcome::{Moment, Outcome, Phase};
+use closecall_scenarios::harm::harm;
+use closecall_scenarios::outcome::{Moment, Outcome, Phase};
 use serde::{Deserialize, Serialize};
 
 use crate::attribution::{Attribution, roles};
@@ -23,7 +23,7 @@ pub struct FailureRow {
     pub controller: String,
     /// Whether the system induces the failure; `None` without a baseline.
     pub is_induced: Option<bool>,
-    /// The harm of the sample, see [`closecall_simulation::harm`].
+    /// The harm of the sample, see [`closecall_scenarios::harm`].
     pub harm: f64,
     /// Time of the first collision (s).
     pub time_s: f64,

@@ -1,7 +1,7 @@
 //! The file of the causes in a campaign's folder.
 
 use closecall_campaign::folder::Folder;
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 
 use super::FailureRow;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use maud::{DOCTYPE, PreEscaped, html};
 
 use super::table::csv;

@@ -7,10 +7,10 @@ use closecall_controllers::{
     ACTUATOR_LAG_S, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse, CheckedDriver, Encounter,
     GOAL_TOLERANCE_S, MisSettings, Reason,
 };
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{ScenarioError, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::{BuiltIn, ControllerChoice};
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 use closecall_traffic::{CONTROL_STEP, ParameterName, Parameters, Value};
 use rayon::prelude::*;

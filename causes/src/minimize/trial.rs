@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use closecall_campaign::runner::run_guarded;
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{Scenario, Setting, SettingError};
 use closecall_simulation::NoObserver;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, Setting, SettingError};
 use closecall_traffic::{ParameterName, Parameters, Value};
 
 use super::grid;

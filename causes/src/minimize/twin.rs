@@ -1,6 +1,6 @@
 //! The nearest case that passes.
 
-use closecall_simulation::scenario::{Setting, SettingError, StartConfig};
+use closecall_scenarios::{Setting, SettingError, StartConfig};
 use closecall_traffic::{Num, ParameterName, Parameters, Value};
 use rayon::prelude::*;
 use serde::Serialize;

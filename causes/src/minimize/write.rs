@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::write_file;
-use closecall_simulation::scenario::{ScenarioFile, Setting, SettingError};
+use closecall_scenarios::{ScenarioFile, Setting, SettingError};
+use closecall_traffic::atomic::write_file;
 use serde::Serialize;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 

@@ -1,8 +1,6 @@
 //! A library or an FMU as an ego controller of the closed loop.
 
-use crate::{
-    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, LeadVehicleSelector, Reason,
-};
+use crate::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, LeadVehicleSelector, Reason};
 use closecall_traffic::Time;
 
 use crate::external::exchange::{Answer, Input, Setup};

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use rand::RngExt;
 
+use closecall_scenarios::source;
 use closecall_sensors::SensorMode;
-use closecall_simulation::scenario::source;
 use closecall_traffic::{ActorId, StandardNormal, Stream, maths, stream};
 
 use super::*;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use closecall_simulation::scenario::source;
+use closecall_scenarios::source;
 use closecall_traffic::{Appearance, Vehicle};
 
 use super::errors::{Figures, Losses, figures, losses};

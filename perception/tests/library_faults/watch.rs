@@ -1,9 +1,9 @@
 //! One drive with the sensors of a scenario: what they show of one vehicle.
 
+use closecall_scenarios::{Scenario, ScenarioFile, library};
 use closecall_sensors::faults::Faults;
 use closecall_sensors::lidar::PointSource;
 use closecall_sensors::{Health, NoiseKey, Scene, SceneVehicle, Sensors};
-use closecall_simulation::scenario::{Scenario, ScenarioFile, library};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Environment, Road, Source, Track, TrackStatus, Vehicle, VehicleClass, VehicleState,
 };

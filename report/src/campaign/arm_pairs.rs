@@ -8,7 +8,7 @@ use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array
 use arrow::datatypes::{DataType, Schema};
 use closecall_campaign::arm_pairs::{PairResult, pair_results};
 use closecall_campaign::summary::Summary;
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use parquet::arrow::ArrowWriter;
 
 use crate::table::{field, properties, required};

@@ -6,7 +6,7 @@ use closecall_campaign::folder::Folder;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_causes::cost::{cost, section as cost_section};
 use closecall_causes::failures::{CAUSES, Failures, campaign_failures, section, without_section, write_rows};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use maud::{Markup, html};
 
 /// The name of the report.

@@ -13,9 +13,9 @@ use closecall_campaign::runner::Work;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::verdict::Judgement;
-use closecall_scenarios::atomic::WriteError;
+use closecall_scenarios::ScenarioFile;
 use closecall_simulation::SampleError;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_traffic::atomic::WriteError;
 
 use super::arm_pairs::write_arm_pairs;
 use super::findings::{Findings, Recordings};

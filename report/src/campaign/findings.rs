@@ -8,7 +8,7 @@ use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::summary::Summary;
 use closecall_campaign::verdict::Judgement;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
 
 /// The recordings of samples: (scenario, sample, controller) to the path of the Rerun file, relative to the campaign's
 /// folder.

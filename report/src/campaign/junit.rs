@@ -17,7 +17,7 @@ use closecall_campaign::gate::{GateResult, Standing};
 use closecall_campaign::probability::Answer;
 use closecall_campaign::summary::Counts;
 use closecall_campaign::verdict::{Judgement, Verdict};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 

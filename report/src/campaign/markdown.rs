@@ -9,7 +9,7 @@ use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::summary::{Counts, Summary};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::statistics::format::percent;
 
 /// Largest number of samples that are listed for each scenario.

@@ -21,10 +21,10 @@ use crate::table::{ROWS_PER_BATCH, field, properties, required};
 use crate::units::unit_of;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::SampleFailure;
-use closecall_scenarios::atomic::{WriteError, write_file};
-use closecall_simulation::criteria::Measure;
-use closecall_simulation::harm::harm;
-use closecall_simulation::outcome::{Collision, MisSummary, Outcome};
+use closecall_scenarios::criteria::Measure;
+use closecall_scenarios::harm::harm;
+use closecall_scenarios::outcome::{Collision, MisSummary, Outcome};
+use closecall_traffic::atomic::{WriteError, write_file};
 
 /// One sample in one arm.
 #[derive(Clone, Debug)]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
-use closecall_scenarios::atomic::WriteError;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
+use closecall_traffic::atomic::WriteError;
 
 use super::files::ReportError;
 use super::findings::Recordings;

@@ -12,8 +12,8 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
 use super::outcomes::OutcomeRow;
-use closecall_scenarios::atomic::{WriteError, write_file};
-use closecall_simulation::outcome::Collision;
+use closecall_scenarios::outcome::Collision;
+use closecall_traffic::atomic::{WriteError, write_file};
 
 /// The counts of one suite. The file states them before the cases.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use arrow::datatypes::{DataType, Schema};
 use parquet::arrow::ArrowWriter;
 
 use crate::table::{ROWS_PER_BATCH, properties, required};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 
 /// The wall time of one sample in one arm.
 #[derive(Clone, Debug)]

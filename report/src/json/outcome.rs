@@ -1,6 +1,6 @@
 //! The outcome of a run as JSON.
 
-use closecall_simulation::outcome::{Collision, Margins, MisSummary, Outcome, ReachedMoment, Unavailability};
+use closecall_scenarios::outcome::{Collision, Margins, MisSummary, Outcome, ReachedMoment, Unavailability};
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 

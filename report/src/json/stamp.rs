@@ -1,7 +1,7 @@
 //! How an output was made, as keys of its JSON.
 
 use closecall_campaign::manifest::version;
-use closecall_simulation::scenario::Setting;
+use closecall_scenarios::Setting;
 use serde_json::{Value, json};
 
 /// The version of the keys. It changes if a key changes its meaning, not if one is added.

@@ -1,9 +1,9 @@
 //! What was found in trajectory data as JSON.
 
-use closecall_scenarios::fit::{FittedDistributions, FittedQuantity, Quantity, RankCorrelation};
-use closecall_scenarios::lane_change::{LaneChange, Score};
-use closecall_scenarios::robustness::Robustness;
-use closecall_scenarios::trajectory_data::{QualityInspector, Tracks};
+use closecall_recorded::fit::{FittedDistributions, FittedQuantity, Quantity, RankCorrelation};
+use closecall_recorded::lane_change::{LaneChange, Score};
+use closecall_recorded::robustness::Robustness;
+use closecall_recorded::trajectory_data::{QualityInspector, Tracks};
 use serde_json::{Value, json};
 
 /// Returns the flaws of a trajectory file. `inspector` has seen all of `tracks`.

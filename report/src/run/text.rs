@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::Measured;
 
 /// Returns an outcome in one line.

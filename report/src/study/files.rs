@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_campaign::frontier::Frontier;
 use closecall_campaign::sensitivity::{FactorKind, RunErrors, Sensitivity};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 

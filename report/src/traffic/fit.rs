@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_scenarios::fit::FittedDistributions;
+use closecall_recorded::fit::FittedDistributions;
 
 /// The quantities with their number of values, median, and the goodness of fit of their parametric form.
 #[derive(Clone, Copy, Debug)]

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use closecall_scenarios::criticality::{Counted, CriticalLaneChange, MetricResult, shares};
-use closecall_scenarios::lane_change::{LaneChange, Score};
-use closecall_scenarios::trajectory_data::{TrajectoryData, count_flaws};
+use closecall_recorded::criticality::{Counted, CriticalLaneChange, MetricResult, shares};
+use closecall_recorded::lane_change::{LaneChange, Score};
+use closecall_recorded::trajectory_data::{TrajectoryData, count_flaws};
 use closecall_traffic::Side;
 
 /// Lane changes as a table, with their number.

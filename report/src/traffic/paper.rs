@@ -7,8 +7,8 @@
 //! | 6 | histograms of the seven metrics with their thresholds | `figure-6-….svg` |
 //! | 7 | critical shares to the left and to the right, with exact intervals | `figure-7-shares.svg` |
 
-use closecall_scenarios::criticality::{CriticalLaneChange, Statistics, statistics};
-use closecall_scenarios::robustness::Robustness;
+use closecall_recorded::criticality::{CriticalLaneChange, Statistics, statistics};
+use closecall_recorded::robustness::Robustness;
 use maud::{DOCTYPE, PreEscaped, html};
 
 use super::paper_charts::{METRICS, histogram, share_chart};

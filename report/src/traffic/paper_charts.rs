@@ -1,7 +1,7 @@
 //! Charts of criticality: how often each value of a metric occurs, with its threshold, and the shares of critical lane
 //! changes to the left and to the right.
 
-use closecall_scenarios::criticality::{
+use closecall_recorded::criticality::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
     CRITICAL_TTCE_S, Counted, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, shares,
 };

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_scenarios::trajectory_data::{QualityInspector, Tracks};
+use closecall_recorded::trajectory_data::{QualityInspector, Tracks};
 
 /// The flaws of a trajectory file as text for human readers.
 pub struct QualityText<'a> {

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use closecall_scenarios::encounter::RecordedEncounter;
-use closecall_simulation::outcome::Outcome;
+use closecall_recorded::encounter::RecordedEncounter;
+use closecall_scenarios::outcome::Outcome;
 use serde_json::{Value, json};
 
 use crate::json;

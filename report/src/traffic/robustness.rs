@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_scenarios::robustness::{CriterionCounts, ReferenceKind, Robustness, Setup};
+use closecall_recorded::robustness::{CriterionCounts, ReferenceKind, Robustness, Setup};
 
 use super::trajectory_charts::{Band, ChartError, Legend, Line, LineChart, Mark};
 

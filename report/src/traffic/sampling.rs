@@ -11,13 +11,13 @@
 use std::fmt;
 
 use closecall_campaign::runner::run_guarded;
-use closecall_scenarios::criticality::{Judgement, criticality};
-use closecall_scenarios::encounter::{EGO_INDEX, REAR_INDEX, RecordedEncounter};
-use closecall_scenarios::filters::smooth;
+use closecall_recorded::criticality::{Judgement, criticality};
+use closecall_recorded::encounter::{EGO_INDEX, REAR_INDEX, RecordedEncounter};
+use closecall_recorded::filters::smooth;
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{SampledEncounter, ScenarioError, StepValue, opp2_of};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{SampledEncounter, ScenarioError, StepValue, opp2_of};
 use closecall_simulation::{Arm, RunKey, SampleError};
 use closecall_traffic::metrics::{bumper_gap_m, time_headway_s};
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use closecall_scenarios::criticality::{BoxPlot, ClassStatistics, Correlation, CriticalLaneChange, Statistics};
-use closecall_scenarios::lane_change::LaneChange;
+use closecall_recorded::criticality::{BoxPlot, ClassStatistics, Correlation, CriticalLaneChange, Statistics};
+use closecall_recorded::lane_change::LaneChange;
 
 use super::trajectory_charts::{BoxChart, BoxSummary, ChartError};
 

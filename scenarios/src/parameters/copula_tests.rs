@@ -4,7 +4,7 @@ use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{ParameterName, Value};
 
 use super::{ParameterSpace, ParametersConfig};
-use crate::criticality::spearman;
+use closecall_recorded::criticality::spearman;
 use crate::sampling::Design;
 
 const INDEPENDENT: &str = "

@@ -29,6 +29,5 @@ pub use config::{
     EmpiricalConfig, FittedConfig, LogNormalConfig, ParameterConfig, ParametersConfig, TruncatedNormalConfig,
     UniformConfig,
 };
-pub(crate) use copula::cholesky;
 pub use distribution::Distribution;
 pub use space::{ParameterSpace, Provenance, SpaceEntry, Variation};

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
 use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
-use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
 use crate::camera::CameraFault;
+use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
 
 /// Longest additional latency (s).
 pub(super) const MAX_DELAY_S: f64 = 0.4;

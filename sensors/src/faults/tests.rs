@@ -15,10 +15,10 @@ use serde::Deserialize;
 
 use super::config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
 use super::{Faults, NOTICED_AFTER_SCANS, ObjectFaultConfig, OdometryErrorConfig};
+use crate::camera::{Backend, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 use crate::lidar::PointSource;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::{Alterations, Detection, Extent, Health, MountedLidar, NoiseKey, Scene, SceneVehicle, SensorsConfig};
-use crate::camera::{Backend, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 
 const PERIOD_S: f64 = CONTROL_STEP.s();
 const EGO_S_M: f64 = 1_000.0;

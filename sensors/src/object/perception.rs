@@ -5,8 +5,8 @@ use super::{NoiseKey, ObjectSensorModel};
 use crate::faults::{Belief, Faults};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::{Perception, Scene, SensorError, SensorHealth};
 use crate::tracking::TrackList;
+use crate::{Perception, Scene, SensorError, SensorHealth};
 use closecall_traffic::Track;
 
 /// Perception by object-level sensors only.

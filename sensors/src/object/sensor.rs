@@ -22,7 +22,6 @@ use crate::alterations::BACKGROUND;
 use crate::faults::{FaultList, ObjectFault};
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
-use crate::{Health, Scene};
 use crate::tracking::Gaussian;
 use crate::tracking::TrackList;
 use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
@@ -30,9 +29,8 @@ use crate::tracking::lifecycle::Lifecycle;
 use crate::tracking::motion::{
     ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
 };
-use crate::tracking::road_filter::{
-    LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame,
-};
+use crate::tracking::road_filter::{LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame};
+use crate::{Health, Scene};
 use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.

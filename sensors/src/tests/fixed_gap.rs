@@ -3,9 +3,9 @@
 
 use rand::RngExt;
 
-use closecall_traffic::statistics::consistency::Consistency;
 use crate::tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::statistics::consistency::Consistency;
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, TrackStatus, VehicleClass, stream,
 };

@@ -2,8 +2,8 @@
 
 use closecall_traffic::{BodyShape, Dimensions, Vehicle, VehicleClass};
 
-use crate::lidar::append_solids;
 use crate::camera::body_triangles;
+use crate::lidar::append_solids;
 
 /// Largest difference of the height, and of each end of the vehicle (m).
 const END_TOLERANCE_M: f64 = 0.05;

@@ -10,10 +10,10 @@ use rand::RngExt;
 use crate::lidar::FACE_SD_M;
 use crate::surroundings::transform_scene;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
-use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, TrackAudit, TrackerConfig};
 use crate::tracking::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
 use crate::tracking::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use crate::tracking::{RearView, TrackList, Tracker, TrackerScan};
+use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, TrackAudit, TrackerConfig};
 use closecall_traffic::{StandardNormal, ego_frame::EgoFrame, maths};
 
 const LEFT_LANE_M: f64 = -1.875;

@@ -1,6 +1,6 @@
 //! The split of the pairs, and the calibrations.
 
-use closecall_scenarios::following::{FollowingData, FollowingPair};
+use closecall_recorded::following::{FollowingData, FollowingPair};
 use rayon::prelude::*;
 
 use super::follower::{FollowingModel, simulate, squared_error};
@@ -56,7 +56,7 @@ pub struct Calibration {
 
 /// Returns true if a pair is held out. The hash of its name decides, so that a file always gives the same split.
 fn is_held_out(pair: &FollowingPair) -> bool {
-    let hash = closecall_scenarios::following::name_hash(&pair.name);
+    let hash = closecall_recorded::following::name_hash(&pair.name);
     hash % 10 < HELD_OUT_OF_TEN
 }
 

@@ -1,7 +1,7 @@
 //! The models as functions of a list of parameters, and their simulation behind a recorded leader.
 
 use closecall_controllers::{Idm, IdmConfig, Lead, Wiedemann99, Wiedemann99Config, Wiedemann99Model};
-use closecall_scenarios::following::FollowingPair;
+use closecall_recorded::following::FollowingPair;
 use closecall_traffic::{Check, Num, Parameters};
 
 /// A car-following model that can be calibrated.

@@ -1,6 +1,6 @@
 //! Posterior predictive checks: what a population of calibrated drivers predicts for recordings that were held out.
 
-use closecall_scenarios::following::FollowingPair;
+use closecall_recorded::following::FollowingPair;
 use closecall_traffic::statistics::quantiles::quantile;
 use rayon::prelude::*;
 

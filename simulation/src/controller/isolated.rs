@@ -9,7 +9,7 @@ use super::exec::ExecSettings;
 use super::hosted::HostedProcess;
 use super::native::{NativeError, NativeFactory};
 use crate::run::ControllerFactory;
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
 
 /// A controller that a worker process runs, together with whole samples.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use closecall_controllers::{CheckedDriver, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
 use closecall_controllers::external::{Identity, Kind, Loaded, NativeController, VariableTable, Variables};
+use closecall_controllers::{CheckedDriver, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
 use serde::{Deserialize, Serialize};
 
 use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecError, ExecFactory, ExecSettings};
 use super::isolated::Isolated;
 use crate::run::ControllerFactory;
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
 
 /// The hidden command that serves libraries and FMUs.
 pub const COMMAND: &str = "host";

@@ -2,20 +2,11 @@
 
 use std::sync::Arc;
 
-use closecall_controllers::{EgoController, EgoSettings};
 use closecall_controllers::external::VariableTable;
+use closecall_controllers::{EgoController, EgoSettings};
 use closecall_sensors::SensorMode;
 
 use crate::controller::isolated::Isolated;
-
-/// Identifies one sample of a scenario.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RunKey {
-    /// The campaign's seed.
-    pub seed: u64,
-    /// The sample's number, from 0.
-    pub sample: u64,
-}
 
 /// Creates the controller under test, a new one for each run.
 pub trait ControllerFactory: Send + Sync {

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use super::equipment::controller;
 use super::state::{Next, Run, settings_of};
 use super::{Arm, Observer, RunKey, SampleError};
-use crate::outcome::Outcome;
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
+use closecall_scenarios::outcome::Outcome;
 
 /// Runs one concrete scenario to its end and returns its outcome.
 ///
@@ -40,8 +40,8 @@ mod tests {
 
     use super::*;
     use crate::controller::ControllerChoice;
-    use crate::scenario::source;
     use crate::{NoObserver, RunEvent, StepView};
+    use closecall_scenarios::source;
 
     /// Counts the tracks of the sensors that look back.
     #[derive(Default)]

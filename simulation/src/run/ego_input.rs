@@ -3,8 +3,8 @@
 use closecall_controllers::{Odometry, SensorAvailability};
 use closecall_sensors::{Health, Perception};
 
-use crate::scenario::Scenario;
 use crate::world::World;
+use closecall_scenarios::Scenario;
 
 /// Returns the ego's own motion, its position in its lane, and its size, as its odometry and its map give them.
 pub(super) fn odometry(scenario: &Scenario, world: &World) -> Odometry {

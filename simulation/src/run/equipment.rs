@@ -6,7 +6,7 @@ use closecall_sensors::{NoiseKey, Perception, SensorError};
 use super::delayed_truth::DelayedTruth;
 use super::suppressed::Suppressed;
 use super::{Arm, RunKey};
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
 
 /// Returns the sensors of the arm in a run. The run needs those that look back only if `needs_rear`.
 pub(super) fn perception(

@@ -4,8 +4,8 @@ use closecall_controllers::LaneChange;
 use closecall_traffic::metrics::time_headway_s;
 use closecall_traffic::{Road, Time};
 
-use crate::scenario::{Brake, Effect, Event, Scenario, Trigger};
 use crate::world::World;
+use closecall_scenarios::{Brake, Effect, Event, Scenario, Trigger};
 
 /// One event and whether it has been triggered.
 struct EventState {

@@ -4,7 +4,7 @@ use closecall_controllers::{CheckedDriver, DesiredSpeedNoise, Driver, Looks, Wea
 use closecall_traffic::{Road, Stream, stream};
 
 use super::RunKey;
-use crate::scenario::{Actor, Scenario};
+use closecall_scenarios::{Actor, Scenario};
 
 /// Names of the random streams of a human driver.
 const DRIVER_CHANNEL: &str = "driver";

@@ -5,7 +5,7 @@ use closecall_traffic::metrics::{time_headway_s, time_to_collision_s};
 use closecall_traffic::{Absent, Measured, VehicleState};
 
 use super::observer::{CurrentMargins, Lead};
-use crate::outcome::Margins;
+use closecall_scenarios::outcome::Margins;
 
 /// Time after which a vehicle that has pulled in ahead counts for the speed deficit (s).
 const SETTLED_LEAD_S: f64 = 1.0;

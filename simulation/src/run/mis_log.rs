@@ -3,7 +3,7 @@
 use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_traffic::{Absent, CONTROL_STEP, Measured, Time};
 
-use crate::outcome::{MisSummary, Unavailability};
+use closecall_scenarios::outcome::{MisSummary, Unavailability};
 
 /// The ego at one control step, as the summary needs it.
 pub(super) struct MisObservation<'a> {

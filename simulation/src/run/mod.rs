@@ -29,8 +29,9 @@ mod state;
 mod stepper;
 mod suppressed;
 
-pub use arm::{Arm, ControllerFactory, RunKey};
+pub use arm::{Arm, ControllerFactory};
 pub use auditor::TrackAuditor;
+pub use closecall_scenarios::RunKey;
 pub use closed_loop::simulate;
 pub use error::SampleError;
 pub use observer::{CurrentMargins, Lead, NoObserver, Observer, RunEvent, StepView};

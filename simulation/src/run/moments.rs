@@ -12,7 +12,7 @@
 
 use closecall_traffic::Time;
 
-use crate::outcome::{Moment, ReachedMoment};
+use closecall_scenarios::outcome::{Moment, ReachedMoment};
 
 /// Collects the moments of a run.
 #[derive(Debug)]

@@ -5,8 +5,8 @@ use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_sensors::{Perception, SceneVehicle};
 use closecall_traffic::{Absent, Measured, Time, Track, VehicleState};
 
-use crate::outcome::{Collision, Phase};
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
+use closecall_scenarios::outcome::{Collision, Phase};
 
 /// The lead vehicle of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]

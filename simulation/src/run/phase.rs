@@ -11,8 +11,8 @@
 use closecall_traffic::Time;
 use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m};
 
-use crate::outcome::Phase;
 use crate::world::World;
+use closecall_scenarios::outcome::Phase;
 
 /// The vehicle behind the ego in the ego's lane.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 use closecall_sensors::{Perception, Scene, SceneVehicle, SensorError};
 use closecall_traffic::CONTROL_STEP;
 
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
 
 /// Number of scans before the start: one second, in which tracks are confirmed and settle. Without it, the ego would start
 /// without a lead vehicle and accelerate.

@@ -18,8 +18,8 @@ use closecall_controllers::EgoSettings;
 use closecall_traffic::VehicleState;
 
 use super::{Arm, SampleError};
-use crate::scenario::Scenario;
 use crate::world::World;
+use closecall_scenarios::Scenario;
 
 /// Smallest gap to the vehicles ahead of and behind the ego at its start (m): numerical, so that no two vehicles overlap.
 const MIN_GAP_M: f64 = 1.0;

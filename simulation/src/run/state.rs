@@ -22,9 +22,9 @@ use super::phase::{Encounter, Follower};
 use super::settling::settle_sensors;
 use super::start::start_of_ego;
 use super::{Arm, CurrentMargins, Observer, RunEvent, RunKey, SampleError, StepView};
-use crate::outcome::{EndReason, Moment, Outcome, Phase};
-use crate::scenario::Scenario;
 use crate::world::{Action, InitialVehicle, World};
+use closecall_scenarios::Scenario;
+use closecall_scenarios::outcome::{EndReason, Moment, Outcome, Phase};
 
 /// Deceleration of the ego above which it counts as braking hard (m/s²): an assumption, above the 1 m/s² of the paper's
 /// comfort limit with its overshoot; 1.2 to 3 are plausible.

@@ -8,8 +8,8 @@ use closecall_sensors::SensorMode;
 
 use super::state::{Next, Run};
 use super::{Arm, ControllerFactory, CurrentMargins, Observer, RunKey, SampleError};
-use crate::outcome::Outcome;
-use crate::scenario::Scenario;
+use closecall_scenarios::Scenario;
+use closecall_scenarios::outcome::Outcome;
 
 /// The name of the controller in the outcome of a run that is stepped from outside.
 const NAME: &str = "external";
@@ -119,8 +119,8 @@ mod tests {
 
     use super::*;
     use crate::controller::ControllerChoice;
-    use crate::scenario::source;
     use crate::{NoObserver, RunEvent, StepView, simulate};
+    use closecall_scenarios::source;
 
     /// Collects the commands of a run.
     #[derive(Default)]

@@ -2,7 +2,7 @@
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 
-use crate::scenario::MisState;
+use closecall_scenarios::MisState;
 
 /// An ego stack whose margin increase system does not drive in some of its states: there, cruise control and emergency
 /// braking drive alone. The system itself goes through its states as before.

@@ -3,12 +3,12 @@
 //! The log holds the vehicle's motion at 100 Hz and, on every fourth step, the signals of its bus. It contains no noise
 //! except the rounding of the written numbers. Robustness studies add noise of their own, from a seed.
 
-use closecall_scenarios::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
+use closecall_recorded::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState, maths};
 
-use crate::scenario::{ActorConfig, Scenario, ScenarioConfig};
 use crate::{CONTROL_STEP, Observer, RunEvent, StepView};
 use closecall_controllers::DriverConfig;
+use closecall_scenarios::{ActorConfig, Scenario, ScenarioConfig};
 
 /// Time between two runs, which leaves a gap in the log.
 const PAUSE: Time = Time::from_ms(10_000);

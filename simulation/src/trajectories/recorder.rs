@@ -1,10 +1,10 @@
 //! Simulated traffic as trajectory data, in the layout in which recorded traffic is read.
 
-use closecall_scenarios::trajectory_data::TrajectoryData;
+use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint, maths};
 
-use crate::scenario::Scenario;
 use crate::{CONTROL_STEP, Observer, RunEvent, StepView};
+use closecall_scenarios::Scenario;
 
 /// Time between two runs, so that vehicles of different runs never meet.
 const PAUSE: Time = Time::from_ms(10_000);

@@ -5,7 +5,7 @@ use closecall_traffic::maths;
 use nalgebra::Vector2;
 
 use super::search::FEW;
-use crate::outcome::ClosedBy;
+use closecall_scenarios::outcome::ClosedBy;
 
 /// Distance that is added to a vehicle's bounds, to cover rounding (m).
 const MARGIN_M: f64 = 1e-6;

@@ -17,5 +17,4 @@ mod plant;
 mod search;
 mod state;
 
-pub(crate) use plant::lateral_grip_mps2;
 pub(crate) use state::{Action, InitialVehicle, World};

@@ -15,13 +15,11 @@
 //! check of a scenario rejects weaving that would.
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
+use closecall_scenarios::lateral_grip_mps2;
 use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState, maths};
 
 use super::path::{LanePath, LateralState};
 
-/// Fraction of the friction that a driver can use laterally in an evasion without losing control: an assumption; 0.3 to
-/// 0.8 are plausible.
-const LATERAL_SHARE: f64 = 0.5;
 /// Wheelbase as a fraction of a vehicle's length: an assumption; 0.5 to 0.65 are plausible.
 const WHEELBASE_SHARE: f64 = 0.6;
 /// Shortest distance of a lane change, even at walking pace (m): an assumption, the order of a car's turning circle.
@@ -31,11 +29,6 @@ const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
 const STANDING_MPS: f64 = 0.01;
 /// Quasi-static brake dive of the body (rad per m/s²): an assumption, about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
-
-/// Returns the largest lateral acceleration that drivers use on a road with this friction (m/s²).
-pub(crate) fn lateral_grip_mps2(friction: f64) -> f64 {
-    LATERAL_SHARE * friction * GRAVITY_MPS2
-}
 
 /// Limits of the actuators of a vehicle class: assumptions.
 #[derive(Clone, Copy, Debug)]
@@ -338,7 +331,7 @@ mod tests {
             car.step(0.0, Indicator::Left, &road);
             largest_mps2 = largest_mps2.max((car.state().speed_mps * car.state().yaw_rate_radps).abs());
         }
-        assert!(largest_mps2 <= LATERAL_SHARE * 0.9 * GRAVITY_MPS2 * 1.01, "{largest_mps2}");
+        assert!(largest_mps2 <= lateral_grip_mps2(0.9) * 1.01, "{largest_mps2}");
         assert!((car.state().d_m + 1.875).abs() < 1e-9);
     }
 

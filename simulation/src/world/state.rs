@@ -10,7 +10,7 @@ use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
 use super::neighbours::{self, Around, Extent};
 use super::plant::Plant;
 use super::search::NeighbourSearch;
-use crate::outcome::{Collision, Phase};
+use closecall_scenarios::outcome::{Collision, Phase};
 
 /// The commands to one vehicle for one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

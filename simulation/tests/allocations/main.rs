@@ -6,12 +6,12 @@ mod counting;
 
 use std::path::Path;
 
-use closecall_sensors::camera::{Backend, Classifier, Crop};
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_sensors::camera::{Backend, Classifier, Crop};
 use closecall_sensors::lidar::ClusteredPoints;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Check, Time, VehicleState};
 

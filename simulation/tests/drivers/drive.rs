@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use closecall_controllers::DriverNote;
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Lane, PHYSICS_STEP, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState, maths};
 

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{NoObserver, RunKey, simulate};
 
 use crate::drive::arm;

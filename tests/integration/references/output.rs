@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::Path;
 
-use closecall_simulation::criteria::{MEASURES, PairFlag};
+use closecall_scenarios::criteria::{MEASURES, PairFlag};
 use parquet::basic::{LogicalType, Type};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use serde_json::Value;

@@ -44,7 +44,7 @@ fn the_examples_of_the_scenario_reference_are_valid() {
 #[test]
 fn every_key_of_a_scenario_has_a_description_and_an_example() {
     let probe = Probe::new().unwrap();
-    let schema = schemars::schema_for!(closecall::simulation::scenario::ScenarioConfig);
+    let schema = schemars::schema_for!(closecall::scenarios::ScenarioConfig);
     for table in tables(schema.as_value(), &|key| probe.position(key)) {
         for key in &table.keys {
             assert!(!key.description.is_empty(), "{}: {}", title(&table.ways[0]), key.name);
@@ -60,7 +60,7 @@ fn every_key_of_a_scenario_has_a_description_and_an_example() {
 #[test]
 fn the_defaults_that_the_scenario_reference_states_are_those_of_the_program() {
     let probe = Probe::new().unwrap();
-    let schema = schemars::schema_for!(closecall::simulation::scenario::ScenarioConfig);
+    let schema = schemars::schema_for!(closecall::scenarios::ScenarioConfig);
     let mut checked = 0;
     for table in tables(schema.as_value(), &|key| probe.position(key)) {
         for key in table.keys.iter().filter(|key| matches!(key.kind, Kind::Number { .. } | Kind::Whole)) {

@@ -22,6 +22,7 @@
 //! All methods for probabilities assume independent, identically distributed samples, as in the random sampling design.
 
 pub mod binomial;
+mod cholesky;
 pub mod consistency;
 pub mod format;
 pub mod holm;
@@ -34,6 +35,8 @@ pub mod quantiles;
 pub mod sensitivity;
 pub mod sequence;
 pub mod two_sample;
+
+pub use cholesky::cholesky;
 
 #[cfg(test)]
 mod tests;

@@ -15,8 +15,8 @@
 
 use rand::{Rng, RngExt};
 
-use crate::statistics::quantiles::quantile;
 use crate::maths;
+use crate::statistics::quantiles::quantile;
 
 /// Number of simulated distances.
 const SIMULATED: usize = 999;

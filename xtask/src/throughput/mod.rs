@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::time::Instant;
 
-use closecall_simulation::scenario::Scenario;
+use closecall_scenarios::Scenario;
 use closecall_traffic::CONTROL_STEP;
 use modes::{Mode, modes};
 use serde_json::json;

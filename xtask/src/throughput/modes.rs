@@ -5,9 +5,9 @@ use std::path::Path;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
 
 use super::stages::{Stages, stages};

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
-use closecall_simulation::scenario::Scenario;
+use closecall_scenarios::Scenario;
 use closecall_simulation::{Arm, ControllerFactory, Observer, RunEvent, RunKey, SampleError, StepView, simulate};
 use closecall_traffic::{Time, VehicleState};
 

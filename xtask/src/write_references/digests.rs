@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, RunKey};
 use closecall_traffic::maths;
 use serde::{Deserialize, Serialize};

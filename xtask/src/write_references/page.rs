@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt::Write;
 
-use closecall::simulation::scenario::ScenarioConfig;
+use closecall::scenarios::ScenarioConfig;
 use serde_json::Value;
 
 use super::files::{ANNOTATED, at_root};

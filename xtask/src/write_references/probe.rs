@@ -7,7 +7,7 @@ use std::error::Error;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
 
-use closecall::simulation::scenario::{ScenarioError, ScenarioFile};
+use closecall::scenarios::{ScenarioError, ScenarioFile};
 use closecall::traffic::{KeyPath, Problem, Segment};
 use toml::{Table, Value};
 

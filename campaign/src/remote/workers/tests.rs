@@ -2,10 +2,10 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::ScenarioFile;
 
 use super::super::engine::EngineError;
 use super::super::{BlockRunner, Shipment};

@@ -10,7 +10,7 @@ use super::{ledger, provenance, samples, scenario, verdict};
 use crate::campaign::causes;
 use crate::campaign::ensemble::ensemble_html;
 use crate::campaign::findings::Findings;
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, write_file};
 
 /// The style sheet of all pages.
 const STYLE: &str = include_str!("style.css");

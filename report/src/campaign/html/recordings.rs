@@ -8,8 +8,8 @@ use closecall_traffic::Measured;
 use maud::{Markup, PreEscaped, html};
 
 use super::page::{document, table};
-use closecall_scenarios::atomic::{WriteError, write_file};
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
+use closecall_traffic::atomic::{WriteError, write_file};
 
 /// One recorded sample.
 #[derive(Clone, Debug)]

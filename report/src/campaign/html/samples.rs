@@ -7,7 +7,7 @@ use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{Axis, ScenarioOverview, WorstSample};
 use crate::units::labelled;
-use closecall_simulation::outcome::Phase;
+use closecall_scenarios::outcome::Phase;
 
 /// Returns the worst samples of a scenario, with the command that runs the first of them again.
 pub(super) fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Markup {

@@ -7,10 +7,10 @@ use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
+use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::ScenarioFile;
 
 use super::page::campaign;
 use crate::campaign::Tally;

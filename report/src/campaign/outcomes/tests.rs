@@ -10,7 +10,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
 use crate::table::ROWS_PER_GROUP;
-use closecall_simulation::outcome::{ClosedBy, EndReason, Margins, Phase};
+use closecall_scenarios::outcome::{ClosedBy, EndReason, Margins, Phase};
 
 fn parameters(rear_class: &str) -> Parameters {
     let values = [("closing-mps", Value::Number(6.5)), ("rear-class", Value::Label(rear_class.to_owned()))];

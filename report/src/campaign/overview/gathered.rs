@@ -1,7 +1,7 @@
 //! The overview of all scenarios of a campaign.
 
 use closecall_campaign::record::Record;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
 
 use super::ScenarioOverview;
 

@@ -2,7 +2,7 @@
 
 use closecall_traffic::Measured;
 
-use closecall_simulation::outcome::{CRITICAL_THW_S, Outcome};
+use closecall_scenarios::outcome::{CRITICAL_THW_S, Outcome};
 
 /// Number of bins of a distribution.
 pub const BINS: usize = 40;

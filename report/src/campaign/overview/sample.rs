@@ -6,7 +6,7 @@ use closecall_traffic::{ActorId, Parameters};
 
 use closecall_campaign::ledger::PairFate;
 use closecall_campaign::record::Record;
-use closecall_simulation::outcome::{Outcome, Phase};
+use closecall_scenarios::outcome::{Outcome, Phase};
 
 /// The outcome of a sample over all arms, in the order of gravity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use closecall_traffic::{Absent, ParameterName, Parameters, Value};
 
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_scenarios::ScenarioFile;
 
 use super::*;
 use crate::campaign::outcomes::tests::rows;

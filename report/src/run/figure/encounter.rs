@@ -4,7 +4,7 @@
 //! If there are two films, the first is the baseline. Its curves are dashed, its vehicles are outlines, and its moments
 //! are not marked, but the road at its hazard, moment (a), and at its collision is shown first.
 
-use closecall_scenarios::criticality::CRITICAL_TTCE_S;
+use closecall_recorded::criticality::CRITICAL_TTCE_S;
 use closecall_traffic::Time;
 
 use super::chart::{Chart, Curve, Range, range_of};
@@ -12,7 +12,7 @@ use super::colours::{EGO, FRONT, REAR, colour};
 use super::strip;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame, ego_state_name};
-use closecall_simulation::outcome::{CRITICAL_THW_S, Moment};
+use closecall_scenarios::outcome::{CRITICAL_THW_S, Moment};
 
 const WIDTH: f64 = 900.0;
 const LEFT: f64 = 78.0;

@@ -5,7 +5,7 @@ use super::colours::{FRONT, REAR};
 use super::strip;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame};
-use closecall_simulation::outcome::CRITICAL_THW_S;
+use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 const SIZE: [f64; 2] = [560.0, 330.0];
 const STRIP: Area = Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };

@@ -6,7 +6,7 @@ use super::chart::tick_text;
 use super::colours::colour;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame};
-use closecall_simulation::outcome::CRITICAL_THW_S;
+use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 const ASPHALT: &str = "#e9eaec";
 const MARKING: &str = "#9aa0a6";

@@ -5,8 +5,8 @@ use closecall_scenarios::sampling::Design;
 use super::*;
 use crate::run::film::{Film, FilmRecorder, Level};
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::ScenarioFile;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, simulate};
 
 fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {

@@ -1,7 +1,7 @@
 //! Films of one sample in several arms.
 
 use closecall_campaign::runner::run_guarded;
-use closecall_simulation::scenario::Scenario;
+use closecall_scenarios::Scenario;
 use closecall_simulation::{Arm, RunKey, SampleError};
 
 use super::{Film, FilmRecorder, Level};

@@ -5,13 +5,13 @@
 
 use std::fmt::Write as _;
 
-use closecall_scenarios::encounter::{REAR_INDEX, RecordedEncounter};
+use closecall_recorded::encounter::{REAR_INDEX, RecordedEncounter};
 use closecall_traffic::metrics::time_headway_s;
 use closecall_traffic::{Absent, Measured, Time};
 
 use super::{Film, Frame, headway_text};
-use closecall_simulation::outcome::worse;
-use closecall_simulation::scenario::RearDriver;
+use closecall_scenarios::RearDriver;
+use closecall_scenarios::outcome::worse;
 
 /// Metrics of one encounter that say how close it was.
 #[derive(Clone, Copy, Debug)]

@@ -4,13 +4,13 @@
 //! those of the scenario that is made from the encounter, so that one film can be drawn into the other. The frames are
 //! one control step of the simulation apart.
 
-use closecall_scenarios::encounter::{EGO_INDEX, RecordedEncounter};
+use closecall_recorded::encounter::{EGO_INDEX, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 
 use super::traffic::{frame_at, present_frames, straight_road};
 use super::{Film, FilmActor, Level, Part, TrafficFilmError};
+use closecall_scenarios::actor_name;
 use closecall_simulation::CONTROL_STEP;
-use closecall_simulation::scenario::actor_name;
 
 /// Returns the film of a recorded encounter, with one frame per control step.
 ///

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use closecall_sensors::camera::Camera;
 use closecall_controllers::EgoCommand;
+use closecall_sensors::camera::Camera;
 use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState, maths};
 
-use closecall_simulation::outcome::{Collision, Outcome, Phase};
+use closecall_scenarios::outcome::{Collision, Outcome, Phase};
 use closecall_simulation::{CurrentMargins, RunEvent};
 
 use super::Scan;

@@ -3,7 +3,7 @@
 use closecall_traffic::Time;
 
 use super::Film;
-use closecall_simulation::outcome::ReachedMoment;
+use closecall_scenarios::outcome::ReachedMoment;
 
 impl Film {
     /// Returns the critical moment of the film, at which its views open.

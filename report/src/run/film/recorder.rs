@@ -1,15 +1,15 @@
 //! The observer that records the film of a run.
 
-use closecall_sensors::camera::Pipeline;
 use closecall_controllers::CheckedDriver;
+use closecall_sensors::camera::Pipeline;
 use closecall_sensors::lidar::RearLidar;
 use closecall_sensors::{Detection, NoiseKey, SensorMode};
 use closecall_traffic::Time;
 
 use super::knowledge::rear_seen;
 use super::{Film, FilmActor, Frame, Level, Limit, Part, Scan};
-use closecall_simulation::outcome::{Outcome, Phase};
-use closecall_simulation::scenario::Scenario;
+use closecall_scenarios::Scenario;
+use closecall_scenarios::outcome::{Outcome, Phase};
 use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView};
 
 /// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest deceleration that the
@@ -60,7 +60,7 @@ impl FilmRecorder {
             None => scenario.sensors,
         };
         let has_camera = sensors.mode() == SensorMode::Full && sensors.camera().pipeline != Pipeline::Off;
-        let film_actor = |(index, actor): (usize, &closecall_simulation::scenario::Actor)| FilmActor {
+        let film_actor = |(index, actor): (usize, &closecall_scenarios::Actor)| FilmActor {
             name: actor.id.to_string(),
             vehicle: scenario.vehicle(index, key),
             present_frames: 0..usize::MAX,

@@ -4,8 +4,8 @@ use closecall_controllers::{DriverNote, EgoState};
 use closecall_traffic::Time;
 
 use super::{Film, headway_text};
+use closecall_scenarios::outcome::Collision;
 use closecall_simulation::RunEvent;
-use closecall_simulation::outcome::Collision;
 
 /// One sentence of the story.
 #[derive(Clone, Debug, PartialEq)]

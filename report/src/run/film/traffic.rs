@@ -5,11 +5,11 @@
 //! straight, with lanes of the typical width in the trajectory data. Trajectory data have no brake lights and no
 //! indicators, so that none are shown.
 
-use closecall_scenarios::criticality::{
+use closecall_recorded::criticality::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
     CRITICAL_TTCE_S, CriticalLaneChange, MetricResult,
 };
-use closecall_scenarios::filters::{PERIOD, SmoothedTrajectoryData};
+use closecall_recorded::filters::{PERIOD, SmoothedTrajectoryData};
 use closecall_traffic::metrics::{CRITICAL_THW_S, time_headway_s, time_to_collision_s};
 use closecall_traffic::{
     Absent, Check, ConfigError, Environment, Num, Parameters, Road, RoadConfig, Side, Time, Trajectory,

@@ -1,7 +1,7 @@
 //! The verdict on a run or on a pair, in words: which vehicles collided, whether the system prevented it, how close it was.
 
 use closecall_campaign::ledger::{PairFate, Tally};
-use closecall_simulation::outcome::{Collision, Outcome};
+use closecall_scenarios::outcome::{Collision, Outcome};
 use closecall_traffic::Light;
 
 use super::Film;

@@ -23,7 +23,7 @@ use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::{Film, Frame};
-use closecall_simulation::outcome::CRITICAL_THW_S;
+use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 /// Factor by which the picture is stretched across the road.
 const STRETCH: f64 = 1.0;

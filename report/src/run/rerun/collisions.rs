@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, StringArray};
-use closecall_simulation::outcome::Collision;
+use closecall_scenarios::outcome::Collision;
 use closecall_traffic::Time;
 use rerun::{
     ComponentDescriptor, ComponentIdentifier, SerializationResult, SerializedComponentBatch, SerializedComponentColumn,

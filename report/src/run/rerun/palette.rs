@@ -1,7 +1,7 @@
 //! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its
 //! curves in the plots can be matched.
 
-use closecall_simulation::outcome::Moment;
+use closecall_scenarios::outcome::Moment;
 
 use crate::run::film::Part;
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use arrow::array::StringArray;
 use closecall_controllers::{EgoState, MisPlan};
-use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
+use closecall_recorded::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
 use closecall_traffic::Time;
 use closecall_traffic::metrics::Encounter;
 use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch, SeriesLines};
@@ -19,7 +19,7 @@ use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::{Film, Frame};
-use closecall_simulation::outcome::CRITICAL_THW_S;
+use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 /// Width of a curve (UI points).
 const LINE_WIDTH: f32 = 2.0;

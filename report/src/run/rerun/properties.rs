@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
-use closecall_simulation::outcome::Outcome;
+use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::{Measured, Value};
 use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 

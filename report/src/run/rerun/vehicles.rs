@@ -9,7 +9,7 @@ use super::bodies;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use crate::run::film::{Film, Frame, Part, headway_text};
-use closecall_simulation::outcome::{CRITICAL_THW_S, Collision};
+use closecall_scenarios::outcome::{CRITICAL_THW_S, Collision};
 
 /// An arrow shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.25;

@@ -15,7 +15,7 @@ use super::{
     vehicles,
 };
 use crate::run::film::{Film, Level};
-use closecall_scenarios::atomic::{WriteError, check_writable, write_atomically};
+use closecall_traffic::atomic::{WriteError, check_writable, write_atomically};
 
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]

@@ -1,11 +1,11 @@
-use closecall_scenarios::following::{FollowingInstant, read};
+use closecall_recorded::following::{FollowingInstant, read};
 use closecall_traffic::maths;
 
 use super::*;
 
 /// Returns a leader that drives in waves, and a follower that drives by the model with these values.
 fn synthetic(name: &str, model: FollowingModel, values: &[f64]) -> FollowingPair {
-    let phase = f64::from(closecall_scenarios::following::name_hash(name));
+    let phase = f64::from(closecall_recorded::following::name_hash(name));
     let mut leader_rear_m = 25.0;
     let instants = (0..600).map(|index| {
         let time_s = 0.1 * f64::from(index);

@@ -3,10 +3,10 @@
 use closecall_controllers::{DriverInput, DriverNote};
 
 use super::Run;
-use crate::outcome::{EndReason, Moment};
 use crate::run::phase::AFTER_COLLISION;
 use crate::run::{Observer, RunEvent, SampleError};
 use crate::world::Action;
+use closecall_scenarios::outcome::{EndReason, Moment};
 
 impl Run<'_> {
     /// Determines the actions of all vehicles, from the current state: of the human drivers, of the scenario's events, and

@@ -1,7 +1,7 @@
 //! The windows of the image that the crop classifier evaluates, with the class that it finds in each.
 
-use closecall_sensors::camera::{PixelRect, RearCamera};
 use closecall_sensors::Detection;
+use closecall_sensors::camera::{PixelRect, RearCamera};
 
 use super::{class_colour, in_picture};
 use crate::run::film::{Film, Frame};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use closecall_controllers::EgoState;
-use closecall_simulation::outcome::{Phase, ReachedMoment};
+use closecall_scenarios::outcome::{Phase, ReachedMoment};
 use closecall_traffic::Time;
 use rerun::{StateChange, StateConfiguration};
 

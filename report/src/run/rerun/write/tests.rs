@@ -2,9 +2,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use arrow::array::AsArray;
 use arrow::datatypes::{Float32Type, UInt16Type, UInt32Type};
-use closecall_scenarios::encounter::encounter;
-use closecall_scenarios::filters::smooth;
-use closecall_scenarios::lane_change::detect;
+use closecall_recorded::encounter::encounter;
+use closecall_recorded::filters::smooth;
+use closecall_recorded::lane_change::detect;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::geometry::BoxSide;
@@ -15,9 +15,9 @@ use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::run::film::{EncounterComparison, FilmRecorder, NO_CLUSTER, Scan, film_encounter};
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::outcome::{ClosedBy, Collision, Phase};
+use closecall_scenarios::{RearDriver, ScenarioFile, reenact};
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
-use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
 use closecall_simulation::trajectories::TrafficRecorder;
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 

@@ -3,8 +3,8 @@
 //! The instances are given: what the network finds is tested in `sensors/tests/mask_rcnn.rs`.
 
 use arrow::array::{Array, BinaryArray, FixedSizeListArray, Float32Array, ListArray, UInt8Array};
-use closecall_sensors::camera::{Instance, Mask, Pipeline};
 use closecall_sensors::RearImage;
+use closecall_sensors::camera::{Instance, Mask, Pipeline};
 use closecall_traffic::VehicleClass;
 
 use super::*;

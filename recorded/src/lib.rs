@@ -1,0 +1,10 @@
+//! Recorded traffic: trajectory data, lane changes, criticality, fitted distributions, and encounters to re-enact.
+
+pub mod criticality;
+pub mod encounter;
+pub mod filters;
+pub mod fit;
+pub mod following;
+pub mod lane_change;
+pub mod robustness;
+pub mod trajectory_data;

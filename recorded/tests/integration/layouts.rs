@@ -1,0 +1,215 @@
+//! Layouts that hold the same data: highD's three files, CommonRoad XML and plain CSV. Also synthetic highD and exiD
+//! files.
+
+use std::path::Path;
+
+use closecall_recorded::filters::smooth;
+use closecall_recorded::lane_change::detect;
+use closecall_recorded::trajectory_data::{
+    Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read, read_from, read_with,
+};
+use closecall_traffic::{Lane, Side, Time, maths};
+
+use crate::support::data_folder;
+
+#[test]
+fn the_highd_layout_yields_the_same_data_as_the_plain_layout() {
+    let Some(data) = data_folder() else { return };
+    let folder = data.join("highd_format_sample");
+    let plain = read(&data.join("ngsim_us101/trajectories/us101_h.csv")).unwrap();
+    let highd = read(&folder.join("01_tracks.csv")).unwrap();
+    assert_eq!((highd.layout, highd.period), (Layout::Highd, Time::from_ms(100)));
+    for other in
+        [folder.clone(), folder.join("01"), folder.join("01_tracksMeta.csv"), folder.join("01_recordingMeta.csv")]
+    {
+        assert_eq!(read(&other).unwrap().trajectories, highd.trajectories, "{}", other.display());
+    }
+    assert_eq!(highd.trajectories.len(), 27);
+    let instants = highd.trajectories.iter().map(|track| track.points.len()).sum::<usize>();
+    assert_eq!(instants, 1_574, "each row of the file becomes a track point");
+    assert!((highd.markings.lane_width_m(Lane(1)).unwrap() - 3.45).abs() < 1e-9);
+    let crossings =
+        |data| detect(&smooth(data)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>();
+    let (one, other) = (crossings(&plain), crossings(&highd));
+    assert_eq!(other.len(), 4, "the highD file contains four lane changes; it lacks some rows of the plain file");
+    let is_same = |a: &(Side, f64), b: &(Side, f64)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101;
+    assert!(other.iter().all(|b| one.iter().any(|a| is_same(a, b))), "{one:?} {other:?}");
+}
+
+#[test]
+fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
+    let Some(data) = data_folder() else { return };
+    let entries = std::fs::read_dir(data.join("ngsim_us101/commonroad_xml")).unwrap();
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    let plain: Vec<TrajectoryData> = ["a", "b", "f", "g", "h", "i"]
+        .map(|name| read(&data.join(format!("ngsim_us101/trajectories/us101_{name}.csv"))).unwrap())
+        .into();
+    let (mut compared, mut same_lane, mut rows) = (0, 0, 0);
+    for path in &paths {
+        let scenario = read(path).unwrap();
+        assert_eq!((scenario.layout, scenario.period), (Layout::Commonroad, Time::from_ms(100)));
+        assert!(scenario.trajectories.len() > 1, "{}", path.display());
+        for track in &scenario.trajectories {
+            rows += track.points.len();
+            // Find the same vehicle in the plain files: same number and same sequence of speeds.
+            let found = plain.iter().flat_map(|data| &data.trajectories).find_map(|other| {
+                let speeds = |points: &[closecall_traffic::TrajectoryPoint]| {
+                    points.iter().map(|point| (point.speed_mps * 10.0).round() as i64).collect::<Vec<_>>()
+                };
+                let (needle, hay) = (speeds(&track.points), speeds(&other.points));
+                (other.vehicle_id == track.vehicle_id && needle.len() > 20 && hay.len() >= needle.len())
+                    .then(|| hay.windows(needle.len()).position(|part| part == needle))
+                    .flatten()
+                    .map(|start| &other.points[start..start + needle.len()])
+            });
+            for (a, b) in track.points.iter().zip(found.unwrap_or_default()) {
+                compared += 1;
+                same_lane += usize::from(a.lane == b.lane && (a.d_m - b.d_m).abs() < 0.5);
+            }
+        }
+    }
+    assert!(rows > 10_000, "{rows}");
+    assert!(compared > 3_000, "{compared}");
+    assert!(same_lane * 100 >= compared * 95, "{same_lane} of {compared}");
+}
+
+#[test]
+fn hand_made_commonroad_scenarios_are_read() {
+    let Some(data) = data_folder() else { return };
+    let merging = read(&data.join("commonroad_crime/ZAM_Zip-1_56_T-1.xml")).unwrap();
+    assert_eq!((merging.name.as_str(), merging.trajectories.len()), ("ZAM_Zip-1_56_T-1", 3));
+    let cut_in = read(&data.join("commonroad_crime/OSC_CutIn-1_2_T-1.xml")).unwrap();
+    assert_eq!(cut_in.trajectories.len(), 2);
+    for track in &cut_in.trajectories {
+        assert!(track.points.iter().all(|point| point.speed_mps >= 0.0), "no vehicle drives backwards");
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m >= pair[0].s_m));
+    }
+}
+
+/// Writes a highD data set. Vehicle 1 drives to the left on the upper carriageway, vehicle 2 to the right on the lower
+/// one.
+fn write_both_ways(folder: &Path) {
+    let meta = "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n";
+    std::fs::write(folder.join("07_recordingMeta.csv"), meta).unwrap();
+    let meta = "id,numFrames,class,drivingDirection\n1,30,Car,1\n2,30,Truck,2\n";
+    std::fs::write(folder.join("07_tracksMeta.csv"), meta).unwrap();
+    let mut rows =
+        "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
+    for frame in 1..=30 {
+        let x_m = 400.0 - 1.2 * f64::from(frame);
+        // The vehicle changes from the lane next to the median (laneId 3) to the outer lane.
+        let (y_m, lane) = if frame < 16 { (13.5, 3) } else { (9.5, 2) };
+        rows += &format!("{frame},1,{x_m:.2},{y_m},4.5,1.8,-30.0,0,0.5,0,0,{lane}\n");
+    }
+    for frame in 1..=30 {
+        let x_m = 10.0 + f64::from(frame);
+        rows += &format!("{frame},2,{x_m:.2},25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n");
+    }
+    std::fs::write(folder.join("07_tracks.csv"), rows).unwrap();
+}
+
+#[test]
+fn both_carriageways_are_driven_forwards_and_are_separated() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let data = read(folder.path()).unwrap();
+    let [upper, lower] = data.trajectories.as_slice() else { panic!() };
+    for track in [upper, lower] {
+        assert!(track.points.iter().all(|point| point.speed_mps > 0.0));
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
+    }
+    assert_eq!((upper.points[0].acceleration_mps2, lower.points[0].acceleration_mps2), (-0.5, -0.5));
+    // The lower carriageway has lanes 1 and 2, lane 3 stands for the median, and the upper carriageway has lanes 4 and
+    // 5.
+    assert_eq!(lower.points[0].lane, Lane(2));
+    assert!(
+        (lower.points[0].d_m + 6.0).abs() < 1e-9,
+        "y = 27 m is 6 m below the uppermost marking of the lower carriageway"
+    );
+    assert_eq!((upper.points[0].lane, upper.points[29].lane), (Lane(4), Lane(5)));
+    assert!(
+        (upper.points[0].d_m + 1_000.0 + 8.0 + 2.1).abs() < 1e-9,
+        "the left edge of the upper carriageway is 1 km to the right of the lower one's right edge"
+    );
+    assert!(upper.points[29].d_m < upper.points[0].d_m, "the vehicle moves to its right");
+    assert_eq!(data.markings.lane_width_m(Lane(5)), Some(4.0));
+}
+
+#[test]
+fn a_file_of_another_layout_than_required_is_rejected() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let path = folder.path().join("07_tracks.csv");
+    let asked = |layout| read_with(&path, ReadOptions { layout: Some(layout), ..ReadOptions::default() });
+    assert!(asked(LayoutChoice::Highd).is_ok());
+    let error = asked(LayoutChoice::Ngsim).unwrap_err();
+    assert!(error.to_string().contains("the layout highd, not in ngsim as asked for"), "{error}");
+    assert!(open(&path, ReadOptions::default()).is_ok());
+    let alone = read_from(std::fs::File::open(&path).unwrap(), &path).unwrap_err();
+    assert!(matches!(alone.problem, TrajectoryFileProblem::NeedsMetadata));
+}
+
+/// Writes an exiD data set of a road that bends with a radius of 2 km and is driven in both directions. The first direction
+/// has two lanes. Vehicle 1 keeps the right lane, vehicle 2 changes from the right to the left lane, vehicle 3 keeps the
+/// left lane, and vehicle 4 drives in the opposite direction.
+fn write_bent_both_ways(folder: &Path) {
+    const RADIUS_M: f64 = 2_000.0;
+    const LANE_M: f64 = 3.75;
+    let meta = "recordingId,locationId,frameRate\n3,0,25\n";
+    std::fs::write(folder.join("03_recordingMeta.csv"), meta).unwrap();
+    let header = "recordingId,trackId,initialFrame,finalFrame,numFrames,width,length,class\n";
+    let vehicles = ["car", "van", "truck", "motorcycle"];
+    let meta: String =
+        vehicles.iter().enumerate().map(|(k, class)| format!("3,{},0,249,250,1.9,4.7,{class}\n", k + 1)).collect();
+    std::fs::write(folder.join("03_tracksMeta.csv"), format!("{header}{meta}")).unwrap();
+    let mut rows = "recordingId,trackId,frame,xCenter,yCenter,heading,width,length,xVelocity,yVelocity,lonVelocity,\
+                    latVelocity,lonAcceleration,latAcceleration,laneWidth,laneletId,laneChange\n"
+        .to_owned();
+    for vehicle in 1..=4 {
+        for frame in 0..250 {
+            let time_s = 0.04 * f64::from(frame);
+            let tau = ((time_s - 3.0) / 4.0).clamp(0.0, 1.0);
+            let shape = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+            // Offset to the left of the middle of the first direction's right lane.
+            let left_m = match vehicle {
+                1 => 0.0,
+                2 => LANE_M * shape,
+                3 => LANE_M,
+                _ => 4.0 * LANE_M,
+            };
+            let is_back = vehicle == 4;
+            let along_m = if is_back { 290.0 - 29.0 * time_s } else { 20.0 + (24.0 + f64::from(vehicle)) * time_s };
+            let angle = along_m / RADIUS_M;
+            let (x_m, y_m) =
+                ((RADIUS_M - left_m) * maths::sin(angle), RADIUS_M - (RADIUS_M - left_m) * maths::cos(angle));
+            let heading = angle.to_degrees() + if is_back { 180.0 } else { 0.0 };
+            let speed_mps = if is_back { 29.0 } else { 24.0 + f64::from(vehicle) };
+            let changes = u8::from(vehicle == 2 && frame == 125);
+            rows += &format!(
+                "3,{vehicle},{frame},{x_m:.4},{y_m:.4},{heading:.4},1.9,4.7,0,0,{speed_mps},0,0.5,0,{LANE_M};3.7,12;13,{changes}\n"
+            );
+        }
+    }
+    std::fs::write(folder.join("03_tracks.csv"), rows).unwrap();
+}
+
+#[test]
+fn the_road_of_exid_data_is_inferred_from_its_traffic() {
+    let folder = tempfile::tempdir().unwrap();
+    write_bent_both_ways(folder.path());
+    let data = read(folder.path()).unwrap();
+    assert_eq!((data.layout, data.period), (Layout::Exid, Time::from_ms(40)));
+    let [keeps, changes, left, back] = data.trajectories.as_slice() else { panic!() };
+    let lanes = |track: &closecall_traffic::Trajectory| (track.points[0].lane.0, track.points[249].lane.0);
+    assert_eq!((lanes(keeps), lanes(changes), lanes(left), lanes(back)), ((2, 2), (2, 1), (1, 1), (4, 4)));
+    for track in &data.trajectories {
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
+    }
+    let d_m = |track: &closecall_traffic::Trajectory| track.points[249].d_m;
+    assert!((d_m(keeps) + 1.5 * 3.75).abs() < 0.05 && (d_m(changes) + 0.5 * 3.75).abs() < 0.05);
+    assert!((d_m(back) + 2.0 * 3.75 + 1_000.0 + 0.5 * 3.75).abs() < 0.05, "{}", d_m(back));
+    let found = detect(&smooth(&data));
+    assert_eq!(found.iter().map(|change| change.track_id).collect::<Vec<_>>(), [2]);
+    assert!((found[0].crossing_s - 5.0).abs() < 0.2, "{}", found[0].crossing_s);
+}

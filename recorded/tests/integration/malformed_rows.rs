@@ -1,0 +1,144 @@
+//! Tables whose rows are wrong together: mixed-up units and columns that leave every single number within its allowed
+//! range, cut rows, and rows in an order that a long file must not have.
+
+use std::path::Path;
+
+use closecall_recorded::trajectory_data::{BadRows, ReadOptions, TrajectoryFileError, open_from};
+
+use crate::support::{PLAIN_HEADER, assert_mentions, read_text};
+
+/// Creates rows of one vehicle. `edit` changes each row's fields: time, s, d, speed, length, width.
+pub(crate) fn drive(edit: impl Fn(&mut [f64; 6])) -> String {
+    let mut text = format!("{PLAIN_HEADER}\n");
+    for frame in 0..40 {
+        let time_s = 0.1 * f64::from(frame);
+        let mut at = [time_s, 50.0 + 25.0 * time_s, 5.2, 25.0, 4.6, 1.8];
+        edit(&mut at);
+        let [time_s, s_m, d_m, speed_mps, length_m, width_m] = at;
+        text += &format!(
+            "a,1,1,{frame},{time_s:.4},{s_m:.3},{d_m:.3},2,{speed_mps:.3},,0,0,0,{length_m:.3},{width_m:.3},car,x\n"
+        );
+    }
+    text
+}
+
+#[test]
+fn mixed_up_units_and_columns_are_detected() {
+    const FEET_PER_M: f64 = 1.0 / 0.3048;
+    assert!(read_text(drive(|_| {}).as_bytes()).is_ok());
+    let steps = ["line", "the median distance between two frames", "units or columns"];
+    let cases: [(&str, String, &[&str]); 9] = [
+        ("km/h", drive(|at| at[3] *= 3.6), &steps),
+        ("mph", drive(|at| at[3] *= 2.237), &steps),
+        ("ft/s", drive(|at| at[3] *= FEET_PER_M), &steps),
+        ("positions in feet", drive(|at| at[1] *= FEET_PER_M), &steps),
+        ("s and d swapped", drive(|at| at.swap(1, 2)), &steps),
+        ("driven backwards", drive(|at| at[1] = 500.0 - at[1]), &steps),
+        ("times in steps of a second", drive(|at| at[0] *= 10.0), &steps),
+        (
+            "sizes in feet",
+            drive(|at| at.iter_mut().skip(4).for_each(|m| *m *= FEET_PER_M)),
+            &["the median length of cars", "15.092 m", "2 to 12 m"],
+        ),
+        ("length and width swapped", drive(|at| at.swap(4, 5)), &["the median length of cars"]),
+    ];
+    for (what, text, needed) in cases {
+        assert_mentions(&read_text(text.as_bytes()).expect_err(what), needed, what);
+    }
+    // Metres instead of NGSIM's feet.
+    let metres: String = (0..40)
+        .map(|k| {
+            format!("1 {k} 40 {} 5.2 {:.2} 0 0 4.6 1.8 2 25.0 0.0 2 0 0 0.0 0.0\n", 100 * k, 50.0 + 2.5 * f64::from(k))
+        })
+        .collect();
+    assert_mentions(&read_text(metres.as_bytes()).unwrap_err(), &["the median length of cars", "1.402 m"], "metres");
+}
+
+#[test]
+fn windows_line_ends_and_a_byte_order_mark_do_not_change_the_data() {
+    let text = drive(|_| {});
+    let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+    let (a, b) = (read_text(text.as_bytes()).unwrap(), read_text(windows.as_bytes()).unwrap());
+    assert_eq!(a.trajectories, b.trajectories);
+}
+
+#[test]
+fn a_truncated_last_row_is_detected() {
+    let text = drive(|_| {});
+    let last_row = text.trim_end().rfind('\n').unwrap() + 1;
+    for cut in last_row + 1..text.len() {
+        let error = read_text(&text.as_bytes()[..cut]).expect_err("a cut row");
+        assert_eq!(error.line, Some(41), "{error}");
+    }
+}
+
+#[test]
+fn bad_rows_are_skipped_and_counted_on_request() {
+    let text = drive(|_| {});
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines[5] = lines[4].clone();
+    lines[9] = lines[9].replace("25.000", "fast");
+    lines[20] = "a,1,1".to_owned();
+    let text = lines.join("\n") + "\n";
+    let options = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
+    let mut tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), options, usize::MAX).unwrap();
+    let mut pieces = 0;
+    while let Some(track) = tracks.next_track().unwrap() {
+        assert_eq!(track.trajectory.vehicle_id, 1);
+        pieces += 1;
+    }
+    assert_eq!(pieces, 4, "three skipped rows split the track");
+    let dropped: Vec<_> = tracks.dropped().reasons().map(|(why, rows)| (why, rows.count, rows.first_line)).collect();
+    let expected =
+        [("cut rows", 1, Some(21)), ("duplicated rows", 1, Some(6)), ("values that are not allowed", 1, Some(10))];
+    assert_eq!(dropped, expected);
+    assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "by default a bad row ends the reading");
+}
+
+/// Creates a file with more rows than the window. `vehicle_and_frame` gives vehicle and frame (from its first) of a row.
+fn long_file(vehicles: u64, frames: u64, vehicle_and_frame: impl Fn(u64) -> (u64, u64)) -> String {
+    let mut text =
+        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    for k in 0..vehicles * frames {
+        let (vehicle, age) = vehicle_and_frame(k);
+        let frame = 5 * vehicle + age;
+        let time_s = 0.1 * frame as f64;
+        text += &format!("{vehicle},{frame},{time_s:.1},{:.1},5.2,2,20,0,4.6,1.8,car\n", 2.0 * age as f64);
+    }
+    text
+}
+
+fn open_with_window(text: &str, window: usize) -> Result<Vec<(u64, usize)>, TrajectoryFileError> {
+    let tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), ReadOptions::default(), window)?;
+    let mut found = tracks
+        .map(|track| track.map(|track| (track.trajectory.track_id, track.trajectory.points.len())))
+        .collect::<Result<Vec<_>, _>>()?;
+    found.sort_unstable();
+    Ok(found)
+}
+
+#[test]
+fn long_files_are_streamed_if_sorted_and_rejected_otherwise() {
+    let (vehicles, frames) = (40, 30);
+    let by_vehicle = long_file(vehicles, frames, |k| (k / frames, k % frames));
+    let whole = open_with_window(&by_vehicle, usize::MAX).unwrap();
+    assert_eq!(whole, (0..vehicles).map(|vehicle| (vehicle, 30)).collect::<Vec<_>>());
+    assert_eq!(open_with_window(&by_vehicle, 100).unwrap(), whole);
+    // Sorted by time: vehicle v is present in frames 5v to 5v + 29.
+    let (header, rows) = by_vehicle.split_once('\n').unwrap();
+    let mut rows: Vec<&str> = rows.lines().collect();
+    rows.sort_by_key(|row| row.split(',').nth(1).unwrap().parse::<u64>().unwrap());
+    let by_time = format!("{header}\n{}\n", rows.join("\n"));
+    assert_eq!(open_with_window(&by_time, 100).unwrap(), whole);
+    // Unsorted from the first row, and then unsorted only after the window.
+    rows.sort_by_key(|row| row.split(',').nth(3).unwrap().parse::<f64>().unwrap() as u64 * 7 % 31);
+    let unsorted = format!("{header}\n{}\n", rows.join("\n"));
+    assert_eq!(open_with_window(&unsorted, usize::MAX).unwrap(), whole, "a short file may be in any order");
+    let error = open_with_window(&unsorted, 100).unwrap_err();
+    assert_mentions(&error, &["line", "sorted by vehicle or by time throughout"], "unsorted");
+    let mut lines: Vec<&str> = by_vehicle.lines().collect();
+    lines.swap(200, 900);
+    let error = open_with_window(&(lines.join("\n") + "\n"), 100).unwrap_err();
+    assert_eq!(error.line, Some(872), "rows of vehicle 29 come before: {error}");
+    assert_mentions(&error, &["sorted by vehicle"], "swapped");
+}

@@ -1,0 +1,110 @@
+//! Scenarios that say only how they differ from a scenario of the library.
+//!
+//! A file whose first key is `base` names a scenario of the library. Its own keys replace those of the base: tables are merged
+//! key by key, lists and lists of tables are replaced as a whole. What the base is judged
+//! by (`requirements`, `checks`, `gate`) does not carry over. The result is one text, on which all later steps work, so that a
+//! campaign's folder keeps the whole scenario.
+
+use toml_edit::{DocumentMut, Item, TableLike};
+
+use super::{ScenarioError, library};
+
+/// The key that names the base.
+const BASE: &str = "base";
+/// What a scenario is judged by. It does not carry over from the base: another question needs its own answer.
+const JUDGED_BY: [&str; 3] = ["requirements", "checks", "gate"];
+
+/// Returns the text of the whole scenario: the text itself if it names no base.
+///
+/// # Errors
+/// A message if the base is no scenario of the library.
+pub(super) fn expand(text: &str) -> Result<Option<String>, String> {
+    // Most files have no base, and a file that is not TOML is answered by the reader.
+    if !text.contains(BASE) {
+        return Ok(None);
+    }
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(None) };
+    let Some(base) = document.remove(BASE) else { return Ok(None) };
+    let name = base.as_str().unwrap_or_default();
+    let Some(text) = library::plain_text(name) else {
+        let known: Vec<&str> = library::plain_names().collect();
+        return Err(format!(
+            "`{BASE}` is {}, but one of the library is needed: {}",
+            base.to_string().trim(),
+            known.join(", ")
+        ));
+    };
+    let mut whole = text.parse::<DocumentMut>().map_err(|error| error.to_string())?;
+    for key in JUDGED_BY {
+        whole.remove(key);
+    }
+    merge(whole.as_table_mut(), document.as_table());
+    Ok(Some(whole.to_string()))
+}
+
+/// Returns the error of the whole text as one of the text that names the base: with the line of the same words there, or that of the
+/// key `base` if the words are the base's.
+pub(super) fn located(error: ScenarioError, whole: &str, text: &str) -> ScenarioError {
+    let line_of = |line: usize| {
+        let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
+        let is_same = |found: &str| found.trim() == words;
+        let own = text.lines().position(is_same).filter(|_| !words.is_empty());
+        own.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
+    };
+    match error {
+        ScenarioError::Syntax { path, line, message } => ScenarioError::Syntax { path, line: line_of(line), message },
+        ScenarioError::Value { path, line, source, at } => {
+            ScenarioError::Value { path, line: line.map(line_of), source, at }
+        }
+        other => other,
+    }
+}
+
+/// Replaces the values of `target` by those of `source`, and merges tables.
+fn merge(target: &mut dyn TableLike, source: &dyn TableLike) {
+    for (key, item) in source.iter() {
+        let both = target.get_mut(key).and_then(Item::as_table_like_mut).zip(item.as_table_like());
+        match both {
+            Some((inner, item)) => merge(inner, item),
+            None => {
+                target.insert(key, item.clone());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::ScenarioFile;
+
+    fn parse(text: &str) -> Result<ScenarioFile, String> {
+        ScenarioFile::parse(Path::new("own.toml"), text, &[]).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_file_with_a_base_has_its_keys_but_for_its_own() {
+        let text = "base = \"low-thw-overtake\"\nname = \"own\"\nsensors.mode = \"object\"\n[[fault.rear-object]]\ndead = true\n";
+        let own = parse(text).unwrap();
+        let base = parse(super::library::text("low-thw-overtake").unwrap()).unwrap();
+        assert_eq!(own.config().name, "own");
+        assert_eq!(own.config().actors, base.config().actors);
+        assert_eq!(own.config().fault.rear_object.len(), 1);
+        assert_ne!(own.config().sensors.mode, base.config().sensors.mode);
+        assert_eq!(own.config().sensors.tracker, base.config().sensors.tracker);
+    }
+
+    #[test]
+    fn an_error_names_the_line_of_the_own_file() {
+        let text = "base = \"low-thw-overtake\"\nname = \"own\"\n\n[[fault.rear-lidar]]\ndrop-out = 0.5\n";
+        let error = parse(text).unwrap_err();
+        assert!(error.contains("own.toml:5") && error.contains("drop-out"), "{error}");
+    }
+
+    #[test]
+    fn a_base_that_the_library_does_not_have_is_refused() {
+        let error = parse("base = \"low-thw\"\nname = \"own\"\n").unwrap_err();
+        assert!(error.contains("`base` is \"low-thw\"") && error.contains("low-thw-overtake"), "{error}");
+    }
+}

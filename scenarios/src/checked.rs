@@ -1,0 +1,310 @@
+//! Concrete scenarios: every value is a number, and every number has been checked.
+
+use closecall_controllers::external::VariableTable;
+use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
+use closecall_sensors::Sensors;
+use closecall_traffic::{
+    ActorId, Check, ConfigError, Environment, PHYSICS_STEP, Parameters, Problem, Range, Road, Time, Vehicle,
+    VehicleState,
+};
+
+use crate::grip::lateral_grip_mps2;
+
+use super::config::{ActorConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
+use super::events::{self, Event};
+use super::fleet::FleetOf;
+use super::intervention::Interventions;
+use super::{inert_fault, placement, traffic};
+
+/// Largest probability or confidence that a gate may ask for: the largest number below 1 (-).
+const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
+
+/// One vehicle of a concrete scenario.
+#[derive(Clone, Debug)]
+pub struct Actor {
+    /// Its name.
+    pub id: ActorId,
+    /// Its class, size and mass.
+    pub vehicle: Vehicle,
+    /// Its state at time zero.
+    pub start: VehicleState,
+    /// Its driver: a human driver, or the ego stack.
+    pub driver: CheckedDriver,
+    /// How its driver weaves in the lane, or `None` if the driver keeps the lane exactly.
+    pub lane_keeping: Option<LaneKeeping>,
+    /// How the desired speed of its driver varies, or `None` if it is constant.
+    pub speed_keeping: Option<SpeedKeeping>,
+    /// What happens to it.
+    pub events: Vec<Event>,
+    /// The fleet that its look is drawn from in each run; see [`Scenario::vehicle`].
+    pub(crate) fleet: Option<FleetOf>,
+}
+
+/// A concrete scenario: every value is a number, and every number has been checked.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Its name.
+    pub name: String,
+    /// Longest duration of a run.
+    pub duration: Time,
+    /// The road.
+    pub road: Road,
+    /// Light, weather and surface.
+    pub environment: Environment,
+    /// The vehicles.
+    pub actors: Vec<Actor>,
+    /// Index of the ego in `actors`.
+    pub ego: usize,
+    /// The ego's sensors.
+    pub sensors: Sensors,
+    /// The parameter values that it was made with.
+    pub parameters: Parameters,
+    /// Step of the vehicle dynamics and the human drivers. The control step is a multiple of it.
+    pub physics_step: Time,
+    /// The sample whose random numbers every run uses; `None` for those of the run itself.
+    pub random_numbers: Option<RandomNumbersConfig>,
+    /// Stages that are replaced by the truth, and injected faults.
+    pub interventions: Interventions,
+    /// The names of the variables of an FMU.
+    pub variables: VariableTable,
+}
+
+impl Scenario {
+    /// Returns the ego's name.
+    pub fn ego_id(&self) -> &ActorId {
+        &self.actors[self.ego].id
+    }
+}
+
+impl Check for ScenarioConfig {
+    type Checked = Scenario;
+
+    fn check(&self, parameters: &Parameters) -> Result<Scenario, ConfigError> {
+        self.check_names()?;
+        let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
+        let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
+        let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
+        let mut actors = self.check_actors(&road, environment.friction, parameters)?;
+        let ego = only_ego(&actors)?;
+        for (index, traffic) in self.traffic.iter().enumerate() {
+            traffic::add(traffic, &mut actors, ego, &road, parameters)
+                .map_err(|error| error.within_index(index).within("traffic"))?;
+        }
+        let interventions = Interventions::check(&self.ideal, &self.fault, parameters)?;
+        interventions.apply(&mut actors, ego);
+        let sensors = self.sensors.check(parameters).map_err(|error| error.within("sensors"))?;
+        inert_fault::refuse(&self.fault, (&sensors, &road, &environment), duration_s, parameters)?;
+        let sensors = sensors.altered(interventions.sensors);
+        sensors.check_mounting().map_err(|error| error.within("sensors"))?;
+        Ok(Scenario {
+            name: self.name.clone(),
+            duration: Time::from_s(duration_s),
+            road,
+            environment,
+            ego,
+            actors,
+            sensors,
+            parameters: parameters.clone(),
+            physics_step: PHYSICS_STEP,
+            random_numbers: self.random_numbers,
+            interventions,
+            variables: self.controller.fmu.clone(),
+        })
+    }
+}
+
+impl ScenarioConfig {
+    fn check_names(&self) -> Result<(), ConfigError> {
+        if self.schema_version != SCHEMA_VERSION {
+            let problem = Problem::WrongCount { value: self.schema_version.into(), allowed: "schema version 1" };
+            return Err(ConfigError::new("schema-version", problem));
+        }
+        // The entry of an ensemble is named SCENARIO@MEMBER.
+        let (name, member) = self.name.split_once('@').map_or((&self.name[..], None), |(name, of)| (name, Some(of)));
+        if ActorId::new(name).is_err() || member.is_some_and(|member| ActorId::new(member).is_err()) {
+            let allowed = "lower-case letters, digits and hyphens, starting with a letter".to_owned();
+            return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
+        }
+        self.check_requirements()?;
+        self.check_criteria()?;
+        for (index, actor) in self.actors.iter().enumerate() {
+            if self.actors[..index].iter().any(|earlier| earlier.id == actor.id) {
+                let problem = Problem::Duplicate { value: actor.id.to_string() };
+                return Err(ConfigError::new("id", problem).within_index(index).within("actor"));
+            }
+        }
+        self.check_event_names()
+    }
+
+    /// Checks that event names are unique across all actors, since logs and reports identify events by name.
+    fn check_event_names(&self) -> Result<(), ConfigError> {
+        let mut names = Vec::new();
+        for (index, actor) in self.actors.iter().enumerate() {
+            for (event_index, event) in actor.events.iter().enumerate() {
+                if names.contains(&&event.id) {
+                    let problem = Problem::Duplicate { value: event.id.to_string() };
+                    let error = ConfigError::new("id", problem).within_index(event_index).within("event");
+                    return Err(error.within_index(index).within("actor"));
+                }
+                names.push(&event.id);
+            }
+        }
+        Ok(())
+    }
+
+    fn check_requirements(&self) -> Result<(), ConfigError> {
+        let is_identifier = |requirement: &str| {
+            let is_allowed = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+            requirement.starts_with(|c: char| c.is_ascii_alphanumeric()) && requirement.chars().all(is_allowed)
+        };
+        for (index, requirement) in self.requirements.iter().enumerate() {
+            let at = |problem| Err(ConfigError::new("requirements", problem).within_index(index));
+            if !is_identifier(requirement) {
+                let allowed = "letters, digits, `-`, `.` and `_`, starting with a letter or digit".to_owned();
+                return at(Problem::UnknownWord { value: requirement.clone(), allowed });
+            }
+            if self.requirements[..index].contains(requirement) {
+                return at(Problem::Duplicate { value: requirement.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the criteria beyond their syntax: every check belongs to a requirement, and shares are from 0 to 1.
+    fn check_criteria(&self) -> Result<(), ConfigError> {
+        for mark in self.checks.keys() {
+            if !self.requirements.contains(mark) {
+                let allowed = format!("one of the `requirements`: {}", self.requirements.join(", "));
+                let problem = Problem::UnknownWord { value: mark.clone(), allowed };
+                return Err(ConfigError::new(mark, problem).within("checks"));
+            }
+        }
+        Range::closed(0.0, 1.0).check(self.expects_share, "expects-share")?;
+        if let Some(max) = self.gate.max_probability {
+            Range::above(0.0, BELOW_ONE).check(max, "max-probability").map_err(|error| error.within("gate"))?;
+        }
+        if let Some(confidence) = self.gate.confidence {
+            Range::above(0.5, BELOW_ONE).check(confidence, "confidence").map_err(|error| error.within("gate"))?;
+        }
+        Ok(())
+    }
+
+    fn check_actors(&self, road: &Road, friction: f64, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
+        let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
+        let mut vehicles = Vec::with_capacity(self.actors.len());
+        let mut fleets = Vec::with_capacity(self.actors.len());
+        for (index, actor) in self.actors.iter().enumerate() {
+            let in_vehicle = |error: ConfigError| at(index, error.within("vehicle"));
+            vehicles.push(actor.vehicle.check(parameters).map_err(in_vehicle)?);
+            fleets.push(FleetOf::check(&actor.vehicle).map_err(in_vehicle)?);
+        }
+        let states = placement::initial_states(&self.actors, &vehicles, road, parameters)?;
+        let start = events::Start { actors: &self.actors, vehicles: &vehicles, states: &states };
+        let mut checked = Vec::with_capacity(self.actors.len());
+        for (index, actor) in self.actors.iter().enumerate() {
+            let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
+            check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
+            let Keeping { lane_keeping, speed_keeping } =
+                actor.check_keeping(parameters).map_err(|error| at(index, error))?;
+            check_weaving(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
+            let mut events = Vec::with_capacity(actor.events.len());
+            for (event_index, event) in actor.events.iter().enumerate() {
+                let locate = |error: ConfigError| at(index, error.within_index(event_index).within("event"));
+                let event = event.check(&start, parameters).map_err(locate)?;
+                let lane = road.lane_at(states[index].d_m);
+                event
+                    .then
+                    .check_lane_change((&actor.driver, lane), road.lanes())
+                    .map_err(|error| locate(error.within("then")))?;
+                events.push(event);
+            }
+            checked.push(Actor {
+                id: actor.id.clone(),
+                vehicle: vehicles[index],
+                start: states[index],
+                driver,
+                lane_keeping,
+                speed_keeping,
+                events,
+                fleet: fleets[index],
+            });
+        }
+        Ok(checked)
+    }
+}
+
+/// How a driver keeps lane and speed.
+struct Keeping {
+    lane_keeping: Option<LaneKeeping>,
+    speed_keeping: Option<SpeedKeeping>,
+}
+
+impl ActorConfig {
+    /// Checks how the driver keeps lane and speed, and that its kind allows this.
+    fn check_keeping(&self, parameters: &Parameters) -> Result<Keeping, ConfigError> {
+        let reject = |key, rule: &str| {
+            Err(ConfigError::new(key, Problem::Contradiction { other: "driver", rule: rule.to_owned() }))
+        };
+        match &self.driver {
+            DriverConfig::EgoStack(_) if self.lane_keeping.is_some() => {
+                return reject("lane-keeping", "the ego stack keeps its lane without weaving");
+            }
+            DriverConfig::EgoStack(_) if self.speed_keeping.is_some() => {
+                return reject("speed-keeping", "the ego stack drives as its controller asks");
+            }
+            DriverConfig::Prescribed(_) if self.speed_keeping.is_some() => {
+                return reject("speed-keeping", "a prescribed driver keeps to its list of speeds");
+            }
+            DriverConfig::Prescribed(_)
+            | DriverConfig::EgoStack(_)
+            | DriverConfig::Wiedemann99(_)
+            | DriverConfig::Idm(_)
+            | DriverConfig::Overtaker(_) => {}
+        }
+        let lane_keeping = self.lane_keeping.as_ref().map(|config| config.check(parameters));
+        let speed_keeping = self.speed_keeping.as_ref().map(|config| config.check(parameters));
+        Ok(Keeping {
+            lane_keeping: lane_keeping.transpose().map_err(|error| error.within("lane-keeping"))?,
+            speed_keeping: speed_keeping.transpose().map_err(|error| error.within("speed-keeping"))?,
+        })
+    }
+}
+
+/// Rejects weaving that needs more lateral acceleration at the initial speed than drivers use on this road.
+fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
+    let largest_mps2 = keeping.map_or(0.0, |keeping| 3.0 * keeping.lateral_acceleration_sd_mps2(speed_mps));
+    let grip_mps2 = lateral_grip_mps2(friction);
+    if largest_mps2 <= grip_mps2 {
+        return Ok(());
+    }
+    let rule = format!(
+        "at {speed_mps:.1} m/s such a weave needs up to {largest_mps2:.2} m/s² sideways, and drivers steer up to \
+         {grip_mps2:.2} m/s² on this road"
+    );
+    let problem = Problem::Contradiction { other: "environment.friction", rule };
+    Err(ConfigError::new("sdlp-m", problem).within("lane-keeping"))
+}
+
+/// Rejects a prescribed driver that would change to a lane that the road does not have.
+fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
+    match driver {
+        CheckedDriver::Human(HumanDriver::Prescribed(prescribed)) => prescribed
+            .check_lanes(road.lane_at(start.d_m), road.lanes())
+            .map_err(|error| error.within("prescribed").within("driver")),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the index of the only actor with an ego stack.
+fn only_ego(actors: &[Actor]) -> Result<usize, ConfigError> {
+    let mut egos = actors.iter().enumerate().filter(|(_, actor)| matches!(actor.driver, CheckedDriver::Ego(_)));
+    let needed = "exactly one actor with `driver = { ego-stack = … }`";
+    match (egos.next(), egos.next()) {
+        (Some((ego, _)), None) => Ok(ego),
+        (None, _) => Err(ConfigError::new("actor", Problem::Missing { needed })),
+        (Some(_), Some((second, actor))) => {
+            let problem = Problem::Duplicate { value: format!("ego-stack of {}", actor.id) };
+            Err(ConfigError::new("driver", problem).within_index(second).within("actor"))
+        }
+    }
+}

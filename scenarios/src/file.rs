@@ -1,0 +1,397 @@
+//! Reads scenario files. Errors name the file, the line, the key, and what is allowed.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use crate::parameters::ParameterSpace;
+use crate::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_sensors::camera::Pipeline;
+use closecall_traffic::suggest::hint;
+use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
+use toml_edit::DocumentMut;
+
+use super::edit::{Setting, SettingError};
+use super::recorded::RecordedError;
+use super::{Scenario, ScenarioConfig, base, lidar_file, locate, recorded};
+
+/// Number of random samples that `check` checks in addition to the nominal values and the bounds.
+const CHECKED_SAMPLES: u64 = 64;
+
+/// Largest size of a scenario file (bytes). A scenario with minutes of recorded speeds has about 1 MiB.
+const MAX_FILE_BYTES: u64 = 64 << 20;
+
+/// A scenario file that cannot be used. No run has been started.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// The file cannot be read.
+    #[error("failed to read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is not UTF-8 text.
+    #[error("failed to read {}: line {line} is not UTF-8 text; a scenario is a TOML file", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// The first line that is not text, counted from 1.
+        line: usize,
+    },
+    /// The file is larger than any scenario.
+    #[error("failed to read {}: the file is larger than {limit_mib} MiB; a scenario is a TOML file of a few KiB", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The largest size (MiB).
+        limit_mib: u64,
+    },
+    /// The file is empty.
+    #[error("failed to read {}: the file is empty; a scenario needs at least `schema-version`, `name`, `duration-s`, `road` and actors", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is not valid TOML, or has an unknown key or a value of the wrong type.
+    #[error("failed to read {}:{line}: {message}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// A value is out of range, or contradicts another value.
+    #[error("failed to check {}{}: {source}{at}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The line of the key, counted from 1, or `None` if the file does not contain the key.
+        line: Option<usize>,
+        /// The key and what is wrong with it.
+        source: Box<ConfigError>,
+        /// The parameter values for which the check failed; empty if there are no parameters.
+        at: String,
+    },
+    /// A setting (`--set`) cannot be applied.
+    #[error("failed to apply --set to {}: {source}", path.display())]
+    Set {
+        /// The file.
+        path: PathBuf,
+        /// The error of the setting.
+        source: SettingError,
+    },
+}
+
+impl ScenarioError {
+    /// Returns whether the file cannot be read at all.
+    pub const fn is_io(&self) -> bool {
+        matches!(self, Self::Read { .. })
+    }
+
+    /// Returns whether a setting is wrong, and not the file.
+    pub const fn is_setting(&self) -> bool {
+        matches!(self, Self::Set { .. })
+    }
+
+    /// Returns the line of the error, counted from 1, or `None` if it has none.
+    pub const fn line(&self) -> Option<usize> {
+        match self {
+            Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
+            Self::Value { line, .. } => *line,
+            Self::Read { .. } | Self::TooLarge { .. } | Self::Empty { .. } | Self::Set { .. } => None,
+        }
+    }
+}
+
+/// A scenario file whose keys have been checked.
+#[derive(Clone, Debug)]
+pub struct ScenarioFile {
+    path: PathBuf,
+    text: String,
+    config: ScenarioConfig,
+    space: ParameterSpace,
+    unused: Vec<ParameterName>,
+    trajectory_files: Vec<PathBuf>,
+    settings: Vec<Setting>,
+}
+
+impl ScenarioFile {
+    /// Reads a file, applies `settings` to it, and checks its keys.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if the file cannot be read or parsed, if a setting cannot be applied, or if a distribution is
+    /// invalid.
+    pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
+        let bytes = read_bounded(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        if bytes.len() as u64 > MAX_FILE_BYTES {
+            return Err(ScenarioError::TooLarge { path: path.to_owned(), limit_mib: MAX_FILE_BYTES >> 20 });
+        }
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let line = locate::line_at(&String::from_utf8_lossy(error.as_bytes()), error.utf8_error().valid_up_to());
+            ScenarioError::NotText { path: path.to_owned(), line }
+        })?;
+        Self::parse(path, &text, settings)
+    }
+
+    /// Parses the text of a scenario file, applies `settings` to it, and checks its keys. `path` appears in error messages,
+    /// and trajectory files are found relative to its folder.
+    ///
+    /// # Errors
+    /// [`ScenarioError`], as for [`Self::load`].
+    pub fn parse(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
+        if text.trim().is_empty() {
+            return Err(ScenarioError::Empty { path: path.to_owned() });
+        }
+        match base::expand(text) {
+            Ok(None) => Self::parse_whole(path, text, settings),
+            Ok(Some(whole)) => {
+                Self::parse_whole(path, &whole, settings).map_err(|error| base::located(error, &whole, text))
+            }
+            Err(message) => Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message }),
+        }
+    }
+
+    /// Parses the text of a scenario that has no base.
+    fn parse_whole(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
+        // The unchanged text is parsed first, so that errors in the file have the line numbers of the file.
+        let mut config = deserialize(path, text)?;
+        // A setting may replace the only use of a parameter. Only a parameter that the file itself does not use is a mistake.
+        let unused = unused_parameters(&config, text);
+        let mut text = text.to_owned();
+        if !settings.is_empty() {
+            text = apply(path, &text, settings)?;
+            config = deserialize(path, &text)?;
+        }
+        let trajectory_files = recorded::files(path, &config);
+        if let Some(inlined) =
+            recorded::inline(path, &text, &config).map_err(|error| recorded_error(path, &text, &error))?
+        {
+            text = inlined;
+            config = deserialize(path, &text)?;
+        }
+        if let Some(inlined) = lidar_file::inline(path, &text, &config)? {
+            text = inlined;
+            config = deserialize(path, &text)?;
+        }
+        let space = config.parameters.check().map_err(|error| {
+            let source = error.within("parameters");
+            let line = locate::line_of(&text, &source.path);
+            ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
+        })?;
+        Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files, settings: settings.to_vec() })
+    }
+
+    /// Returns the same file with another text, whose keys are checked. Settings and trajectory files stay as they are.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if the text is not a scenario, or if a distribution is invalid.
+    pub(super) fn with_text(&self, text: &str) -> Result<Self, ScenarioError> {
+        let Self { trajectory_files, settings, unused, .. } = self.clone();
+        Ok(Self { trajectory_files, settings, unused, ..Self::parse(&self.path, text, &[])? })
+    }
+
+    /// Returns the path of the file, as given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns the trajectory files that the file names.
+    pub fn trajectory_files(&self) -> &[PathBuf] {
+        &self.trajectory_files
+    }
+
+    /// Returns the settings that were applied to the file.
+    pub fn settings(&self) -> &[Setting] {
+        &self.settings
+    }
+
+    /// Returns the text of the scenario, with all settings applied.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Returns the contents of the file, with all settings applied.
+    pub fn config(&self) -> &ScenarioConfig {
+        &self.config
+    }
+
+    /// Returns the distributions of the parameters.
+    pub fn space(&self) -> &ParameterSpace {
+        &self.space
+    }
+
+    /// Returns whether some sample may have this pipeline of the rear camera: the file names it, or a parameter can.
+    pub fn may_have_pipeline(&self, pipeline: Pipeline) -> bool {
+        let choice = &self.config.sensors.rear_camera.pipeline;
+        let words = self.space.extremes().into_iter().map(|parameters| parameters.word(choice, "pipeline"));
+        words.into_iter().any(|word| word == Ok(pipeline))
+    }
+
+    /// Returns whether some sample may have this mode of the sensors, unless a command asks for the mode `asked`.
+    pub fn may_have_mode(&self, mode: SensorMode, asked: Option<SensorMode>) -> bool {
+        let choice = &self.config.sensors.mode;
+        asked.map_or_else(
+            || self.space.extremes().into_iter().any(|parameters| parameters.word(choice, "mode") == Ok(mode)),
+            |asked| asked == mode,
+        )
+    }
+
+    /// Returns the parameters that no value of the file uses, which is most likely a mistake.
+    pub fn unused_parameters(&self) -> &[ParameterName] {
+        &self.unused
+    }
+
+    /// Returns the name of the ego, or `None` if no actor has an ego stack.
+    pub fn ego_id(&self) -> Option<&ActorId> {
+        let is_ego = |driver: &_| matches!(driver, closecall_controllers::DriverConfig::EgoStack(_));
+        self.config.actors.iter().find(|actor| is_ego(&actor.driver)).map(|actor| &actor.id)
+    }
+
+    /// Returns the concrete scenario with these parameter values.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`] if a value is out of range or contradicts another value.
+    pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
+        self.config.check(parameters).map_err(|source| self.located(source, describe(parameters)))
+    }
+
+    /// Returns an error with its place in the file. `at` says when it holds.
+    pub(super) fn located(&self, source: ConfigError, at: String) -> ScenarioError {
+        let line = locate::line_of(&self.text, &source.path);
+        ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at }
+    }
+
+    /// Checks the scenario with the median of every parameter, with each parameter at each of its bounds, and with 64
+    /// random samples.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`] for the first of these scenarios that is not valid.
+    pub fn check(&self) -> Result<(), ScenarioError> {
+        for parameters in self.space.extremes() {
+            self.concrete(&parameters)?;
+        }
+        for index in 0..CHECKED_SAMPLES {
+            self.concrete(&self.space.sample(Design::Random, 0, index, CHECKED_SAMPLES))?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads a file, or the first bytes of it if it is larger than [`MAX_FILE_BYTES`].
+fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn describe(parameters: &Parameters) -> String {
+    let values: Vec<String> = parameters.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    if values.is_empty() { String::new() } else { format!(" (with {})", values.join(", ")) }
+}
+
+fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, ScenarioError> {
+    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| ScenarioError::Syntax {
+        path: path.to_owned(),
+        line: locate::line_at(text, error.span().map_or(0, |span| span.start)),
+        message: error.message().to_owned(),
+    })?;
+    for setting in settings {
+        setting.apply(&mut document).map_err(|source| ScenarioError::Set { path: path.to_owned(), source })?;
+    }
+    Ok(document.to_string())
+}
+
+/// Converts an error of recorded traffic. Its line is the first one that contains `recorded`.
+fn recorded_error(path: &Path, text: &str, error: &RecordedError) -> ScenarioError {
+    let line = text.lines().position(|line| line.contains("recorded")).map_or(1, |index| index + 1);
+    ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`recorded`: {error}") }
+}
+
+fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError> {
+    toml::from_str(text).map_err(|error: toml::de::Error| {
+        let offset = error.span().map_or(0, |span| span.start);
+        let line = locate::line_at(text, offset);
+        let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
+        let message = format!("{named}{}{}", without_rust_types(error.message()), suggestion(error.message()));
+        ScenarioError::Syntax { path: path.to_owned(), line, message }
+    })
+}
+
+/// Returns the parameters that no value uses.
+fn unused_parameters(config: &ScenarioConfig, text: &str) -> Vec<ParameterName> {
+    let Ok(document) = toml::from_str::<toml::Table>(text) else { return Vec::new() };
+    let mut used = Vec::new();
+    for (_, value) in document.iter().filter(|(key, _)| *key != "parameters") {
+        append_names(value, &mut used);
+    }
+    config.parameters.0.keys().filter(|name| !used.contains(&name.as_str())).cloned().collect()
+}
+
+/// Appends the names of all parameters that `value` uses.
+fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
+    match value {
+        toml::Value::String(text) => names.extend(text.strip_prefix('$')),
+        toml::Value::Array(values) => values.iter().for_each(|value| append_names(value, names)),
+        toml::Value::Table(table) => table.iter().for_each(|(_, value)| append_names(value, names)),
+        _ => {}
+    }
+}
+
+/// Returns the known word that the message's first word resembles, as the end of the message. The message is serde's:
+/// "unknown field `x`, expected one of `a`, `b`".
+fn suggestion(message: &str) -> String {
+    let is_unknown_word = message.starts_with("unknown field ") || message.starts_with("unknown variant ");
+    match (message.split('`').nth(1), message.split_once("expected ")) {
+        (Some(word), Some((_, known))) if is_unknown_word => hint(word, known),
+        _ => String::new(),
+    }
+}
+
+/// Returns the deserialiser's message without the names of Rust types.
+fn without_rust_types(message: &str) -> String {
+    const WORDS: [(&str, &str); 5] = [
+        ("u8", "a whole number from 0 to 255"),
+        ("u32", "a whole number, 0 or more"),
+        ("u64", "a whole number, 0 or more"),
+        ("f64", "a number"),
+        ("a sequence", "a list"),
+    ];
+    let Some((found, expected)) = message.split_once("expected ") else { return message.to_owned() };
+    let plain = WORDS.iter().find(|(rust, _)| expected.trim_end() == *rust).map(|(_, plain)| *plain);
+    match plain {
+        Some(plain) => format!("{found}expected {plain}"),
+        None if expected.starts_with("struct ") => format!("{found}expected a table of keys"),
+        None => message.to_owned(),
+    }
+}
+
+/// Returns the key at a byte offset, or the last key before it on its line, for messages that have only a position.
+fn key_at(text: &str, offset: usize) -> Option<String> {
+    let offset = offset.min(text.len());
+    let start = text[..offset].rfind(['\n', '{', ',']).map_or(0, |delimiter| delimiter + 1);
+    let line = text[start..].lines().next()?;
+    let key = line.split('=').next()?.trim();
+    let is_key = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "-_.\"".contains(c));
+    is_key.then(|| key.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_key_or_word_is_answered_with_a_suggestion() {
+        let parse = |text: &str| ScenarioFile::parse(Path::new("a.toml"), text, &[]).unwrap_err().to_string();
+        let message = parse("schema-version = 1\nname = 'a'\nduration = 3\n");
+        assert!(message.starts_with("failed to read a.toml:3: "), "{message}");
+        assert!(message.ends_with("; did you mean `duration-s`?"), "{message}");
+        let message = parse("schema-version = 1\nroad = { lanes = 3, overtaking-side = 'lefft' }\n");
+        assert!(message.ends_with("; did you mean `left`?"), "{message}");
+        assert!(!parse("schema-version = 1\nzzz = 3\n").contains("did you mean"));
+    }
+}

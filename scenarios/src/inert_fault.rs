@@ -1,0 +1,324 @@
+//! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
+
+use closecall_sensors::camera::Pipeline;
+use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
+use closecall_sensors::lidar::Lidar;
+use closecall_sensors::{SensorMode, Sensors};
+use closecall_traffic::{Check, ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road, maths};
+
+use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
+use super::intervention::FaultConfig;
+use super::{ScenarioError, ScenarioFile};
+
+/// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, those of a front radar that a
+/// LiDAR replaces and of a front LiDAR that does not exist, blocked sectors outside of the field of view, mirror images without guard rails,
+/// glare of a source that does not shine into the camera, and entries that begin when the run has ended.
+///
+/// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes, and so is one with
+/// faults both of the LiDAR and of the radar that look ahead. A mode that the
+/// command line gives is checked by [`ScenarioFile::check_faults_in`].
+pub(super) fn refuse(
+    fault: &FaultConfig,
+    (sensors, road, environment): (&Sensors, &Road, &Environment),
+    duration_s: f64,
+    parameters: &Parameters,
+) -> Result<(), ConfigError> {
+    refuse_absent(fault, sensors)?;
+    refuse_glare(fault, (sensors, road, environment))?;
+    let model = sensors.full_model();
+    let rear_lidars: Vec<Lidar> = model.rear_lidars().collect();
+    refuse_of_lidars(("rear-lidar", &fault.rear_lidar), &rear_lidars, road, parameters)?;
+    if let Some(front_lidar) = model.front_lidar {
+        refuse_of_lidars(("front-lidar", &fault.front_lidar), &[front_lidar], road, parameters)?;
+    }
+    let refuse_late = |key, starts: &mut dyn Iterator<Item = &Option<Num>>| {
+        for (index, from) in starts.enumerate() {
+            let from_s = parameters.number_or(from.as_ref(), "from-s", Range::closed(0.0, f64::MAX), 0.0);
+            if from_s.map_err(|error| at(key, index, error))? >= duration_s {
+                let rule = "a fault begins before the run ends";
+                return Err(at(key, index, contradiction("from-s", "duration-s", rule)));
+            }
+        }
+        Ok(())
+    };
+    refuse_late("rear-lidar", &mut fault.rear_lidar.iter().map(|of| &of.from_s))?;
+    refuse_late("front-lidar", &mut fault.front_lidar.iter().map(|of| &of.from_s))?;
+    refuse_late("rear-camera", &mut fault.rear_camera.iter().map(|of| &of.from_s))?;
+    refuse_late("front-radar", &mut fault.front_radar.iter().map(|of| &of.from_s))?;
+    refuse_late("surround", &mut fault.surround.iter().map(|of| &of.from_s))?;
+    refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))?;
+    refuse_of_objects(fault, sensors, parameters)?;
+    match &fault.odometry {
+        Some(odometry) => refuse_of_map(odometry, (sensors, road), duration_s, parameters),
+        None => Ok(()),
+    }
+}
+
+/// Refuses names that no LiDAR has, blocked sectors outside of the field of view of a LiDAR, and mirror images without guard rails.
+fn refuse_of_lidars(
+    (of, entries): (&str, &[LidarFaultConfig]),
+    lidars: &[Lidar],
+    road: &Road,
+    parameters: &Parameters,
+) -> Result<(), ConfigError> {
+    for (index, entry) in entries.iter().enumerate() {
+        let is_meant = |lidar: &&Lidar| entry.sensor.as_deref().is_none_or(|name| name == lidar.name());
+        let half_deg = lidars.iter().filter(is_meant).map(Lidar::half_field_deg).fold(f64::INFINITY, f64::min);
+        if !half_deg.is_finite() {
+            let names: Vec<&str> = lidars.iter().map(Lidar::name).collect();
+            let rule = format!("no such LiDAR is called that, but `{}`", names.join("`, `"));
+            let problem = Problem::Contradiction { other: "sensors", rule };
+            return Err(at(of, index, ConfigError::new("sensor", problem)));
+        }
+        for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
+            let within = Range::closed(-half_deg, half_deg);
+            parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at(of, index, error))?;
+        }
+        let share = parameters.number_or(entry.rail_ghosts.as_ref(), "rail-ghosts", Range::closed(0.0, 1.0), 0.0);
+        if share.map_err(|error| at(of, index, error))? > 0.0 && !road.has_guard_rails() {
+            let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
+            return Err(at(of, index, error));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an entry whose only effect is glare of a source that does not shine into the camera.
+fn refuse_glare(
+    fault: &FaultConfig,
+    (sensors, road, environment): (&Sensors, &Road, &Environment),
+) -> Result<(), ConfigError> {
+    let sun = sensors.camera().sun;
+    // On a curved road, the sun is behind the ego sooner or later.
+    let is_ahead = road.curvature_per_m() == 0.0 && maths::cos(sun.azimuth_rad) * maths::cos(sun.elevation_rad) >= 0.0;
+    let is_day = environment.light == Light::Day;
+    for (index, entry) in fault.rear_camera.iter().enumerate() {
+        let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, .. } = entry.clone();
+        let of_sun = CameraFaultConfig { sun_glare, from_s, until_s, ..CameraFaultConfig::default() };
+        let of_beam = CameraFaultConfig { main_beam_glare, sun_glare: None, ..of_sun.clone() };
+        let inert = [
+            (*entry == of_sun && !is_day, "sun-glare", "environment.light", "the sun shines by day only"),
+            (
+                *entry == of_sun && is_ahead,
+                "sun-glare",
+                "sensors.rear-camera.sun",
+                "a sun ahead of the ego does not shine into its rear camera: its azimuth is beyond 1.58 rad to either side",
+            ),
+            (
+                *entry == of_beam && is_day,
+                "main-beam-glare",
+                "environment.light",
+                "a main beam blinds at dusk and at night only",
+            ),
+        ];
+        if let Some((_, key, other, rule)) = inert.into_iter().find(|(is_inert, ..)| *is_inert) {
+            return Err(at("rear-camera", index, contradiction(key, other, rule)));
+        }
+    }
+    Ok(())
+}
+
+impl ScenarioFile {
+    /// Refuses a mode of the sensors, given instead of the file's, in which a fault of the file could not act: the runs would pass
+    /// for runs with the fault.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`] with the fault.
+    pub fn check_faults_in(&self, mode: SensorMode) -> Result<(), ScenarioError> {
+        let parameters = self.space().nominal();
+        let at = format!(" (with the mode `{}`, which is given instead of the file's)", mode.name());
+        let checked = self.config().sensors.check(&parameters).map_err(|error| error.within("sensors"));
+        checked
+            .and_then(|sensors| refuse_absent(&self.config().fault, &sensors.with_mode(mode)))
+            .map_err(|error| self.located(error, at))
+    }
+}
+
+/// Refuses faults of sensors that do not exist.
+fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigError> {
+    const MODE: &str = "sensors.mode";
+    let mode = sensors.mode();
+    let (has_lidar, has_camera) = (!fault.rear_lidar.is_empty(), !fault.rear_camera.is_empty());
+    let has_object = !fault.rear_object.is_empty();
+    let is_for_both = has_object && (has_lidar || has_camera) && mode != SensorMode::GroundTruth;
+    let (has_front_lidar, has_front_radar) = (!fault.front_lidar.is_empty(), !fault.front_radar.is_empty());
+    let is_front_for_both = has_front_lidar && has_front_radar && mode != SensorMode::GroundTruth;
+    let full_only = "LiDAR and camera exist in mode `full` only";
+    let object_only = "the object-level sensor behind exists in mode `object` only";
+    let no_sensor = "mode `ground-truth` has no sensor that can fail";
+    let camera_is_off = mode == SensorMode::Full && sensors.camera().pipeline == Pipeline::Off;
+    let is_truth = mode == SensorMode::GroundTruth;
+    let absent = [
+        (has_lidar && mode != SensorMode::Full && !is_for_both, "rear-lidar", MODE, full_only),
+        (has_camera && mode != SensorMode::Full && !is_for_both, "rear-camera", MODE, full_only),
+        (has_object && mode != SensorMode::Object && !is_for_both, "rear-object", MODE, object_only),
+        (is_truth && has_front_radar, "front-radar", MODE, no_sensor),
+        (is_truth && !fault.surround.is_empty(), "surround", MODE, no_sensor),
+        (
+            has_front_lidar && sensors.full_model().front_lidar.is_none(),
+            "front-lidar",
+            "sensors.front-lidar",
+            "no LiDAR looks ahead: the radar's faults are those of `fault.front-radar`",
+        ),
+        (has_front_lidar && mode != SensorMode::Full && !is_front_for_both, "front-lidar", MODE, full_only),
+        (
+            has_front_radar && sensors.full_model().front_lidar.is_some() && !is_front_for_both,
+            "front-radar",
+            "sensors.front-lidar",
+            "in mode `full`, a LiDAR looks ahead in place of the radar: its faults are those of `fault.front-lidar`",
+        ),
+        (
+            has_camera && camera_is_off,
+            "rear-camera",
+            "sensors.rear-camera.pipeline",
+            "a camera whose pipeline is off is not used",
+        ),
+    ];
+    match absent.into_iter().find(|(is_absent, ..)| *is_absent) {
+        Some((_, key, other, rule)) => Err(contradiction(key, other, rule).within("fault")),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn contradiction(key: &str, other: &'static str, rule: &str) -> ConfigError {
+    ConfigError::new(key, Problem::Contradiction { other, rule: rule.to_owned() })
+}
+
+/// Returns an error of an entry with its place in the file.
+pub(super) fn at(key: &str, index: usize, error: ConfigError) -> ConfigError {
+    error.within_index(index).within(key).within("fault")
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_sensors::SensorMode;
+
+    use crate::{ScenarioFile, library};
+
+    /// Returns what the check says of the shipped scenario with these keys added.
+    fn check(keys: &str) -> Result<(), String> {
+        let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{keys}");
+        let file = ScenarioFile::parse(&library::path("own"), &text, &[]).map_err(|error| error.to_string())?;
+        file.concrete(&file.space().nominal()).map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_mode_in_which_a_fault_cannot_act_is_refused() {
+        let in_mode = |name: &str, mode| {
+            let file = ScenarioFile::parse(&library::path(name), library::text(name).unwrap(), &[]).unwrap();
+            file.check_faults_in(mode).map_err(|error| error.to_string())
+        };
+        for (name, mode, key) in [
+            ("lidar-dirty", SensorMode::Object, "fault.rear-lidar"),
+            ("camera-dead", SensorMode::Object, "fault.rear-camera"),
+            ("object-late", SensorMode::Full, "fault.rear-object"),
+            ("front-radar-dead", SensorMode::GroundTruth, "fault.front-radar"),
+        ] {
+            let message = in_mode(name, mode).unwrap_err();
+            assert!(message.contains(&format!("`{key}` contradicts `sensors.mode`")), "{message}");
+            assert!(message.contains(&format!("the mode `{}`, which is given", mode.name())), "{message}");
+        }
+        in_mode("lidar-dirty", SensorMode::Full).unwrap();
+        in_mode("front-radar-dead", SensorMode::Full).unwrap();
+        in_mode("odometry-wrong", SensorMode::Full).unwrap();
+        in_mode("low-thw-overtake", SensorMode::GroundTruth).unwrap();
+    }
+
+    #[test]
+    fn faults_that_cannot_act_are_refused_by_their_keys() {
+        let (full, object) = ("sensors.mode = \"full\"\n", "sensors.mode = \"object\"\n");
+        let truth = "sensors.mode = \"ground-truth\"\n";
+        let lidar = "[[fault.rear-lidar]]\ndead = true\n";
+        let further = "sensors.additional-rear-lidars = [{ name = \"left\", mount-height-m = 0.25 }]\n";
+        let camera = "[[fault.rear-camera]]\ndead = true\n";
+        let behind = "[[fault.rear-object]]\ndead = true\n";
+        let radar = "[[fault.front-radar]]\ndead = true\n";
+        let (front, ahead) = ("sensors.front-lidar = {}\n", "[[fault.front-lidar]]\ndead = true\n");
+        let (sun, beam) =
+            ("[[fault.rear-camera]]\nsun-glare = 1.0\n", "[[fault.rear-camera]]\nmain-beam-glare = 1.0\n");
+        let (low_sun, night) = ("sensors.rear-camera.sun.azimuth-rad = 3.1\n", "environment.light = \"night\"\n");
+        let is_off = "sensors.rear-camera.pipeline = \"off\"\n";
+        let mirrors = "[[fault.rear-lidar]]\nrail-ghosts = 0.5\n";
+        for (keys, key, why) in [
+            (format!("{object}{lidar}"), "fault.rear-lidar", "in mode `full` only"),
+            (format!("{object}{camera}"), "fault.rear-camera", "in mode `full` only"),
+            (format!("{full}{behind}"), "fault.rear-object", "in mode `object` only"),
+            (format!("{truth}{radar}"), "fault.front-radar", "no sensor that can fail"),
+            (format!("{truth}{lidar}{behind}"), "fault.rear-lidar", "in mode `full` only"),
+            (format!("{full}sensors.front-lidar = {{}}\n{radar}"), "fault.front-radar", "`sensors.front-lidar`"),
+            (format!("{object}sensors.front-lidar = {{}}\n{radar}"), "fault.front-radar", "`sensors.front-lidar`"),
+            (
+                format!("{full}[[fault.rear-lidar]]\nblocked-from-deg = 60.0\nblocked-to-deg = 70.0\n"),
+                "fault.rear-lidar[0].blocked-to-deg",
+                "from -66.5 to 66.5",
+            ),
+            (
+                format!("{full}sensors.front-lidar = {{}}\n{behind}{lidar}{radar}"),
+                "fault.front-radar",
+                "`fault.front-lidar`",
+            ),
+            (format!("{full}{ahead}"), "fault.front-lidar", "no LiDAR looks ahead"),
+            (format!("{object}{front}{ahead}"), "fault.front-lidar", "in mode `full` only"),
+            (format!("{truth}{front}{ahead}{radar}"), "fault.front-radar", "no sensor that can fail"),
+            (
+                format!("{full}{front}[[fault.front-lidar]]\nblocked-from-deg = -70.0\nblocked-to-deg = 0.0\n"),
+                "fault.front-lidar[0].blocked-from-deg",
+                "from -66.5 to 66.5",
+            ),
+            (
+                format!("{full}{front}[[fault.front-lidar]]\nrail-ghosts = 0.5\n"),
+                "fault.front-lidar[0].rail-ghosts",
+                "`road.guard-rails`",
+            ),
+            (
+                format!("{full}sensors.front-lidar.mount-height-m = 0.25\n[[fault.front-lidar]]\nheight-m = -0.2\n"),
+                "sensors.front-lidar.mount-height-m",
+                "`fault.front-lidar`",
+            ),
+            (format!("{full}{front}{ahead}from-s = 3000.0\n"), "fault.front-lidar[0].from-s", "`duration-s`"),
+            (
+                format!("{full}{further}[[fault.rear-lidar]]\ndead = true\nsensor = \"right\"\n"),
+                "fault.rear-lidar[0].sensor",
+                "`rear-lidar`, `left`",
+            ),
+            (
+                format!("{full}{further}[[fault.rear-lidar]]\nheight-m = -0.2\nsensor = \"left\"\n"),
+                "sensors.additional-rear-lidars[0].mount-height-m",
+                "at least 0.1 m above the road",
+            ),
+            (format!("{full}{front}{ahead}sensor = \"rear-lidar\"\n"), "fault.front-lidar[0].sensor", "`front-lidar`"),
+            (format!("{full}{sun}"), "fault.rear-camera[0].sun-glare", "`sensors.rear-camera.sun`"),
+            (format!("{full}{low_sun}{night}{sun}"), "fault.rear-camera[0].sun-glare", "by day only"),
+            (format!("{full}{beam}"), "fault.rear-camera[0].main-beam-glare", "`environment.light`"),
+            (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
+            (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
+            (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
+            (
+                format!("{full}sensors.rear-lidar.mount-height-m = 0.25\n[[fault.rear-lidar]]\nheight-m = -0.2\n"),
+                "sensors.rear-lidar.mount-height-m",
+                "at least 0.1 m above the road",
+            ),
+            (format!("{full}{lidar}{lidar}from-s = 3000.0\n"), "fault.rear-lidar[1].from-s", "`duration-s`"),
+        ] {
+            let message = check(&keys).unwrap_err();
+            assert!(message.contains(key) && message.contains(why), "{keys}: {message}");
+        }
+        for keys in [
+            format!("{full}{lidar}{camera}{radar}"),
+            format!("{full}{low_sun}{sun}"),
+            format!("{full}{night}{beam}"),
+            format!("{full}{sun}dirt = 0.1\n"),
+            format!("{full}{further}{lidar}sensor = \"left\"\n"),
+            format!("{full}{further}[[fault.rear-lidar]]\nheight-m = -0.2\nsensor = \"rear-lidar\"\n"),
+            format!("{object}{behind}{radar}"),
+            format!("{full}road.guard-rails = true\n{mirrors}"),
+            format!("{object}{behind}{lidar}"),
+            format!("{full}{behind}{lidar}"),
+            format!("{full}{front}{ahead}"),
+            format!("{full}{front}{ahead}{radar}"),
+            format!("{object}{front}{ahead}{radar}"),
+        ] {
+            check(&keys).unwrap();
+        }
+    }
+}

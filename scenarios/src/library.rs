@@ -1,0 +1,296 @@
+//! The scenario library: the files of `scenarios/library`, which are part of the program.
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use closecall_traffic::suggest::nearest;
+use serde::Serialize;
+use toml::{Table, Value};
+
+use super::{ScenarioError, ScenarioFile, base};
+
+/// Embeds scenarios of `scenarios/library`, or of a folder in it, by their names.
+macro_rules! embedded {
+    ($folder:literal: $($name:literal),* $(,)?) => {
+        [$(($name, include_str!(concat!("../library/", $folder, "/", $name, ".toml")))),*]
+    };
+    ($($name:literal),* $(,)?) => {
+        [$(($name, include_str!(concat!("../library/", $name, ".toml")))),*]
+    };
+}
+
+/// The scenarios of the library, each with its name and its text, in alphabetical order.
+const LIBRARY: [(&str, &str); 14] = embedded![
+    "cut-in-into-margin",
+    "empty-wet-road",
+    "lead-brakes-at-any-time",
+    "lead-brakes-partially",
+    "left-lane-blocked",
+    "low-thw-overtake",
+    "low-thw-overtake-at-cut-out",
+    "overtake-without-brake",
+    "paper-figure",
+    "rear-follower-stays",
+    "rear-follower-stays-lead-brakes",
+    "rear-vehicle-is-followed",
+    "rear-vehicles-one-after-another",
+    "slow-approach",
+];
+
+/// The scenarios of the folder `traffic` of the library: those with surrounding traffic.
+const TRAFFIC: [(&str, &str); 2] = embedded!["traffic": "busy-overtake", "dense-traffic"];
+
+/// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
+/// base.
+const FAULTS: [(&str, &str); 82] = embedded![
+    "faults":
+    "camera-dead",
+    "camera-dirty",
+    "camera-frozen",
+    "camera-low-sun",
+    "camera-main-beam",
+    "camera-out-of-focus",
+    "front-lidar-blocked",
+    "front-lidar-blooming",
+    "front-lidar-clock-offset",
+    "front-lidar-crosstalk",
+    "front-lidar-dead",
+    "front-lidar-dirty",
+    "front-lidar-dropout",
+    "front-lidar-frozen",
+    "front-lidar-height",
+    "front-lidar-jitter",
+    "front-lidar-late",
+    "front-lidar-lost-frames",
+    "front-lidar-noisy",
+    "front-lidar-pitch",
+    "front-lidar-rail-ghosts",
+    "front-lidar-yaw",
+    "front-radar-blocked",
+    "front-radar-clock-offset",
+    "front-radar-dead",
+    "front-radar-dirty",
+    "front-radar-dropout",
+    "front-radar-frozen",
+    "front-radar-ghost",
+    "front-radar-jitter",
+    "front-radar-late",
+    "front-radar-lost-frames",
+    "front-radar-noisy",
+    "front-radar-yaw",
+    "lidar-blocked",
+    "lidar-blooming",
+    "lidar-clock-offset",
+    "lidar-crosstalk",
+    "lidar-dead",
+    "lidar-dirty",
+    "lidar-dropout",
+    "lidar-frozen",
+    "lidar-height",
+    "lidar-jitter",
+    "lidar-late",
+    "lidar-lost-frames",
+    "lidar-misaligned",
+    "lidar-noisy",
+    "lidar-pitch",
+    "lidar-rail-ghosts",
+    "lidar-yaw",
+    "map-curvature",
+    "map-lane-width",
+    "map-without-rails",
+    "object-blocked",
+    "object-clock-offset",
+    "object-dead",
+    "object-dirty",
+    "object-dropout",
+    "object-frozen",
+    "object-ghost",
+    "object-jitter",
+    "object-late",
+    "object-lost-frames",
+    "object-noisy",
+    "object-yaw",
+    "odometry-heading",
+    "odometry-lateral",
+    "odometry-speed",
+    "odometry-wrong",
+    "surround-blocked",
+    "surround-clock-offset",
+    "surround-dead",
+    "surround-dirty",
+    "surround-dropout",
+    "surround-frozen",
+    "surround-ghost",
+    "surround-jitter",
+    "surround-late",
+    "surround-lost-frames",
+    "surround-noisy",
+    "surround-yaw",
+];
+
+/// The scenarios of [`FAULTS`], each with the text of the whole scenario.
+static EXPANDED_FAULTS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
+    let whole = |text: &str| base::expand(text).ok().flatten().unwrap_or_else(|| text.to_owned());
+    FAULTS.iter().map(|(name, text)| (*name, whole(text))).collect()
+});
+
+/// Returns all scenarios: those with surrounding traffic, and then those with faults last.
+fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+    plain().chain(EXPANDED_FAULTS.iter().map(|(name, text)| (*name, text.as_str())))
+}
+
+/// Returns all scenarios that have no base.
+fn plain() -> impl Iterator<Item = (&'static str, &'static str)> {
+    LIBRARY.into_iter().chain(TRAFFIC)
+}
+
+/// Returns the names of the scenarios that can be a base.
+pub(super) fn plain_names() -> impl Iterator<Item = &'static str> {
+    plain().map(|(name, _)| name)
+}
+
+/// Returns the text of a scenario that can be a base, or `None` if the library has none of that name.
+pub(super) fn plain_text(name: &str) -> Option<&'static str> {
+    plain().find(|(known, _)| *known == name).map(|(_, text)| text)
+}
+
+/// A name that is not that of a scenario of the library.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the library has no scenario `{name}`, only {known}{}", suggestion(name))]
+pub struct UnknownScenario {
+    /// The name.
+    pub name: String,
+    /// The names of the library, separated by commas.
+    pub known: String,
+}
+
+fn suggestion(name: &str) -> String {
+    nearest(name, names()).map(|known| format!("; did you mean `{known}`?")).unwrap_or_default()
+}
+
+/// A scenario of the library, as a list of the library describes it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LibraryEntry {
+    /// The scenario's name.
+    pub name: &'static str,
+    /// The question that the scenario answers.
+    pub question: String,
+    /// The tags.
+    pub tags: Vec<String>,
+    /// The requirements that the scenario tests.
+    pub requirements: Vec<String>,
+    /// Number of sampled parameters.
+    pub parameters: usize,
+    /// The criteria of the table `[gate]`, as the file writes them.
+    pub gates: Vec<String>,
+}
+
+impl std::fmt::Display for LibraryEntry {
+    /// Writes the name, and below it the question, the requirements and the gates, a line each.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { name, question, parameters, .. } = self;
+        writeln!(f, "{name}\n  {question}\n  requirements: {}; {parameters} parameters", self.requirements.join(", "))?;
+        self.gates.iter().try_for_each(|gate| writeln!(f, "  gate: {gate}"))
+    }
+}
+
+impl LibraryEntry {
+    fn new(name: &'static str, text: &str) -> Result<Self, ScenarioError> {
+        let file = ScenarioFile::parse(&path(name), text, &[])?;
+        let config = file.config();
+        Ok(Self {
+            name,
+            question: config.description.clone(),
+            tags: config.tags.clone(),
+            requirements: config.requirements.clone(),
+            parameters: file.space().iter().len(),
+            gates: gates(text),
+        })
+    }
+}
+
+/// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic and then those with faults
+/// last.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    plain_names().chain(FAULTS.into_iter().map(|(name, _)| name))
+}
+
+/// Returns the text of a scenario, or `None` if the library has no scenario of that name.
+pub fn text(name: &str) -> Option<&'static str> {
+    // Without the scenarios with faults, which are put together from their bases, if possible.
+    plain_text(name).or_else(|| all().find(|(known, _)| *known == name).map(|(_, text)| text))
+}
+
+/// Returns the path by which messages and manifests name a scenario of the library. No such file is read.
+pub fn path(name: &str) -> PathBuf {
+    PathBuf::from(format!("library/{name}.toml"))
+}
+
+/// Describes every scenario of the library, in the order of [`names`].
+///
+/// # Errors
+/// [`ScenarioError`] if an embedded scenario is invalid, which is a defect of the program.
+pub fn entries() -> Result<Vec<LibraryEntry>, ScenarioError> {
+    all().map(|(name, text)| LibraryEntry::new(name, text)).collect()
+}
+
+/// Returns the text of the scenario `from` of the library, under the name `name`.
+///
+/// # Errors
+/// [`UnknownScenario`] if the library has no scenario `from`.
+pub fn copy_of(from: &str, name: &str) -> Result<String, UnknownScenario> {
+    let text = text(from)
+        .ok_or_else(|| UnknownScenario { name: from.to_owned(), known: names().collect::<Vec<_>>().join(", ") })?;
+    Ok(text.replace(&format!("name = \"{from}\""), &format!("name = \"{name}\"")))
+}
+
+/// Returns the gates that the text of a scenario sets.
+fn gates(text: &str) -> Vec<String> {
+    let Ok(document) = text.parse::<Table>() else { return Vec::new() };
+    let required = document.get("gate").and_then(|gate| gate.get("require")).and_then(Value::as_array);
+    required.into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_library_holds_every_scenario_of_its_folder() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
+        let names_in = |folder: &Path| {
+            let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+            let scenarios = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+            let mut names: Vec<String> =
+                scenarios.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+            names.sort();
+            names
+        };
+        let expected =
+            [names_in(&folder), names_in(&folder.join("traffic")), names_in(&folder.join("faults"))].concat();
+        assert_eq!(names().collect::<Vec<_>>(), expected);
+        for (entry, (name, text)) in entries().unwrap().into_iter().zip(all()) {
+            assert_eq!(entry.name, ScenarioFile::parse(&path(name), text, &[]).unwrap().config().name);
+            assert!(entry.question.ends_with('?'), "{name}: {}", entry.question);
+        }
+    }
+
+    #[test]
+    fn gates_are_those_of_the_text() {
+        assert_eq!(gates("[gate]\nrequire = ['count(ego_collided) <= 0']\n"), ["count(ego_collided) <= 0"]);
+        assert_eq!(gates("name = 'a'\n"), Vec::<String>::new());
+    }
+
+    #[test]
+    fn every_copy_is_valid_under_its_new_name() {
+        for text in names().map(|name| copy_of(name, "mine").unwrap()) {
+            let file = ScenarioFile::parse(Path::new("mine.toml"), &text, &[]).unwrap();
+            file.check().unwrap();
+            assert_eq!(file.config().name, "mine");
+            assert!(file.unused_parameters().is_empty());
+        }
+        assert!(copy_of("paper-figur", "mine").unwrap_err().to_string().contains("did you mean `paper-figure`?"));
+    }
+}

@@ -1,0 +1,10 @@
+//! Which sample of which seed.
+
+/// Identifies one sample of a scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunKey {
+    /// The campaign's seed.
+    pub seed: u64,
+    /// The sample's number, from 0.
+    pub sample: u64,
+}

@@ -1,0 +1,195 @@
+//! The JSON Schema of scenario files, with the ranges that the check of a scenario applies.
+//!
+//! The types give the keys and words. The ranges come from the checks themselves: a scenario that uses every key is
+//! changed in one number at a time, far beyond any range, and the check answers with the range that it allows. The schema
+//! thus cannot state another range than the check. Rules between several keys remain with the check.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use closecall_traffic::{Check, KeyPath, Problem, Range, Segment};
+use serde_json::{Value, json};
+use toml::Table;
+
+use super::{SCHEMA_VERSION, ScenarioConfig, ScenarioError, ScenarioFile};
+
+const EVERY_KEY: &str = include_str!("../../docs/reference/scenario/every-key.toml");
+/// The actor of that scenario that follows trajectory data: a file that is not part of the program.
+const RECORDED_ACTOR: &str = "recorded";
+/// The key of a LiDAR that names another file, which is not part of the program either.
+const PATTERN_FILE: &str = "pattern-file";
+/// Larger than every number that a scenario allows.
+const HUGE: f64 = 1e300;
+/// Bound of a quantity that may have any value: it is not written.
+const UNBOUNDED: f64 = 1e12;
+/// The pattern of names.
+const NAME_PATTERN: &str = "^[a-z][a-z0-9-]*$";
+/// The pattern of the names of scenarios: SCENARIO, or SCENARIO@MEMBER for an entry of an ensemble.
+const SCENARIO_PATTERN: &str = "^[a-z][a-z0-9-]*(@[a-z][a-z0-9-]*)?$";
+
+/// Returns the JSON Schema of scenario files.
+///
+/// Besides keys and types it states the range of each number that the check of a scenario limits for itself. Rules
+/// between several keys are not part of it.
+pub fn strict_schema() -> Value {
+    let mut schema = schemars::schema_for!(ScenarioConfig).to_value();
+    for (pointer, range) in ranges(&schema) {
+        if let Some(object) = schema.pointer_mut(&pointer).and_then(Value::as_object_mut) {
+            if range.high() < UNBOUNDED {
+                object.insert("maximum".to_owned(), json!(range.high()));
+            }
+            if range.low() > -UNBOUNDED {
+                let key = if range.includes_low() { "minimum" } else { "exclusiveMinimum" };
+                object.insert(key.to_owned(), json!(range.low()));
+            }
+        }
+    }
+    let mut put = |pointer: &str, key: &str, value: Value| {
+        if let Some(object) = schema.pointer_mut(pointer).and_then(Value::as_object_mut) {
+            object.insert(key.to_owned(), value);
+        }
+    };
+    put("/properties/schema-version", "const", json!(SCHEMA_VERSION));
+    put("/properties/name", "pattern", json!(SCENARIO_PATTERN));
+    put("/properties/actor", "minItems", json!(1));
+    put("/properties/requirements", "uniqueItems", json!(true));
+    put("/$defs/ActorId", "pattern", json!(NAME_PATTERN));
+    put("/$defs/ParameterName", "pattern", json!(NAME_PATTERN));
+    put("/$defs/Lane", "minimum", json!(1));
+    let one_of = |keys: [&str; 2]| json!({ "oneOf": keys.map(|key| json!({ "required": [key] })) });
+    put(
+        "/$defs/RelativeStartConfig",
+        "allOf",
+        json!([one_of(["gap-m", "thw-s"]), one_of(["speed-mps", "closing-mps"])]),
+    );
+    put("/$defs/TrafficConfig", "allOf", json!([one_of(["mean-thw-s", "density-per-km"])]));
+    schema
+}
+
+/// Returns the range of each number, by the JSON pointer of its schema. Where a table stands in several places, the range
+/// contains the ranges of all of them.
+fn ranges(schema: &Value) -> BTreeMap<String, Range> {
+    let Ok(mut document) = EVERY_KEY.parse::<Table>() else { return BTreeMap::new() };
+    if let Some(actors) = document.get_mut("actor").and_then(toml::Value::as_array_mut) {
+        actors.retain(|actor| actor.get("id").and_then(toml::Value::as_str) != Some(RECORDED_ACTOR));
+    }
+    // A pattern in a file has the ranges of a pattern in the scenario.
+    let sensors = document.get_mut("sensors").and_then(toml::Value::as_table_mut);
+    for (_, sensor) in sensors.into_iter().flatten() {
+        sensor.as_table_mut().and_then(|sensor| sensor.remove(PATTERN_FILE));
+    }
+    // The ranges of distributions depend on the other numbers of the same distribution.
+    let sampled = ["parameters"];
+    let mut search = Search { schema, document: &document, found: BTreeMap::new() };
+    for (key, value) in document.iter().filter(|(key, _)| !sampled.contains(&key.as_str())) {
+        search.visit(&format!("/properties/{key}"), &[Segment::Key(key.clone())], value);
+    }
+    search.found
+}
+
+struct Search<'a> {
+    schema: &'a Value,
+    document: &'a Table,
+    found: BTreeMap<String, Range>,
+}
+
+impl Search<'_> {
+    /// Finds the ranges of `value`, which stands at `path` of the document and has the schema at `pointer`.
+    fn visit(&mut self, pointer: &str, path: &[Segment], value: &toml::Value) {
+        let within = |segment| path.iter().cloned().chain([segment]).collect::<Vec<_>>();
+        match value {
+            toml::Value::Table(table) => {
+                for (key, inner) in table {
+                    for target in self.properties(pointer, key) {
+                        self.visit(&target, &within(Segment::Key(key.clone())), inner);
+                    }
+                }
+            }
+            toml::Value::Array(values) => {
+                for (index, inner) in values.iter().enumerate() {
+                    for target in self.resolved(pointer).into_iter().map(|target| format!("{target}/items")) {
+                        self.visit(&target, &within(Segment::Index(index)), inner);
+                    }
+                }
+            }
+            _ if self.is_number(pointer) => {
+                if let Some(range) = allowed(self.document, path) {
+                    let wider = self.found.get(pointer).map_or(range, |known| hull(*known, range));
+                    self.found.insert(pointer.to_owned(), wider);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Returns the pointers of the schemas that the schema at `pointer` refers to, itself included.
+    fn resolved(&self, pointer: &str) -> Vec<String> {
+        let Some(schema) = self.schema.pointer(pointer) else { return Vec::new() };
+        if let Some(target) = schema["$ref"].as_str().and_then(|target| target.strip_prefix('#')) {
+            return self.resolved(target);
+        }
+        let mut found = vec![pointer.to_owned()];
+        for kind in ["anyOf", "oneOf"] {
+            for index in 0..schema[kind].as_array().map_or(0, Vec::len) {
+                found.extend(self.resolved(&format!("{pointer}/{kind}/{index}")));
+            }
+        }
+        found
+    }
+
+    /// Returns the pointers of the schemas of a key.
+    fn properties(&self, pointer: &str, key: &str) -> Vec<String> {
+        let candidates = self.resolved(pointer).into_iter().map(|target| format!("{target}/properties/{key}"));
+        candidates.filter(|target| self.schema.pointer(target).is_some()).collect()
+    }
+
+    fn is_number(&self, pointer: &str) -> bool {
+        self.resolved(pointer).iter().any(|target| {
+            let kind = self.schema.pointer(target).map(|schema| &schema["type"]);
+            kind.is_some_and(|kind| {
+                kind == "number" || kind.as_array().is_some_and(|all| all.contains(&json!("number")))
+            })
+        })
+    }
+}
+
+/// Returns the range that the check allows at `path`, or `None` if it states none for that key alone.
+fn allowed(document: &Table, path: &[Segment]) -> Option<Range> {
+    [-HUGE, HUGE].into_iter().find_map(|number| {
+        let mut changed = toml::Value::Table(document.clone());
+        let mut target = &mut changed;
+        for segment in path {
+            target = match segment {
+                Segment::Key(key) => target.get_mut(key)?,
+                Segment::Index(index) => target.get_mut(*index)?,
+            };
+        }
+        *target = toml::Value::Float(number);
+        let text = toml::to_string(&changed).ok()?;
+        let file = match ScenarioFile::parse(Path::new("schema"), &text, &[]) {
+            Ok(file) => file,
+            Err(ScenarioError::Value { source, .. }) => return range_at(&source.problem, &source.path, path),
+            Err(_) => return None,
+        };
+        let error = file.config().check(&file.space().nominal()).err()?;
+        range_at(&error.problem, &error.path, path)
+    })
+}
+
+fn range_at(problem: &Problem, found: &KeyPath, path: &[Segment]) -> Option<Range> {
+    match problem {
+        Problem::OutOfRange { allowed, .. } if found.0 == path => Some(*allowed),
+        _ => None,
+    }
+}
+
+/// Returns the smallest range that contains both.
+fn hull(one: Range, other: Range) -> Range {
+    let low = one.low().min(other.low());
+    let includes_low = [one, other].iter().any(|range| range.low() <= low && range.includes_low());
+    let high = one.high().max(other.high());
+    if includes_low { Range::closed(low, high) } else { Range::above(low, high) }
+}
+
+#[cfg(test)]
+mod tests;
