@@ -10,9 +10,9 @@ use std::path::Path;
 use closecall::campaign::gate::GateSet;
 use closecall::campaign::plan::Plan;
 use closecall::campaign::runner::Sampling;
+use closecall::scenarios::ScenarioFile;
 use closecall::scenarios::sampling::Design;
 use closecall::simulation::controller::ControllerChoice;
-use closecall::scenarios::ScenarioFile;
 
 /// Runs 20 samples with and without the margin increase system, and applies a gate to the result.
 #[expect(clippy::print_stdout, reason = "an example prints its result")]

@@ -11,27 +11,26 @@
 //!
 //! | crate | holds |
 //! |---|---|
-//! | [`traffic`] | the shared data types and the criticality metrics |
-//! | [`statistics`] | confidence bounds, tests and distributions |
-//! | [`scenarios`] | trajectory data, lane changes, distributions, sampling designs |
+//! | [`traffic`] | the shared data types, the criticality metrics, and statistics |
 //! | [`sensors`] | the perception of the ego vehicle |
-//! | [`controllers`] | the ego stack and the human drivers |
-//! | `native` | controllers that are shared libraries or FMUs |
-//! | [`simulation`] | one run: scenario file, world, closed loop, outcome |
+//! | [`controllers`] | the ego stack, the human drivers, and controllers from outside |
+//! | [`recorded`] | trajectory data, lane changes, criticality, fits |
+//! | [`scenarios`] | scenario files, parameters, sampling, pass criteria, the library |
+//! | [`simulation`] | one run: world, closed loop, outcome |
 //! | [`campaign`] | many runs: journal, workers, gates, validity, verdict |
-//! | [`causes`] | the cause of a collision, the smallest failing case, the map, exposure |
+//! | [`studies`] | the cause of a collision, the smallest failing case, the map, exposure, perception |
 //! | [`report`] | Rerun recordings, figures, Parquet, JUnit, HTML, JSON |
 //!
 //! `examples/campaign.rs` runs a campaign without the command line.
 
 pub use closecall_campaign as campaign;
-pub use closecall_causes as causes;
 pub use closecall_controllers as controllers;
 pub use closecall_recorded as recorded;
 pub use closecall_report as report;
 pub use closecall_scenarios as scenarios;
 pub use closecall_sensors as sensors;
 pub use closecall_simulation as simulation;
+pub use closecall_studies as studies;
 pub use closecall_traffic as traffic;
 
 pub mod cli;

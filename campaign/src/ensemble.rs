@@ -117,7 +117,7 @@ pub struct EnsembleVerdict {
     pub spreads: Vec<Spread>,
 }
 
-/// Returns the verdict over the ensemble for each scenario of which entries SCENARIO@MEMBER were run, of the arm under test.
+/// Returns the verdict over the ensemble of the arm under test, for each scenario that was run as entries SCENARIO@MEMBER.
 /// `without_effect` names pairs of scenario and member that were not run because the member changes nothing.
 pub fn verdicts(summary: &Summary, without_effect: &[(String, String)]) -> Vec<EnsembleVerdict> {
     verdicts_of_arm(summary, without_effect, summary.controllers.len().saturating_sub(1))

@@ -235,7 +235,7 @@ impl Manifest {
         ControllerChoice::names(&self.arms)
     }
 
-    /// Returns the manifest of the whole campaign, of which this one may describe a part.
+    /// Returns the manifest of the whole campaign. This one may describe a part of it.
     pub fn whole(&self) -> Self {
         Self { partition: None, ..self.clone() }
     }

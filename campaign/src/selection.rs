@@ -92,7 +92,7 @@ pub struct Chosen {
     pub reasons: Vec<&'static str>,
 }
 
-/// The kind of a sample of which the worst is selected from a whole campaign.
+/// The kind of a sample. The worst sample of each kind is selected from a whole campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The system prevents the collision.

@@ -62,7 +62,7 @@ fn texts(arguments: &[OsString]) -> Vec<String> {
     arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Returns the arguments of the command, of which the first is the program's name.
+/// Returns the arguments of the command. The first is the program's name.
 pub fn arguments() -> Vec<String> {
     RUNNING.with_borrow(|running| running.arguments.clone())
 }

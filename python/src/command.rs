@@ -28,7 +28,7 @@ pub(crate) fn set_program(path: PathBuf, words: Vec<String>) {
     closecall_simulation::controller::native::set_program(words);
 }
 
-/// Runs the program `closecall` with these arguments, of which the first is its name, and returns its exit code.
+/// Runs the program `closecall` with these arguments and returns its exit code. The first argument is its name.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| cli::main(&arguments) as u8)

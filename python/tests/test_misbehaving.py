@@ -46,7 +46,7 @@ FAULTS = [
 
 
 def fault_of(speed_mps: float) -> int:
-    """The fault of a sample, of which the first speed of the ego tells."""
+    """The fault of a sample. The first speed of the ego tells which."""
     return int(1e6 * speed_mps) % len(FAULTS)
 
 

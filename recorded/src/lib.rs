@@ -1,5 +1,6 @@
 //! Recorded traffic: trajectory data, lane changes, criticality, fitted distributions, and encounters to re-enact.
 
+pub mod aerial;
 pub mod criticality;
 pub mod encounter;
 pub mod filters;

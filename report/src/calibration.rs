@@ -31,7 +31,7 @@ pub fn no_pair(data: &FollowingData) -> String {
     let reasons = data.left_out.iter().take(3).map(|pair| format!("{}: {}", pair.name, pair.reason));
     let reasons: Vec<String> = reasons.collect();
     format!(
-        "no pair is left to calibrate: {} can be used, of which the hash of the name holds some out, and {} are left out ({})",
+        "no pair is left to calibrate: {} can be used, but the hash of the name holds some out, and {} are left out ({})",
         data.pairs.len(),
         data.left_out.len(),
         reasons.join("; ")

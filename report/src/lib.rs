@@ -6,8 +6,10 @@
 //! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
+//! * [`perception`]: studies of perception as text, JSON, Parquet and a page
 //! * [`page`], [`table`]: what all pages and all Parquet tables share
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
+//! * [`tables`]: the tables of one run: its trace, and the points of its LiDARs
 //! * [`traffic`]: texts and charts of what was found in trajectory data
 //!
 //! This crate is the only one that uses rerun and plotters.
@@ -22,9 +24,11 @@ pub mod page {
 }
 pub mod heartbeat;
 pub mod json;
+pub mod perception;
 pub mod run;
 pub mod study;
+pub mod tables;
 pub mod traffic;
 mod units;
 
-pub use closecall_tables::table;
+pub use tables::table;

@@ -102,7 +102,7 @@ impl FleetOf {
         }))
     }
 
-    /// Returns the fleet of vehicles of which nothing is given.
+    /// Returns the fleet of vehicles about which nothing is given.
     pub(super) fn of_name(name: &str) -> Result<Self, ConfigError> {
         let [has_paint, has_colour, has_shape, has_height, has_plate] = [false; 5];
         Ok(Self { fleet: Fleet::named(name)?, has_paint, has_colour, has_shape, has_height, has_plate })

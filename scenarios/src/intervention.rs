@@ -105,7 +105,7 @@ pub struct FaultConfig {
     pub surround: Vec<ObjectFaultConfig>,
     /// Faults of the object-level sensor that replaces LiDAR and camera in mode `object`, at most four.
     pub rear_object: Vec<ObjectFaultConfig>,
-    /// Errors of the ego's odometry and map, of which the ego does not know. Default: none.
+    /// Errors of the ego's odometry and map. The ego does not know them. Default: none.
     pub odometry: Option<OdometryErrorConfig>,
 }
 

@@ -165,7 +165,7 @@ pub(super) fn find_actor(actors: &[ActorConfig], id: &ActorId, key: &str) -> Res
     })
 }
 
-/// One of two keys of which exactly one must be given.
+/// One of two keys. Exactly one must be given.
 #[derive(Clone, Copy)]
 struct Alternative<'a> {
     key: &'static str,

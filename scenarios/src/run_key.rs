@@ -1,4 +1,4 @@
-//! Which sample of which seed.
+//! The identity of a run: a seed and the number of a sample.
 
 /// Identifies one sample of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -32,7 +32,7 @@ const EDGE_SD_PX: f64 = 3.0;
 const PITCH_SD_RAD: f64 = 0.005;
 /// Distance up to which the place of an instance on the road is used (m): at 60 m, its standard deviation is 15 m.
 const MAX_ALONE_M: f64 = 60.0;
-/// A detection of the camera alone counts as much as a cluster of so many points, of which the tracker takes the scores with full weight.
+/// A detection of the camera alone counts as much as a cluster of so many points. The tracker takes the scores of such a cluster with full weight.
 const ALONE_POINTS: usize = 12;
 
 /// What the image says of a detection.
@@ -183,7 +183,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
     (!is_beside_road(&detection, lane)).then_some(detection)
 }
 
-/// Returns a detection at another time and place of the ego, of which it lies on the same spot of the road.
+/// Returns a detection at another time and place of the ego, on the same spot of the road.
 pub(crate) fn moved(detection: &Detection, from: &Exposed, scene: &Scene<'_>) -> Detection {
     let then = closecall_traffic::ego_frame::EgoFrame::new(scene.road, &from.ego.state);
     let now = closecall_traffic::ego_frame::EgoFrame::new(scene.road, &scene.ego.state);

@@ -1,9 +1,9 @@
 //! What the ego vehicle perceives: models of its rear LiDAR, rear camera and object-level sensors, and the tracker
-//! (crate `tracking`) behind the rear LiDAR.
+//! behind the rear LiDAR.
 //!
 //! ```text
 //!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ clusters ─▶ boxes ┐
-//!  Scene ────┤ camera/  image crop at each cluster ─▶ classifier ─▶ class scores                ├─▶ `tracking` ─▶ tracks
+//!  Scene ────┤ camera/  image crop at each cluster ─▶ classifier ─▶ class scores                ├─▶ tracking/ ─▶ tracks
 //!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
 //! ```
 

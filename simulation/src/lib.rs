@@ -1,14 +1,12 @@
 //! Simulates one closed-loop run: a scenario, a seed and an arm (controller and sensors) go in, an outcome comes out.
 //!
 //! ```text
-//!  scenario file ─▶ checked scenario ─▶ [ world ─▶ sensors ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome
+//!  concrete scenario ─▶ [ world ─▶ sensors ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome
 //! ```
 //!
-//! * [`scenario`]: scenario files, checked into concrete scenarios
 //! * [`controller`]: the controllers that can drive the ego vehicle, built in or as a separate process
 //! * [`run`](mod@run): the closed loop, and the observers of a run
 //! * [`calibration`]: car-following models fitted to recorded pairs
-//! * [`outcome`]: the result of a run
 //! * [`trajectories`]: simulated traffic as trajectory data
 //!
 //! The outcome depends on the scenario, the seed, the sample number and the arm only, down to the last bit. This crate is

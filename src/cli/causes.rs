@@ -5,21 +5,21 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::arguments::{count, positive};
 use closecall_campaign::saved::SavedCampaign;
-use closecall_causes::CausesError;
-use closecall_causes::case::Case;
-use closecall_causes::cost::{CostText, cost as cost_of};
-use closecall_causes::explain::ExplanationText;
-use closecall_causes::exposure::{
-    Counted, EventRule, ExposureText, StatedRange, exposure as compute_exposure, observe, shares_of,
-};
-use closecall_causes::failures::explain_failures;
-use closecall_causes::map::{MapGrid, MapText, map as compute_map, write_map};
-use closecall_causes::minimize::{MinimizedText, minimize_sample, output_files, write_files};
 use closecall_recorded::filters::smooth;
 use closecall_recorded::trajectory_data::read_with;
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_studies::CausesError;
+use closecall_studies::case::Case;
+use closecall_studies::cost::{CostText, cost as cost_of};
+use closecall_studies::explain::ExplanationText;
+use closecall_studies::exposure::{
+    Counted, EventRule, ExposureText, StatedRange, exposure as compute_exposure, observe, shares_of,
+};
+use closecall_studies::failures::explain_failures;
+use closecall_studies::map::{MapGrid, MapText, map as compute_map, write_map};
+use closecall_studies::minimize::{MinimizedText, minimize_sample, output_files, write_files};
 use serde_json::json;
 
 use super::CliError;
@@ -121,7 +121,7 @@ pub(super) struct MapArgs {
     /// Front time headways at the start
     #[arg(long, value_name = "S,…", value_delimiter = ',', value_parser = positive, default_value = "0.5,0.7,0.9,1.2", help_heading = heading::METHOD)]
     front_thw_s: Vec<f64>,
-    /// Engage at the gaps of the paper's system or of the extended one, and brake as hard: `mis` or `mis-extended`
+    /// Engage at the gaps of the paper's system or of the extended one, and brake as strongly: `mis` or `mis-extended`
     #[arg(long, default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
     /// Folder for the page, the pictures (SVG) and the points (CSV, JSON)
@@ -165,7 +165,7 @@ pub(super) struct ExposureArgs {
     /// Deceleration in m/s² from which the lead vehicle counts as braking
     #[arg(long, value_name = "M/S²", value_parser = positive, default_value = "4", help_heading = heading::METHOD)]
     braking_mps2: f64,
-    /// Encounters per 10^6 km, as a range that is stated: for want of files that show one
+    /// Encounters per 10^6 km, as a stated range, where no file shows one
     #[arg(long, value_name = "LOW..HIGH", conflicts_with = "counted", help_heading = heading::METHOD)]
     per_million_km: Option<StatedRange>,
     /// Encounters that were counted elsewhere, and the distance in km

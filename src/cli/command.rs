@@ -139,7 +139,7 @@ fn parse(arguments: &[std::ffi::OsString]) -> Result<Cli, clap::Error> {
     })
 }
 
-/// Runs the program with these arguments, of which the first is the program's name.
+/// Runs the program with these arguments. The first is the program's name.
 pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     set_arguments(arguments);
     // Messages name their causes themselves. Lines are not wrapped, so that paths can be copied.

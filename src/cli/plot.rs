@@ -85,7 +85,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         return Err(CliError::usage("a campaign has its own seed and settings: --seed and --set cannot change them"));
     }
     if !args.comparison.arms.is_empty() {
-        return Err(CliError::usage("a campaign has its own arms, all of which are drawn: --arms cannot change them"));
+        return Err(CliError::usage("a campaign has its own arms, and all are drawn: --arms cannot change them"));
     }
     let Some(sample) = args.number.or(args.sample) else {
         return Err(CliError::usage(

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_campaign::arguments::scene_count;
+use closecall_recorded::aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_report::json::stamped;
 use closecall_sensors::datasets::{CameraLooks, Content, DatasetOptions, MAX_VEHICLES, Set, render_dataset};
 use serde_json::json;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::arguments::count;
-use closecall_perception::output::Studies;
-use closecall_perception::{Extent, Study};
+use closecall_report::perception::Studies;
+use closecall_studies::perception::{Extent, Study};
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};

@@ -93,7 +93,7 @@ pub(super) struct SensitivityArgs {
 pub(super) struct FrontierArgs {
     #[command(flatten)]
     study: StudyArgs,
-    /// Values of a key, named as for --set, of which all combinations are run; can be given more than once [default:
+    /// Values of a key, named as for --set. All combinations are run. Can be given more than once [default:
     /// braking, engagement distance, goal and critical gap of the margin increase system]
     #[arg(long = "vary", value_name = "KEY=a,b,…", help_heading = heading::METHOD)]
     vary: Vec<Grid>,

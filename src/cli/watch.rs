@@ -8,10 +8,10 @@ use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
+use closecall_report::tables::RunTables;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, Setting};
 use closecall_simulation::{Arm, RunKey};
-use closecall_tables::RunTables;
 
 use super::CliError;
 use super::backend::check_backend_of;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use closecall::sensors::SensorMode;
 use closecall::scenarios::ScenarioFile;
+use closecall::sensors::SensorMode;
 
 use crate::support::{ROOT, library};
 

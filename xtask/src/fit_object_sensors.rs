@@ -13,11 +13,11 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall::traffic::atomic::write_file;
 use closecall::scenarios::source;
-use closecall_perception::fit::{FitPlan, at_bounds, fit, fit_errors};
-use closecall_perception::validation::{Measured, differences, measure, table};
+use closecall::traffic::atomic::write_file;
 use closecall_sensors::{Chain, RearFit};
+use closecall_studies::perception::fit::{FitPlan, at_bounds, fit, fit_errors};
+use closecall_studies::perception::validation::{Measured, differences, measure, table};
 
 /// First line of the file.
 const HEAD: &str =

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
+use closecall_recorded::aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_sensors::datasets::Set;
 
 pub(crate) fn main(arguments: Vec<String>) -> Result<(), Box<dyn std::error::Error>> {

@@ -11,8 +11,8 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_aerial::dataset::write_png;
-use closecall_aerial::{FlightOptions, fly, losses};
+use closecall_recorded::aerial::dataset::write_png;
+use closecall_recorded::aerial::{FlightOptions, fly, losses};
 use closecall_recorded::trajectory_data::{read, write_trajectories};
 use closecall_sensors::camera::Backend;
 
@@ -49,7 +49,7 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn std::error::Error>>
     Ok(())
 }
 
-fn save(flight: &closecall_aerial::Flight, folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+fn save(flight: &closecall_recorded::aerial::Flight, folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     std::fs::create_dir_all(folder)?;
     let path = |name: &str| folder.join(name);
     write_trajectories(&flight.truth, &path(&format!("{}.csv", flight.truth.name)))?;

@@ -13,13 +13,13 @@ use std::process::ExitCode;
 
 use closecall::scenarios::source;
 use closecall_campaign::runner::{Sampling, concrete};
-use closecall_perception::agreement::{Verdict, reason};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{ScenarioFile, Setting};
 use closecall_sensors::camera::Backend;
 use closecall_sensors::{SensorMode, set_inference_backend};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
+use closecall_studies::perception::agreement::{Verdict, reason};
 use closecall_traffic::{Source, Time, Track, TrackStatus};
 use rayon::prelude::*;
 

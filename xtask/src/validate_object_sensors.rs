@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use closecall::scenarios::source;
-use closecall_perception::agreement::Agreement;
+use closecall_studies::perception::agreement::Agreement;
 
 /// The weather: its name and its settings.
 const CONDITIONS: [(&str, &[&str]); 4] = [
@@ -128,7 +128,7 @@ impl Display for Comparison {
 #[cfg(test)]
 mod tests {
     use clap::Parser as _;
-    use closecall_perception::agreement::{Pair, Verdict};
+    use closecall_studies::perception::agreement::{Pair, Verdict};
 
     use super::*;
 

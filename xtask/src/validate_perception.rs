@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The statistic is the mean normalised error squared (NEES) of the confirmed rear tracks' state (x, y, vx, vy) with its
-//! 95 % bounds, as defined by `Consistency` of closecall-statistics:
+//! 95 % bounds, as defined by `Consistency` of closecall-traffic:
 //!
 //! - consistent: the tracker's covariance agrees with its errors;
 //! - conservative: the errors are smaller than the covariance states;

@@ -1,6 +1,6 @@
 """Judges the exported detector on held-out aerial pictures, and writes the model card.
 
-    python xtask/training/aerial_evaluate.py --pictures DIR --model aerial/models/aerial-detector.onnx --card aerial/models/MODEL_CARD.md
+    python xtask/training/aerial_evaluate.py --pictures DIR --model recorded/models/aerial-detector.onnx --card recorded/models/MODEL_CARD.md
 
 A box counts as found if a box of the same class overlaps with it by at least half (intersection over union). The average
 precision is the area below the interpolated curve of precision over recall. Difficult vehicles are neither wanted nor wrong.

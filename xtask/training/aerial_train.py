@@ -1,6 +1,6 @@
 """Trains the detector of vehicles in aerial pictures, and exports it to ONNX.
 
-    python xtask/training/aerial_train.py --pictures DIR --out aerial/models/aerial-detector.onnx
+    python xtask/training/aerial_train.py --pictures DIR --out recorded/models/aerial-detector.onnx
 
 The network is fully convolutional and has no anchors (in the manner of X. Zhou et al., *Objects as Points*, 2019). For each
 cell of 8 px it returns eight numbers: the logits that the centre of a car or of a truck lies there, the offset of the centre

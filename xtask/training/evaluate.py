@@ -32,7 +32,7 @@ Says what a LiDAR cluster behind the ego vehicle looks like in the rear camera: 
   much as those of LiDAR clusters. It has seen no photograph, and what it says of photographs is not known.
 - **Calibration**: one temperature, fitted on a tenth of the training scenes.
 - **Judged on** {count} held-out crops: body shapes, bands of paint and seeds that training never saw, in the
-  `onnxruntime` wheel, one crop at a time. Vehicles of which those in front leave less than 55 % are not counted.
+  `onnxruntime` wheel, one crop at a time. A vehicle that is hidden by more than 45 % is not counted.
 - **Not for** anything but simulation.
 """
 

@@ -166,7 +166,7 @@ def decode(anchors, shifts, weights):
 class Exported(nn.Module):
     """The network from the image to boxes, labels, scores and masks, in torchvision's layout.
 
-    The input is the image [3, 800, 1280], red, green and blue from 0 to 1, of which it reads the sampled pixels. The exported file also
+    The input is the image [3, 800, 1280], red, green and blue from 0 to 1, and reads the sampled pixels. The exported file also
     takes these pixels alone (`take_sampled`). Boxes are in px of
     the image; masks have 28 × 28 cells that divide the box evenly, as in the ONNX model zoo.
     """

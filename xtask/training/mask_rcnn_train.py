@@ -19,7 +19,7 @@ from torchvision.ops import box_iou
 import mask_rcnn_model as model
 import mask_rcnn_sampling as sampling
 
-# Vehicles of which fewer pixels of the sampled picture are seen are not learned.
+# A vehicle with fewer visible pixels in the sampled picture is not learned.
 LEAST_PIXELS, LEAST_COLUMNS = 10, 4
 # One of so many scenes of the last folder is held back for the calibration; not a multiple of the period of empty and crowded scenes, 10.
 HELD_BACK = 21

@@ -49,7 +49,7 @@ pub use evaluate::{Judgement, criticality};
 pub use record::{CriticalLaneChange, Evaluation, FollowingMetrics, MetricResult, Metrics};
 pub use severity::by_severity;
 pub use shares::{Counted, CriticalShare, CriticalShares, shares};
-pub(crate) use statistics::spearman;
+pub use statistics::spearman;
 pub use statistics::{BoxPlot, ClassStatistics, Correlation, Statistics, statistics};
 pub use thresholds::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,

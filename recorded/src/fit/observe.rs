@@ -237,7 +237,7 @@ struct Following {
     speed_mps: f64,
 }
 
-/// Returns all pairs of neighbours in one lane of which one follows the other at `time`.
+/// Returns all pairs of neighbours in one lane in which one follows the other at `time`.
 fn following_at(data: &SmoothedTrajectoryData, time: Time) -> Vec<Following> {
     let mut present: Vec<_> = data.present_at(time).to_vec();
     present.sort_by(|a, b| {

@@ -27,7 +27,7 @@ impl Crossing {
     }
 }
 
-/// Returns the changes between lanes in each of which the vehicle stays for at least [`MIN_DWELL`]. Shorter stays are
+/// Returns the changes between two lanes if the vehicle stays in each for at least [`MIN_DWELL`]. Shorter stays are
 /// ignored.
 pub(super) fn crossings(stays: &[Stay]) -> Vec<Crossing> {
     let mut crossings = Vec::new();

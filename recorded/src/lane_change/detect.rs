@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_slow_lane_change_with_a_pause_is_one_without_lanes() {
-        // Two moves by half a lane, the second of which begins before the first has ended.
+        // Two moves by half a lane. The second begins before the first has ended.
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -3.5), (3.0, 5.0), 200);
         let second = changing_track(1, (0.0, 30.0), (0.0, 1.75), (6.5, 5.0), 200);
         for (point, second) in track.points.iter_mut().zip(&second.points) {
@@ -310,7 +310,7 @@ mod tests {
         assert!(change.start_s < 3.6 && change.end_s > 10.9, "{change:?}");
     }
 
-    /// Detects two lane changes from lane 3 to lane 1, of which the second begins `pause_s` after the first has begun.
+    /// Detects two lane changes from lane 3 to lane 1. The second begins `pause_s` after the first has begun.
     fn two_to_the_left(pause_s: f64) -> Vec<LaneChange> {
         let mut track = changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 4.0), 250);
         let second = changing_track(1, (0.0, 30.0), (0.0, 3.5), (3.0 + pause_s, 4.0), 250);

@@ -18,7 +18,7 @@ pub(crate) struct LaneGeometry {
     pub(crate) width_m: f64,
 }
 
-/// Lane markings, of which unknown ones are filled in at the typical lane width.
+/// Lane markings. Unknown ones are filled in at the typical lane width.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LaneGrid {
     /// Lateral positions of the right edges of lanes 1, 2 … (m), in descending order.

@@ -17,7 +17,7 @@
 //! it detects undisturbed itself: what it misses or invents even then says nothing about disturbances.
 //!
 //! **Matching.** A lane change counts as detected again if a detected one in the same direction on the same track
-//! overlaps it in time. Each belongs to at most one pair, of which there are as many as possible. A detected lane change
+//! overlaps it in time. Each belongs to at most one pair, and there are as many pairs as possible. A detected lane change
 //! without a partner is *invented*. The lanes
 //! count as unreliable here: the recorded lane tells where the vehicle really was, which a disturbed sensor cannot
 //! measure. Therefore the peak criterion uses the lateral shift alone, the distance criterion uses the disturbed

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use closecall_campaign::folder::Folder;
 use closecall_campaign::saved::SavedCampaign;
-use closecall_causes::cost::{cost, section as cost_section};
-use closecall_causes::failures::{CAUSES, Failures, campaign_failures, section, without_section, write_rows};
+use closecall_studies::cost::{cost, section as cost_section};
+use closecall_studies::failures::{CAUSES, Failures, campaign_failures, section, without_section, write_rows};
 use closecall_traffic::atomic::{WriteError, write_file};
 use maud::{Markup, html};
 

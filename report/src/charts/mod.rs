@@ -3,7 +3,7 @@
 //! * `bars`: bars in the cells of a table
 //! * `distribution`: distributions of margins and of sampled values
 //! * `map`: the outcome over two parameters
-//! * `scatter`: points with intervals, of which some are marked
+//! * `scatter`: points with intervals; some are marked
 //! * `tornado`: which factor moves an output most
 //! * [`style`]: sizes, fonts, colours and axes
 

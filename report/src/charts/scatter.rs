@@ -1,4 +1,4 @@
-//! Points with intervals in both directions, of which some are marked.
+//! Points with intervals in both directions. Some are marked.
 
 use std::io;
 use std::ops::Range;

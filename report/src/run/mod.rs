@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  simulation ─▶ FilmRecorder ─▶ Film ─▶ rerun (to view) │ figure (to print)
-//!             ├▶ crate `tables` ─▶ CSV or Parquet (to evaluate)
+//!             ├▶ `tables` ─▶ CSV or Parquet (to evaluate)
 //!             └▶ Outcome ─▶ text
 //! ```
 

@@ -1,7 +1,7 @@
 //! The observers of a run whose output is requested.
 
+use crate::tables::RunTables;
 use closecall_simulation::{Observer, RunEvent, StepView};
-use closecall_tables::RunTables;
 use closecall_traffic::Time;
 
 use super::film::FilmRecorder;

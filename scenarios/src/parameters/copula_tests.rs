@@ -4,8 +4,8 @@ use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{ParameterName, Value};
 
 use super::{ParameterSpace, ParametersConfig};
-use closecall_recorded::criticality::spearman;
 use crate::sampling::Design;
+use closecall_recorded::criticality::spearman;
 
 const INDEPENDENT: &str = "
     a = { uniform = { min = 0.0, max = 1.0 } }

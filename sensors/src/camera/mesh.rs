@@ -177,7 +177,7 @@ impl Mesh {
     }
 
     /// Adds a prism that is symmetric about y = `centre_y`. Its outline is convex in the x–z plane, and each corner of
-    /// the outline, of which there are at most eight, has its own half width.
+    /// the outline has its own half width. There are at most eight.
     pub(crate) fn prism(&mut self, ribs: &[Rib], centre_y: f32, surface: Surface) {
         let count = ribs.len() as f32;
         let mean = |part: usize| ribs.iter().map(|rib| rib[part]).sum::<f32>() / count;

@@ -57,7 +57,7 @@ pub struct LidarFaultConfig {
     pub jitter_s: Option<Num>,
     /// Error of the time stamps (s): positive if a scan counts as measured later than it was.
     pub clock_offset_s: Option<Num>,
-    /// Error of the mounting, of which the ego does not know: rotation of the sensor about the vertical axis, to the left seen
+    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis, to the left seen
     /// from above (deg). After calibration some tenths of a degree remain.
     pub yaw_deg: Option<Num>,
     /// Error of the mounting: upward tilt of the sensor's axis (deg).

@@ -52,7 +52,7 @@ pub struct ObjectFaultConfig {
     pub jitter_s: Option<Num>,
     /// Error of the time stamps (s): positive if a scan counts as measured later than it was. Default: 0.
     pub clock_offset_s: Option<Num>,
-    /// Error of the mounting, of which the ego does not know: rotation of the sensor about the vertical axis, to the left seen
+    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis, to the left seen
     /// from above (deg). It moves what is seen; the field of view stays. Default: 0.
     pub yaw_deg: Option<Num>,
     /// Standard deviation of an additional error of each measured position along the road (m). Default: 0.

@@ -1,4 +1,4 @@
-//! Errors of the ego's odometry, of its position on the map, and of the map itself, of which the ego does not know.
+//! Errors of the ego's odometry, of its position on the map, and of the map itself. The ego does not know them.
 //!
 //! ```text
 //!   scene ─▶ seen from the ego: distance, bearing ─▶ + own position, heading and speed, on the map ─▶ scene as believed

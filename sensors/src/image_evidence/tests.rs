@@ -154,7 +154,7 @@ fn what_the_camera_alone_sees_is_moved_with_the_ego() {
     });
 }
 
-/// Returns the confirmed track of a vehicle after `steps` scans, of which each has the detections that `seen` returns.
+/// Returns the confirmed track of a vehicle after `steps` scans. Each scan has the detections that `seen` returns.
 fn tracked(steps: usize, seen: impl Fn(usize) -> Vec<Detection>) -> Option<Track> {
     let (mut tracker, mut list) =
         (Tracker::new(TrackerConfig::default().check(&Parameters::default()).unwrap()), TrackList::default());

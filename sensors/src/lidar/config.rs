@@ -191,7 +191,7 @@ impl Lidar {
         self.nominal_range_m.min(max_range_m).min(REACH_M.into())
     }
 
-    /// Returns the LiDAR as it is with this fault, of which the ego does not know.
+    /// Returns the LiDAR as it is with this fault. The ego does not know the fault.
     pub(crate) fn with_fault(self, fault: &LidarFault) -> Self {
         Self {
             mount_height_m: self.mount_height_m + fault.height_m,
@@ -234,7 +234,7 @@ impl LidarConfig {
     }
 }
 
-/// Names of the sensors of which the scenario gives none.
+/// Names of the sensors if the scenario gives none.
 pub(crate) const REAR_NAME: &str = "rear-lidar";
 pub(crate) const FRONT_NAME: &str = "front-lidar";
 

@@ -19,9 +19,9 @@ use super::pattern::{GROUPS, mirror_bounds_deg};
 use super::power::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
 use super::{LidarModel, MirrorSide};
 
-/// Height of a sensor of which nothing else is said (m): in the bumper.
+/// Height of a sensor if nothing else is said (m): in the bumper.
 const MOUNT_HEIGHT_M: f64 = 0.6;
-/// Distance up to which the road may give returns to a sensor of which nothing else is said (m).
+/// Distance up to which the road may give returns to a sensor if nothing else is said (m).
 const GROUND_REACH_M: f32 = 40.0;
 /// Power of a usual return from a vehicle (detection thresholds): assumption, that of a grey car that fills the beam at 130 m. The
 /// range of such a point of the SCALA has a standard deviation of 0.05 m.

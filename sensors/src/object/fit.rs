@@ -214,7 +214,7 @@ impl RearFit {
     }
 }
 
-/// Returns the value of a grid over paints and extinctions, for each of which it has a row and a column.
+/// Returns the value of a grid. It has a row for each paint and a column for each extinction.
 pub(super) fn interpolated(
     [paints, extinctions_per_m]: [&[f64]; 2],
     grid: &[Vec<f64>],

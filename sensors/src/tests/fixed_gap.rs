@@ -202,7 +202,7 @@ fn a_box_is_as_sure_as_the_pattern_of_its_lidar_allows() {
     }
 }
 
-/// Returns position and speed of the tracks after each of 100 scans, of which the first is that of step `first`, with a car that
+/// Returns position and speed of the tracks after each of 100 scans. The first is the scan of step `first`. A car
 /// approaches at 5 m/s.
 fn states_from(first: i64) -> Vec<Vec<[f64; 4]>> {
     let road = Road::straight(3);

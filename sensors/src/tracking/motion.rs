@@ -2,7 +2,7 @@
 //!
 //! White acceleration does not describe driving. A vehicle holds its speed and its lane for many seconds, and then
 //! brakes or changes lanes for a few. A single spectral density for both is far too conservative in the first case and
-//! far too confident in the second. Each axis therefore has a few modes, one of which holds at a time, and switches
+//! far too confident in the second. Each axis therefore has a few modes, and one of them holds at a time, and switches
 //! between them at given rates (interacting multiple models: Blom and Bar-Shalom 1988). The acceleration of a mode is
 //! exponentially correlated (Singer 1970).
 //!

@@ -148,8 +148,8 @@ impl RoadFilter {
     /// A part says nothing across the road for a while after the middle has been seen: one side of the mirror may see the plate, and
     /// the other always the same lamp, whose distance from the middle never averages out.
     ///
-    /// Along each axis, the filter follows one sensor. What another one measures corrects nothing there if it contradicts that one: two
-    /// sensors of which one is mounted askew would pull the track apart in every scan, always in the same order.
+    /// Along each axis, the filter follows one sensor. What another one measures corrects nothing there if it contradicts that one:
+    /// two sensors, one of them mounted askew, would pull the track apart in every scan, always in the same order.
     pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, sensor: Option<usize>) {
         let estimate = self.estimate();
         if Self::counts(&mut self.followed[0], &measurement.along, &estimate[0], sensor) {

@@ -21,7 +21,7 @@ use closecall_traffic::ego_frame::EgoFrame;
 const MAX_PART_SPEED_MPS: f64 = 3.0;
 /// Least width assumed for a box that may contain parts (m).
 ///
-/// A car of which one lamp is seen is as wide as a car, and two vehicles never drive side by side in the middle of a
+/// A car that shows one lamp is as wide as a car, and two vehicles never drive side by side in the middle of a
 /// lane.
 const MIN_WHOLE_WIDTH_M: f64 = 1.9;
 /// Maximum distance by which a part stands out ahead of a vehicle's face (m).

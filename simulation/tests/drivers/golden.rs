@@ -62,7 +62,7 @@ impl Case {
         self.rows.iter().map(seen).collect()
     }
 
-    /// Returns what the follower of the closed loop does behind the same lead vehicle. It brakes as hard as SUMO's, 8 m/s².
+    /// Returns what the follower of the closed loop does behind the same lead vehicle. It brakes as strongly as SUMO's, 8 m/s².
     fn closed_loop(&self) -> Vec<Seen> {
         let profile: Vec<[f64; 2]> = self.rows.iter().map(|row| [row.time_s, row.lead_mps]).collect();
         let (start, cc1_s) = (self.rows[0], self.cc1_s);

@@ -25,7 +25,7 @@ fn quantile(probability: f64) -> f64 {
     if step.is_finite() { z - step } else { z }
 }
 
-/// The standard normal distribution, truncated at two bounds, of which either may be infinite.
+/// The standard normal distribution, truncated at two bounds. Either may be infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruncatedStandardNormal {
     /// Lower bound (standard deviations).

@@ -60,7 +60,7 @@ impl Mode {
     }
 }
 
-/// Modes of which some are wanted.
+/// The modes from which some are chosen.
 struct Chosen<W> {
     is_wanted: W,
     modes: Vec<Mode>,

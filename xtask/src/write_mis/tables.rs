@@ -11,13 +11,13 @@ use closecall_campaign::ledger::{ArmCounts, Pairs};
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::summary::Summary;
-use closecall_perception::agreement::{Agreement, Pair};
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::member::{ensemble_of, members};
 use closecall_scenarios::parameters::Variation;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_studies::perception::agreement::{Agreement, Pair};
 
 /// The arms, the baseline first. The others are compared with it.
 const ARMS: [(&str, &str); 4] = [

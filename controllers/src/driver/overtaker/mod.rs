@@ -18,11 +18,11 @@
 //! seconds before it pulls out.
 //!
 //! The brake light of the vehicle ahead makes the driver release the accelerator. If the gap closes as fast as drivers
-//! brake at (a time to collision below 10 s), the driver brakes at least as hard as that vehicle, one reaction time after
+//! brake at (a time to collision below 10 s), the driver brakes at least as strongly as that vehicle, one reaction time after
 //! the light.
 //!
 //! In all phases, the driver predicts whether its present course would collide with the vehicle ahead before the two
-//! are laterally clear of each other ([`conflict`]). If so, it brakes as hard as necessary, up to the limit of a human,
+//! are laterally clear of each other ([`conflict`]). If so, it brakes as strongly as necessary, up to the limit of a human,
 //! and continues to steer. The gap that it tries to keep is its own safe gap, cc0 + cc1·v.
 
 mod acceptance;

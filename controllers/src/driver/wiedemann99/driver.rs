@@ -128,7 +128,7 @@ pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
 }
 
 /// Limits the acceleration as [`coast_for_brake_light`] does. If the vehicle ahead is near enough to be followed, the
-/// driver also brakes at least as hard as that vehicle: humans brake first, and assess afterwards how hard they need
+/// driver also brakes at least as strongly as that vehicle: humans brake first, and assess afterwards how hard they need
 /// to.
 pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
@@ -142,7 +142,7 @@ pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
 }
 
 /// Limits the acceleration as [`coast_for_brake_light`] does, for a driver who is about to overtake the vehicle ahead. If
-/// the gap closes as fast as drivers brake at, the driver brakes at least as hard as that vehicle, even if steering alone
+/// the gap closes as fast as drivers brake at, the driver brakes at least as strongly as that vehicle, even if steering alone
 /// would avoid it: the brake light says that the prediction may be wrong.
 pub(crate) fn brake_before_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);

@@ -171,7 +171,7 @@ fn steps(fixed_s: Option<f64>) -> Result<u32, String> {
     let whole = ratio.round();
     if !(whole >= 1.0 && whole <= f64::from(u32::MAX) && (ratio - whole).abs() <= STEP_TOLERANCE * whole) {
         return Err(format!(
-            "it has a fixed step of {fixed_s} s, of which a control step of {control_s} s is no multiple; expected 0.04 s, or a \
+            "it has a fixed step of {fixed_s} s, and a control step of {control_s} s is not a multiple of it; expected 0.04 s, or a \
              whole part of it, such as 0.02 s or 0.01 s"
         ));
     }

@@ -16,7 +16,7 @@ use resvg::usvg::{self, FillRule, Group, LineCap, LineJoin, Node, Paint, PaintOr
 
 /// Points of PDF in a millimetre.
 const POINTS_PER_MM: f32 = 72.0 / 25.4;
-/// Points of PDF in a pixel of SVG, of which an inch has 96.
+/// Points of PDF in a pixel of SVG. An inch has 96 pixels.
 const POINTS_PER_PX: f32 = 72.0 / 96.0;
 
 /// Returns the bytes of a PDF file with the picture, which is `width_mm` wide, or as wide as the picture says.

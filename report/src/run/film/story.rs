@@ -115,7 +115,7 @@ pub(crate) fn driver_note_text(note: DriverNote) -> &'static str {
         DriverNote::CutOutStarted => "begins to change lanes to overtake",
         DriverNote::CutOutAborted => "gives up the lane change",
         DriverNote::Passed => "has passed",
-        DriverNote::EmergencyBraking => "brakes as hard as possible",
+        DriverNote::EmergencyBraking => "brakes as strongly as possible",
     }
 }
 

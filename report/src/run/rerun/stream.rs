@@ -117,7 +117,7 @@ impl<'a> Writer<'a> {
         self.write_each(entity, &[(time, what)])
     }
 
-    /// Writes several things, of which each holds from its time on until that of the next. The times must ascend.
+    /// Writes several things. Each holds from its time on until the time of the next. The times must ascend.
     pub(super) fn write_each(&self, entity: &str, whats: &[(Time, &dyn AsComponents)]) -> Result<(), RecordingError> {
         let until_critical = whats.partition_point(|(time, _)| *time <= self.critical);
         if let Some(shown) = until_critical.checked_sub(1) {

@@ -183,7 +183,7 @@ fn write_film(
     Ok(contents)
 }
 
-/// Writes the verdict and the story, each of which has a view.
+/// Writes the verdict and the story. Each has a view.
 fn write_texts(recording: &Recording, films: &[Film]) -> Result<(), RecordingError> {
     for (entity, text) in [("verdict", summary::verdict(films)), ("summary", summary::story(films))] {
         recording.log_static(entity.into(), &TextDocument::new(text).with_media_type(MediaType::markdown()))?;

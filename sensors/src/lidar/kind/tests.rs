@@ -82,7 +82,7 @@ fn the_processing_knows_points_beams_and_ground_of_a_kind() {
         (point_sd_m.to_bits(), narrow_m.to_bits(), ground_m.to_bits()),
         (0.05_f64.to_bits(), 30.0_f32.to_bits(), 40.0_f32.to_bits())
     );
-    assert_eq!(Resolution::default().ground_reach_m, ground_m, "also for a scan of which nothing else is said");
+    assert_eq!(Resolution::default().ground_reach_m, ground_m, "also for a scan about which nothing else is said");
     // √(0.015² + (0.237/2.25)²) m; 0.44 m over the tangent of 4/3 of 0.13°, down to tens of metres.
     assert_eq!(known(LidarModel::Os1With64.kind()), (0.1064, 140.0, 40.0));
     assert_eq!(known(LidarModel::PandarXt16.kind()), (0.0167, 100.0, 40.0));

@@ -29,7 +29,7 @@ impl Scanner {
         levels().into_iter().map(of).collect()
     }
 
-    /// Asserts that all columns of a block of which the road counts as ground count as ground one by one, in this scene. Returns the
+    /// Asserts that all columns of a block whose road counts as ground also count as ground one by one, in this scene. Returns the
     /// number of columns of these blocks, and of all columns that count as ground.
     pub(crate) fn columns_of_bare_road(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> [usize; 2] {
         self.scan(scene, rng);

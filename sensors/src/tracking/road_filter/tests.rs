@@ -22,7 +22,7 @@ fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
     }
 }
 
-/// Returns the estimate across the road after these measurements, of which the first is that of step 0.
+/// Returns the estimate across the road after these measurements. The first is the one of step 0.
 fn across(all: impl IntoIterator<Item = Measurement>) -> AxisEstimate {
     let mut all = all.into_iter();
     let mut filter = RoadFilter::new(&all.next().unwrap(), 30.0, Some(0));

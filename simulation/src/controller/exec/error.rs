@@ -114,7 +114,7 @@ pub enum ExecError {
     },
 }
 
-/// Describes when an error happened by the number of answers before it, of which the first is the greeting.
+/// Describes when an error happened by the number of answers before it. The first answer is the greeting.
 fn when(answered: u64) -> String {
     match answered {
         0 => "before its greeting".to_owned(),

@@ -34,7 +34,7 @@ fn holding_needs_room_for_the_worst_braking_of_the_lead_vehicle() {
     bench.lead().state[2] = 20.0;
     let command = bench.step();
     assert_eq!((command.state, command.reason), (EgoState::Releasing, Reason::NoRoomToHold));
-    // The ACC brakes as hard as it may, within its jerk limit.
+    // The ACC brakes as strongly as it may, within its jerk limit.
     assert!(command.acceleration_mps2 < 0.0, "{command:?}");
     let command = bench.step_for(3.5 / 2.5);
     assert_eq!(command.acceleration_mps2, -3.5);

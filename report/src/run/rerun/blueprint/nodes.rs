@@ -68,7 +68,7 @@ pub(super) fn below(nodes: Vec<(f32, Node)>) -> Option<Node> {
     container(ContainerKind::Vertical, nodes)
 }
 
-/// Returns the nodes as tabs, of which the first is open.
+/// Returns the nodes as tabs. The first is open.
 pub(super) fn tabs(nodes: Vec<Node>) -> Option<Node> {
     container(ContainerKind::Tabs, nodes.into_iter().map(|node| (1.0, node)).collect())
 }

@@ -1,0 +1,184 @@
+//! How well the object-level sensors agree with the full chain on whether the ego collides, sample by sample.
+//!
+//! Every sample is run in both modes with the margin increase system, and with the same random numbers. Agreement beyond chance is
+//! Cohen's κ (J. Cohen, *A coefficient of agreement for nominal scales*, 1960). Each sample on which the modes differ has a reason:
+//! the first difference of the two runs that is large enough to matter.
+
+use closecall_campaign::runner::{Sampling, concrete};
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::{Arm, NoObserver, RunKey, SampleError, simulate};
+use closecall_traffic::VehicleClass;
+use rayon::prelude::*;
+
+use crate::perception::study::StudyError;
+
+/// Difference of times from which they count as different (s): more than the resolution of the tracks, which is 0.04 s.
+const DIFFERENT_S: f64 = 0.1;
+/// Name of the vehicle that approaches, as in the scenarios of the library.
+const REAR: &str = "rear";
+
+/// What one run of a sample showed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// Whether the ego collided.
+    pub has_collided: bool,
+    /// Time at which the system engaged (s), if it did.
+    pub engaged_at_s: Option<f64>,
+    /// Time at which it released (s), if it did.
+    pub released_at_s: Option<f64>,
+    /// Smallest gap behind the ego (m), if a vehicle was there.
+    pub min_gap_rear_m: Option<f64>,
+}
+
+/// One sample in both modes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// The sample.
+    pub sample: u64,
+    /// Class of the rear vehicle, and the reflectivity of its paint; `None` without one.
+    pub rear: Option<(VehicleClass, f64)>,
+    /// With object-level sensors.
+    pub object: Verdict,
+    /// With the full chain.
+    pub full: Verdict,
+}
+
+/// All samples of a scenario in both modes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Agreement {
+    /// The samples, in order.
+    pub pairs: Vec<Pair>,
+}
+
+impl Verdict {
+    /// Returns what a run showed.
+    pub fn of(outcome: &Outcome) -> Self {
+        let mis = outcome.mis.as_ref().ok();
+        Self {
+            has_collided: outcome.ego_collided(),
+            engaged_at_s: mis.and_then(|mis| mis.engaged_at_s.ok()),
+            released_at_s: mis.and_then(|mis| mis.released_at_s.ok()),
+            min_gap_rear_m: outcome.margins.min_gap_rear_m.ok(),
+        }
+    }
+}
+
+impl Pair {
+    /// Returns whether the modes differ on the collision.
+    pub fn differs(&self) -> bool {
+        self.object.has_collided != self.full.has_collided
+    }
+
+    /// Returns the first difference of the two runs that is large enough to matter.
+    pub fn reason(&self) -> String {
+        reason([&self.object, &self.full], ["the object-level sensors", "the full chain"])
+    }
+}
+
+/// Returns the first difference of two runs of a sample that is large enough to matter. `names` says what each run had.
+pub fn reason([one, other]: [&Verdict; 2], names: [&str; 2]) -> String {
+    let differ = |what: &str, first: Option<f64>, second: Option<f64>| match (first, second) {
+        (Some(first), Some(second)) if (first - second).abs() > DIFFERENT_S => Some(format!(
+            "the system {what} {:.2} s {} with {}",
+            (first - second).abs(),
+            if first < second { "earlier" } else { "later" },
+            names[0]
+        )),
+        (Some(_), None) => Some(format!("the system {what} only with {}", names[0])),
+        (None, Some(_)) => Some(format!("the system {what} only with {}", names[1])),
+        _ => None,
+    };
+    differ("engages", one.engaged_at_s, other.engaged_at_s)
+        .or_else(|| differ("releases", one.released_at_s, other.released_at_s))
+        .unwrap_or_else(|| {
+            let missed = if one.has_collided { other } else { one };
+            let gap = missed
+                .min_gap_rear_m
+                .map_or_else(String::new, |gap_m| format!(": the other run passes by {gap_m:.2} m"));
+            format!("engaged and released within {DIFFERENT_S} s of each other, on the edge of a contact{gap}")
+        })
+}
+
+impl Agreement {
+    /// Runs all samples of a scenario in both modes. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a run fails.
+    pub fn of(file: &ScenarioFile, seed: u64, samples: u64) -> Result<Self, StudyError> {
+        let sampling = Sampling { seed, design: Design::Random, samples };
+        let pair = |sample| {
+            let failed = |error: &dyn std::fmt::Display| StudyError::Run { sample, message: error.to_string() };
+            let scenario = concrete(file, sampling, sample).map_err(|error| failed(&error))?;
+            let key = RunKey { seed, sample };
+            let in_mode = |mode| {
+                let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(mode) };
+                let outcome = simulate(&scenario, key, &arm, &mut NoObserver);
+                outcome.map(|outcome| Verdict::of(&outcome)).map_err(|error: SampleError| failed(&error))
+            };
+            let rear = scenario.actors.iter().position(|actor| actor.id.as_str() == REAR).map(|index| {
+                let vehicle = scenario.vehicle(index, key);
+                (vehicle.class, vehicle.appearance.paint_reflectivity)
+            });
+            Ok(Pair { sample, rear, object: in_mode(SensorMode::Object)?, full: in_mode(SensorMode::Full)? })
+        };
+        Ok(Self { pairs: (0..samples).into_par_iter().map(pair).collect::<Result<_, StudyError>>()? })
+    }
+
+    /// Returns the collision rates with object-level sensors and with the full chain.
+    pub fn rates(&self) -> [f64; 2] {
+        let rate =
+            |of: fn(&Pair) -> bool| self.pairs.iter().filter(|pair| of(pair)).count() as f64 / self.pairs.len() as f64;
+        [rate(|pair| pair.object.has_collided), rate(|pair| pair.full.has_collided)]
+    }
+
+    /// Returns Cohen's κ; `None` if no run or every run collides, so that chance alone explains the agreement.
+    pub fn kappa(&self) -> Option<f64> {
+        let [object, full] = self.rates();
+        let agree = self.pairs.iter().filter(|pair| !pair.differs()).count() as f64 / self.pairs.len() as f64;
+        let by_chance = object * full + (1.0 - object) * (1.0 - full);
+        (by_chance < 1.0).then(|| (agree - by_chance) / (1.0 - by_chance))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(object: bool, full: bool) -> Pair {
+        let verdict = |has_collided| Verdict {
+            has_collided,
+            engaged_at_s: Some(3.0),
+            released_at_s: Some(9.0),
+            min_gap_rear_m: Some(0.4),
+        };
+        Pair { sample: 0, rear: None, object: verdict(object), full: verdict(full) }
+    }
+
+    #[test]
+    fn kappa_is_that_of_a_worked_table() {
+        // 20 both, 15 neither, 5 and 10 only one: 35 of 50 agree, 25 by chance.
+        let table = [(20, true, true), (5, true, false), (10, false, true), (15, false, false)];
+        let pairs = table.iter().flat_map(|&(count, object, full)| std::iter::repeat_n(pair(object, full), count));
+        let agreement = Agreement { pairs: pairs.collect() };
+        assert!((agreement.kappa().unwrap() - 0.4).abs() < 1e-12);
+        assert_eq!(agreement.rates(), [0.5, 0.6]);
+        assert_eq!(Agreement { pairs: vec![pair(false, false)] }.kappa(), None);
+    }
+
+    #[test]
+    fn a_reason_is_the_first_difference() {
+        let mut differing = pair(true, false);
+        assert!(
+            differing.differs()
+                && differing.reason().contains("on the edge of a contact: the other run passes by 0.40 m")
+        );
+        differing.object.released_at_s = Some(8.0);
+        assert_eq!(differing.reason(), "the system releases 1.00 s earlier with the object-level sensors");
+        differing.full.engaged_at_s = None;
+        assert_eq!(differing.reason(), "the system engages only with the object-level sensors");
+    }
+}

@@ -1,0 +1,356 @@
+//! One approach: a vehicle comes from behind, and the sensors watch it.
+
+use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorError, Sensors, TrackAudit};
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Road, Source, Stream, Track, TrackStatus, Vehicle, VehicleClass, VehicleState, maths, stream,
+};
+use rand::RngExt;
+
+use crate::perception::cases::{Case, ego_lane};
+
+pub(crate) mod watching;
+
+/// Speed of the ego (m/s).
+const EGO_MPS: f64 = 30.0;
+/// Position of the ego along the road at the start (m).
+const EGO_S_M: f64 = 1_000.0;
+/// Gap from the front of the approaching vehicle to the rear of the ego, at the start and at the end (m).
+pub const GAPS_M: [f64; 2] = [150.0, 5.0];
+/// Closing speeds (m/s): 10 to 50 km/h, as in the scenarios of the library.
+const CLOSING_MPS: [f64; 2] = [2.8, 13.9];
+/// Gap of the car in between (m).
+const SCREEN_GAP_M: f64 = 25.0;
+/// Gap at which a vehicle appears for the time to confirm (m), and the longest time that is waited (steps).
+pub const APPEARS_AT_M: f64 = 40.0;
+const WAIT_STEPS: i64 = 100;
+/// Time at which it appears (steps): 6 s.
+const APPEARS_AFTER_STEPS: i64 = 150;
+/// Distance beyond which a track and a vehicle do not belong together (m): the cut-off of GOSPA, a usual value for vehicles.
+pub const CUTOFF_M: f64 = 5.0;
+
+/// What one control step showed.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation {
+    /// True gap from the front of the vehicle to the ego's rear (m).
+    pub gap_m: f64,
+    /// The confirmed track of the vehicle, if there is one.
+    pub tracked: Option<Tracked>,
+    /// Generalised optimal sub-pattern assignment metric of all confirmed rear tracks (m): Rahmathullah, García-Fernández and
+    /// Svensson (2017), with p = 2 and α = 2.
+    pub gospa_m: f64,
+}
+
+/// The error of a track.
+#[derive(Clone, Copy, Debug)]
+pub struct Tracked {
+    /// Errors of the position of the front along the road, and of the position across it (m).
+    pub position_m: [f64; 2],
+    /// Error of the speed over ground (m/s).
+    pub speed_mps: f64,
+    /// Whether the most probable class is the true one.
+    pub is_class_right: bool,
+    /// Score of the most probable class.
+    pub confidence: f64,
+}
+
+/// What one approach showed.
+#[derive(Clone, Debug, Default)]
+pub struct Approach {
+    /// Every control step from the first gap on.
+    pub observations: Vec<Observation>,
+    /// Normalised squared errors of the tracks that belong to a vehicle; 4 on average if their covariance is right.
+    pub nees: Vec<f64>,
+    /// Number of steps in which the ego knew that its rear sensors had failed.
+    pub failed_steps: u64,
+    /// Number of times that the track of a vehicle changed its id.
+    pub id_switches: u64,
+    /// Number of confirmed tracks that belonged to no vehicle, and were classified as one.
+    pub false_tracks: u64,
+    /// Time from the appearance of a vehicle until its track is confirmed (s); `None` if it was not within 4 s.
+    pub confirmed_after_s: Option<f64>,
+}
+
+/// The place of an approach in the study.
+#[derive(Clone, Copy, Debug)]
+pub struct Address {
+    /// The seed of the study.
+    pub seed: u64,
+    /// The number of the approach, the same in all cases.
+    pub run: u64,
+}
+
+/// Runs one approach of a case.
+///
+/// # Errors
+/// [`SensorError`] if a sensor model fails.
+pub fn approach(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Approach, SensorError> {
+    let ego_id = ego_name();
+    let mut rng = stream(at.seed, at.run, &ego_id, "approach");
+    let mut found = drive(case, sensors, road, at, &mut rng)?;
+    found.confirmed_after_s = time_to_confirm(case, sensors, road, at)?;
+    Ok(found)
+}
+
+#[expect(clippy::unwrap_used, reason = "a legal name")]
+fn ego_name() -> ActorId {
+    ActorId::new("ego").unwrap()
+}
+
+/// The ego, the vehicle that approaches, and the one in between.
+struct Traffic {
+    ego: SceneVehicle,
+    others: Vec<SceneVehicle>,
+}
+
+impl Traffic {
+    fn new(case: &Case, road: &Road, gap_m: f64, closing_mps: f64) -> Self {
+        let ego_d_m = road.lane_centre_m(ego_lane(road));
+        let vehicle = |actor, class, s_m, d_m, speed_mps| SceneVehicle {
+            actor,
+            vehicle: Vehicle::typical(class),
+            state: VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() },
+            pitch_rad: 0.0,
+        };
+        let ego = vehicle(0, VehicleClass::Car, EGO_S_M, ego_d_m, EGO_MPS);
+        let behind = |actor, class, gap_m: f64, offset_m: f64, speed_mps| {
+            let half_m = 0.5 * Vehicle::typical(class).dimensions.length_m;
+            let s_m = EGO_S_M - 0.5 * ego.vehicle.dimensions.length_m - gap_m - half_m;
+            vehicle(actor, class, s_m, ego_d_m + offset_m, speed_mps)
+        };
+        let mut target = behind(1, case.class, gap_m, case.offset_m, EGO_MPS + closing_mps);
+        let appearance = &mut target.vehicle.appearance;
+        (appearance.paint_reflectivity, appearance.plate) = (case.paint, case.plate);
+        if let Some(shape) = case.shape {
+            // As for a vehicle of a fleet, the other dimensions stay as they are.
+            appearance.body_shape = shape;
+            target.vehicle.dimensions.height_m = shape.usual_dimensions().height_m;
+        }
+        let screen = case.is_screened.then(|| behind(2, VehicleClass::Car, SCREEN_GAP_M, 0.0, EGO_MPS));
+        Self { ego, others: std::iter::once(target).chain(screen).collect() }
+    }
+
+    fn advance(&mut self) {
+        for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
+            vehicle.state.s_m += vehicle.state.speed_mps * CONTROL_STEP.s();
+        }
+    }
+
+    fn front_x_m(&self, vehicle: &SceneVehicle) -> f64 {
+        vehicle.state.s_m + 0.5 * vehicle.vehicle.dimensions.length_m - self.ego.state.s_m
+    }
+
+    fn gap_m(&self) -> f64 {
+        -self.front_x_m(&self.others[0]) - 0.5 * self.ego.vehicle.dimensions.length_m
+    }
+
+    /// Returns position of the front, and lateral position, relative to the ego, of each other vehicle (m).
+    fn truths_m(&self) -> Vec<[f64; 2]> {
+        self.others.iter().map(|other| [self.front_x_m(other), other.state.d_m - self.ego.state.d_m]).collect()
+    }
+}
+
+fn build(sensors: &Sensors, at: Address) -> Result<Box<dyn Perception>, SensorError> {
+    sensors.build(&NoiseKey { seed: at.seed, sample: at.run, ego: ego_name(), actors: [].into() })
+}
+
+fn drive(case: &Case, sensors: &Sensors, road: &Road, at: Address, rng: &mut Stream) -> Result<Approach, SensorError> {
+    let [from, to] = CLOSING_MPS;
+    let closing_mps = from + (to - from) * rng.random::<f64>();
+    // The offset varies the distances at which each side of the alternating mirror scans the vehicle.
+    let start_m = GAPS_M[0] + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
+    let traffic = Traffic::new(case, road, start_m, closing_mps);
+    observe((case, road), traffic, &mut *build(sensors, at)?)
+}
+
+/// Observes an approach of these vehicles with this perception.
+fn observe(
+    (case, road): (&Case, &Road),
+    mut traffic: Traffic,
+    perception: &mut dyn Perception,
+) -> Result<Approach, SensorError> {
+    let mut audit = TrackAudit::default();
+    let mut found = Approach::default();
+    // A vehicle in the way is not driven through.
+    let last_m = if case.is_screened { SCREEN_GAP_M + 10.0 } else { GAPS_M[1] };
+    for step in 0.. {
+        let gap_m = traffic.gap_m();
+        if gap_m < last_m {
+            break;
+        }
+        let scene = Scene {
+            time: CONTROL_STEP * step,
+            road,
+            environment: &case.environment,
+            ego: traffic.ego,
+            others: &traffic.others,
+        };
+        let tracks = perception.step(&scene)?;
+        audit.observe(tracks, &scene)?;
+        let confirmed: Vec<&Track> = confirmed(tracks).collect();
+        let truths_m = traffic.truths_m();
+        found.observations.push(Observation {
+            gap_m,
+            tracked: nearest(&confirmed, truths_m[0]).map(|track| errors(track, truths_m[0], &traffic.others[0])),
+            gospa_m: gospa_m(&truths_m, &confirmed),
+        });
+        found.failed_steps += u64::from(perception.health().rear == Health::Failed);
+        traffic.advance();
+    }
+    found.id_switches = audit.id_switches;
+    found.false_tracks = audit.false_tracks() as u64;
+    found.nees = audit.nees;
+    Ok(found)
+}
+
+/// Drives an approach, and calls `see` with the gap (m), the confirmed track, and the traffic in each step, until it is false.
+fn follow(
+    (case, sensors, road, at): (&Case, &Sensors, &Road, Address),
+    from_m: f64,
+    mut see: impl FnMut(f64, Option<&Track>, &Traffic) -> bool,
+) -> Result<(), SensorError> {
+    let mut rng = stream(at.seed, at.run, &ego_name(), "approach");
+    let [slowest, fastest] = CLOSING_MPS;
+    let closing_mps = slowest + (fastest - slowest) * rng.random::<f64>();
+    let start_m = from_m + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
+    let mut traffic = Traffic::new(case, road, start_m, closing_mps);
+    let mut perception = build(sensors, at)?;
+    for step in 0.. {
+        let gap_m = traffic.gap_m();
+        let time = CONTROL_STEP * step;
+        let scene = Scene { time, road, environment: &case.environment, ego: traffic.ego, others: &traffic.others };
+        let tracks = perception.step(&scene)?;
+        let confirmed: Vec<&Track> = confirmed(tracks).collect();
+        if gap_m < GAPS_M[1] || !see(gap_m, nearest(&confirmed, traffic.truths_m()[0]), &traffic) {
+            break;
+        }
+        traffic.advance();
+    }
+    Ok(())
+}
+
+/// The gaps at which the track of a vehicle reaches a state for the first time (m); those of the end of the approach if never.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Firsts {
+    /// The track is confirmed.
+    pub(crate) confirmed_m: f64,
+    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle: what a function waits for.
+    pub(crate) classified_m: f64,
+}
+
+/// Returns when the track of the vehicle is confirmed and classified.
+///
+/// # Errors
+/// [`SensorError`] if a sensor model fails.
+pub(crate) fn firsts(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Firsts, SensorError> {
+    let mut firsts = Firsts { confirmed_m: GAPS_M[1], classified_m: GAPS_M[1] };
+    follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
+        let Some(track) = track else { return true };
+        firsts.confirmed_m = firsts.confirmed_m.max(gap_m);
+        let is_classified = track.existence >= 0.5 && track.class.is_vehicle();
+        if is_classified {
+            firsts.classified_m = gap_m;
+        }
+        !is_classified
+    })?;
+    Ok(firsts)
+}
+
+/// Returns the scores of the true class between two gaps (m).
+///
+/// # Errors
+/// [`SensorError`] if a sensor model fails.
+pub(crate) fn scores(
+    case: &Case,
+    sensors: &Sensors,
+    road: &Road,
+    at: Address,
+    [near_m, far_m]: [f64; 2],
+) -> Result<Vec<f64>, SensorError> {
+    let mut scores = Vec::new();
+    // The track has settled when the vehicle reaches the gaps.
+    follow((case, sensors, road, at), far_m + 20.0, |gap_m, track, _| {
+        scores.extend(track.filter(|_| gap_m <= far_m).map(|track| track.class.0[case.class as usize]));
+        gap_m >= near_m
+    })?;
+    Ok(scores)
+}
+
+/// Returns the time until a vehicle that appears at [`APPEARS_AT_M`] has a confirmed track (s).
+fn time_to_confirm(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Option<f64>, SensorError> {
+    let case = Case { is_screened: false, ..case.clone() };
+    let mut traffic = Traffic::new(&case, road, APPEARS_AT_M, 0.0);
+    let mut perception = build(sensors, at)?;
+    for step in 0..WAIT_STEPS {
+        // A fault of the studied scenario has begun by then.
+        let time = CONTROL_STEP * (APPEARS_AFTER_STEPS + step);
+        let scene = Scene { time, road, environment: &case.environment, ego: traffic.ego, others: &traffic.others };
+        let tracks = perception.step(&scene)?;
+        let confirmed: Vec<&Track> = confirmed(tracks).collect();
+        if nearest(&confirmed, traffic.truths_m()[0]).is_some() {
+            return Ok(Some((CONTROL_STEP * step).s()));
+        }
+        traffic.advance();
+    }
+    Ok(None)
+}
+
+/// Returns the rear tracks that a controller may act on.
+fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
+    tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative)
+}
+
+/// Returns front and lateral position of a track (m).
+fn position_m(track: &Track) -> [f64; 2] {
+    [track.x_m() + 0.5 * track.length_m, track.y_m()]
+}
+
+fn distance_m([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
+    maths::hypot(x - to_x, y - to_y)
+}
+
+/// Returns the nearest track within the cut-off.
+fn nearest<'a>(tracks: &[&'a Track], truth_m: [f64; 2]) -> Option<&'a Track> {
+    let apart_m = |track: &Track| distance_m(position_m(track), truth_m);
+    let nearest = tracks.iter().min_by(|one, other| apart_m(one).total_cmp(&apart_m(other)))?;
+    (apart_m(nearest) <= CUTOFF_M).then_some(*nearest)
+}
+
+fn errors(track: &Track, truth_m: [f64; 2], vehicle: &SceneVehicle) -> Tracked {
+    let at_m = position_m(track);
+    let (best, confidence) = (0..track.class.0.len())
+        .map(|class| (class, track.class.0[class]))
+        .fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+    Tracked {
+        position_m: [at_m[0] - truth_m[0], at_m[1] - truth_m[1]],
+        speed_mps: track.vx_mps() - vehicle.state.speed_mps,
+        is_class_right: best == vehicle.vehicle.class as usize,
+        confidence,
+    }
+}
+
+/// Returns the GOSPA metric: the least over all assignments of √(Σ d² + c²/2 · (missed + false)) (m).
+fn gospa_m(truths_m: &[[f64; 2]], tracks: &[&Track]) -> f64 {
+    let mut free: Vec<[f64; 2]> = tracks.iter().map(|track| position_m(track)).collect();
+    least_m2(truths_m, &mut free).sqrt()
+}
+
+/// Returns the least sum of squares, by trying each assignment: there are one or two vehicles.
+fn least_m2(truths_m: &[[f64; 2]], free: &mut Vec<[f64; 2]>) -> f64 {
+    let alone_m2 = 0.5 * CUTOFF_M * CUTOFF_M;
+    let Some((first, rest)) = truths_m.split_first() else { return alone_m2 * free.len() as f64 };
+    let mut least = alone_m2 + least_m2(rest, free);
+    for index in 0..free.len() {
+        let apart_m = distance_m(free[index], *first);
+        if apart_m < CUTOFF_M {
+            let taken = free.swap_remove(index);
+            least = least.min(apart_m * apart_m + least_m2(rest, free));
+            free.push(taken);
+            let last = free.len() - 1;
+            free.swap(index, last);
+        }
+    }
+    least
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,252 @@
+//! The fit of the rear object-level sensor to the full chain.
+//!
+//! ```text
+//!  scenario ─▶ full chain ─┬▶ distances of the first confirmed track and of the first one that is classified as a vehicle,
+//!                          │  over class, paint, plate, shape, extinction ─▶ ranges
+//!                          ├▶ errors and losses of the tracks over class, paint, extinction ─▶ those of the measurements
+//!                          └▶ scores of the true class ─▶ confidence
+//! ```
+//!
+//! Only what is perceived is fitted: no controller runs, and no collision counts. A range is the mean distance of the first
+//! confirmed track, plus the distance that the object-level sensor itself needs to confirm a vehicle. A class range is the mean
+//! distance at which a confirmed track is first classified as a vehicle, plus the distance that the latency costs. It is a distance
+//! and no time, because the full chain recognises a vehicle in fog at nearly the same distance at all closing speeds. The errors of the
+//! measurements are those with which its tracks err as the full chain's do.
+
+use std::collections::BTreeMap;
+
+use closecall_scenarios::{Scenario, ScenarioFile, Setting};
+use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
+use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass, maths};
+use rayon::prelude::*;
+
+use crate::perception::approach::{Address, Firsts, firsts, scores};
+use crate::perception::cases::Case;
+use crate::perception::study::StudyError;
+
+mod errors;
+#[cfg(test)]
+mod tests;
+
+pub use errors::at_bounds;
+
+/// Reflectivities of the paint of the grid (-).
+const PAINTS: [f64; 6] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.8];
+/// Visibilities of the grid (m), the first that of a clear day.
+const VISIBILITIES_M: [f64; 9] = [10_000.0, 1_000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0];
+/// Extinction times visibility: Koschmieder's contrast threshold of 2 %.
+const KOSCHMIEDER: f64 = 3.912;
+/// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid.
+const SHAPE_PAINTS: [f64; 2] = [0.1, 0.4];
+const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
+/// Gaps between which the class scores of tracks are taken (m).
+const GAPS_M: [f64; 2] = [20.0, 80.0];
+/// Ranges at which the object-level sensor's own time to confirm, and to report a class, are measured (m).
+const TEST_RANGE_M: f64 = 100.0;
+const TEST_CLASS_RANGE_M: f64 = 60.0;
+
+/// What a fit is made of.
+#[derive(Clone, Debug)]
+pub struct FitPlan<'a> {
+    /// The scenario whose sensors are fitted.
+    pub file: &'a ScenarioFile,
+    /// The seed.
+    pub seed: u64,
+    /// Number of approaches of each point of the grid.
+    pub approaches: u64,
+    /// The command that the file names.
+    pub command: String,
+    /// The version of the program.
+    pub version: String,
+}
+
+/// A run of the fitter: the sensors of both modes.
+struct Fitter<'a> {
+    plan: &'a FitPlan<'a>,
+    scenario: Scenario,
+    /// The full chain.
+    full: Sensors,
+    /// The LiDAR without the camera, which no error depends on.
+    lidar: Sensors,
+}
+
+/// Fits the rear object-level sensor to the full chain. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
+pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
+    let fitter = Fitter::new(plan)?;
+    let usual = fitter.usual_errors()?;
+    let (range, range_spread) = fitter.ranges(&usual)?;
+    let ranges = RearFit {
+        origin: plan.origin(),
+        errors: fitter.same_errors(&usual),
+        class_confidence: fitter.class_confidence()?,
+        range_spread,
+        paints: PAINTS.to_vec(),
+        extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
+        range,
+        shapes: fitter.shapes()?,
+        validation: None,
+    };
+    Ok(RearFit { errors: fitter.error_grids(&ranges)?, ..ranges })
+}
+
+/// Fits the errors alone to the full chain, with the ranges of another fit, whose validation no longer holds.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_errors(plan: &FitPlan<'_>, ranges: &RearFit) -> Result<RearFit, StudyError> {
+    Ok(RearFit { errors: Fitter::new(plan)?.error_grids(ranges)?, validation: None, ..ranges.clone() })
+}
+
+impl FitPlan<'_> {
+    /// Returns what a file says about where its figures come from.
+    pub(crate) fn origin(&self) -> Origin {
+        let FitPlan { seed, approaches, command, version, file } = self.clone();
+        Origin { command, version, scenario: file.config().name.clone(), seed, approaches }
+    }
+}
+
+fn with_settings(file: &ScenarioFile, settings: &[String]) -> Result<ScenarioFile, StudyError> {
+    let settings: Vec<Setting> = settings.iter().filter_map(|text| text.parse().ok()).collect();
+    Ok(ScenarioFile::parse(file.path(), file.text(), &settings)?)
+}
+
+fn extinctions_per_m(visibilities_m: &[f64]) -> Vec<f64> {
+    visibilities_m.iter().map(|visibility_m| rounded(KOSCHMIEDER / visibility_m, 1e6)).collect()
+}
+
+fn rounded(value: f64, per_unit: f64) -> f64 {
+    (value * per_unit).round() / per_unit
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Returns the mean distances at which tracks are confirmed and classified (m).
+fn means_m(firsts: &[Firsts]) -> [f64; 2] {
+    let of = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
+    [of(|firsts| firsts.confirmed_m), of(|firsts| firsts.classified_m)]
+}
+
+impl<'a> Fitter<'a> {
+    fn new(plan: &'a FitPlan<'a>) -> Result<Self, StudyError> {
+        let nominal = plan.file.space().nominal();
+        let without_camera = with_settings(plan.file, &["sensors.rear-camera.pipeline=\"off\"".to_owned()])?;
+        let lidar = without_camera.concrete(&nominal)?.sensors.with_mode(SensorMode::Full);
+        let scenario = plan.file.concrete(&nominal)?;
+        Ok(Self { plan, full: scenario.sensors.with_mode(SensorMode::Full), scenario, lidar })
+    }
+}
+
+impl Fitter<'_> {
+    fn case(class: VehicleClass, paint: f64, plate: Plate, visibility_m: f64) -> Case {
+        let environment = Environment { visibility_m, ..Environment::CLEAR_DAY };
+        Case { class, paint, plate, environment, ..Case::usual() }
+    }
+
+    /// Returns when the tracks are confirmed and classified in all approaches of a case.
+    fn firsts(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Firsts>, StudyError> {
+        let one = |run| {
+            firsts(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
+                .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
+        };
+        (0..self.plan.approaches).into_par_iter().map(one).collect()
+    }
+
+    /// Returns the distances that the object-level sensor with these errors needs to confirm a vehicle, and to report its class (m).
+    fn own_delays_m(&self, errors: &FittedErrors) -> Result<[f64; 2], StudyError> {
+        let file = with_settings(self.plan.file, &[format!("sensors.rear-object.range-m={TEST_RANGE_M:?}")])?;
+        let sensors = file.concrete(&file.space().nominal())?.sensors.with_mode(SensorMode::Object);
+        let sensors = sensors.without_range_fit(TEST_CLASS_RANGE_M).with_rear_errors(*errors);
+        let [confirmed_m, classified_m] = means_m(&self.firsts(&Case::usual(), &sensors)?);
+        Ok([TEST_RANGE_M - confirmed_m, TEST_CLASS_RANGE_M - classified_m])
+    }
+
+    /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's range.
+    fn ranges(&self, errors: &FittedErrors) -> Result<(Vec<RangeGrid>, f64), StudyError> {
+        let [delay_m, class_delay_m] = self.own_delays_m(errors)?;
+        let (mut grids, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
+        for (class, plate) in [
+            (VehicleClass::Car, Plate::Clean),
+            (VehicleClass::Car, Plate::Dirty),
+            (VehicleClass::Car, Plate::None),
+            (VehicleClass::Truck, Plate::Clean),
+            (VehicleClass::Motorcycle, Plate::Clean),
+        ] {
+            let mut grid = RangeGrid { class, plate, range_m: Vec::new(), class_range_m: Vec::new() };
+            for paint in PAINTS {
+                let (mut row_m, mut class_row_m) = (Vec::new(), Vec::new());
+                for visibility_m in VISIBILITIES_M {
+                    let found = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
+                    let [centre_m, classified_m] = means_m(&found);
+                    if class == VehicleClass::Car {
+                        squares += found.iter().map(|it| maths::ln(it.confirmed_m / centre_m).powi(2)).sum::<f64>();
+                        count += found.len() as f64 - 1.0;
+                    }
+                    let range_m = rounded(centre_m + delay_m, 10.0);
+                    // A class that the full chain knows when it confirms the track limits nothing.
+                    let is_known_at_once = found.iter().all(|it| it.classified_m == it.confirmed_m);
+                    let class_range_m = rounded(classified_m + class_delay_m, 10.0).min(range_m);
+                    row_m.push(range_m);
+                    class_row_m.push(if is_known_at_once { range_m } else { class_range_m });
+                }
+                grid.range_m.push(row_m);
+                grid.class_range_m.push(class_row_m);
+            }
+            grids.push(grid);
+        }
+        Ok((grids, rounded((squares / count.max(1.0)).sqrt(), 1e4)))
+    }
+
+    /// Returns the ranges of each body shape relative to those of the first of its class.
+    fn shapes(&self) -> Result<ShapeRatios, StudyError> {
+        let (mut range, mut class_range) = (BTreeMap::new(), BTreeMap::new());
+        for class in VehicleClass::ALL {
+            let means_m = |shape: BodyShape| {
+                let of = |paint: f64, visibility_m: f64| {
+                    let case = Case { shape: Some(shape), ..Self::case(class, paint, Plate::Clean, visibility_m) };
+                    self.firsts(&case, &self.full).map(|found| means_m(&found))
+                };
+                let row = |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| of(paint, *visibility_m)).collect();
+                SHAPE_PAINTS.into_iter().map(row).collect::<Result<Vec<Vec<[f64; 2]>>, StudyError>>()
+            };
+            let shapes = BodyShape::of_class(class);
+            let first_m = means_m(shapes[0])?;
+            for shape in &shapes[1..] {
+                let own_m = means_m(*shape)?;
+                let ratios = |of: usize| -> Vec<Vec<f64>> {
+                    let row = |(own, first): (&Vec<[f64; 2]>, &Vec<[f64; 2]>)| {
+                        own.iter().zip(first).map(|(own, first)| rounded(own[of] / first[of], 1e3)).collect()
+                    };
+                    own_m.iter().zip(&first_m).map(row).collect()
+                };
+                range.insert(shape.name().to_owned(), ratios(0));
+                class_range.insert(shape.name().to_owned(), ratios(1));
+            }
+        }
+        let extinctions_per_m = extinctions_per_m(&SHAPE_VISIBILITIES_M);
+        Ok(ShapeRatios { paints: SHAPE_PAINTS.to_vec(), extinctions_per_m, range, class_range })
+    }
+
+    /// Returns the mean score of the true class, of each class.
+    fn class_confidence(&self) -> Result<ByClass, StudyError> {
+        let of = |class| {
+            let case = Case { class, ..Case::usual() };
+            let one = |run| {
+                scores(&case, &self.full, &self.scenario.road, Address { seed: self.plan.seed, run }, GAPS_M)
+                    .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
+            };
+            let scores: Result<Vec<Vec<f64>>, StudyError> =
+                (0..self.plan.approaches).into_par_iter().map(one).collect();
+            Ok::<f64, StudyError>(rounded(mean(&scores?.concat()).clamp(0.25, 1.0), 1e4))
+        };
+        Ok(ByClass {
+            car: of(VehicleClass::Car)?,
+            truck: of(VehicleClass::Truck)?,
+            motorcycle: of(VehicleClass::Motorcycle)?,
+        })
+    }
+}
