@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_recorded::trajectory_data::{
-    BadRows, LayoutChoice, ReadOptions, TrajectoryData, read_with, refuse_duplicates,
+    AxisOptions, BadRows, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, read_with,
+    refuse_duplicates,
 };
 use closecall_scenarios::{ScenarioError, ScenarioFile, Setting, source};
 use closecall_sensors::SensorMode;
@@ -86,10 +87,22 @@ impl FilesArgs {
     /// Reads the files, none of which may be given twice.
     pub(super) fn read_all(&self) -> Result<Vec<TrajectoryData>, CliError> {
         let options = self.read.options();
-        let data_sets = self.files.iter().map(|path| read_with(path, options)).collect::<Result<Vec<_>, _>>()?;
+        let data_sets = self.files.iter().map(|path| read_noting(path, options)).collect::<Result<Vec<_>, _>>()?;
         refuse_duplicates(&self.files, &data_sets).map_err(|message| CliError::Usage { message })?;
         Ok(data_sets)
     }
+}
+
+/// Reads a trajectory file, and prints what a reader of the results has to know of it.
+///
+/// # Errors
+/// The file cannot be read, or its content is wrong.
+pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
+    let data = read_with(path, options)?;
+    for warning in data.warnings() {
+        print_error(format_args!("warning: {}: {warning}\n", path.display()));
+    }
+    Ok(data)
 }
 
 /// How a trajectory file is read.
@@ -101,6 +114,12 @@ pub(super) struct ReadArgs {
     /// Skip and count rows that cannot be used, instead of refusing the file
     #[arg(long, help_heading = heading::DATA)]
     pub(super) drop_bad_rows: bool,
+    /// The lateral position of the file points to the other side than its layout states
+    #[arg(long, help_heading = heading::DATA)]
+    mirror_d: bool,
+    /// The file counts its lanes from the right
+    #[arg(long, help_heading = heading::DATA)]
+    lanes_from_right: bool,
 }
 
 impl ReadArgs {
@@ -112,7 +131,8 @@ impl ReadArgs {
             Layout::Csv => LayoutChoice::Csv,
             Layout::InCar => LayoutChoice::InCar,
         });
-        ReadOptions { layout, bad_rows: if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject } }
+        let axes = AxisOptions { mirror_d: self.mirror_d, lanes_from_right: self.lanes_from_right };
+        ReadOptions { layout, bad_rows: if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject }, axes }
     }
 }
 

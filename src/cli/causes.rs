@@ -6,7 +6,6 @@ use clap::Args;
 use closecall_campaign::arguments::{count, positive};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_recorded::filters::smooth;
-use closecall_recorded::trajectory_data::read_with;
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
 use closecall_simulation::controller::ControllerChoice;
@@ -23,7 +22,7 @@ use closecall_studies::minimize::{MinimizedText, minimize_sample, output_files, 
 use serde_json::json;
 
 use super::CliError;
-use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs};
+use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
 use super::protect::{of_campaign, protect};
@@ -186,7 +185,7 @@ pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
     let rule = EventRule { braking_mps2: args.braking_mps2 };
     let mut observed = args.counted.map(Counted::observed);
     for path in &args.files {
-        let data = read_with(path, args.read.options())?;
+        let data = read_noting(path, args.read.options())?;
         observe(&smooth(&data), rule, observed.get_or_insert_default());
     }
     let saved = args.campaign.as_deref().map(SavedCampaign::open).transpose()?;

@@ -1,6 +1,5 @@
 //! The errors of the commands, and the exit code of each.
 
-use closecall_aerial::AerialError;
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
@@ -11,12 +10,11 @@ use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
-use closecall_causes::CausesError;
-use closecall_perception::StudyError;
+use closecall_recorded::aerial::AerialError;
 use closecall_recorded::encounter::{NoEncounter, track_suggestion};
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
-use closecall_recorded::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
+use closecall_recorded::trajectory_data::{TrajectoryFileError, TrajectoryFileProblem, WriteError as TrajectoryWriteError};
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;
@@ -30,6 +28,8 @@ use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::datasets::DatasetError;
 use closecall_simulation::SampleError;
 use closecall_simulation::controller::native::NativeError;
+use closecall_studies::CausesError;
+use closecall_studies::perception::StudyError;
 use closecall_traffic::atomic::WriteError;
 use miette::Diagnostic;
 
@@ -55,7 +55,7 @@ pub enum CliError {
     #[error(transparent)]
     Following(#[from] FollowingError),
     /// A trajectory file cannot be used.
-    #[error(transparent)]
+    #[error("{_0}{}", remedy(&_0.problem))]
     TrajectoryData(#[from] TrajectoryFileError),
     /// A list of known lane changes cannot be used.
     #[error("failed to use the list of lane changes {0}")]
@@ -191,6 +191,16 @@ impl From<SourceError> for CliError {
             SourceError::StandardInputTwice => Self::usage(error.to_string()),
             SourceError::NoScenario { .. } => Self::usage(format!("{error}: `closecall new NAME` writes one")),
         }
+    }
+}
+
+/// Returns the option that reads a trajectory file in spite of the problem, if there is one.
+fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
+    match problem {
+        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => "; --mirror-d turns the position",
+        TrajectoryFileProblem::LanesAgainstPosition { .. } => "; --lanes-from-right turns the lanes",
+        problem if problem.affects_one_row() => "; --drop-bad-rows skips such rows, and counts them",
+        _ => "",
     }
 }
 

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use closecall_recorded::encounter::{ChoiceError, RecordedEncounter, choose};
 use closecall_recorded::filters::smooth;
-use closecall_recorded::trajectory_data::read_with;
 use closecall_report::json::stamped;
 use closecall_report::run::film::{EncounterComparison, film_encounter};
 use closecall_report::run::rerun::write_recording;
@@ -15,7 +14,7 @@ use closecall_simulation::{CONTROL_STEP, RunKey};
 use closecall_traffic::atomic::write_file;
 
 use super::CliError;
-use super::args::{Format, ReadArgs, SimulationArgs};
+use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{made_by, out, outln};
 use super::protect::{of_trajectories, protect};
@@ -106,7 +105,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
 
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
 pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result<RecordedEncounter, CliError> {
-    let found = choose(&smooth(&read_with(path, read.options())?), track, CONTROL_STEP);
+    let found = choose(&smooth(&read_noting(path, read.options())?), track, CONTROL_STEP);
     let file = path.display();
     found.map_err(|error| match error {
         ChoiceError::NoLaneChange => {

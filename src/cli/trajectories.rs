@@ -10,7 +10,7 @@ use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_
 use closecall_recorded::lane_change::{
     Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
 };
-use closecall_recorded::trajectory_data::{Layout, open, read_with};
+use closecall_recorded::trajectory_data::{Layout, open};
 use closecall_report::json::{self, stamped};
 use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::write_recording;
@@ -20,7 +20,7 @@ use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_ch
 use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, ReadArgs};
+use super::args::{FilesArgs, Format, ReadArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{command_line, out, outln, print_error, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
@@ -175,7 +175,8 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
     let FoundLaneChanges { lane_changes: changes, spans, tracks: count, basis } =
         find(&mut tracks, args.criterion.criterion(), lanes)?;
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
-    for warning in basis.warnings().into_iter().chain(tracks.unknown_classes().iter().map(ToString::to_string)) {
+    let unknown = tracks.unknown_classes().iter().map(ToString::to_string);
+    for warning in tracks.continuity().warnings().into_iter().chain(basis.warnings()).chain(unknown) {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
     }
     match (args.format, scored) {
@@ -197,10 +198,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     for chart in charts.iter().flatten() {
         protect(&inputs, &[("--plot", Some(chart))])?;
     }
-    let data = read_with(&args.file, args.read.options())?;
-    for warning in data.warnings() {
-        print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
-    }
+    let data = read_noting(&args.file, args.read.options())?;
     let smoothed = smooth(&data);
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: args.ttce_alone };
     let changes = evaluate(&smoothed, &judgement);

@@ -38,6 +38,7 @@ mod mask_rcnn;
 mod mis_page;
 mod native_controllers;
 mod nothing_checked;
+mod odd_recordings;
 mod own_controller;
 mod paper;
 mod paper_figure;

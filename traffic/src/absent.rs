@@ -54,6 +54,9 @@ pub enum Absent {
     /// The data do not contain what the value needs.
     #[error("not recorded")]
     NotRecorded,
+    /// The recorded value is beyond what a vehicle can do.
+    #[error("the recorded value is beyond what a vehicle can do")]
+    Implausible,
 }
 
 /// A value, or the reason for its absence.

@@ -306,7 +306,7 @@ impl Target {
         let bytes = self.damaged(&bytes);
         let bad_rows = if self.random.below(2) == 0 { BadRows::Reject } else { BadRows::Skip };
         let window = [usize::MAX, 1 << 20, 16][self.random.below(3)];
-        let options = ReadOptions { layout: None, bad_rows };
+        let options = ReadOptions { bad_rows, ..ReadOptions::default() };
         let mut judged = Ok(None);
         let mut fastest = Duration::MAX;
         // On a busy machine, any file may be slow once.

@@ -18,6 +18,13 @@ use crate::lane_change::{LaneChange, detect};
 /// Speed below which a vehicle is assumed to point along the road, because its direction of movement is noise (m/s).
 const HEADING_FROM_MPS: f64 = 1.0;
 
+/// Acceleration beyond which a recorded value is an error (m/s²): no tyre brakes harder.
+const IMPLAUSIBLE_MPS2: f64 = 12.0;
+/// Speed beyond which a recorded value is an error (m/s): 360 km/h.
+const IMPLAUSIBLE_MPS: f64 = 100.0;
+/// Lateral distance within which vehicles are on one carriageway (m). The readers put carriageways 1 km apart.
+const CARRIAGEWAY_M: f64 = 200.0;
+
 /// What counts as critical, beside the thresholds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Judgement {
@@ -58,7 +65,9 @@ fn evaluate(
     let mut extremes = Extremes::default();
     for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
         let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
-        let others: Vec<VehicleState<'_>> = others.map(|&presence| VehicleState::new(data.look_up(presence))).collect();
+        let others = others.map(|&presence| VehicleState::new(data.look_up(presence)));
+        let is_opponent = |other: &VehicleState<'_>| (other.point.d_m - point.d_m).abs() < CARRIAGEWAY_M;
+        let others: Vec<VehicleState<'_>> = others.filter(is_opponent).collect();
         extremes.observe(&VehicleState::new((own, point)), &others, Lane(lane_change.to_lane));
     }
     Some(Evaluation { metrics: extremes.metrics(judgement), following: extremes.following() })
@@ -106,6 +115,15 @@ fn metric_record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl 
             MetricResult::Value { value, opponent, time_s, critical: is_critical(value) }
         }
         None => MetricResult::Absent { absent: otherwise },
+    }
+}
+
+/// Returns the result of a metric of the vehicle alone, which is critical above `critical`. A value above `limit` is an error
+/// of the recording, and never critical.
+fn magnitude_record(extreme: Option<Extreme>, limit: f64, critical: f64) -> MetricResult {
+    match extreme {
+        Some(extreme) if !(extreme.value <= limit) => MetricResult::Absent { absent: Absent::Implausible },
+        extreme => metric_record(extreme, Absent::NotRecorded, |value| value > critical),
     }
 }
 
@@ -220,9 +238,9 @@ impl Extremes {
         let no_dce = if self.ttce.is_some() { Absent::BeyondHorizon } else { no_ttce };
         Metrics {
             distance_m: metric_record(self.distance, Absent::NoOpponent, |value| value < CRITICAL_DISTANCE_M),
-            speed_mps: metric_record(self.speed, Absent::NotRecorded, |v| v > CRITICAL_SPEED_FACTOR * speed_limit_mps),
-            a_lon_mps2: metric_record(self.a_lon, Absent::NotRecorded, |value| value > CRITICAL_A_LON_MPS2),
-            a_lat_mps2: metric_record(self.a_lat, Absent::NotRecorded, |value| value > CRITICAL_A_LAT_MPS2),
+            speed_mps: magnitude_record(self.speed, IMPLAUSIBLE_MPS, CRITICAL_SPEED_FACTOR * speed_limit_mps),
+            a_lon_mps2: magnitude_record(self.a_lon, IMPLAUSIBLE_MPS2, CRITICAL_A_LON_MPS2),
+            a_lat_mps2: magnitude_record(self.a_lat, IMPLAUSIBLE_MPS2, CRITICAL_A_LAT_MPS2),
             thw_s: metric_record(self.thw, no_lead, |value| value < CRITICAL_THW_S),
             dce_m: metric_record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
             ttce_s: metric_record(self.ttce, no_ttce, |value| judgement.ttce_alone && value < CRITICAL_TTCE_S),

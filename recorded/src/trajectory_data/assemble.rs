@@ -2,6 +2,7 @@
 
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint};
 
+use super::continuity::FrameClock;
 use super::data::RecordedTrack;
 use super::error::TrajectoryFileProblem;
 use super::source::{Clock, ReadError, Row};
@@ -22,7 +23,8 @@ pub(super) enum Step {
 ///
 /// # Errors
 /// Fails if both rows describe the same instant, or if time and frame number disagree.
-pub(super) fn step(before: &Row, row: &Row, period: Time) -> Result<Step, ReadError> {
+pub(super) fn step(before: &Row, row: &Row, clock: FrameClock) -> Result<Step, ReadError> {
+    let period = clock.period;
     let (later, earlier) = if row.line > before.line { (row, before) } else { (before, row) };
     let (frames, step) = (row.frame - before.frame, row.time - before.time);
     if frames == 0 && (step == Time::ZERO || row.clock == Clock::Continuous) {
@@ -30,14 +32,14 @@ pub(super) fn step(before: &Row, row: &Row, period: Time) -> Result<Step, ReadEr
             TrajectoryFileProblem::DuplicateRow { vehicle: row.number, frame: row.frame, first_line: earlier.line };
         return Err(ReadError::new(later.line, problem));
     }
-    let is_near = |count: i64| {
-        let off_ns = step.ns().saturating_sub(period.ns().saturating_mul(count));
-        off_ns.unsigned_abs() as f64 <= UNEVENNESS * period.ns() as f64
+    let needed_ns = period.ns().saturating_mul(frames) / clock.frames;
+    let is_near = |needed_ns: i64| {
+        step.ns().saturating_sub(needed_ns).unsigned_abs() as f64 <= UNEVENNESS * period.ns() as f64
     };
-    if frames >= 1 && is_near(frames) {
-        return Ok(if frames > 1 { Step::Gap } else { Step::Next });
+    if frames >= 1 && is_near(needed_ns) {
+        return Ok(if frames == clock.frames { Step::Next } else { Step::Gap });
     }
-    if row.clock == Clock::MayRestart && step > period && !is_near(1) {
+    if row.clock == Clock::MayRestart && step > period && !is_near(period.ns()) {
         return Ok(Step::Gap);
     }
     let problem = TrajectoryFileProblem::UnevenTime {
@@ -46,7 +48,7 @@ pub(super) fn step(before: &Row, row: &Row, period: Time) -> Result<Step, ReadEr
         line_before: before.line,
         frame: row.frame,
         step_s: step.s(),
-        needed_s: period.s() * frames as f64,
+        needed_s: Time::from_ns(needed_ns).s(),
     };
     Err(ReadError::new(row.line, problem))
 }

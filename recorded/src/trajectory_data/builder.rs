@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use closecall_traffic::Time;
 
 use super::assemble::{Step, assemble_track, step};
+use super::continuity::{Continuity, FrameClock, bridge, is_jump};
 use super::data::RecordedTrack;
 use super::error::TrajectoryFileProblem;
 use super::order::{Order, TimeOrder, VehicleOrder};
@@ -21,16 +22,17 @@ const MAX_OPEN_ROWS: usize = 3 << 20;
 
 /// Builds tracks from rows.
 pub(super) struct TrackBuilder {
-    period: Time,
+    clock: FrameClock,
     start: Time,
     order: OrderCheck,
-    /// Rows of incomplete tracks without a gap, by vehicle number and origin.
+    /// Rows of incomplete tracks, with bridged gaps, by vehicle number and origin.
     open: BTreeMap<(u64, Time), Vec<Row>>,
     open_rows: usize,
     max_open_rows: usize,
     /// Number of pieces completed so far, by vehicle number.
     pieces: BTreeMap<u64, u64>,
     ready: VecDeque<RecordedTrack>,
+    continuity: Continuity,
 }
 
 /// The check of the row order that the builder applies.
@@ -42,9 +44,9 @@ enum OrderCheck {
 
 impl TrackBuilder {
     /// Creates a builder for rows that are already sorted by vehicle and time.
-    pub(super) fn for_sorted(period: Time, start: Time) -> Self {
+    pub(super) fn for_sorted(clock: FrameClock, start: Time) -> Self {
         Self {
-            period,
+            clock,
             start,
             order: OrderCheck::Sorted,
             open: BTreeMap::new(),
@@ -52,16 +54,17 @@ impl TrackBuilder {
             max_open_rows: usize::MAX,
             pieces: BTreeMap::new(),
             ready: VecDeque::new(),
+            continuity: Continuity::default(),
         }
     }
 
     /// Creates a builder for rows that arrive in `order`, which it checks.
-    pub(super) fn for_stream(period: Time, start: Time, order: Order) -> Self {
+    pub(super) fn for_stream(clock: FrameClock, start: Time, order: Order) -> Self {
         let order = match order {
             Order::Vehicle => OrderCheck::Vehicle(VehicleOrder::default()),
             Order::Time => OrderCheck::Time(TimeOrder::default()),
         };
-        Self { order, max_open_rows: MAX_OPEN_ROWS, ..Self::for_sorted(period, start) }
+        Self { order, max_open_rows: MAX_OPEN_ROWS, ..Self::for_sorted(clock, start) }
     }
 
     /// Adds the next row.
@@ -74,7 +77,7 @@ impl TrackBuilder {
         match &mut self.order {
             OrderCheck::Sorted => self.close_all_but(key)?,
             OrderCheck::Vehicle(order) => {
-                order.check(&row, self.period)?;
+                order.check(&row, self.clock)?;
                 self.close_all_but(key)?;
             }
             OrderCheck::Time(order) => {
@@ -84,11 +87,24 @@ impl TrackBuilder {
             }
         }
         let rows = self.open.entry(key).or_default();
-        if let Some(before) = rows.last()
-            && step(before, &row, self.period)? == Step::Gap
-        {
-            let complete = std::mem::take(rows);
-            self.close(&complete)?;
+        if let Some(before) = rows.last() {
+            let step = step(before, &row, self.clock)?;
+            let missing = if step == Step::Gap { bridge(before, &row, self.clock) } else { Some(Vec::new()) };
+            let is_jump = is_jump(before, &row);
+            match missing {
+                Some(missing) if !is_jump => {
+                    self.continuity.bridged_gaps += u64::from(!missing.is_empty());
+                    self.continuity.bridged_frames += missing.len() as u64;
+                    self.open_rows += missing.len();
+                    rows.extend(missing);
+                }
+                missing => {
+                    // Beyond a long gap, the number may well belong to another vehicle.
+                    self.continuity.jumps += u64::from(missing.is_some());
+                    let complete = std::mem::take(rows);
+                    self.close(&complete)?;
+                }
+            }
         }
         self.open_rows += 1;
         if self.open_rows > self.max_open_rows {
@@ -101,6 +117,15 @@ impl TrackBuilder {
     /// Removes and returns the next complete track.
     pub(super) fn pop(&mut self) -> Option<RecordedTrack> {
         self.ready.pop_front()
+    }
+
+    /// Returns how the rows so far became tracks.
+    pub(super) fn continuity(&self) -> Continuity {
+        Continuity {
+            vehicles: self.pieces.len() as u64,
+            pieces: self.pieces.values().sum(),
+            ..self.continuity
+        }
     }
 
     /// Returns the complete tracks that [`TrackBuilder::pop`] has not removed yet.
@@ -119,10 +144,10 @@ impl TrackBuilder {
         if self.open.contains_key(&key) { Ok(()) } else { self.finish() }
     }
 
-    /// Completes the tracks that have no row at the frame before `now`.
+    /// Completes the tracks that no row at `now` or later can continue.
     fn close_before(&mut self, now: Time) -> Result<(), ReadError> {
-        let missed = now - self.period - Time::from_ns(self.period.ns() / 2);
-        let is_over = |rows: &Vec<Row>| rows.last().is_none_or(|row| row.time < missed);
+        let clock = self.clock;
+        let is_over = |rows: &Vec<Row>| rows.last().is_none_or(|row| clock.bridged_until(row.time) < now);
         let over: Vec<_> = self.open.iter().filter(|(_, rows)| is_over(rows)).map(|(key, _)| *key).collect();
         over.into_iter().try_for_each(|key| self.open.remove(&key).map_or(Ok(()), |rows| self.close(&rows)))
     }

@@ -12,7 +12,7 @@ const MAX_NAMES: usize = 16;
 
 /// Parts of names that stand for a class other than a car, in lower case.
 const HINTS: [(VehicleClass, &[&str]); 2] = [
-    (VehicleClass::Truck, &["truck", "lorry", "bus", "coach", "trailer", "heavy", "hgv"]),
+    (VehicleClass::Truck, &["truck", "lorry", "bus", "coach", "trailer", "semi", "heavy", "hgv"]),
     (VehicleClass::Motorcycle, &["motor", "bike", "cycl", "scooter", "pedestrian"]),
 ];
 

@@ -6,6 +6,7 @@ use closecall_traffic::{Time, Trajectory};
 use serde::Serialize;
 
 use super::class_names::UnknownClass;
+use super::continuity::Continuity;
 use super::markings::LaneMarkings;
 
 /// The layout of a trajectory file.
@@ -89,6 +90,8 @@ pub struct TrajectoryData {
     pub hash: String,
     /// Unknown names of vehicle classes in the file.
     pub unknown_classes: Vec<UnknownClass>,
+    /// How the rows of the file became tracks; zeros if the data does not come from a file.
+    pub continuity: Continuity,
 }
 
 /// Checks that no two of the files at `paths`, which hold `data_sets`, have the same content: their lane changes would count
@@ -119,6 +122,7 @@ impl TrajectoryData {
             trajectories,
             hash: String::new(),
             unknown_classes: Vec::new(),
+            continuity: Continuity::default(),
         }
     }
 
@@ -126,6 +130,7 @@ impl TrajectoryData {
     /// classes.
     pub fn warnings(&self) -> Vec<String> {
         let ignored = self.markings.ignored().iter().map(ToString::to_string);
-        ignored.chain(self.unknown_classes.iter().map(ToString::to_string)).collect()
+        let unknown = self.unknown_classes.iter().map(ToString::to_string);
+        self.continuity.warnings().into_iter().chain(ignored).chain(unknown).collect()
     }
 }

@@ -64,6 +64,12 @@ pub enum TrajectoryFileProblem {
         /// Kind of archive or compression.
         what: &'static str,
     },
+    /// The file is in a format of another program.
+    #[error("this is {what}, which is not read; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)")]
+    Foreign {
+        /// The format.
+        what: &'static str,
+    },
     /// The file has another layout than the caller requires.
     #[error("the content is in the layout {}, not in {asked} as asked for", found.name())]
     OtherLayout {
@@ -73,7 +79,7 @@ pub enum TrajectoryFileProblem {
         asked: &'static str,
     },
     /// The last line is not terminated.
-    #[error("the last line does not end: the trajectory file may be cut there; if it is whole, end the line")]
+    #[error("the last line does not end, and its last field is shorter than the one before: the file may be cut there; if it is whole, end the line")]
     CutLine,
     /// A line exceeds the permitted length.
     #[error("the line is longer than {allowed} bytes")]
@@ -271,6 +277,37 @@ pub enum TrajectoryFileProblem {
         /// Number of the track.
         track: u64,
     },
+    /// The lanes lie in the opposite order of their numbers.
+    #[error(
+        "lane {} lies {apart_m:.1} m to the left of lane {}, but lanes are counted from the left: {}",
+        lanes[1], lanes[0],
+        if *is_mirrored {
+            "the lateral position points to the left, or else the lanes are counted from the right"
+        } else {
+            "the lanes are counted from the right, or else the lateral position is mirrored"
+        }
+    )]
+    LanesAgainstPosition {
+        /// The smallest and the largest number of a lane.
+        lanes: [u8; 2],
+        /// Distance of their middles (m).
+        apart_m: f64,
+        /// Whether the positions have the sign of the other side, too.
+        is_mirrored: bool,
+    },
+    /// The tracks fall to pieces.
+    #[error(
+        "the tracks of its {vehicles} vehicles fall into {pieces} pieces of {piece_s:.2} s on average, so that nothing can be \
+         followed: frames are missing throughout, or numbers are given to other vehicles"
+    )]
+    Shreds {
+        /// Number of vehicles.
+        vehicles: u64,
+        /// Number of pieces.
+        pieces: u64,
+        /// Mean duration of a piece (s).
+        piece_s: f64,
+    },
     /// Values are implausible for road traffic, which points to mixed-up units or columns.
     #[error("{what} is {found}, but {allowed} is plausible: are units or columns mixed up?")]
     Implausible {
@@ -293,7 +330,7 @@ pub enum TrajectoryFileProblem {
 
 impl TrajectoryFileProblem {
     /// Returns `true` if the problem makes only one row unusable.
-    pub(super) fn affects_one_row(&self) -> bool {
+    pub fn affects_one_row(&self) -> bool {
         matches!(
             self,
             Self::ColumnCount { .. }

@@ -80,8 +80,10 @@ pub(super) fn optional_number(text: &str, column: &'static str, bounds: Bounds) 
 
 /// Parses a whole number within `low..=high`.
 pub(super) fn integer(text: &str, column: &'static str, (low, high): (i64, i64)) -> Result<i64, FieldError> {
-    let value = if text.contains(',') { without_separators(text).parse() } else { text.parse() };
-    match value {
+    let text_of_number = if text.contains(',') { without_separators(text) } else { text.to_owned() };
+    // A spreadsheet or pandas writes whole numbers as 1.0.
+    let whole = text_of_number.split_once('.').filter(|(_, digits)| digits.bytes().all(|digit| digit == b'0'));
+    match whole.map_or(&text_of_number[..], |(whole, _)| whole).parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
         _ => Err(FieldError::at(column, wrong_value(text, format!("a whole number from {low} to {high}")))),
     }

@@ -16,7 +16,11 @@ impl Header {
 
     /// Splits `line` into column names. Also returns their separator and their number.
     pub(super) fn parse(line: &str) -> Result<(Self, Separator, usize), TrajectoryFileProblem> {
-        let separator = if line.contains(',') { Separator::Comma } else { Separator::Blank };
+        let separator = match (line.contains(';'), line.contains(',')) {
+            (true, _) => Separator::Semicolon,
+            (false, true) => Separator::Comma,
+            (false, false) => Separator::Blank,
+        };
         let mut fields = Fields::default();
         fields.split(line, separator)?;
         Ok((Self::new((0..fields.len()).map(|index| fields.get(line, index))), separator, fields.len()))

@@ -22,8 +22,10 @@
 //!   `Local_Y` is the middle of the front bumper, so the reader subtracts half the vehicle length to get the centre of
 //!   the box. `Local_X` stays as it is: during a lane change at a heading of 0.05 rad, the front is 0.1 m beside the
 //!   centre, which is below NGSIM's own accuracy.
-//! - They split the rows of a vehicle wherever a frame is missing, because NGSIM reuses vehicle numbers after gaps. The
-//!   first piece keeps the vehicle's number; later pieces add multiples of [`PIECE_STRIDE`] to it.
+//! - They take the step between two frames from the rows: a file may hold every second frame.
+//! - They bridge gaps of at most half a second, and split the rows of a vehicle at longer gaps and at movements that no
+//!   vehicle makes, because NGSIM and others reuse vehicle numbers ([`Continuity`]). The first piece keeps the vehicle's
+//!   number; later pieces add multiples of [`PIECE_STRIDE`] to it.
 //! - The catalogue's export joins several data sets of one location in which vehicle numbers recur. The reader tells
 //!   them apart by the time of frame 0. If their clocks overlap, it shifts them one behind the other, so that their
 //!   vehicles never meet. (Files longer than [`WINDOW_ROWS`] rows are not shifted, because their time spans are unknown
@@ -44,9 +46,11 @@
 //! the whole file, in any row order: criticality needs all of it, because every vehicle may be an opponent.
 
 mod assemble;
+mod axes;
 mod builder;
 mod class_names;
 mod commonroad;
+mod continuity;
 mod data;
 mod error;
 mod exid;
@@ -78,8 +82,10 @@ mod write;
 mod write_in_car;
 mod xml;
 
+pub use axes::AxisOptions;
 pub use builder::PIECE_STRIDE;
 pub use class_names::UnknownClass;
+pub use continuity::Continuity;
 pub use data::{Layout, MarkingDistances, RecordedTrack, TrajectoryData, refuse_duplicates};
 pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
 pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings};

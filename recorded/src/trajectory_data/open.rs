@@ -24,6 +24,17 @@ const ARCHIVES: [(&[u8], &str); 5] = [
     (b"\x28\xb5\x2f\xfd", "a Zstandard file"),
 ];
 
+/// The first bytes of formats of other programs, with a description of each.
+const FOREIGN: [(&[u8], &str); 5] = [
+    (b"PAR1", "a Parquet file"),
+    (b"$V", "a vehicle record of Vissim (.fzp)"),
+    (b"* File", "a vehicle record of Vissim (.fzp)"),
+    (b"[", "JSON, as I-24 MOTION and others publish it"),
+    (b"{", "JSON, as OpenLABEL and others are written"),
+];
+/// A word at the start of SUMO's floating car data.
+const SUMO: &[u8] = b"<fcd-export";
+
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see [`WINDOW_ROWS`].
@@ -73,7 +84,7 @@ pub fn open_from<'a>(
     let digest = Digest::default();
     let input = digest.input(source).map_err(|error| with_path(path, error))?;
     let source = reader_for(input, &options).map_err(|error| with_path(path, error))?;
-    Tracks::new((path, digest), source, options.bad_rows, window)
+    Tracks::new((path, digest), source, options, window)
 }
 
 /// Returns the files that are read for `path`: several for a highD or exiD data set.
@@ -101,7 +112,7 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
     let source = TextSource::with_meta(input, || set.meta(&digest), || InferredRoad::from_traffic(&path));
     let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
     check_choice(&source, &options).map_err(in_tracks)?;
-    Tracks::new((&path, digest), Box::new(source), options.bad_rows, window)
+    Tracks::new((&path, digest), Box::new(source), options, window)
 }
 
 /// Rejects a file whose layout differs from the required one.
@@ -125,6 +136,13 @@ fn reader_for<'a>(
         return Err(ReadError::of_file(TrajectoryFileProblem::Archive { what }));
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
+    if let Some((_, what)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning)) {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
+    }
+    if text.starts_with(b"<") && text.windows(SUMO.len()).any(|window| window == SUMO) {
+        let what = "floating car data of SUMO (`--fcd-output`)";
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
+    }
     let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
         Box::new(CommonRoadSource::new(input)?)
     } else {

@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use closecall_traffic::Time;
 
+use super::continuity::FrameClock;
 use super::error::TrajectoryFileProblem;
 use super::source::{ReadError, Row};
 
@@ -31,9 +32,9 @@ pub(super) enum Order {
 }
 
 /// Determines the order of `rows`. If neither order holds, returns the error of the order that breaks later.
-pub(super) fn order_of(rows: &[Row], period: Time) -> Result<Order, ReadError> {
+pub(super) fn order_of(rows: &[Row], clock: FrameClock) -> Result<Order, ReadError> {
     let mut by_vehicle = VehicleOrder::default();
-    let vehicle_breaks = rows.iter().find_map(|row| by_vehicle.check(row, period).err());
+    let vehicle_breaks = rows.iter().find_map(|row| by_vehicle.check(row, clock).err());
     let mut by_time = TimeOrder::default();
     let time_breaks = rows.iter().find_map(|row| by_time.check(row).err());
     match (vehicle_breaks, time_breaks) {
@@ -53,7 +54,7 @@ pub(super) struct VehicleOrder {
 impl VehicleOrder {
     /// Checks the next row. A vehicle number may recur later, but its track must not continue after rows of other
     /// vehicles.
-    pub(super) fn check(&mut self, row: &Row, period: Time) -> Result<(), ReadError> {
+    pub(super) fn check(&mut self, row: &Row, clock: FrameClock) -> Result<(), ReadError> {
         let unsorted = || {
             let problem = TrajectoryFileProblem::NotByVehicle { vehicle: row.number, rows: WINDOW_ROWS };
             Err(ReadError::new(row.line, problem))
@@ -72,7 +73,7 @@ impl VehicleOrder {
                 }
                 if let Some((origin, end)) = self.ends.get(&row.number)
                     && *origin == row.origin
-                    && row.time <= *end + period + Time::from_ns(period.ns() / 2)
+                    && row.time <= clock.bridged_until(*end)
                 {
                     return unsorted();
                 }

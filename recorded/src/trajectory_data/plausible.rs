@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use closecall_traffic::{Time, VehicleClass};
 
+use super::continuity::FrameClock;
 use super::data::Layout;
 use super::error::TrajectoryFileProblem;
 use super::source::{ReadError, Row};
@@ -24,7 +25,7 @@ const MIN_SPEED_MPS: f64 = 5.0;
 const MIN_STEPS: usize = 10;
 
 /// Rejects rows whose medians are implausible for road traffic.
-pub(super) fn check(rows: &[Row], layout: Layout) -> Result<(), ReadError> {
+pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(), ReadError> {
     let cars = || rows.iter().filter(|row| row.class == VehicleClass::Car);
     // In-car logs need not state the size of their vehicle, and that single vehicle may have any size.
     if layout != Layout::InCar {
@@ -33,7 +34,7 @@ pub(super) fn check(rows: &[Row], layout: Layout) -> Result<(), ReadError> {
         let widths = cars().map(|row| (row.width_m, row.line)).collect();
         check_median(widths, (1.0, 3.0), ("the median width of cars", "m", "1 to 3 m"))?;
     }
-    let steps = steps(rows);
+    let steps = steps(rows, clock);
     if steps.len() < MIN_STEPS {
         return Ok(());
     }
@@ -43,13 +44,13 @@ pub(super) fn check(rows: &[Row], layout: Layout) -> Result<(), ReadError> {
 
 /// Returns, for each step between two frames, the travelled distance as a share of what the speed predicts, and the
 /// line of the later row.
-fn steps(rows: &[Row]) -> Vec<(f64, u64)> {
+fn steps(rows: &[Row], clock: FrameClock) -> Vec<(f64, u64)> {
     let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
     let mut steps = Vec::new();
     for row in rows {
         let Some(before) = latest.insert((row.number, row.origin), row) else { continue };
         let (time_s, speed_mps) = ((row.time - before.time).s(), 0.5 * (row.speed_mps + before.speed_mps));
-        let follows = row.frame == before.frame + 1 && time_s > 0.0;
+        let follows = row.frame == before.frame + clock.frames && time_s > 0.0;
         if follows && speed_mps > MIN_SPEED_MPS {
             steps.push(((row.s_m - before.s_m) / (speed_mps * time_s), row.line));
         }

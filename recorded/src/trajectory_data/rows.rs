@@ -18,6 +18,8 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 pub(super) enum Separator {
     /// A comma. Fields may be in double quotes.
     Comma,
+    /// A semicolon, with decimal commas or points. Fields may be in double quotes.
+    Semicolon,
     /// One or more blanks or tabs.
     Blank,
 }
@@ -92,6 +94,11 @@ impl Fields {
         self.spans.len()
     }
 
+    /// Returns the length of the last field (bytes).
+    pub(super) fn last_len(&self) -> usize {
+        self.spans.last().map_or(0, ExactSizeIterator::len)
+    }
+
     /// Returns one field of `line` without surrounding blanks and quotes.
     pub(super) fn get<'l>(&self, line: &'l str, index: usize) -> &'l str {
         &line[self.spans[index].clone()]
@@ -101,7 +108,8 @@ impl Fields {
     pub(super) fn split(&mut self, line: &str, separator: Separator) -> Result<(), TrajectoryFileProblem> {
         self.spans.clear();
         match separator {
-            Separator::Comma => self.split_commas(line),
+            Separator::Comma => self.split_at(line, b','),
+            Separator::Semicolon => self.split_at(line, b';'),
             Separator::Blank => {
                 let spans = line.split_ascii_whitespace().map(|field| span_in(line, field));
                 self.spans.extend(spans);
@@ -110,13 +118,13 @@ impl Fields {
         }
     }
 
-    /// Splits at the commas outside of double quotes.
-    fn split_commas(&mut self, line: &str) -> Result<(), TrajectoryFileProblem> {
+    /// Splits at the separators outside of double quotes.
+    fn split_at(&mut self, line: &str, separator: u8) -> Result<(), TrajectoryFileProblem> {
         let (mut start, mut quoted) = (0, false);
         for (index, byte) in line.bytes().enumerate() {
             match byte {
                 b'"' => quoted = !quoted,
-                b',' if !quoted => {
+                byte if byte == separator && !quoted => {
                     self.spans.push(span_in(line, unquoted(&line[start..index])));
                     start = index + 1;
                 }

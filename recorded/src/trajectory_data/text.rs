@@ -8,7 +8,7 @@ use super::exid::InferredRoad;
 use super::fields::FieldError;
 use super::file_set::Meta;
 use super::layout::{Format, drone_format, is_drone_header, recognise};
-use super::rows::{Fields, Lines};
+use super::rows::{Fields, Lines, Separator};
 use super::source::{FileInfo, ReadError, Row, RowSource};
 
 /// The rows of a text file in any layout that has one row per line.
@@ -19,6 +19,8 @@ pub(super) struct TextSource<R> {
     name: Option<String>,
     /// The first line with its number, if it is a row instead of a header.
     first: Option<(u64, String)>,
+    /// Length of the last field of the row before (bytes): a shorter one at the end of the file may be cut.
+    usual_last_field: usize,
 }
 
 impl<R: BufRead> TextSource<R> {
@@ -44,13 +46,13 @@ impl<R: BufRead> TextSource<R> {
         }
         let format = drone_format(&first, meta().map_err(Err)?, infer_road)
             .map_err(|error| error.map(|problem| ReadError::new(number, problem)))?;
-        Ok(Self { lines, format, fields: Fields::default(), name: None, first: None })
+        Ok(Self { lines, format, fields: Fields::default(), name: None, first: None, usual_last_field: 0 })
     }
 
     fn with_recognised_layout(lines: Lines<R>, number: u64, first: String) -> Result<Self, ReadError> {
         let format = recognise(&first).map_err(|problem| ReadError::new(number, problem))?;
         let first = (!format.has_header).then_some((number, first));
-        Ok(Self { lines, format, fields: Fields::default(), name: None, first })
+        Ok(Self { lines, format, fields: Fields::default(), name: None, first, usual_last_field: 0 })
     }
 }
 
@@ -81,7 +83,7 @@ impl<R: BufRead> RowSource for TextSource<R> {
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
-        let Self { lines, format, fields, name, first } = self;
+        let Self { lines, format, fields, name, first, usual_last_field } = self;
         loop {
             let first = first.take();
             let (number, line) = match &first {
@@ -95,9 +97,11 @@ impl<R: BufRead> RowSource for TextSource<R> {
                 },
             };
             let row = parse(line, format, fields, name).map_err(|error| ReadError::new(number, error))?;
-            if lines.is_unterminated() {
+            let last_field = fields.last_len();
+            if lines.is_unterminated() && last_field < *usual_last_field {
                 return Err(ReadError::new(number, TrajectoryFileProblem::CutLine));
             }
+            *usual_last_field = last_field;
             if let Some(row) = row {
                 return Ok(Some(Row { line: number, ..row }));
             }
@@ -111,6 +115,14 @@ fn parse(
     fields: &mut Fields,
     name: &mut Option<String>,
 ) -> Result<Option<Row>, FieldError> {
+    let with_points;
+    let line = if format.separator == Separator::Semicolon && line.contains(',') {
+        // Decimal commas, as spreadsheets of many countries write them.
+        with_points = line.replace(',', ".");
+        &with_points
+    } else {
+        line
+    };
     fields.split(line, format.separator)?;
     let (found, needed) = (fields.len(), format.width);
     if found != needed {

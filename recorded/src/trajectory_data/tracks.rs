@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use closecall_traffic::Time;
 
+use super::axes::{self, Axes, AxisOptions};
 use super::builder::TrackBuilder;
 use super::class_names::UnknownClass;
+use super::continuity::{Continuity, FrameClock};
 use super::data::{Layout, RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::input::Digest;
@@ -26,6 +28,11 @@ const SEPARATION: Time = Time::from_ms(10_000);
 /// Largest number of rows that are held at once: four times the rows of all NGSIM motorway data, about 8 GiB.
 const MAX_ROWS: usize = 50_000_000;
 
+/// Number of pieces per vehicle above which short pieces are shreds.
+const SHREDS_PER_VEHICLE: u64 = 3;
+/// Mean duration below which pieces are shreds (s): no lane change fits into it.
+const SHRED_S: f64 = 2.0;
+
 /// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
@@ -33,6 +40,8 @@ pub struct ReadOptions {
     pub layout: Option<LayoutChoice>,
     /// Treatment of unusable rows.
     pub bad_rows: BadRows,
+    /// Directions of the file that differ from the documented ones.
+    pub axes: AxisOptions,
 }
 
 /// A layout that a caller can require by name.
@@ -91,6 +100,8 @@ pub struct Tracks<'a> {
     source: Box<dyn RowSource + 'a>,
     digest: Digest,
     bad_rows: BadRows,
+    axis_options: AxisOptions,
+    axes: Axes,
     builder: TrackBuilder,
     period: Time,
     markings: LaneMarkings,
@@ -104,15 +115,17 @@ impl<'a> Tracks<'a> {
     pub(super) fn new(
         (path, digest): (&Path, Digest),
         source: Box<dyn RowSource + 'a>,
-        bad_rows: BadRows,
+        options: ReadOptions,
         window: usize,
     ) -> Result<Self, TrajectoryFileError> {
-        let builder = TrackBuilder::for_sorted(ngsim::PERIOD, Time::ZERO);
+        let builder = TrackBuilder::for_sorted(FrameClock::every_frame(ngsim::PERIOD), Time::ZERO);
         let mut tracks = Self {
             path: path.to_owned(),
             source,
             digest,
-            bad_rows,
+            bad_rows: options.bad_rows,
+            axis_options: options.axes,
+            axes: Axes::default(),
             builder,
             period: ngsim::PERIOD,
             markings: LaneMarkings::default(),
@@ -157,6 +170,11 @@ impl<'a> Tracks<'a> {
         self.rows
     }
 
+    /// Returns how the rows so far became tracks.
+    pub fn continuity(&self) -> Continuity {
+        self.builder.continuity()
+    }
+
     /// Returns the rows skipped so far.
     pub fn dropped(&self) -> &SkippedRows {
         &self.dropped
@@ -197,7 +215,8 @@ impl<'a> Tracks<'a> {
         if let Some(markings) = markings {
             data.markings = markings;
         }
-        Ok(TrajectoryData { layout, hash: self.hash(), unknown_classes: self.unknown_classes().to_vec(), ..data })
+        let (hash, continuity) = (self.hash(), self.continuity());
+        Ok(TrajectoryData { layout, hash, continuity, unknown_classes: self.unknown_classes().to_vec(), ..data })
     }
 
     /// Reads rows until the next track is complete.
@@ -210,10 +229,13 @@ impl<'a> Tracks<'a> {
                 return Ok(None);
             }
             match self.next_row()? {
-                Some(row) => self.push(row)?,
+                Some(mut row) => {
+                    self.axes.turn(&mut row);
+                    self.push(row)?;
+                }
                 None => {
                     self.ended = true;
-                    self.builder.finish()?;
+                    self.finish()?;
                 }
             }
         }
@@ -268,22 +290,40 @@ impl<'a> Tracks<'a> {
             return Err(self.dropped.take_first().unwrap_or(ReadError::of_file(TrajectoryFileProblem::Empty)));
         }
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
-        self.period = self.source.info().period.unwrap_or_else(|| period(beginning));
+        let frame_period = self.source.info().period.unwrap_or_else(|| period(beginning));
+        let clock = FrameClock::of_rows(beginning, frame_period);
+        self.period = clock.period;
         let start = start(beginning);
-        plausible::check(beginning, self.source.info().layout)?;
+        plausible::check(beginning, self.source.info().layout, clock)?;
+        self.axes = Axes::new(self.axis_options, beginning);
+        rows.iter_mut().for_each(|row| self.axes.turn(row));
+        if matches!(self.source.info().layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25) {
+            axes::check(&rows[..rows.len().min(WINDOW_ROWS)])?;
+        }
         if self.ended {
             separate_data_sets(&mut rows);
             rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
-            self.builder = TrackBuilder::for_sorted(self.period, start);
+            self.builder = TrackBuilder::for_sorted(clock, start);
         } else {
-            self.builder = TrackBuilder::for_stream(self.period, start, order_of(&rows, self.period)?);
+            self.builder = TrackBuilder::for_stream(clock, start, order_of(&rows, clock)?);
         }
         rows.into_iter().try_for_each(|row| self.push(row))?;
         if self.ended {
-            self.builder.finish()?;
+            self.finish()?;
         }
         let derived = || LaneMarkings::from_tracks(self.builder.ready().map(|track| &track.trajectory));
         self.markings = self.source.info().markings.unwrap_or_else(derived);
+        Ok(())
+    }
+
+    /// Completes all tracks, and checks that they are tracks and not shreds of them.
+    fn finish(&mut self) -> Result<(), ReadError> {
+        self.builder.finish()?;
+        let Continuity { vehicles, pieces, .. } = self.continuity();
+        let piece_s = self.rows as f64 * self.period.s() / pieces as f64;
+        if pieces > SHREDS_PER_VEHICLE * vehicles && piece_s < SHRED_S {
+            return Err(ReadError::of_file(TrajectoryFileProblem::Shreds { vehicles, pieces, piece_s }));
+        }
         Ok(())
     }
 

@@ -23,6 +23,7 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
         "lane_width_m": tracks.markings().typical_lane_width_m(),
         "ignored_markings": tracks.markings().ignored(),
         "unknown_classes": tracks.unknown_classes(),
+        "continuity": tracks.continuity(),
         "flaws": inspector.flaws(),
         "overlaps_unchecked_instants": inspector.unchecked_points(),
         "dropped": tracks.dropped(),

@@ -36,6 +36,9 @@ impl fmt::Display for QualityText<'_> {
                 }
             }
         }
+        for warning in tracks.continuity().warnings() {
+            writeln!(f, "  warning: {warning}")?;
+        }
         let markings = tracks.markings();
         writeln!(f, "  lanes {:.2} m wide", markings.typical_lane_width_m())?;
         for ignored in markings.ignored() {

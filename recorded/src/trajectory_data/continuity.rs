@@ -1,0 +1,158 @@
+//! What makes one track of the rows of a vehicle: the clock of the file, gaps that are bridged, jumps at which it is split.
+//!
+//! | between two rows of a vehicle | becomes |
+//! |---|---|
+//! | the next frame | two points of one track |
+//! | missing frames, for at most [`LONGEST_BRIDGE`] | interpolated points in between, which are counted |
+//! | missing frames for longer | two tracks |
+//! | a movement that no vehicle makes: a number that was given to another vehicle | two tracks; the jump is counted |
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::Time;
+use serde::Serialize;
+
+use super::data::MarkingDistances;
+use super::source::Row;
+
+/// Longest time that is missing between two rows of one track. A car crosses a marking in a few times as long.
+pub(super) const LONGEST_BRIDGE: Time = Time::from_ms(500);
+
+/// Speed beyond the recorded one by which a step along the road is a jump (m/s). No vehicle is so fast within one step;
+/// errors of NGSIM's positions stay below it.
+const JUMP_ALONG_MPS: f64 = 30.0;
+/// Smallest jump along the road (m): less than the length of a car, so that two cars in one lane are further apart.
+const JUMP_ALONG_M: f64 = 3.5;
+/// Lateral speed of a jump (m/s). Lane changes stay below 2 m/s.
+const JUMP_ACROSS_MPS: f64 = 8.0;
+/// Smallest jump across the road (m): half a narrow lane, so that two vehicles side by side are further apart.
+const JUMP_ACROSS_M: f64 = 1.5;
+
+/// The steps of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FrameClock {
+    /// Time between two rows of one vehicle.
+    pub(super) period: Time,
+    /// Difference of their frame numbers: 2 in a file with every second frame.
+    pub(super) frames: i64,
+}
+
+impl FrameClock {
+    /// Creates the clock of a file with every frame.
+    pub(super) fn every_frame(period: Time) -> Self {
+        Self { period, frames: 1 }
+    }
+
+    /// Returns the clock of `rows`, whose frames follow one another after `frame_period`.
+    pub(super) fn of_rows(rows: &[Row], frame_period: Time) -> Self {
+        let frames = usual_step(rows);
+        Self { period: frame_period * frames, frames }
+    }
+
+    /// Returns the latest time at which a track goes on that has its last row at `last`.
+    pub(super) fn bridged_until(self, last: Time) -> Time {
+        last + self.period + LONGEST_BRIDGE.max(Time::from_ns(self.period.ns() / 2))
+    }
+}
+
+/// Returns the most frequent difference between the frame numbers of two successive rows of a vehicle, 1 if no vehicle has two.
+fn usual_step(rows: &[Row]) -> i64 {
+    let mut frames: Vec<(u64, Time, i64)> = rows.iter().map(|row| (row.number, row.origin, row.frame)).collect();
+    frames.sort_unstable();
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    for pair in frames.windows(2) {
+        if (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1) && pair[1].2 > pair[0].2 {
+            *counts.entry(pair[1].2 - pair[0].2).or_default() += 1;
+        }
+    }
+    // Of equally frequent steps, the smallest.
+    counts.into_iter().rev().max_by_key(|(_, count)| *count).map_or(1, |(step, _)| step)
+}
+
+/// How the rows of a file became tracks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Continuity {
+    /// Vehicles, by their numbers in the file.
+    pub vehicles: u64,
+    /// Tracks: the vehicles, and the further pieces of those that were split.
+    pub pieces: u64,
+    /// Gaps that were bridged.
+    pub bridged_gaps: u64,
+    /// Frames that were interpolated in them.
+    pub bridged_frames: u64,
+    /// Movements that no vehicle makes, at each of which a track was split.
+    pub jumps: u64,
+}
+
+impl Continuity {
+    /// Returns what a reader of results has to know of it.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let split = self.pieces - self.vehicles;
+        if 10 * split > self.vehicles {
+            warnings.push(format!(
+                "{} vehicles are recorded in {} pieces: a lane change that touches an end of a piece is incomplete",
+                self.vehicles, self.pieces
+            ));
+        }
+        if self.jumps > 0 {
+            warnings.push(format!(
+                "{} jumps that no vehicle makes, at each of which the track was split: a number may belong to several vehicles",
+                self.jumps
+            ));
+        }
+        if self.bridged_gaps > 0 {
+            warnings.push(format!(
+                "{} gaps of at most {} s were bridged by {} interpolated frames",
+                self.bridged_gaps,
+                LONGEST_BRIDGE.s(),
+                self.bridged_frames
+            ));
+        }
+        warnings
+    }
+}
+
+/// Returns true if no vehicle moves as from `before` to the later `row`.
+pub(super) fn is_jump(before: &Row, row: &Row) -> bool {
+    let step_s = (row.time - before.time).s();
+    let along_m = row.s_m - before.s_m - 0.5 * (before.speed_mps + row.speed_mps) * step_s;
+    let exceeds = |off_m: f64, mps: f64, least_m: f64| !(off_m.abs() <= (mps * step_s).max(least_m));
+    exceeds(along_m, JUMP_ALONG_MPS, JUMP_ALONG_M) || exceeds(row.d_m - before.d_m, JUMP_ACROSS_MPS, JUMP_ACROSS_M)
+}
+
+/// Returns the rows that are missing between two rows of a vehicle, or `None` if the gap is too long to be bridged.
+///
+/// The position along the road follows the cubic polynomial with the recorded positions and speeds at both ends. All else is
+/// linear. A frame has the lane of the nearer row.
+pub(super) fn bridge(before: &Row, row: &Row, clock: FrameClock) -> Option<Vec<Row>> {
+    let step = row.time - before.time;
+    if step > LONGEST_BRIDGE + clock.period {
+        return None;
+    }
+    let steps = (step.ns() + clock.period.ns() / 2) / clock.period.ns();
+    let missing = |k: i64| {
+        let share = k as f64 / steps as f64;
+        let mix = |from: f64, to: f64| from + share * (to - from);
+        let cubic = {
+            let (one, two) = (1.0 - share, share);
+            let from_m = (1.0 + 2.0 * two) * before.s_m + two * step.s() * before.speed_mps;
+            let to_m = (1.0 + 2.0 * one) * row.s_m - one * step.s() * row.speed_mps;
+            one * one * from_m + two * two * to_m
+        };
+        let nearer = if 2 * k <= steps { before } else { row };
+        Row {
+            frame: before.frame + k * clock.frames,
+            time: before.time + clock.period * k,
+            s_m: cubic,
+            d_m: mix(before.d_m, row.d_m),
+            lane: nearer.lane,
+            speed_mps: mix(before.speed_mps, row.speed_mps),
+            acceleration_mps2: before.acceleration_mps2.zip(row.acceleration_mps2).map(|(from, to)| mix(from, to)),
+            marking_distances: MarkingDistances::default(),
+            line: row.line,
+            ..*before
+        }
+    };
+    Some((1..steps).map(missing).collect())
+}
