@@ -2,6 +2,8 @@
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 
+use closecall_traffic::Time;
+
 use crate::scenario::MisState;
 
 /// An ego stack whose margin increase system does not drive in some of its states: there, cruise control and emergency
@@ -27,5 +29,9 @@ impl EgoController for Suppressed {
             return Ok(command);
         }
         Ok(EgoCommand { acceleration_mps2: plain.acceleration_mps2, ..command })
+    }
+
+    fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
+        self.stack.finish(time)
     }
 }

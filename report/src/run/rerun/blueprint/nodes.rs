@@ -8,10 +8,10 @@ use rerun::datatypes::Uuid;
 use rerun::{AsComponents, EntityPath, TimeColumn};
 
 use super::super::RecordingError;
-use super::super::recording::Recording;
 use super::super::parts::{
     ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
+use super::super::recording::Recording;
 
 /// The timeline on which the viewer reads a layout.
 const BLUEPRINT_TIMELINE: &str = "blueprint";
