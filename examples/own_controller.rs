@@ -90,7 +90,7 @@ pub(crate) fn against_cruise_control(
 ) -> Result<Counts, CampaignError> {
     let arms = vec![BuiltIn::Acc.factory(), tested].into_iter().map(|controller| Arm { controller, sensors: None });
     let sampling = Sampling { seed: 1, design: Design::Random, samples };
-    let work = Arc::new(Work { file, sampling, arms: arms.collect(), checks: CheckPlan::default() });
+    let work = Arc::new(Work { file, sampling, arms: arms.collect(), checks: CheckPlan::default(), retry_crashed: 0 });
     let jobs = available_parallelism().unwrap_or(std::num::NonZeroUsize::MIN);
     let workers = Workers { jobs, sample_timeout: SAMPLE_TIMEOUT };
     Ok(Campaign::new(vec![work], workers).count()?.total())

@@ -90,7 +90,7 @@ impl Baseline {
             .iter()
             .map(|scenario| (scenario.name.clone(), Collected::new(scenario.blake3.clone())))
             .collect();
-        for record in folder.records()? {
+        for record in folder.complete_records()? {
             let record = record?;
             if let (Some(scenario), Some(arm)) = (collected.get_mut(&record.scenario), record.arms.last()) {
                 scenario.push(record.sample, arm);

@@ -238,7 +238,7 @@ pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioCompar
         difference,
     };
     let mut found: Vec<ScenarioComparison> = Vec::new();
-    let (mut earlier, mut later) = (baseline.records()?, current.records()?);
+    let (mut earlier, mut later) = (baseline.complete_records()?, current.complete_records()?);
     loop {
         let (before, after) = match (earlier.next().transpose()?, later.next().transpose()?) {
             (None, None) => return Ok(found),

@@ -145,7 +145,7 @@ mod tests {
 
     fn error(sample: u64) -> Record {
         let failure = SampleFailure { kind: "panic".to_owned(), message: "m".to_owned() };
-        let arm = ArmRecord { controller: "mis".to_owned(), result: Err(failure), checks: None };
+        let arm = ArmRecord::new("mis".to_owned(), Err(failure));
         Record { scenario: "s".to_owned(), sample, arms: vec![arm] }
     }
 

@@ -8,6 +8,7 @@ use closecall_traffic::atomic::WriteError;
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
 use super::host::refusal;
+use super::identity::of_work;
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
@@ -51,6 +52,8 @@ pub struct ResumeReport {
     pub damaged: Vec<TornLine>,
     /// Number of samples that had ended in an error, and were run again.
     pub retried: u64,
+    /// Number of lines that repeated the line before them, and were removed.
+    pub doubled: u64,
     /// Why the last records are not in the folder, if the campaign went on without it.
     pub lost: Option<WriteError>,
 }
@@ -66,7 +69,9 @@ impl ResumeReport {
         let torn = self.torn.iter().map(|TornLine { line, reason }| {
             format!("the journal was torn at line {line} ({reason}): the samples from there on were run again")
         });
-        damaged.chain(retried).chain(torn).collect()
+        let doubled = (self.doubled > 0)
+            .then(|| format!("{} lines of the journal that repeated the line before were removed", self.doubled));
+        damaged.chain(retried).chain(doubled).chain(torn).collect()
     }
 }
 
@@ -160,7 +165,7 @@ impl Campaign {
             judge.push(next.record);
             ControlFlow::Continue(())
         })?;
-        let judged = verdict::judge(&summary, &judge, gates.max_flip_rate);
+        let judged = verdict::judge(&summary, &judge, gates.into());
         Ok((summary, judged))
     }
 
@@ -195,8 +200,9 @@ impl Campaign {
         folder: Option<&LockedFolder>,
         mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<ResumeReport, CampaignError> {
-        let Repair { damaged, retried } = folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
-        let mut report = ResumeReport { torn: None, damaged, retried, lost: None };
+        let Repair { damaged, retried, doubled } =
+            folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
+        let mut report = ResumeReport { torn: None, damaged, retried, doubled, lost: None };
         if let Some(folder) = folder.filter(|folder| self.stop.is_set() && folder.journal_path().exists()) {
             // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
@@ -237,22 +243,28 @@ impl Campaign {
         let mut samples = self.works.first().map(|work| work.samples(self.partition));
         folder.resume(|record| {
             loop {
-                let Some(work) = self.works.get(position.work) else { return false };
+                let out_of_order = || {
+                    let (sample, scenario) = (record.sample, &record.scenario);
+                    format!("sample {sample} of `{scenario}` is not the next sample of the campaign")
+                };
+                let Some(work) = self.works.get(position.work) else { return Err(out_of_order()) };
                 match samples.as_mut().and_then(Iterator::next) {
                     Some(sample) => {
-                        let is_next = !position.is_over && is_of(record, work, sample);
-                        if is_next {
-                            position.done += 1;
-                            position.total += 1;
-                            let next = NextRecord { work: position.work, record, is_new: false, spent_s: [0.0; 2] };
-                            let end = on_record(next).break_value();
-                            position.is_over = end == Some(End::Campaign);
-                            if end == Some(End::Scenario) {
-                                (position.work, position.done) = (position.work + 1, 0);
-                                samples = self.works.get(position.work).map(|work| work.samples(self.partition));
-                            }
+                        let is_next = record.scenario == work.file.config().name && record.sample == sample;
+                        if position.is_over || !is_next {
+                            return Err(out_of_order());
                         }
-                        return is_next;
+                        of_work(work).check(record, sample)?;
+                        position.done += 1;
+                        position.total += 1;
+                        let next = NextRecord { work: position.work, record, is_new: false, spent_s: [0.0; 2] };
+                        let end = on_record(next).break_value();
+                        position.is_over = end == Some(End::Campaign);
+                        if end == Some(End::Scenario) {
+                            (position.work, position.done) = (position.work + 1, 0);
+                            samples = self.works.get(position.work).map(|work| work.samples(self.partition));
+                        }
+                        return Ok(());
                     }
                     None => {
                         (position.work, position.done) = (position.work + 1, 0);
@@ -339,13 +351,6 @@ struct Position {
     total: u64,
     /// True if `on_record` has ended the campaign.
     is_over: bool,
-}
-
-fn is_of(record: &Record, work: &Work, sample: u64) -> bool {
-    record.scenario == work.file.config().name
-        && record.sample == sample
-        && record.arms.len() == work.arms.len()
-        && record.arms.iter().zip(&work.arms).all(|(kept, arm)| kept.controller == arm.controller.name())
 }
 
 fn append(files: &mut ResumedFiles, index: u64, finished: &Finished) -> Result<(), WriteError> {

@@ -53,7 +53,7 @@ impl From<&FolderError> for FailureKind {
             | FolderError::OtherCampaign { .. }
             | FolderError::NotACampaign { .. }
             | FolderError::Foreign { .. } => Self::Usage,
-            FolderError::Content { .. } => Self::InvalidInput,
+            FolderError::Content { .. } | FolderError::Incomplete { .. } => Self::InvalidInput,
         }
     }
 }

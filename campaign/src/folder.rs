@@ -19,10 +19,12 @@ use std::path::{Path, PathBuf};
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
 
+use super::identity::JournalPlan;
 use super::journal::{self, Entry, Journal};
 use super::lock::{LOCK, Lock};
 use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::record::Record;
+use super::saved::SavedError;
 use super::wall_times::{self, WallTime, WallTimes};
 
 pub use crate::folder_error::FolderError;
@@ -61,6 +63,17 @@ pub const REPORT_FILES: [&str; 5] = [REPORT, "summary.md", "junit.xml", "outcome
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
+}
+
+/// How an outcome compares with that of the journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Agreement {
+    /// Every bit is the same.
+    Same,
+    /// Some bit differs, or the journal has an error.
+    Differs,
+    /// The journal has no result of this sample in this arm.
+    NotCompared,
 }
 
 /// A campaign's folder that this program has locked, so that it can run a campaign in it.
@@ -188,38 +201,53 @@ impl Folder {
         }
     }
 
-    /// Returns the records of the journal in their order. An unfinished last line is skipped.
+    /// Returns the records of the journal in their order. An unfinished last line is skipped, as a killed program leaves it.
     ///
     /// # Errors
-    /// [`FolderError`] if the journal cannot be opened. An item of the iterator is an error if its line is damaged or
-    /// cannot be read.
-    pub fn records(&self) -> Result<impl Iterator<Item = Result<Record, FolderError>> + use<>, FolderError> {
+    /// [`FolderError`] if the manifest cannot be read or the journal cannot be opened. An item of the iterator is an error if its line
+    /// is damaged, cannot be read, or is not the next one of the manifest's plan.
+    pub fn records(&self) -> Result<Records, FolderError> {
         let path = self.file(JOURNAL);
+        let plan = self.plan()?;
         let entries = journal::read(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
-        Ok(entries.filter_map(move |entry| match entry {
-            Ok(Entry::Record { record, .. }) => Some(Ok(*record)),
-            Ok(Entry::Torn { is_tail: true, .. }) => None,
-            Ok(Entry::Torn { line, reason: message, .. }) => {
-                Some(Err(FolderError::Content { path: path.clone(), line, message }))
-            }
-            Err(source) => Some(Err(FolderError::Read { path: path.clone(), source })),
-        }))
+        Ok(Records { path, plan, entries, line: 0, is_over: false, must_be_complete: false })
     }
 
-    /// Returns false if the journal has a result of this sample that differs in any bit. Returns true if it has none.
+    /// Returns the records of a journal that must be complete. A part of the samples says nothing about all of them.
     ///
     /// # Errors
-    /// [`FolderError`] if a line of the journal is damaged or cannot be read.
-    pub fn agrees_with(&self, outcome: &Outcome) -> Result<bool, FolderError> {
-        let Ok(records) = self.records() else { return Ok(true) };
-        for record in records {
-            let record = record?;
-            if record.scenario == outcome.scenario && record.sample == outcome.sample {
-                let same_arm = record.arms.iter().find(|arm| arm.controller == outcome.controller);
-                return Ok(same_arm.is_none_or(|arm| arm.result.as_ref().is_ok_and(|kept| kept.has_same_bits(outcome))));
-            }
+    /// As [`Self::records`]. The last item of the iterator is [`FolderError::Incomplete`] if samples of the plan are missing.
+    pub fn complete_records(&self) -> Result<Records, FolderError> {
+        Ok(Records { must_be_complete: true, ..self.records()? })
+    }
+
+    /// Returns the plan of the manifest, which the journal follows.
+    fn plan(&self) -> Result<JournalPlan, FolderError> {
+        let path = self.file(MANIFEST);
+        JournalPlan::new(&self.path, &self.manifest()?).map_err(|error| match error {
+            SavedError::Folder(error) => error,
+            other => FolderError::Content { path, line: 1, message: other.to_string() },
+        })
+    }
+
+    /// Returns how the journal's result of this sample compares with an outcome, to the last bit.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the journal cannot be read, or a line of it is damaged.
+    pub fn agreement(&self, outcome: &Outcome) -> Result<Agreement, FolderError> {
+        if !self.file(JOURNAL).exists() {
+            return Ok(Agreement::NotCompared);
         }
-        Ok(true)
+        for record in self.records()? {
+            let record = record?;
+            if record.scenario != outcome.scenario || record.sample != outcome.sample {
+                continue;
+            }
+            let Some(arm) = record.arms.iter().find(|arm| arm.controller == outcome.controller) else { break };
+            let is_same = arm.result.as_ref().is_ok_and(|kept| kept.has_same_bits(outcome));
+            return Ok(if is_same { Agreement::Same } else { Agreement::Differs });
+        }
+        Ok(Agreement::NotCompared)
     }
 
     /// Returns the wall time of each sample, in the order of the plan.
@@ -229,6 +257,49 @@ impl Folder {
     pub fn wall_times(&self) -> Result<impl Iterator<Item = WallTime> + use<>, FolderError> {
         let path = self.file(WALL_TIMES);
         wall_times::read(&path).map_err(|source| FolderError::Read { path, source })
+    }
+}
+
+/// The records of a journal, each checked against the plan of the manifest. See [`Folder::records`].
+pub struct Records {
+    path: PathBuf,
+    plan: JournalPlan,
+    entries: journal::Entries,
+    /// Number of lines that have been read.
+    line: usize,
+    is_over: bool,
+    must_be_complete: bool,
+}
+
+impl Records {
+    fn content(&self, line: usize, message: String) -> FolderError {
+        FolderError::Content { path: self.path.clone(), line, message }
+    }
+}
+
+impl Iterator for Records {
+    type Item = Result<Record, FolderError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over {
+            return None;
+        }
+        let item = match self.entries.next() {
+            Some(Ok(Entry::Record { record, .. })) => {
+                self.line += 1;
+                Some(self.plan.check(&record).map(|()| *record).map_err(|message| self.content(self.line, message)))
+            }
+            Some(Ok(Entry::Torn { line, reason, is_tail: false })) => Some(Err(self.content(line, reason))),
+            Some(Err(source)) => Some(Err(FolderError::Read { path: self.path.clone(), source })),
+            None | Some(Ok(Entry::Torn { is_tail: true, .. })) => {
+                let (has, missing) = (self.line as u64, self.plan.missing());
+                let is_missing = self.must_be_complete && missing > 0;
+                is_missing.then(|| Err(FolderError::Incomplete { path: self.path.clone(), has, of: has + missing }))
+            }
+        };
+        // What follows a wrong line cannot be trusted.
+        self.is_over = !matches!(item, Some(Ok(_)));
+        item
     }
 }
 
@@ -243,30 +314,25 @@ impl LockedFolder {
         self.folder.file(WALL_TIMES)
     }
 
-    /// Hands each existing record to `is_expected`, and opens the journal for appending behind the last one. A torn
+    /// Hands each existing record to `check`, and opens the journal for appending behind the last one. A torn
     /// line is cut off together with everything after it: those samples run again.
     ///
-    /// `is_expected` returns true if the record is the next one in the plan.
+    /// `check` returns an error, in words, if the record is not the next one in the plan.
     ///
     /// # Errors
-    /// [`FolderError::Content`] if `is_expected` returns false for a record; the journal is then unchanged. Other
-    /// [`FolderError`]s if a file cannot be read or written.
-    pub fn resume(&self, mut is_expected: impl FnMut(&Record) -> bool) -> Result<ResumedFiles, FolderError> {
+    /// [`FolderError::Content`] if `check` refuses a record; the journal is then unchanged. Other [`FolderError`]s if a file cannot be
+    /// read or written.
+    pub fn resume(&self, mut check: impl FnMut(&Record) -> Result<(), String>) -> Result<ResumedFiles, FolderError> {
         let path = self.folder.file(JOURNAL);
         let (mut kept_bytes, mut kept_records, mut torn) = (0, 0_u64, None);
         if path.exists() {
             let fail = |source| FolderError::Read { path: path.clone(), source };
             for (index, entry) in journal::read(&path).map_err(fail)?.enumerate() {
                 match entry.map_err(fail)? {
-                    Entry::Record { record, end } if is_expected(&record) => {
+                    Entry::Record { record, end } => {
+                        let wrong = |message| FolderError::Content { path: path.clone(), line: index + 1, message };
+                        check(&record).map_err(wrong)?;
                         (kept_bytes, kept_records) = (end, kept_records + 1);
-                    }
-                    Entry::Record { record, .. } => {
-                        let message = format!(
-                            "sample {} of `{}` is not the next sample of the campaign",
-                            record.sample, record.scenario
-                        );
-                        return Err(FolderError::Content { path: path.clone(), line: index + 1, message });
                     }
                     Entry::Torn { line, reason, .. } => torn = Some(TornLine { line, reason }),
                 }

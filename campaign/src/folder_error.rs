@@ -62,6 +62,20 @@ pub enum FolderError {
         /// The content of the lock file: the process that holds the lock.
         holder: String,
     },
+    /// Samples of the plan are missing in the journal.
+    #[error(
+        "failed to use {}: it has {has} of the {of} samples of its campaign, and a part of them says nothing about all; complete it with \
+         --resume",
+        path.display()
+    )]
+    Incomplete {
+        /// The journal.
+        path: PathBuf,
+        /// Number of samples that it has.
+        has: u64,
+        /// Number of samples of the plan.
+        of: u64,
+    },
     /// A file of the folder is damaged, or does not belong to the campaign.
     #[error("failed to read {}:{line}: {message}", path.display())]
     Content {

@@ -177,7 +177,7 @@ mod tests {
 
     fn record(sample: u64) -> Record {
         let failure = SampleFailure { kind: "panic".to_owned(), message: "a \"quoted\"\nline".to_owned() };
-        let arm = ArmRecord { controller: "mis".to_owned(), result: Err(failure), checks: None };
+        let arm = ArmRecord::new("mis".to_owned(), Err(failure));
         Record { scenario: "s".to_owned(), sample, arms: vec![arm] }
     }
 

@@ -63,6 +63,8 @@ pub struct ArmCounts {
     pub collisions: u64,
     /// Samples that ended in an error.
     pub errors: u64,
+    /// Samples with an outcome only because they were run again after their process had crashed or hung (`--retry-crashed`).
+    pub flaky: u64,
     /// Samples in which the margin increase system engages.
     pub engagements: u64,
     /// Engagements whose goal is in reach.
@@ -84,6 +86,8 @@ pub struct ArmCounts {
 pub struct Tally {
     /// Whether the ego collides, as judged; `None` if the sample ended in an error.
     pub collided: Option<bool>,
+    /// Whether it has an outcome only because it was run again after its process had crashed or hung.
+    pub flaky: bool,
     /// Whether two vehicles other than the ego collide with each other.
     pub others_collided: bool,
     /// Whether the margin increase system engages.
@@ -112,6 +116,7 @@ impl ArmCounts {
             }
             None => self.errors += 1,
         }
+        self.flaky += u64::from(tally.flaky);
         self.engagements += u64::from(tally.engaged);
         self.goals_in_reach += u64::from(tally.engaged && tally.goal_in_reach);
         self.unavailable += u64::from(tally.unavailable);
@@ -126,6 +131,7 @@ impl ArmCounts {
         self.outcomes += other.outcomes;
         self.collisions += other.collisions;
         self.errors += other.errors;
+        self.flaky += other.flaky;
         self.engagements += other.engagements;
         self.goals_in_reach += other.goals_in_reach;
         self.unavailable += other.unavailable;

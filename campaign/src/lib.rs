@@ -30,6 +30,7 @@ mod folder_error;
 pub mod frontier;
 pub mod gate;
 pub mod host;
+mod identity;
 pub mod inputs;
 pub mod interrupt;
 pub mod journal;

@@ -145,6 +145,9 @@ pub struct Manifest {
     pub models: Vec<ManifestModel>,
     /// Longest wall time of a sample in one arm (s).
     pub sample_timeout_s: f64,
+    /// How often a sample runs again in a new process after its worker process has crashed or hung.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub retry_crashed: u32,
     /// What identifies the controllers that run as processes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub controllers: Vec<Fingerprint>,
@@ -159,6 +162,11 @@ pub struct Manifest {
     pub replaceable: bool,
     /// The command line.
     pub command: Vec<String>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+const fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// Keys of a manifest that do not affect the outcomes, or whose differences are worded elsewhere.
@@ -186,8 +194,8 @@ impl Manifest {
         texts.iter().filter_map(|text| text.parse().ok()).collect()
     }
 
-    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, whether it named a folder, the paths of the
-    /// scenario files, the partition, and the build of the program. It is the same for a campaign that ran in one go,
+    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, whether it named a folder, the working
+    /// folder, the paths of the scenario files, the partition, and the build of the program. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {
         let mut whole = self.whole();
@@ -195,7 +203,7 @@ impl Manifest {
             whole.closecall_version.truncate(end);
         }
         let mut value = serde_json::to_value(whole).ok()?;
-        for name in ["command", "replaceable"] {
+        for name in ["command", "replaceable", "working_folder"] {
             value.as_object_mut()?.remove(name);
         }
         for scenario in value.get_mut("scenarios")?.as_array_mut()? {
@@ -317,6 +325,7 @@ mod tests {
             sample_timeout_s: 300.0,
             controllers: Vec::new(),
             working_folder: None,
+            retry_crashed: 0,
             without_effect: Vec::new(),
             replaceable: false,
             command: vec!["closecall".to_owned()],

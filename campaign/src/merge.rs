@@ -172,7 +172,7 @@ impl Parts {
     /// [`MergeError`] if a part cannot be read, or if the new folder cannot be written or is not new.
     pub fn merge(&self, works: &[Arc<Work>], out: &Path, command: Vec<String>) -> Result<LockedFolder, MergeError> {
         let merged = Folder::lock(out, &Manifest { command, ..self.manifest.clone() }, false)?;
-        let mut files = merged.resume(|_| false)?;
+        let mut files = merged.resume(|_| Err("the folder of the merged campaign holds results already".to_owned()))?;
         let mut readers = Vec::with_capacity(self.folders.len());
         for (part, folder) in &self.folders {
             readers.push((*part, Reader { records: folder.records()?, times: folder.wall_times()?.peekable() }));

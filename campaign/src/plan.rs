@@ -72,6 +72,8 @@ pub struct Plan {
     pub inference: Inference,
     /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
+    /// How often a sample runs again in a new process after its worker process has crashed or hung.
+    pub retry_crashed: u32,
     /// Scenarios and members of a driver ensemble that are not run, because the member changes nothing in the scenario.
     pub without_effect: Vec<(String, String)>,
 }
@@ -125,6 +127,7 @@ impl Plan {
             checks: CheckPlan::default(),
             inference: Inference::default(),
             workers: Workers::default(),
+            retry_crashed: 0,
             without_effect: Vec::new(),
         })
     }
@@ -146,8 +149,10 @@ impl Plan {
         let controllers = ControllerChoice::factories(&self.controllers, None);
         let arms: Vec<Arm> =
             controllers.into_iter().map(|controller| Arm { controller, sensors: self.sensors }).collect();
-        let (sampling, checks) = (self.sampling, self.checks);
-        let work = |file: &ScenarioFile| Arc::new(Work { file: file.clone(), sampling, arms: arms.clone(), checks });
+        let (sampling, checks, retry_crashed) = (self.sampling, self.checks, self.retry_crashed);
+        let work = |file: &ScenarioFile| {
+            Arc::new(Work { file: file.clone(), sampling, arms: arms.clone(), checks, retry_crashed })
+        };
         Campaign {
             works: self.scenarios.iter().map(work).collect(),
             partition: self.partition,
@@ -233,6 +238,7 @@ impl Plan {
             controllers: self.fingerprints(folder),
             working_folder: std::env::current_dir().ok(),
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
+            retry_crashed: self.retry_crashed,
             without_effect: self.without_effect.clone(),
             replaceable: false,
             command,

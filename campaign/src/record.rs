@@ -23,6 +23,15 @@ impl From<SampleError> for SampleFailure {
     }
 }
 
+/// What happened before the run of a sample that has been run again because its process crashed or hung.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Flaky {
+    /// Number of runs that crashed or hung.
+    pub crashes: u32,
+    /// The first failure.
+    pub first: SampleFailure,
+}
+
 /// The result of one sample in one arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArmRecord {
@@ -33,9 +42,24 @@ pub struct ArmRecord {
     /// The findings of the validity checks; `None` if this sample was not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checks: Option<ArmChecks>,
+    /// The crashes before this outcome, if it is that of a repeated run (`--retry-crashed`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flaky: Option<Flaky>,
 }
 
 impl ArmRecord {
+    /// Returns the result of a single run that was not checked.
+    pub const fn new(controller: String, result: Result<Outcome, SampleFailure>) -> Self {
+        Self { controller, result, checks: None, flaky: None }
+    }
+}
+
+impl ArmRecord {
+    /// Returns true if there is no outcome, or a check of the outcome took too long: another run may be complete.
+    pub fn is_incomplete(&self) -> bool {
+        self.result.is_err() || self.checks.as_ref().is_some_and(|checks| checks.not_checked.is_some())
+    }
+
     /// Returns what this arm contributes to the counts, before the validity checks are taken into account.
     pub fn tally(&self) -> Tally {
         match &self.result {
@@ -43,6 +67,7 @@ impl ArmRecord {
                 let mis = outcome.mis.as_ref().ok();
                 Tally {
                     collided: Some(outcome.ego_collided()),
+                    flaky: self.flaky.is_some(),
                     others_collided: outcome.others_collided(),
                     engaged: mis.is_some_and(|mis| mis.engaged_at_s.is_ok()),
                     goal_in_reach: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),

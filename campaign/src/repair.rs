@@ -15,7 +15,7 @@ use super::execution::{Campaign, CampaignError};
 use super::folder::{FolderError, LockedFolder, TornLine};
 use super::journal;
 use super::ledger::Inference;
-use super::record::Record;
+use super::record::{ArmRecord, Record};
 use super::wall_times;
 use super::workers::Finished;
 
@@ -26,6 +26,8 @@ pub(super) struct Repair {
     pub(super) damaged: Vec<TornLine>,
     /// Number of samples that had ended in an error, and were run again.
     pub(super) retried: u64,
+    /// Number of lines that repeated the line before them, and were removed.
+    pub(super) doubled: u64,
 }
 
 /// A sample: the index of its scenario in the campaign, and its number.
@@ -36,7 +38,7 @@ type Key = (usize, u64);
 struct Redo {
     bytes: Range<u64>,
     samples: Vec<Key>,
-    /// The damaged lines; empty if the part is an intact record of an error.
+    /// The damaged lines; empty if the part is an intact record of an error, or a repeated line.
     damaged: Vec<TornLine>,
 }
 
@@ -71,6 +73,7 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
     let of_error = complete.iter().filter(|redo| redo.damaged.is_empty());
     Ok(Repair {
         retried: of_error.map(|redo| redo.samples.len() as u64).sum(),
+        doubled: complete.iter().filter(|redo| redo.samples.is_empty() && redo.damaged.is_empty()).count() as u64,
         damaged: complete.iter().flat_map(|redo| redo.damaged.clone()).collect(),
     })
 }
@@ -79,9 +82,10 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
 /// left out: they are cut off when the journal is opened.
 fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
     let mut reader = BufReader::new(File::open(path)?);
-    let (mut redos, mut damaged, mut buffer) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut redos, mut damaged, mut buffer, mut before) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut last, mut end, mut damaged_from) = (None, 0, 0);
     for number in 1.. {
+        std::mem::swap(&mut buffer, &mut before);
         buffer.clear();
         let read = reader.read_until(b'\n', &mut buffer)? as u64;
         if read == 0 {
@@ -89,6 +93,10 @@ fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
         }
         let start = end;
         end += read;
+        if damaged.is_empty() && buffer == before {
+            redos.push(Redo { bytes: start..end, samples: Vec::new(), damaged: Vec::new() });
+            continue;
+        }
         let record = match journal::parse(&buffer) {
             Ok(record) => record,
             Err(reason) => {
@@ -104,7 +112,7 @@ fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
             let Some(samples) = between(campaign, last, key) else { break };
             redos.push(Redo { bytes: damaged_from..start, samples, damaged: std::mem::take(&mut damaged) });
         }
-        if campaign.retry_errors && record.arms.iter().any(|arm| arm.result.is_err()) {
+        if campaign.retry_errors && record.arms.iter().any(ArmRecord::is_incomplete) {
             redos.push(Redo { bytes: start..end, samples: vec![key], damaged: Vec::new() });
         }
         last = Some(key);

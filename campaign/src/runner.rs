@@ -13,7 +13,7 @@ use closecall_traffic::Check;
 use super::host;
 use super::partition::Partition;
 use super::record::{ArmRecord, SampleFailure};
-use super::validity::{CheckPlan, CheckedRun};
+use super::validity::{ArmChecks, CheckPlan, CheckedRun};
 use super::workers::Samples;
 
 /// How the samples of a campaign are drawn.
@@ -52,6 +52,9 @@ pub struct Work {
     pub arms: Vec<Arm>,
     /// The samples that are checked for validity.
     pub checks: CheckPlan,
+    /// How often a sample runs again in a new process after its worker process has crashed or hung. Its record then says that it is
+    /// flaky.
+    pub retry_crashed: u32,
 }
 
 impl fmt::Debug for Work {
@@ -85,20 +88,20 @@ impl Samples for Work {
     }
 
     /// Runs one sample in one arm, in a worker process if its controller is isolated, and checks it if the plan of the checks includes it.
-    fn run(&self, sample: u64, index: usize, limit: Duration) -> ArmRun {
+    fn run(&self, sample: u64, index: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let arm = &self.arms[index];
         if let Some(isolated) = arm.controller.isolated() {
             return host::run(self, (index, isolated), sample, limit);
         }
         let mut done = None;
-        arm.controller.in_thread(&mut || done = Some(self.run_here(sample, arm)));
-        done.unwrap_or_else(|| self.run_here(sample, arm))
+        arm.controller.in_thread(&mut || done = Some(self.run_here(sample, arm, on_outcome)));
+        done.unwrap_or_else(|| self.run_here(sample, arm, on_outcome))
     }
 }
 
 impl Work {
-    /// Runs one sample in one arm in this thread.
-    fn run_here(&self, sample: u64, arm: &Arm) -> ArmRun {
+    /// Runs one sample in one arm in this thread. `on_outcome` gets what is known before the checks, if there are any.
+    fn run_here(&self, sample: u64, arm: &Arm, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
         let scenario = guarded(|| concrete(&self.file, self.sampling, sample));
@@ -108,13 +111,14 @@ impl Work {
             Err(error) => Err((*error).clone()),
         };
         let wall_s = started.elapsed().as_secs_f64();
-        let checks = match (&run, &result) {
-            (Ok(run), Ok(outcome)) if self.checks.includes(key) => Some(run.check(outcome)),
-            _ => None,
-        };
-        let check_s = if checks.is_some() { started.elapsed().as_secs_f64() - wall_s } else { 0.0 };
-        let (controller, result) = (arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
-        ArmRun { record: ArmRecord { controller, result, checks }, wall_s, check_s }
+        let record = ArmRecord::new(arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
+        let mut done = ArmRun { record, wall_s, check_s: 0.0 };
+        if let (Ok(run), true, true) = (&run, done.record.result.is_ok(), self.checks.includes(key)) {
+            on_outcome(&done);
+            done.record.checks = done.record.result.as_ref().ok().map(|outcome| run.check(outcome));
+            done.check_s = started.elapsed().as_secs_f64() - wall_s;
+        }
+        done
     }
 }
 
@@ -126,6 +130,17 @@ pub(crate) struct ArmRun {
     pub(crate) wall_s: f64,
     /// Wall time of the validity checks (s).
     pub(crate) check_s: f64,
+}
+
+/// Takes the run of a sample that has its outcome, before its validity checks.
+pub(crate) type OnOutcome<'a> = dyn Fn(&ArmRun) + Sync + 'a;
+
+impl ArmRun {
+    /// Returns the run if its checks have no result, because of this error.
+    pub(crate) fn unchecked(mut self, error: &SampleError) -> Self {
+        self.record.checks = Some(ArmChecks { not_checked: Some(error.to_string()), ..ArmChecks::default() });
+        self
+    }
 }
 
 /// Returns the concrete scenario of one sample.

@@ -180,9 +180,18 @@ pub fn works(folder: &Path, manifest: &Manifest) -> Result<Vec<Arc<Work>>, Saved
     let arms = manifest.arms();
     let work = |scenario| {
         let file = scenario_file(folder, scenario)?;
-        Ok(Arc::new(Work { file, sampling: manifest.sampling, arms: arms.clone(), checks: manifest.checks }))
+        let (sampling, checks, retry_crashed) = (manifest.sampling, manifest.checks, manifest.retry_crashed);
+        Ok(Arc::new(Work { file, sampling, arms: arms.clone(), checks, retry_crashed }))
     };
     manifest.scenarios.iter().map(work).collect()
+}
+
+/// Returns the scenarios of a manifest. `folder` appears in messages only.
+///
+/// # Errors
+/// [`SavedError`] if a scenario of the manifest cannot be used.
+pub(crate) fn scenario_files(folder: &Path, manifest: &Manifest) -> Result<Vec<ScenarioFile>, SavedError> {
+    manifest.scenarios.iter().map(|scenario| scenario_file(folder, scenario)).collect()
 }
 
 fn scenario_file(folder: &Path, scenario: &ManifestScenario) -> Result<ScenarioFile, SavedError> {

@@ -76,6 +76,11 @@ impl Counts {
         self.repeated += other.repeated;
     }
 
+    /// Returns the number of samples, in any arm, that have an outcome only because they were run again.
+    pub fn flaky(&self) -> u64 {
+        self.arms.iter().map(|arm| arm.flaky).sum()
+    }
+
     /// Returns the number of errors, in any arm.
     pub fn errors(&self) -> u64 {
         self.arms.iter().map(|arm| arm.errors).sum()

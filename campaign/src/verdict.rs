@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | a sample ended in an error | [`Decision::SampleError`] | ERROR | 5 |
 //! | a validity check failed, or what a scenario expects did not happen | [`Decision::Invalid`] | INVALID | 7 |
-//! | a gate or the check of a requirement is not met | [`Decision::Fail`] | FAIL | 1 |
+//! | a gate or the check of a requirement is not met, or more samples are flaky than allowed | [`Decision::Fail`] | FAIL | 1 |
 //! | the samples do not decide a gate | [`Decision::Inconclusive`] | INCONCLUSIVE | 4 |
 //! | no gate and no requirement was checked | [`Decision::NotJudged`] | NOT JUDGED | 4 |
 //! | every gate that was checked is met | [`Decision::Pass`] | PASS | 0 |
@@ -18,7 +18,7 @@ use std::fmt;
 use closecall_traffic::statistics::format::percent;
 use serde::Serialize;
 
-use super::gate::{ExpectationResult, GateResult, GateSource, Judge, RequirementResult, Standing};
+use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
 use super::probability::{Answer, Finding};
 use super::summary::Summary;
 use super::validity::CheckCounts;
@@ -130,6 +130,8 @@ pub struct Judgement {
     pub expectations: Vec<ExpectationResult>,
     /// What the samples of each scenario say about the probability of a collision, if that was asked.
     pub probabilities: Vec<(String, Finding)>,
+    /// The gate on the number of flaky samples, if there is one.
+    pub flaky: Option<FlakyGate>,
 }
 
 impl Judgement {
@@ -144,9 +146,52 @@ impl Judgement {
     }
 }
 
-/// Judges a campaign by the evidence that a judge has gathered. `max_flip_rate` is the share of checked verdicts that may
-/// flip at half the time step.
-pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement {
+/// What a campaign may have and still be believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allowed {
+    /// Share of checked verdicts that may flip at half the time step.
+    pub max_flip_rate: f64,
+    /// Most flaky samples; any number if `None`.
+    pub max_flaky: Option<u64>,
+}
+
+impl Default for Allowed {
+    fn default() -> Self {
+        Self { max_flip_rate: MAX_FLIP_RATE, max_flaky: None }
+    }
+}
+
+impl From<&GateSet> for Allowed {
+    fn from(gates: &GateSet) -> Self {
+        Self { max_flip_rate: gates.max_flip_rate, max_flaky: gates.max_flaky }
+    }
+}
+
+/// The number of flaky samples, and the gate on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct FlakyGate {
+    /// Samples with an outcome only because they were run again after their process had crashed or hung.
+    pub flaky: u64,
+    /// Most such samples.
+    pub max: u64,
+}
+
+impl FlakyGate {
+    /// Returns true if there are no more than allowed.
+    pub const fn is_met(self) -> bool {
+        self.flaky <= self.max
+    }
+}
+
+impl fmt::Display for FlakyGate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { flaky, max } = self;
+        write!(f, "flaky samples: {flaky}, at most {max} allowed (--max-flaky)")
+    }
+}
+
+/// Judges a campaign by the evidence that a judge has gathered.
+pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let mut found = Found::default();
     let total = summary.total();
     if total.errors() > 0 {
@@ -155,7 +200,8 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
     if summary.is_unchecked {
         found.note("the validity of the simulator was not checked: the checks were switched off".to_owned());
     }
-    judge_validity(&total.checks, max_flip_rate, &mut found);
+    let flaky = judge_flaky(total.flaky(), allowed.max_flaky, &mut found);
+    judge_validity(&total.checks, allowed.max_flip_rate, &mut found);
     let expectations = judge_expectations(judge, &mut found);
     judge_samples(summary, judge, &mut found);
     let probabilities = judge_probabilities(summary, judge, &mut found);
@@ -192,7 +238,7 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
         }
         Decision::first_of(&found.decisions).unwrap_or(Decision::Pass)
     };
-    Judgement { decision, reasons: found.reasons, gates, requirements, expectations, probabilities }
+    Judgement { decision, reasons: found.reasons, gates, requirements, expectations, probabilities, flaky }
 }
 
 /// Returns the subjects of the gates that somebody set and that no scenario decides: there is no sample in which they have a
@@ -214,7 +260,34 @@ fn is_judged(gates: &[GateResult]) -> bool {
         || (!checks.is_empty() && checks.iter().all(|gate| gate.standing() != Standing::NotChecked))
 }
 
+fn judge_flaky(flaky: u64, max: Option<u64>, found: &mut Found) -> Option<FlakyGate> {
+    let Some(gate) = max.map(|max| FlakyGate { flaky, max }) else {
+        if flaky > 0 {
+            found.note(format!("flaky: {} succeeded only in another process", samples(flaky)));
+        }
+        return None;
+    };
+    if gate.is_met() {
+        // Nothing was run again: there is nothing to say.
+        if flaky > 0 {
+            found.note(gate.to_string());
+        }
+    } else {
+        found.add(Decision::Fail, gate.to_string());
+    }
+    Some(gate)
+}
+
 fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, found: &mut Found) {
+    if checks.not_checked > 0 {
+        let sentence = format!(
+            "not checked: {} of {} runs that were chosen for the validity checks, because a check took too long (--retry-errors runs \
+             them again)",
+            checks.not_checked,
+            checks.not_checked + checks.runs
+        );
+        if checks.runs == 0 { found.add(Decision::Inconclusive, sentence) } else { found.note(sentence) }
+    }
     for (check, count) in checks.broken() {
         found.add(Decision::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
     }

@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 use closecall_simulation::{Arm, SampleError};
 
 use super::record::{ArmRecord, Record, SampleFailure};
-use super::runner::{ArmRun, Work};
+use super::runner::{ArmRun, OnOutcome, Work};
 use super::stop::StopFlag;
 
 /// Number of runs, for each worker, that may be ahead of the last result returned.
@@ -87,8 +87,9 @@ pub(crate) trait Samples: Send + Sync + 'static {
     fn scenario(&self) -> &str;
     /// Returns the arms in which each sample runs.
     fn arms(&self) -> &[Arm];
-    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it any more.
-    fn run(&self, sample: u64, arm: usize, limit: Duration) -> ArmRun;
+    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it any more. `on_outcome` gets the run
+    /// before its validity checks, if it is checked in this process.
+    fn run(&self, sample: u64, arm: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun;
 }
 
 impl Workers {
@@ -137,9 +138,17 @@ struct Done {
     run: ArmRun,
 }
 
-/// The job of a worker and its start time. Whichever empties the slot reports the job: the worker that has finished it,
-/// or the watch that has found it late.
-type Slot = Arc<Mutex<Option<(Job, Instant)>>>;
+/// The job of a worker. Whichever empties the slot reports the job: the worker that has finished it, or the watch that has found it
+/// late.
+type Slot = Arc<Mutex<Option<Running>>>;
+
+/// A job that a worker runs.
+struct Running {
+    job: Job,
+    started: Instant,
+    /// The run, once only its validity checks are left.
+    outcome: Option<ArmRun>,
+}
 
 /// Locks a mutex, poisoned or not: panics of the simulation are caught inside the run, when no lock is held.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -240,8 +249,14 @@ impl<S: Samples> WorkerPool<S> {
                 if stop.is_set() {
                     return;
                 }
-                *lock(&own_slot) = Some((job, Instant::now()));
-                let run = work.run(job.sample, job.arm, limit);
+                *lock(&own_slot) = Some(Running { job, started: Instant::now(), outcome: None });
+                let keep = |run: &ArmRun| {
+                    // The slot is empty once the job has been found late.
+                    if let Some(running) = &mut *lock(&own_slot) {
+                        running.outcome = Some(run.clone());
+                    }
+                };
+                let run = work.run(job.sample, job.arm, limit, &keep);
                 let is_abandoned = lock(&own_slot).take().is_none();
                 let done = Done { index: job.index, sample: job.sample, run };
                 if is_abandoned || result_sender.send(done).is_err() {
@@ -293,12 +308,20 @@ impl<S: Samples> WorkerPool<S> {
     fn abandon_late_runs(&mut self, done: &mut Vec<Done>) -> Result<(), WorkersError> {
         let limit = self.workers.sample_timeout;
         for index in 0..self.slots.len() {
-            let late = lock(&self.slots[index]).take_if(|(_, started)| started.elapsed() >= limit);
-            if let Some((job, started)) = late {
-                let failure = SampleFailure::from(SampleError::Timeout { limit_s: limit.as_secs_f64() });
-                let controller = self.work.arms()[job.arm].controller.name().to_owned();
-                let record = ArmRecord { controller, result: Err(failure), checks: None };
-                let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 };
+            let late = lock(&self.slots[index]).take_if(|running| running.started.elapsed() >= limit);
+            if let Some(Running { job, started, outcome }) = late {
+                let error = SampleError::Timeout { limit_s: limit.as_secs_f64() };
+                let run = match outcome {
+                    // The sample has its outcome: the time is over for its checks.
+                    Some(run) => {
+                        ArmRun { check_s: started.elapsed().as_secs_f64() - run.wall_s, ..run.unchecked(&error) }
+                    }
+                    None => {
+                        let controller = self.work.arms()[job.arm].controller.name().to_owned();
+                        let record = ArmRecord::new(controller, Err(SampleFailure::from(error)));
+                        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
+                    }
+                };
                 done.push(Done { index: job.index, sample: job.sample, run });
                 self.slots[index] = self.spawn()?;
             }

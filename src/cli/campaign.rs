@@ -19,7 +19,7 @@ use closecall_campaign::session;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::wall_times::check_share;
 use closecall_campaign::workers::Workers;
-use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
+use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
 use closecall_report::heartbeat::Heartbeat;
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
@@ -37,7 +37,7 @@ use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{heartbeat, out, outln, print_error};
 use super::plan::PlanArgs;
-use super::results::{Place, Results, ResultsArgs, print_results, selection};
+use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -76,8 +76,14 @@ pub(super) struct CampaignArgs {
     /// Longest wall time of a sample with one controller; a sample that takes longer ends in an error
     #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive, help_heading = heading::EXECUTION)]
     sample_timeout_s: f64,
+    /// Run a sample up to N times more in a new process if the process of its library, FMU or Python controller crashes or hangs.
+    /// A sample that succeeds only so is FLAKY: it is counted and listed, see --max-flaky
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100), help_heading = heading::EXECUTION)]
+    retry_crashed: u32,
     #[command(flatten)]
     results: ResultsArgs,
+    #[command(flatten)]
+    artifacts: ArtifactArgs,
     /// With --out: run only part I of N of the samples; `closecall tool merge` merges the parts
     #[arg(long, value_name = "I/N", requires = "out", help_heading = heading::EXECUTION)]
     partition: Option<Partition>,
@@ -122,6 +128,7 @@ impl CampaignArgs {
         plan.checks = self.plan.checks()?;
         plan.inference = self.plan.inference();
         plan.workers = self.workers()?;
+        plan.retry_crashed = self.retry_crashed;
         Ok(plan)
     }
 }
@@ -129,7 +136,8 @@ impl CampaignArgs {
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let controllers = args.comparison.controllers(&args.controller, args.plan.wants_pairs())?;
     let is_paired = controllers.len() > 1;
-    let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
+    let mut gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
+    gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
     let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
     check_cameras(plan.mask_rcnn_cameras())?;
@@ -163,17 +171,6 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let judged = tally.judgement();
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
-    // A full disk costs the reports, and not the verdict.
-    let recorded = match results.complete() {
-        Some(folder) => {
-            let written = report.write(folder, selection(args.record));
-            results.reported(written)
-        }
-        None => {
-            report.write_without_folder()?;
-            None
-        }
-    };
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, Some(wall_s))),
         Format::Human => {
@@ -182,13 +179,20 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
             let checks = check_share(progress.spent_s);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
             out!("{}", ensemble_text(&tally.summary, &manifest));
+            out!("{}", FlakyText(&tally.overview));
             out!("{}", VerdictText(&judged));
         }
     }
-    if let (Some(folder), Some(recorded)) = (results.complete(), recorded) {
-        print_results(folder, &recorded);
+    // A report that cannot be written does not cost the verdict.
+    let written = match results.complete() {
+        Some(folder) => report.write(folder, selection(args.record)),
+        None => report.write_without_folder(),
+    };
+    let code = args.artifacts.code((&judged).into(), &written);
+    if let Some(folder) = results.complete() {
+        print_results(folder, &written.recorded);
     }
-    results.into_lost().map_or(Ok(ExitCode::from(&judged)), Err)
+    results.into_lost().map_or(Ok(code), Err)
 }
 
 /// Counts the records of a running campaign, shows the progress, and applies the stop rule.

@@ -76,10 +76,6 @@ pub enum CliError {
     )]
     #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
     ResultsCut(WriteError),
-    /// The reports cannot be written into the default folder of a campaign's results.
-    #[error("{0}\nthe verdict counts every sample; when there is room again, --resume writes the reports")]
-    #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
-    ResultsReport(ReportError),
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -237,7 +233,6 @@ impl From<&CliError> for ExitCode {
             CliError::Sensors(error) => error.kind().into(),
             CliError::Write(_)
             | CliError::ResultsCut(_)
-            | CliError::ResultsReport(_)
             | CliError::Chart(_)
             | CliError::Record(_)
             | CliError::View(ViewError::Read { .. } | ViewError::Viewer(_) | ViewError::Browser { .. })

@@ -20,7 +20,7 @@ pub(super) struct GateArgs {
     require: Vec<Expression>,
     /// Measure only: no gate is judged, and there is no verdict
     #[arg(long, conflicts_with_all = ["require", "max_collisions", "max_other_collisions", "max_probability", "max_induced",
-        "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk"], help_heading = heading::GATES)]
+        "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk", "max_flaky"], help_heading = heading::GATES)]
     no_gate: bool,
     /// Fail if the ego collides in more than K samples
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
@@ -60,6 +60,10 @@ pub(super) struct GateArgs {
     /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at half the time step
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE, help_heading = heading::GATES)]
     max_flip_rate: f64,
+    /// Fail if more than K samples are flaky: they crashed or hung, and have an outcome only because of --retry-crashed
+    /// [default: any number; 0 with --preset]
+    #[arg(long, value_name = "K", help_heading = heading::GATES)]
+    max_flaky: Option<u64>,
 }
 
 impl GateArgs {
@@ -71,7 +75,12 @@ impl GateArgs {
         design: Design,
         preset: Option<PresetGates>,
     ) -> Result<GateSet, CliError> {
-        let mut set = GateSet { is_measurement: self.no_gate, max_flip_rate: self.max_flip_rate, ..GateSet::default() };
+        let mut set = GateSet {
+            is_measurement: self.no_gate,
+            max_flip_rate: self.max_flip_rate,
+            max_flaky: self.max_flaky,
+            ..GateSet::default()
+        };
         set.probability = self.probability()?.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
         set.assemble(self.criteria()?, preset, is_paired, design).map_err(|error| match error {
             AssemblyError::Project(error) => error.into(),

@@ -7,7 +7,7 @@ use closecall_campaign::merge::Parts;
 use closecall_campaign::saved::{SavedCampaign, works};
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
-use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
+use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
 use closecall_report::json;
 
 use super::CliError;
@@ -15,7 +15,7 @@ use super::args::Format;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{out, outln};
-use super::results::{print_results, selection};
+use super::results::{ArtifactArgs, print_results, selection};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall tool merge`.
@@ -38,6 +38,8 @@ pub(super) struct MergeArgs {
     #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
+    artifacts: ArtifactArgs,
+    #[command(flatten)]
     gates: GateArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -55,15 +57,17 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let tally = Tally::of(&saved, &works, &gates)?;
     let judged = tally.judgement();
     let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged };
-    let recorded = report.write(saved.folder(), selection(args.record))?;
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
             out!("{}", CountsText(&tally.summary));
             out!("{}", ensemble_text(&tally.summary, saved.manifest()));
+            out!("{}", FlakyText(&tally.overview));
             out!("{}", VerdictText(&judged));
         }
     }
-    print_results(saved.folder(), &recorded);
-    Ok(ExitCode::from(&judged))
+    let written = report.write(saved.folder(), selection(args.record));
+    let code = args.artifacts.code((&judged).into(), &written);
+    print_results(saved.folder(), &written.recorded);
+    Ok(code)
 }

@@ -87,6 +87,11 @@ impl PlanArgs {
         self.preset.filter(|_| is_paired).map(Preset::gates)
     }
 
+    /// Returns the largest number of flaky samples that the preset allows.
+    pub(super) fn preset_max_flaky(&self) -> Option<u64> {
+        self.preset.map(|_| 0)
+    }
+
     /// Returns the largest number of samples of each scenario.
     pub(super) fn samples(&self) -> u64 {
         let default = match self.inference() {

@@ -1,6 +1,7 @@
 //! `closecall replay`: runs one sample of a campaign again, and compares the outcome bit for bit unless settings change it.
 
 use clap::Args;
+use closecall_campaign::folder::Agreement;
 use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::saved::SavedCampaign;
 
@@ -57,12 +58,17 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     if !args.set.settings.is_empty() {
         return Ok(ExitCode::Pass);
     }
-    let mut agrees = true;
-    for outcome in &outcomes {
-        agrees &= saved.folder().agrees_with(outcome)?;
-    }
-    if agrees {
-        return Ok(ExitCode::Pass);
+    let agreements = outcomes.iter().map(|outcome| saved.folder().agreement(outcome)).collect::<Result<Vec<_>, _>>()?;
+    if !agreements.contains(&Agreement::Differs) {
+        let missing = agreements.iter().filter(|agreement| **agreement == Agreement::NotCompared).count();
+        if missing == 0 {
+            return Ok(ExitCode::Pass);
+        }
+        print_error(format_args!(
+            "not compared: the campaign's journal has no result of {missing} of the {} runs; its campaign may not have come to its end\n",
+            outcomes.len()
+        ));
+        return Ok(ExitCode::Inconclusive);
     }
     let (there, here) = (&saved.manifest().closecall_version, version());
     let cause = match &changes[..] {

@@ -8,14 +8,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::execution::Campaign;
-use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::{Folder, FolderError, LockedFolder, REPORT};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
 use closecall_campaign::resume_command::quoted;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
-use closecall_report::campaign::{RecordedSample, ReportError};
+use closecall_report::campaign::{RecordedSample, Written};
 use closecall_report::run::rerun::is_recording_enabled;
 use closecall_traffic::atomic::WriteError;
 
@@ -23,6 +22,7 @@ use super::CliError;
 use super::help::heading;
 use super::output::{print_error, print_report_files};
 use super::protect::{of_controller, of_scenario};
+use crate::exit_code::ExitCode;
 
 /// Largest number of recordings that are named one by one.
 const NAMED_RECORDINGS: usize = 3;
@@ -75,11 +75,40 @@ impl ResultsArgs {
     }
 }
 
+/// What a missing report means.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct ArtifactArgs {
+    /// End with the exit code of the failure if a report or a recording cannot be written. Without it, that is a warning, and the
+    /// verdict decides
+    #[arg(long, help_heading = heading::OUTPUT)]
+    strict_artifacts: bool,
+}
+
+impl ArtifactArgs {
+    /// Prints a warning for each report or recording that could not be written. Returns the exit code, if `verdict` is that of the
+    /// verdict.
+    pub(super) fn code(self, verdict: ExitCode, written: &Written) -> ExitCode {
+        for failure in &written.failures {
+            print_error(format_args!("warning: {failure}\n"));
+        }
+        if !written.failures.is_empty() {
+            print_error(format_args!(
+                "the verdict stands; the same command with --resume writes what is missing, --out DIR names another folder, --no-out keeps \
+                 no results\n"
+            ));
+        }
+        let codes = written.failures.iter().map(|failure| ExitCode::from(failure.source.kind()));
+        match self.strict_artifacts {
+            true => ExitCode::first_of(codes.chain([verdict])),
+            false => verdict,
+        }
+    }
+}
+
 /// The folder of a running campaign.
 #[derive(Debug)]
 pub(super) struct Results {
     pub(super) locked: Option<LockedFolder>,
-    is_default: bool,
     /// Why the results are not kept completely, if they should be.
     lost: Option<CliError>,
 }
@@ -104,7 +133,7 @@ impl Results {
                 }
             }
         };
-        Ok(Self { locked, is_default: campaign.goes_on_without_folder, lost })
+        Ok(Self { locked, lost })
     }
 
     /// Returns the folder if it holds every result so far.
@@ -116,18 +145,6 @@ impl Results {
     pub(super) fn lose(&mut self, error: Option<WriteError>) {
         if let Some(error) = error {
             self.lost = Some(CliError::ResultsCut(error));
-        }
-    }
-
-    /// Returns what the reports have written, or notes why they could not be made.
-    pub(super) fn reported<T>(&mut self, written: Result<T, ReportError>) -> Option<T> {
-        match written {
-            Ok(written) => Some(written),
-            Err(error) => {
-                let is_lost = self.is_default && error.kind() == FailureKind::Io;
-                self.lost = Some(if is_lost { CliError::ResultsReport(error) } else { error.into() });
-                None
-            }
         }
     }
 

@@ -60,6 +60,7 @@ fn synthetic(records: &[Record], collision: &Collision, random: &mut StdRng) -> 
         arm.checks = random.random_bool(0.5).then(|| ArmChecks {
             collided_at_half_step: Some(outcome.ego_collided() ^ random.random_bool(0.3 * flips)),
             broken: if has_broken { vec![Invariance::Mirror] } else { Vec::new() },
+            not_checked: None,
         });
         if random.random_bool(error_rate) {
             arm.result = Err(SampleFailure { kind: "sensor".to_owned(), message: "made up".to_owned() });

@@ -17,7 +17,7 @@ use closecall_campaign::record::{Record, SampleFailure};
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
-use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
+use closecall_campaign::verdict::{Allowed, Decision, Judgement, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::ScenarioFile;
@@ -102,7 +102,10 @@ fn campaign(fault: Option<Fault>, jobs: usize) -> Campaign {
     let arms = vec![arm(BuiltIn::Acc.factory()), arm(Arc::new(Faulty { fault }))];
     let sampling = Sampling { seed: SEED, design: Design::Random, samples: SAMPLES };
     let workers = Workers { jobs: NonZeroUsize::new(jobs).unwrap(), sample_timeout: timeout(fault) };
-    Campaign::new(vec![Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() })], workers)
+    Campaign::new(
+        vec![Arc::new(Work { file, sampling, arms, checks: CheckPlan::default(), retry_crashed: 0 })],
+        workers,
+    )
 }
 
 fn manifest(campaign: &Campaign) -> Manifest {
@@ -113,7 +116,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         scenarios: vec![ManifestScenario {
             name: file.config().name.clone(),
             path: String::new(),
-            blake3: String::new(),
+            blake3: blake3::hash(file.text().as_bytes()).to_string(),
             text: file.text().to_owned(),
             settings: Vec::new(),
         }],
@@ -127,6 +130,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         sample_timeout_s: WATCHDOG.as_secs_f64(),
         controllers: Vec::new(),
         working_folder: None,
+        retry_crashed: 0,
         without_effect: Vec::new(),
         replaceable: false,
         command: Vec::new(),
@@ -189,7 +193,7 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
 
 /// Judges a summary without gates.
 fn judged(summary: &Summary, campaign: &Campaign) -> Judgement {
-    judge(summary, &Judge::new(&campaign.works, &GateSet::default(), campaign.inference), MAX_FLIP_RATE)
+    judge(summary, &Judge::new(&campaign.works, &GateSet::default(), campaign.inference), Allowed::default())
 }
 
 /// Runs `campaign` in a folder, and stops it after `samples` more samples.

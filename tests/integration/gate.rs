@@ -174,7 +174,7 @@ fn judged(names: &[&str], tested: &Arc<dyn ControllerFactory>, samples: u64) -> 
     let work = |name: &&str| {
         let file = ScenarioFile::load(&library(name), &[]).unwrap();
         let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested.clone())];
-        Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() })
+        Arc::new(Work { file, sampling, arms, checks: CheckPlan::default(), retry_crashed: 0 })
     };
     let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(10) };
     Campaign::new(names.iter().map(work).collect(), workers).judge(&GateSet::default()).unwrap()

@@ -57,6 +57,7 @@ mod signals;
 mod statistics;
 mod support;
 mod trajectory_files;
+mod trust;
 mod validity;
 mod view;
 mod viewer;

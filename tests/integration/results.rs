@@ -149,7 +149,10 @@ fn recordings_that_the_environment_switches_off_are_no_error_unless_they_are_ask
     };
     stdout(&off(&[]), 0);
     assert!(!folder.path().join(RESULTS).join("recordings").exists());
-    assert_eq!(code(&off(&["--record", "worst:1"])), 6);
+    let asked = off(&["--record", "worst:1"]);
+    stdout(&asked, 0);
+    assert!(message(&asked).contains("warning: the recording of sample "), "{}", stderr(&asked));
+    assert_eq!(code(&off(&["--record", "worst:1", "--strict-artifacts"])), 6);
 }
 
 #[test]
@@ -451,8 +454,9 @@ fn a_read_only_working_folder_costs_the_results_and_not_the_verdict() {
 
 #[test]
 fn a_full_disk_costs_the_results_and_not_the_verdict() {
-    // Full at the start, during the samples, and at the reports.
-    for (size, more) in [("8k", &[][..]), ("60k", &[]), ("260k", &["--record", "worst:2"])] {
+    // Full at the start, during the samples, and at the reports, which are no part of the results unless they are asked for.
+    let strict = &["--record", "worst:2", "--strict-artifacts"];
+    for (size, more) in [("8k", &[][..]), ("60k", &[]), ("260k", strict)] {
         let Some(output) = campaign_on(&format!("size={size}"), "true", &[&JUDGED[..], more].concat()) else { return };
         assert_verdict_without_results(&output, "No space left on device");
         assert!(message(&output).contains("closecall-results"), "{size}: {}", stderr(&output));

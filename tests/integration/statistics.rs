@@ -35,7 +35,7 @@ fn run(seed: u64, samples: u64, is_over: impl Fn(&ArmCounts) -> bool, mut observ
     let arms = vec![Arm { controller: BuiltIn::Acc.factory(), sensors: None }];
     let sampling = Sampling { seed, design: Design::Random, samples };
     let workers = Workers { jobs: NonZeroUsize::new(2).unwrap(), sample_timeout: Duration::from_mins(10) };
-    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
+    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default(), retry_crashed: 0 });
     let campaign = Campaign::new(vec![work], workers);
     let mut summary = campaign.summary();
     campaign

@@ -11,7 +11,7 @@ use closecall_campaign::ledger::Inference;
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::{CheckPlan, Invariance};
-use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
+use closecall_campaign::verdict::{Allowed, Decision, Judgement, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::ScenarioFile;
@@ -89,7 +89,7 @@ fn checked(on: DependsOn) -> Summary {
     let arms = vec![Arm { controller, sensors: Some(SensorMode::GroundTruth) }];
     let sampling = Sampling { seed: 5, design: Design::Random, samples: 6 };
     let workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout: Duration::from_mins(10) };
-    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::new(1.0, 100).unwrap() });
+    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::new(1.0, 100).unwrap(), retry_crashed: 0 });
     Campaign::new(vec![work], workers).count().unwrap()
 }
 
@@ -100,7 +100,7 @@ fn findings(counts: &Counts) -> Vec<(Invariance, u64)> {
 
 /// Judges a summary without gates.
 fn judged(summary: &Summary) -> Judgement {
-    judge(summary, &Judge::new(&[], &GateSet::default(), Inference::FixedSamples), MAX_FLIP_RATE)
+    judge(summary, &Judge::new(&[], &GateSet::default(), Inference::FixedSamples), Allowed::default())
 }
 
 #[test]

@@ -1,50 +1,147 @@
-//! Worker processes of campaigns: what one sample does to its process is no matter of the next, and a relative path leads to the
-//! same file wherever the process runs.
+//! Worker processes of campaigns: a crash is an outcome of the sample that it hits, an answer is that of its question, and a
+//! relative path leads to the same file wherever the process runs.
 
 use std::io::Write;
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Output, Stdio};
 
 use closecall_testing::has_python;
 use serde_json::Value;
 
+use crate::exec_controller::left_behind;
 use crate::fmu_controllers::fmu;
-use crate::native_controllers::{campaign, compile, is_as_baseline, lib, records};
-use crate::support::{code, folder, program, stderr, stdout};
+use crate::native_controllers::{campaign, compile, is_as_baseline, lib, records, with_fault};
+use crate::support::{code, folder, json, program, stderr, stdout};
 
 /// Faults that show from the second run of a process on: it crashes, or hangs. `wears-out` also crashes in every sample in which the ego is fast.
 const WEAR: [&str; 2] = ["wears-out", "tires"];
 
 #[test]
-fn a_sample_that_fails_in_a_used_process_runs_again_in_a_new_one() {
+fn a_crash_or_hang_is_an_outcome_of_the_sample_that_it_hits() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
     // The checks of validity repeat a run in the same process.
     let limits = ["--no-validity-checks", "--controller-timeout-ms", "500"];
     for fault in WEAR {
-        let journals = ["1", "2"].map(|jobs| {
-            let out = folder.path().join(format!("{fault}-{jobs}"));
-            let output = campaign(&library, &out, jobs, Some(fault), &limits);
-            assert_eq!(code(&output), if fault == "tires" { 0 } else { 5 }, "{fault}: {}", stderr(&output));
-            std::fs::read_to_string(out.join("journal.jsonl")).unwrap()
-        });
-        assert_eq!(journals[0], journals[1]);
-        let mut failed = 0;
-        for record in records(&folder.path().join(format!("{fault}-1"))) {
+        let out = folder.path().join(fault);
+        let output = campaign(&library, &out, "1", Some(fault), &limits);
+        assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
+        let records = records(&out);
+        // Every second sample at the latest is the second of its process.
+        assert!(records.windows(2).all(|two| two.iter().any(|record| record.arms[1].result.is_err())), "{fault}");
+        assert!(records.iter().all(|record| record.arms[1].flaky.is_none()), "{fault}");
+        let sound: Vec<_> = records.iter().filter(|record| record.arms[1].result.is_ok()).collect();
+        assert!(sound.len() > 1 && sound.iter().all(|record| is_as_baseline(record)), "{fault}");
+    }
+}
+
+#[test]
+fn a_sample_that_succeeds_only_in_another_process_is_flaky() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let limits = ["--no-validity-checks", "--controller-timeout-ms", "500", "--retry-crashed", "1"];
+    for fault in WEAR {
+        let out = folder.path().join(fault);
+        let output = campaign(&library, &out, "1", Some(fault), &limits);
+        assert_eq!(code(&output), if fault == "tires" { 0 } else { 5 }, "{fault}: {}", stderr(&output));
+        let mut flaky = 0;
+        for record in records(&out) {
             let values = serde_json::to_value(&record.arms[0].result.as_ref().unwrap().parameters).unwrap();
             let is_fast = values["cruise-mps"].as_f64().unwrap() >= 32.7;
             match &record.arms[1].result {
                 Ok(_) => assert!(is_as_baseline(&record), "{fault}: sample {}", record.sample),
                 Err(failure) => {
-                    // The message is that of the new process, which has had no earlier run.
                     let expected = "the controller ended its process (signal: 11 (SIGSEGV))";
-                    assert_eq!((is_fast, failure.message.as_str()), (true, expected), "{fault}");
-                    failed += 1;
+                    assert!(is_fast && failure.message.starts_with(expected), "{fault}: {}", failure.message);
+                    assert_eq!(fault, "wears-out");
                 }
             }
+            flaky += u64::from(record.arms[1].flaky.is_some());
         }
-        assert_eq!(failed > 1, fault == "wears-out", "{fault} shows in {failed} samples");
+        assert!(flaky > 5, "{fault}: {flaky} are flaky");
     }
+}
+
+/// Runs a campaign whose library crashes in the fifth run of each process.
+fn crashing_in_the_fifth_run(library: &str, out: &Path, more: &[&str]) -> Output {
+    let mut command = program();
+    command
+        .args(["campaign", "overtake-without-brake", "-n", "24", "--sensors", "object", "--no-validity-checks"])
+        .args(["--jobs", "1", "--record", "failures:0", "--controller", library, "--out", out.to_str().unwrap()])
+        .args(more);
+    with_fault(&mut command, Some("fifth"))
+}
+
+#[test]
+fn a_library_that_crashes_in_each_fifth_run_of_its_process_is_never_repeated_silently() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let crash = "the controller ended its process (signal: 11 (SIGSEGV)); it last wrote: worn out";
+    let plain = folder.path().join("plain");
+    let output = crashing_in_the_fifth_run(&library, &plain, &["--no-gate"]);
+    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    let failed: Vec<(u64, String)> = records(&plain)
+        .iter()
+        .filter_map(|record| Some((record.sample, record.arms[0].result.as_ref().err()?.message.clone())))
+        .collect();
+    assert_eq!(failed, [4, 9, 14, 19].map(|sample| (sample, crash.to_owned())));
+    // Repeated on request, and shown in every report.
+    let flaky = folder.path().join("flaky");
+    let text = stdout(&crashing_in_the_fifth_run(&library, &flaky, &["--no-gate", "--retry-crashed", "1"]), 0);
+    let listed = format!("first in sample 4: {crash}");
+    assert!(text.contains("5 FLAKY") && text.contains(&listed), "{text}");
+    for file in ["report.html", "summary.md", "junit.xml"] {
+        let text = std::fs::read_to_string(flaky.join(file)).unwrap();
+        assert!(text.contains("worn out") && text.to_lowercase().contains("flaky"), "{file}: {text}");
+    }
+    let mut first = true;
+    for record in records(&flaky).iter().filter(|record| record.arms[0].flaky.is_some()) {
+        assert_eq!(record.arms[0].flaky.as_ref().unwrap().first.message, crash);
+        assert!(!std::mem::take(&mut first) || record.sample == 4);
+    }
+    // As a gate: on request, and with a preset.
+    for (name, more) in [("gate", &["--max-collisions", "24", "--max-flaky", "4"][..]), ("preset", &["--preset", "pr"])]
+    {
+        let out = folder.path().join(name);
+        let output = crashing_in_the_fifth_run(&library, &out, &[more, &["--retry-crashed", "1"]].concat());
+        let text = stdout(&output, 1);
+        assert!(text.contains("flaky samples: 5, at most"), "{name}: {text}");
+        let junit = std::fs::read_to_string(out.join("junit.xml")).unwrap();
+        assert!(junit.contains("<failure message=\"flaky samples: 5, at most"), "{name}: {junit}");
+    }
+    let more = ["--max-collisions", "24", "--max-flaky", "5", "--retry-crashed", "1", "--format", "json"];
+    let report = json(&crashing_in_the_fifth_run(&library, &folder.path().join("allowed"), &more), 0);
+    assert_eq!((&report["flaky"], &report["flaky_gate"]["max"]), (&5.into(), &5.into()));
+    assert_eq!(report["flaky_samples"][0]["first_message"], crash);
+}
+
+#[test]
+fn a_library_that_forks_files_no_outcome_under_another_sample() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let mark = format!("forks-{}", std::process::id());
+    for jobs in ["1", "2"] {
+        let out = folder.path().join(jobs);
+        let mut command = program();
+        command
+            .args(["campaign", "low-thw-overtake", "-n", "40", "--sensors", "object", "--no-gate", "--jobs", jobs])
+            .args(["--record", "failures:0", "--controller", &library, "--out", out.to_str().unwrap()])
+            .env("CLOSECALL_TEST_MARK", &mark);
+        let output = with_fault(&mut command, Some("forks"));
+        assert_eq!(code(&output), 5, "{}", stderr(&output));
+        // Reading the records checks that each is that of its sample.
+        let records = records(&out);
+        assert_eq!(records.len(), 40);
+        let messages: Vec<_> = records
+            .iter()
+            .filter_map(|record| record.arms[0].result.as_ref().err().map(|failure| failure.message.clone()))
+            .collect();
+        let named = |message: &String| {
+            message.contains("is not that of the sample: ") || message.contains("a line that nobody had asked for")
+        };
+        assert!(!messages.is_empty() && messages.iter().all(named), "{messages:?}");
+    }
+    assert_eq!(left_behind(&mark), Vec::<String>::new());
 }
 
 #[test]

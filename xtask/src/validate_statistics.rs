@@ -56,7 +56,7 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Ca
     let sampling = Sampling { seed, design: Design::Random, samples };
     let jobs = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let workers = Workers { jobs, sample_timeout: Duration::from_secs(60) };
-    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
+    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default(), retry_crashed: 0 });
     let campaign = Campaign::new(vec![work.clone()], workers);
     let mut summary = campaign.summary();
     let mut is_ever_outside = false;

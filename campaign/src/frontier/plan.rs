@@ -13,7 +13,7 @@ use closecall_simulation::{Arm, NoObserver, RunKey};
 use super::result::{Frontier, Point};
 use crate::ledger::Tally;
 use crate::record::{ArmRecord, SampleFailure};
-use crate::runner::{ArmRun, Sampling, concrete, guarded, run_guarded};
+use crate::runner::{ArmRun, OnOutcome, Sampling, concrete, guarded, run_guarded};
 use crate::sensitivity::RunErrors;
 use crate::stop::StopFlag;
 use crate::workers::{Samples, Workers, WorkersError};
@@ -221,13 +221,13 @@ impl Samples for Unchecked {
         &self.arms
     }
 
-    fn run(&self, sample: u64, arm: usize, _: Duration) -> ArmRun {
+    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
         let (arm, started) = (&self.arms[arm], Instant::now());
         let key = RunKey { seed: self.sampling.seed, sample };
         let result = guarded(|| concrete(&self.file, self.sampling, sample))
             .and_then(|scenario| run_guarded(&scenario, key, arm, &mut NoObserver));
         let controller = arm.controller.name().to_owned();
-        let record = ArmRecord { controller, result: result.map_err(SampleFailure::from), checks: None };
+        let record = ArmRecord::new(controller, result.map_err(SampleFailure::from));
         ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
     }
 }

@@ -83,11 +83,19 @@ pub struct GateSet {
     pub is_measurement: bool,
     /// Share of the checked verdicts that may flip at half the time step.
     pub max_flip_rate: f64,
+    /// Most flaky samples; any number if `None`.
+    pub max_flaky: Option<u64>,
 }
 
 impl Default for GateSet {
     fn default() -> Self {
-        Self { specs: Vec::new(), probability: None, is_measurement: false, max_flip_rate: MAX_FLIP_RATE }
+        Self {
+            specs: Vec::new(),
+            probability: None,
+            is_measurement: false,
+            max_flip_rate: MAX_FLIP_RATE,
+            max_flaky: None,
+        }
     }
 }
 

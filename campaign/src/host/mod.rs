@@ -4,12 +4,16 @@
 //! ```text
 //!  campaign, one thread per job                         worker process: `closecall host samples`
 //!    Work::run ──▶ task: scenario, arm, checks ──────▶ standard input  ─▶ Work ─▶ controller in the same process
-//!              ──▶ sample number ────────────────────▶                        └─▶ simulate, validity checks
-//!              ◀── record of the arm ◀─────────────── standard output
+//!              ──▶ question: task, arm, sample ──────▶                        └─▶ simulate, validity checks
+//!              ◀── the question, record of the arm ◀─ standard output
 //! ```
 //!
 //! A thread keeps its process for all its samples, so that a control step costs a function call. A process that crashes, ends,
 //! hangs or outgrows its memory costs the sample that it runs: the record says how, and the next sample starts a new process.
+//! Only if the campaign asks for it (`--retry-crashed`) is such a sample run again, and its record then says that it is flaky.
+//!
+//! An answer repeats its question. Foreign code can copy its process (`fork`) and so answer twice: an answer to another question, an
+//! answer of a copy, and a line that is left over before the next question each end the process and the sample with an error.
 //!
 //! A process that starts late may find another file, or be another version of this program. It then refuses its task, which ends
 //! the campaign.
@@ -23,6 +27,7 @@ mod serve;
 pub(crate) use client::run;
 pub use serve::serve;
 
+use std::fmt;
 use std::path::PathBuf;
 
 use closecall_sensors::SensorMode;
@@ -57,9 +62,39 @@ struct Task {
     sensors: Option<SensorMode>,
 }
 
+/// Returns the identity of a task: a hash of its line, which holds the scenario, the seed, the checks and the controller.
+fn task_identity(line: &[u8]) -> String {
+    const DIGITS: usize = 16;
+    blake3::hash(line).to_hex()[..DIGITS].to_owned()
+}
+
+/// What a worker process is asked, and what its answer repeats.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Question {
+    /// The identity of the task: [`task_identity`].
+    task: String,
+    /// The index of the arm.
+    arm: usize,
+    /// The sample's number.
+    sample: u64,
+    /// The number of the question to this process, from 1 on.
+    number: u64,
+}
+
+impl fmt::Display for Question {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { task, arm, sample, number } = self;
+        write!(f, "question {number} (sample {sample}, arm {arm}, task {task})")
+    }
+}
+
 /// The result of one sample.
 #[derive(Serialize, Deserialize)]
-struct Answer {
+struct Answer<Q = Question> {
+    /// The question as it was asked.
+    question: Q,
+    /// The number of the process of which the one that answers is a copy; `None` if it is none.
+    copied_from: Option<u32>,
     record: ArmRecord,
     /// Wall time, without the validity checks (s).
     wall_s: f64,

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use closecall_controllers::ControllerError;
@@ -14,7 +14,7 @@ use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::Probe;
 use closecall_simulation::{Arm, SampleError};
 
-use super::{Answer, REFUSED, Task};
+use super::{Answer, Question, REFUSED, Task, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
@@ -99,40 +99,56 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
             "Closecall has changed since the start: it was {there}, and is {}. The results so far are kept",
             version()
         );
-        return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) };
+        return refuse(answers, lines.next(), reason);
     }
     let task: Task = read(&first)?;
+    let identity = task_identity(first.as_bytes());
     let timeout_ms = task.controller.timeout_ms();
     let controller = match task.controller.in_this_process() {
         Ok(controller) => controller,
-        Err(reason) => return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) },
+        Err(reason) => return refuse(answers, lines.next(), reason),
     };
     let name = controller.name().to_owned();
     let file = ScenarioFile::parse(&task.path, &task.text, &[]).map_err(|error| error.to_string())?;
     let arms = vec![Arm { controller, sensors: task.sensors }];
-    let work = Work { file, sampling: task.sampling, arms, checks: task.checks };
+    let work = Work { file, sampling: task.sampling, arms, checks: task.checks, retry_crashed: 0 };
     let is_answered = Arc::new(AtomicBool::new(true));
+    let current: Arc<Mutex<Current>> = Arc::default();
+    let answering = Answering { answers: answers.clone(), process: std::process::id() };
     let late = {
-        let (answers, is_answered) = (answers.clone(), is_answered.clone());
+        let (answering, is_answered, current) = (answering.clone(), is_answered.clone(), current.clone());
         move |time, limit: Duration| {
             let reason = format!("no answer within {} ms", limit.as_millis());
-            let failure = SampleFailure::from(SampleError::from(ControllerError::Own { reason, time }));
-            let record = ArmRecord { controller: name.clone(), result: Err(failure), checks: None };
-            if !is_answered.swap(true, Ordering::SeqCst) {
-                // The process ends after this. If the answer is lost, its end is the error of the sample.
-                answer(&answers, ArmRun { record, wall_s: limit.as_secs_f64(), check_s: 0.0 }, true).ok();
+            let error = SampleError::from(ControllerError::Late { reason, time });
+            if is_answered.swap(true, Ordering::SeqCst) {
+                return;
             }
+            let Current { question, outcome } = std::mem::take(&mut *lock(&current));
+            let run = match outcome {
+                // The sample has its outcome: the time is over for its checks.
+                Some(run) => run.unchecked(&error),
+                None => {
+                    let record = ArmRecord::new(name.clone(), Err(SampleFailure::from(error)));
+                    ArmRun { record, wall_s: limit.as_secs_f64(), check_s: 0.0 }
+                }
+            };
+            // The process ends after this. If the answer is lost, its end is the error of the sample.
+            answering.answer(question, run, true).ok();
         }
     };
     watch::start(Duration::from_millis(timeout_ms), late).map_err(|error| error.to_string())?;
     let limit = Duration::MAX;
     for line in lines {
-        let sample: u64 = line.map_err(|error| error.to_string()).and_then(|line| read(&line))?;
+        let question: Question = line.map_err(|error| error.to_string()).and_then(|line| read(&line))?;
+        if question.task != identity {
+            return Err(format!("{question} is not of the task {identity}"));
+        }
         io::stderr().write_all(&[NEW_SAMPLE]).map_err(|error| error.to_string())?;
+        *lock(&current) = Current { question: Some(question.clone()), outcome: None };
         is_answered.store(false, Ordering::SeqCst);
-        let run = work.run(sample, 0, limit);
+        let run = work.run(question.sample, 0, limit, &|run| lock(&current).outcome = Some(run.clone()));
         if !is_answered.swap(true, Ordering::SeqCst) {
-            answer(answers, run, false)?;
+            answering.answer(Some(question), run, false)?;
         }
     }
     Ok(())
@@ -144,21 +160,47 @@ struct Stated {
     version: String,
 }
 
-/// Answers a sample with the reason for which this process does not run it.
-fn refuse(answers: &Mutex<File>, message: String) -> Result<(), String> {
+/// The sample that a process runs, with its outcome once only the checks are left.
+#[derive(Default)]
+struct Current {
+    question: Option<Question>,
+    outcome: Option<ArmRun>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Answers the first question, if there is one, with the reason for which this process runs no sample. The question of another
+/// version may have any form.
+fn refuse(answers: &Arc<Mutex<File>>, question: Option<io::Result<String>>, message: String) -> Result<(), String> {
+    let Some(question) = question else { return Ok(()) };
+    let question: serde_json::Value = question.map_err(|error| error.to_string()).and_then(|line| read(&line))?;
     let failure = SampleFailure { kind: REFUSED.to_owned(), message };
-    let record = ArmRecord { controller: String::new(), result: Err(failure), checks: None };
-    answer(answers, ArmRun { record, wall_s: 0.0, check_s: 0.0 }, true)
+    let record = ArmRecord::new(String::new(), Err(failure));
+    let answering = Answering { answers: answers.clone(), process: std::process::id() };
+    answering.answer(question, ArmRun { record, wall_s: 0.0, check_s: 0.0 }, true)
 }
 
 fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, String> {
     serde_json::from_str(line).map_err(|error| format!("failed to read a message: {error}"))
 }
 
-fn answer(answers: &Mutex<File>, run: ArmRun, is_last: bool) -> Result<(), String> {
-    let ArmRun { record, wall_s, check_s } = run;
-    let mut line =
-        serde_json::to_vec(&Answer { record, wall_s, check_s, is_last }).map_err(|error| error.to_string())?;
-    line.push(b'\n');
-    answers.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line).map_err(|error| error.to_string())
+/// Where the answers go, and which process gives them.
+#[derive(Clone)]
+struct Answering {
+    answers: Arc<Mutex<File>>,
+    /// The number of the process when it got its task. A copy that the controller has made of it (`fork`) has another one.
+    process: u32,
+}
+
+impl Answering {
+    fn answer<Q: serde::Serialize>(&self, question: Q, run: ArmRun, is_last: bool) -> Result<(), String> {
+        let ArmRun { record, wall_s, check_s } = run;
+        let copied_from = (std::process::id() != self.process).then_some(self.process);
+        let answer = Answer { question, copied_from, record, wall_s, check_s, is_last };
+        let mut line = serde_json::to_vec(&answer).map_err(|error| error.to_string())?;
+        line.push(b'\n');
+        lock(&self.answers).write_all(&line).map_err(|error| error.to_string())
+    }
 }

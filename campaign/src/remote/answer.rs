@@ -5,13 +5,12 @@
 //!  one line of the journal for each sample, with its checksum
 //! ```
 
-use closecall_scenarios::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
+use crate::identity::of_work;
 use crate::journal;
-use crate::record::Record;
 use crate::runner::Work;
-use crate::workers::{Finished, Samples};
+use crate::workers::Finished;
 
 /// The first line of an answer.
 #[derive(Serialize, Deserialize)]
@@ -72,39 +71,9 @@ impl Expected<'_> {
         let mut results = Vec::with_capacity(records.len());
         let times = header.wall_s.into_iter().zip(header.check_s);
         for ((record, (wall_s, check_s)), &sample) in records.into_iter().zip(times).zip(self.samples) {
-            self.check(&record, sample)?;
+            of_work(self.work).check(&record, sample)?;
             results.push(Finished { record, wall_s, check_s });
         }
         Ok(results)
-    }
-
-    /// Returns what is wrong if a record is not that of the sample.
-    fn check(&self, record: &Record, sample: u64) -> Result<(), String> {
-        let (work, scenario) = (self.work, self.work.scenario());
-        if record.scenario != scenario || record.sample != sample {
-            let (there, number) = (&record.scenario, record.sample);
-            return Err(format!("there is sample {number} of `{there}` instead of {sample} of `{scenario}`"));
-        }
-        let names = || work.arms.iter().map(|arm| arm.controller.name());
-        if !record.arms.iter().map(|arm| arm.controller.as_str()).eq(names()) {
-            let names: Vec<&str> = names().collect();
-            return Err(format!("sample {sample} was not run with {}", names.join(" and ")));
-        }
-        let sampling = work.sampling;
-        let values = work.file.space().sample(sampling.design, sampling.seed, sample, sampling.samples);
-        let is_own = |outcome: &Outcome| {
-            (outcome.scenario.as_str(), outcome.seed, outcome.sample) == (scenario, sampling.seed, sample)
-        };
-        for arm in &record.arms {
-            let Ok(outcome) = &arm.result else { continue };
-            if !is_own(outcome) {
-                let (there, seed) = (outcome.sample, outcome.seed);
-                return Err(format!("sample {sample} is sample {there} of the seed {seed}, not of {}", sampling.seed));
-            }
-            if outcome.controller != arm.controller || outcome.parameters != values {
-                return Err(format!("sample {sample} has other values than the seed {} draws", sampling.seed));
-            }
-        }
-        Ok(())
     }
 }

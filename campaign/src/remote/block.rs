@@ -74,6 +74,7 @@ impl BlockRunner {
         plan.checks = sent.checks;
         plan.inference = sent.inference;
         plan.workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout };
+        plan.retry_crashed = sent.retry_crashed;
         plan.without_effect.clone_from(&sent.without_effect);
         let own = plan.manifest_in(sent.command.clone(), local.controller_folder())?;
         let differences = sent.differences(&own);

@@ -14,7 +14,7 @@ use closecall_traffic::Check;
 use super::factor::FactorRange;
 use super::output::values;
 use crate::record::{ArmRecord, SampleFailure};
-use crate::runner::{ArmRun, guarded, run_guarded};
+use crate::runner::{ArmRun, OnOutcome, guarded, run_guarded};
 use crate::stop::StopFlag;
 use crate::workers::{Samples, Workers, WorkersError};
 
@@ -94,11 +94,11 @@ impl<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static> Samples for Points<P> {
         &self.arms
     }
 
-    fn run(&self, sample: u64, arm: usize, _: Duration) -> ArmRun {
+    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
         let (arm, started) = (&self.arms[arm], Instant::now());
         let point = (self.point)(usize::try_from(sample).unwrap_or(usize::MAX));
         let result = self.cube.run(&point, arm);
-        let record = ArmRecord { controller: arm.controller.name().to_owned(), result, checks: None };
+        let record = ArmRecord::new(arm.controller.name().to_owned(), result);
         ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
     }
 }

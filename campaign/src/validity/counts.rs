@@ -53,6 +53,9 @@ pub struct ArmChecks {
     /// The checks that failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub broken: Vec<Invariance>,
+    /// Why a check has no result: its run took too long. Time says nothing about the simulator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_checked: Option<String>,
 }
 
 /// The findings of the checks of a campaign.
@@ -60,6 +63,8 @@ pub struct ArmChecks {
 pub struct CheckCounts {
     /// Number of runs that were checked: samples times arms.
     pub runs: u64,
+    /// Number of runs of which at least one check has no result, because it took too long.
+    pub not_checked: u64,
     /// Number of runs whose verdict (collision or none) flipped at half the time step.
     pub flips: u64,
     /// Number of failures of each check, in the order of [`Invariance::ALL`].
@@ -69,7 +74,10 @@ pub struct CheckCounts {
 impl CheckCounts {
     /// Adds the findings about one run. `collided` says whether the ego collided in that run.
     pub fn push(&mut self, found: &ArmChecks, collided: bool) {
-        self.runs += 1;
+        match found.not_checked {
+            Some(_) => self.not_checked += 1,
+            None => self.runs += 1,
+        }
         self.flips += u64::from(found.collided_at_half_step.is_some_and(|halved| halved != collided));
         for &check in &found.broken {
             self.count(check);
@@ -96,6 +104,7 @@ impl CheckCounts {
     /// Adds the findings of another campaign or scenario.
     pub fn add(&mut self, other: &Self) {
         self.runs += other.runs;
+        self.not_checked += other.not_checked;
         self.flips += other.flips;
         for (count, more) in self.counts.iter_mut().zip(other.counts) {
             *count += more;

@@ -33,17 +33,22 @@ impl CheckedRun<'_> {
         let reversed = self.scenario.reversed();
         let (reordered, halved) =
             on_new_thread(|| self.run(&reversed, self.arm), || self.run(&self.scenario.at_half_step(), self.arm));
-        let mut broken = Vec::new();
-        if !is_same(&reordered, outcome) {
-            broken.push(self.cause(&reversed, outcome));
+        let (mut broken, mut late) = (Vec::new(), Vec::new());
+        match &reordered {
+            Err(error) if error.is_late() => late.push((Invariance::ActorOrder, error.clone())),
+            reordered if !is_same(reordered, outcome) => broken.push(self.cause(&reversed, outcome)),
+            _ => {}
         }
-        if !self.is_mirrored(outcome) {
-            broken.push(Invariance::Mirror);
+        match self.is_mirrored(outcome) {
+            Err(error) => late.push((Invariance::Mirror, error)),
+            Ok(is_mirrored) => broken.extend((!is_mirrored).then_some(Invariance::Mirror)),
         }
-        if halved.is_err() {
-            broken.push(Invariance::HalfStep);
+        match &halved {
+            Err(error) if error.is_late() => late.push((Invariance::HalfStep, error.clone())),
+            halved => broken.extend(halved.is_err().then_some(Invariance::HalfStep)),
         }
-        ArmChecks { collided_at_half_step: halved.ok().map(|halved| halved.ego_collided()), broken }
+        let not_checked = late.first().map(|(check, error)| format!("{}: {error}", check.name()));
+        ArmChecks { collided_at_half_step: halved.ok().map(|halved| halved.ego_collided()), broken, not_checked }
     }
 
     fn run(&self, scenario: &Scenario, arm: &Arm) -> Run {
@@ -52,7 +57,8 @@ impl CheckedRun<'_> {
 
     /// Returns the change that makes the outcome differ. If no single change does so again, the run is not repeatable.
     fn cause(&self, reversed: &Scenario, outcome: &Outcome) -> Invariance {
-        let differs = |run: Run| !is_same(&run, outcome);
+        // A run that took too long says nothing.
+        let differs = |run: Run| in_time(run).is_ok_and(|run| !is_same(&run, outcome));
         if differs(self.run(self.scenario, self.arm)) {
             Invariance::Repetition
         } else if differs(self.run(reversed, self.arm)) {
@@ -67,17 +73,29 @@ impl CheckedRun<'_> {
     /// Returns true if the mirrored scenario has the mirrored outcome, or if the scenario has no mirror image.
     ///
     /// Object-level sensors replace the full sensor simulation, since the LiDAR's scan pattern has no mirror image.
-    fn is_mirrored(&self, outcome: &Outcome) -> bool {
-        let Some(mirrored) = self.scenario.mirrored() else { return true };
+    ///
+    /// # Errors
+    /// The error of a run that took too long.
+    fn is_mirrored(&self, outcome: &Outcome) -> Result<bool, SampleError> {
+        let Some(mirrored) = self.scenario.mirrored() else { return Ok(true) };
         let mode = self.arm.sensors.unwrap_or(self.scenario.sensors.mode());
         if mode != SensorMode::Full {
-            return self.run(&mirrored, self.arm).is_ok_and(|image| is_mirror_image(&image, outcome));
+            let image = in_time(self.run(&mirrored, self.arm))?;
+            return Ok(image.is_ok_and(|image| is_mirror_image(&image, outcome)));
         }
         let arm = Arm { sensors: Some(SensorMode::Object), ..self.arm.clone() };
-        match (self.run(self.scenario, &arm), self.run(&mirrored, &arm)) {
+        Ok(match (in_time(self.run(self.scenario, &arm))?, in_time(self.run(&mirrored, &arm))?) {
             (Ok(object), Ok(image)) => is_mirror_image(&image, &object),
             (object, image) => object == image,
-        }
+        })
+    }
+}
+
+/// Returns a run that took too long as an error, and any other as it is.
+fn in_time(run: Run) -> Result<Run, SampleError> {
+    match run {
+        Err(error) if error.is_late() => Err(error),
+        run => Ok(run),
     }
 }
 

@@ -124,6 +124,14 @@ pub enum ControllerError {
         /// The time of the control step.
         time: Time,
     },
+    /// A controller from outside Closecall did not answer in time, by the wall clock. The same run may succeed on another machine.
+    #[error("failed at {time}: {reason}")]
+    Late {
+        /// The failure, in words.
+        reason: String,
+        /// The time of the control step.
+        time: Time,
+    },
 }
 
 /// A controller of the ego, called once per control step (25 Hz) in order of time.
@@ -134,7 +142,7 @@ pub enum ControllerError {
 /// A controller may fail or even panic: that sample then ends as an error, and the campaign continues.
 ///
 /// ```
-/// use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
+/// use crate::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
 ///
 /// /// Brakes gently while any track is behind the ego.
 /// struct GentleBraking;
@@ -161,4 +169,14 @@ pub trait EgoController: Send {
     /// # Errors
     /// [`ControllerError`] if no command could be computed.
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError>;
+
+    /// Ends the run, which has an outcome only if this succeeds. `time` is its end. A controller that is a process checks here that
+    /// the process has given no more answers than it was asked for.
+    ///
+    /// # Errors
+    /// [`ControllerError`] if the commands of the run cannot be trusted.
+    fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
+        let _ = time;
+        Ok(())
+    }
 }

@@ -189,7 +189,10 @@ pub fn serve(
                 json!({ "type": "hello", "protocol": 1, "name": identity.name, "version": identity.version })
                     .to_string()
             }
-            Message::Step(step) => text(session.step((loaded, table), || setup.clone(), &Input::from(*step))?),
+            Message::Step(step) => {
+                let time_ns = step.time_ns;
+                text(session.step((loaded, table), || setup.clone(), &Input::from(*step))?, time_ns)
+            }
         };
         let written = writeln!(answers, "{answer}").and_then(|()| answers.flush());
         written.map_err(|error| format!("failed to answer: {error}"))?;
@@ -197,12 +200,12 @@ pub fn serve(
     Ok(())
 }
 
-/// Returns an answer as a line. JSON has no number that is not finite: it is written as a word, which the reader refuses by name.
-fn text(Answer { acceleration_mps2, state }: Answer) -> String {
+/// Returns an answer as a line, which repeats the time of its control step (ns). JSON has no number that is not finite: it is written as a word, which the reader refuses by name.
+fn text(Answer { acceleration_mps2, state }: Answer, time_ns: i64) -> String {
     let number = match acceleration_mps2.is_finite() {
         true => json!(acceleration_mps2).to_string(),
         false => acceleration_mps2.to_string(),
     };
     let state = serde_json::to_value::<EgoState>(state).unwrap_or_default();
-    format!("{{\"acceleration_mps2\":{number},\"state\":{state}}}")
+    format!("{{\"acceleration_mps2\":{number},\"state\":{state},\"time_ns\":{time_ns}}}")
 }

@@ -1,4 +1,11 @@
 //! The files that a campaign writes into its folder at the end, all of them made from its journal.
+//!
+//! ```text
+//!  journal ─▶ verdict on the console ─▶ junit.xml ─▶ summary of the CI server ─▶ tables ─▶ report ─▶ recordings ─▶ links to them
+//! ```
+//!
+//! What matters most is written first. A file that cannot be written costs no other, and never the verdict: it is an
+//! [`ArtifactError`], which the caller shows.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -24,7 +31,7 @@ use super::junit::write_junit;
 use super::markdown::{markdown, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
-use super::recordings::{RecordedSample, record};
+use super::recordings::{Recorded, RecordedSample, record};
 use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
@@ -72,6 +79,33 @@ impl ReportError {
     }
 }
 
+/// A file that a campaign could not write. The verdict stands, and so do all other files.
+#[derive(Debug, thiserror::Error)]
+#[error("{artifact} is missing: {source}")]
+pub struct ArtifactError {
+    /// What is missing: the name of the file, or which recording.
+    pub artifact: String,
+    /// Why.
+    pub source: ReportError,
+}
+
+/// What a campaign has written at its end.
+#[derive(Debug, Default)]
+pub struct Written {
+    /// The recordings.
+    pub recorded: Vec<RecordedSample>,
+    /// What could not be written.
+    pub failures: Vec<ArtifactError>,
+}
+
+impl Written {
+    /// Notes the failure of an artifact, if it is one.
+    fn note<T, E: Into<ReportError>>(&mut self, artifact: &str, result: Result<T, E>) -> Option<T> {
+        let fail = |error: E| ArtifactError { artifact: artifact.to_owned(), source: error.into() };
+        result.map_err(|error| self.failures.push(fail(error))).ok()
+    }
+}
+
 /// A finished campaign with its verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct CampaignReport<'a> {
@@ -86,51 +120,86 @@ pub struct CampaignReport<'a> {
 }
 
 impl CampaignReport<'_> {
-    /// Writes every file into the folder, with recordings of the selected samples, which are returned.
-    ///
-    /// # Errors
-    /// [`ReportError`] if the journal cannot be read or a file cannot be written; the files that exist are complete.
-    pub fn write(&self, folder: &Folder, selection: Selection) -> Result<Vec<RecordedSample>, ReportError> {
-        let files = self.scenario_files();
-        let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
-        let rows = || rows(folder, self.manifest);
-        write_outcomes(&folder.file("outcomes.parquet"), Some(self.manifest), &parameter_columns(&nominal), rows()?)?;
-        let mut slowest = Vec::with_capacity(SLOWEST + 1);
-        let mut wall_s: Vec<(String, f64)> = files.iter().map(|file| (file.config().name.clone(), 0.0)).collect();
-        let timings = timings(folder, self.manifest)?.inspect(|timing| {
-            keep_slowest(&mut slowest, timing);
-            if let Some((_, sum_s)) = wall_s.iter_mut().find(|(name, _)| *name == timing.scenario) {
-                *sum_s += timing.wall_s;
-            }
+    /// Writes every file into the folder, with recordings of the selected samples. A file that cannot be written costs no other.
+    pub fn write(&self, folder: &Folder, selection: Selection) -> Written {
+        let mut written = Written::default();
+        let (files, none) = (self.scenario_files(), Recordings::new());
+        let (slowest, wall_s) = written.note("the wall times", self.wall_times(folder, &files)).unwrap_or_default();
+        let junit = self.with_findings(&files, Some(folder), &none, &slowest, |findings| {
+            write_junit(&folder.file("junit.xml"), findings, &wall_s)
         });
-        write_timings(&folder.file("timings.parquet"), timings)?;
-        let (recorded, samples) = record(folder, &files, selection)?;
-        let with_recordings = rows()?.map(|row| {
+        written.note("junit.xml", junit);
+        written.note(&step_summary_name(), self.append_step_summary(Some(folder)));
+        let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
+        let path = folder.file("outcomes.parquet");
+        let outcomes = rows(folder, self.manifest)
+            .map_err(ReportError::from)
+            .and_then(|rows| write_outcomes(&path, Some(self.manifest), &parameter_columns(&nominal), rows));
+        written.note("outcomes.parquet", outcomes);
+        let timings = timings(folder, self.manifest)
+            .map_err(ReportError::from)
+            .and_then(|timings| Ok(write_timings(&folder.file("timings.parquet"), timings)?));
+        written.note("timings.parquet", timings);
+        if self.tally.summary.is_paired() {
+            written.note("arm_pairs.parquet", write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary));
+        }
+        self.write_pages(folder, (&none, &slowest), &mut written);
+        let Recorded { paths, samples, failures } = match record(folder, &files, selection) {
+            Ok(recorded) => recorded,
+            Err(error) => {
+                written.note::<(), _>("the recordings", Err(error));
+                Recorded::default()
+            }
+        };
+        written.recorded = samples;
+        for (artifact, error) in failures {
+            written.note::<(), _>(&artifact, Err(error));
+        }
+        if !paths.is_empty() {
+            // Once more, with links to the recordings.
+            self.write_pages(folder, (&paths, &slowest), &mut written);
+        }
+        written.note("samples.xml", self.write_samples(folder, &paths));
+        written
+    }
+
+    /// Writes the reports for human readers, with links to the recordings.
+    fn write_pages(&self, folder: &Folder, (recordings, slowest): (&Recordings, &[Timing]), written: &mut Written) {
+        self.with_findings(&self.scenario_files(), Some(folder), recordings, slowest, |findings| {
+            written.note(REPORT, write_html(&folder.file(REPORT), findings));
+            written.note("summary.md", write_markdown(&folder.file("summary.md"), findings));
+        });
+    }
+
+    fn write_samples(&self, folder: &Folder, recordings: &Recordings) -> Result<(), ReportError> {
+        let with_recordings = rows(folder, self.manifest)?.map(|row| {
             row.map(|row| {
-                let recording = recorded.get(&(row.scenario.clone(), row.sample, row.controller.clone())).cloned();
+                let recording = recordings.get(&(row.scenario.clone(), row.sample, row.controller.clone())).cloned();
                 (row, recording)
             })
         });
         let tested = self.tally.summary.controllers.last().map_or("", String::as_str);
-        write_samples(&folder.file("samples.xml"), &self.suites(), tested, with_recordings)?;
-        if self.tally.summary.is_paired() {
-            write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary)?;
+        write_samples(&folder.file("samples.xml"), &self.suites(), tested, with_recordings)
+    }
+
+    /// Returns the slowest samples, and the wall time of each scenario (s), by name.
+    fn wall_times(&self, folder: &Folder, files: &[&ScenarioFile]) -> Result<(Vec<Timing>, WallTimes), FolderError> {
+        let mut slowest = Vec::with_capacity(SLOWEST + 1);
+        let mut wall_s: WallTimes = files.iter().map(|file| (file.config().name.clone(), 0.0)).collect();
+        for timing in timings(folder, self.manifest)? {
+            keep_slowest(&mut slowest, &timing);
+            if let Some((_, sum_s)) = wall_s.iter_mut().find(|(name, _)| *name == timing.scenario) {
+                *sum_s += timing.wall_s;
+            }
         }
-        self.with_findings(&files, Some(folder), &recorded, &slowest, |findings| {
-            write_junit(&folder.file("junit.xml"), findings, &wall_s)?;
-            write_html(&folder.file(REPORT), findings)?;
-            write_markdown(&folder.file("summary.md"), findings)
-        })?;
-        self.append_step_summary(Some(folder), &recorded)?;
-        Ok(samples)
+        Ok((slowest, wall_s))
     }
 
     /// Appends the summary of a campaign without a folder to the file of the CI server.
-    ///
-    /// # Errors
-    /// [`ReportError::Write`] if the CI server's file cannot be written.
-    pub fn write_without_folder(&self) -> Result<(), ReportError> {
-        self.append_step_summary(None, &Recordings::new())
+    pub fn write_without_folder(&self) -> Written {
+        let mut written = Written::default();
+        written.note(&step_summary_name(), self.append_step_summary(None));
+        written
     }
 
     fn scenario_files(&self) -> Vec<&ScenarioFile> {
@@ -172,15 +241,23 @@ impl CampaignReport<'_> {
     }
 
     /// Appends the summary to the file that a CI server shows for this step, if there is one.
-    fn append_step_summary(&self, folder: Option<&Folder>, recordings: &Recordings) -> Result<(), ReportError> {
+    fn append_step_summary(&self, folder: Option<&Folder>) -> Result<(), ReportError> {
         let Some(path) = std::env::var_os(STEP_SUMMARY).filter(|path| !path.is_empty()).map(PathBuf::from) else {
             return Ok(());
         };
-        let text = self.with_findings(&self.scenario_files(), folder, recordings, &[], markdown);
+        let text = self.with_findings(&self.scenario_files(), folder, &Recordings::new(), &[], markdown);
         let opened = OpenOptions::new().create(true).append(true).open(&path);
         let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)
     }
+}
+
+/// The wall time of each scenario (s), by name.
+type WallTimes = Vec<(String, f64)>;
+
+/// Returns what the file of the CI server is called in messages.
+fn step_summary_name() -> String {
+    format!("the summary for the CI server ({STEP_SUMMARY})")
 }
 
 fn keep_slowest(slowest: &mut Vec<Timing>, timing: &Timing) {

@@ -5,6 +5,7 @@
 //! |---|---|---|---|---|
 //! | gate, requirement check | met | not met | the samples do not decide it | it cannot be checked in this campaign, or the campaign is only measured |
 //! | probability gate | shown | refuted | not decided | |
+//! | `at most N flaky samples` | met | not met | | the campaign is only measured |
 //! | `verdict` | PASS, measured | | ERROR, INVALID, INCONCLUSIVE, NOT JUDGED | FAIL: the gates say it |
 //!
 //! The failures are the failed gates and requirement checks, and nothing else. Samples stand in `samples.xml`.
@@ -22,6 +23,7 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
 use super::findings::Findings;
+use super::overview::ErrorGroup;
 use super::samples_xml::legal_xml;
 
 /// The answer of one case.
@@ -69,6 +71,18 @@ fn cases(judged: &Judgement) -> Vec<Case> {
                 Answer::Open => Status::Error,
             },
             message: format!("between {} and {}", finding.lower_bound, finding.upper_bound),
+        });
+    }
+    if let Some(gate) = judged.flaky {
+        cases.push(Case {
+            suite: CAMPAIGN_SUITE.to_owned(),
+            name: format!("at most {} flaky samples", gate.max),
+            status: match (gate.is_met(), is_measured) {
+                (true, _) => Status::Passed,
+                (false, false) => Status::Failed,
+                (false, true) => Status::Skipped,
+            },
+            message: gate.to_string(),
         });
     }
     cases.push(Case {
@@ -140,6 +154,13 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
         for (controller, arm) in findings.summary.controllers.iter().zip(&counts.arms) {
             properties.push((format!("{controller}.collisions"), arm.collisions.to_string()));
             properties.push((format!("{controller}.errors"), arm.errors.to_string()));
+            properties.push((format!("{controller}.flaky"), arm.flaky.to_string()));
+        }
+        if let Some(scenario) = findings.overview.scenarios.iter().find(|scenario| scenario.name == suite) {
+            let first = |(arm, flaky): (&String, &ErrorGroup)| {
+                (format!("{arm}.flaky.first"), format!("sample {}: {}", flaky.first_sample, flaky.message))
+            };
+            properties.extend(scenario.flaky.iter().map(first));
         }
         if findings.summary.has_references() {
             properties.extend(arm_pair_properties(findings, counts));

@@ -184,6 +184,15 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
             cell(first_line)
         ));
     }
+    for (arm, flaky) in &scenario.flaky {
+        let first_line = flaky.message.lines().next().unwrap_or_default();
+        let (count, sample) = (flaky.count, flaky.first_sample);
+        text.push_str(&format!(
+            "- {count} × FLAKY in {} (run again after a crash), first in sample {sample}: {}\n",
+            cell(arm),
+            cell(first_line)
+        ));
+    }
     if !text.is_empty() {
         text = format!("**Errors in {}**\n\n{text}\n", cell(&scenario.name));
     }

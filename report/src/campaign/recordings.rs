@@ -29,35 +29,54 @@ pub struct RecordedSample {
     pub path: PathBuf,
 }
 
-/// Runs the selected samples again, records all arms of each in one file, and writes the page. Returns where the reports find
-/// the recordings, and the recordings in the order of the page.
+/// What has been recorded.
+#[derive(Default)]
+pub(super) struct Recorded {
+    /// Where the reports find the recordings.
+    pub(super) paths: Recordings,
+    /// The recordings in the order of the page.
+    pub(super) samples: Vec<RecordedSample>,
+    /// What could not be recorded, in words, and why.
+    pub(super) failures: Vec<(String, ReportError)>,
+}
+
+/// Runs the selected samples again, records all arms of each in one file, and writes the page. A sample that cannot be recorded costs
+/// no other.
 pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
     selection: Selection,
-) -> Result<(Recordings, Vec<RecordedSample>), ReportError> {
+) -> Result<Recorded, ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
     // An earlier, identical campaign may have recorded other samples.
     if path.exists() {
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
-    let (mut recorded, mut samples, mut entries) = (Recordings::new(), Vec::new(), Vec::new());
+    let (mut recorded, mut entries) = (Recorded::default(), Vec::new());
     for (name, chosen) in choose(&saved, scenarios, selection)? {
         fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
-        let entry = record_one(&saved, name, &chosen)?;
+        let entry = match record_one(&saved, name, &chosen) {
+            Ok(entry) => entry,
+            Err(error) => {
+                recorded.failures.push((format!("the recording of sample {} of {name}", chosen.sample), error));
+                continue;
+            }
+        };
         for outcome in &entry.outcomes {
             let key = (name.to_owned(), chosen.sample, outcome.controller.clone());
-            recorded.insert(key, format!("{RECORDINGS}/{}", entry.file));
+            recorded.paths.insert(key, format!("{RECORDINGS}/{}", entry.file));
         }
         let (scenario, path) = (name.to_owned(), path.join(&entry.file));
-        samples.push(RecordedSample { scenario, sample: chosen.sample, reasons: chosen.reasons, path });
+        recorded.samples.push(RecordedSample { scenario, sample: chosen.sample, reasons: chosen.reasons, path });
         entries.push(entry);
     }
-    if !entries.is_empty() {
-        write_index(&path.join(RECORDINGS_PAGE), &entries)?;
+    if !entries.is_empty()
+        && let Err(error) = write_index(&path.join(RECORDINGS_PAGE), &entries)
+    {
+        recorded.failures.push((format!("{RECORDINGS}/{RECORDINGS_PAGE}"), error.into()));
     }
-    Ok((recorded, samples))
+    Ok(recorded)
 }
 
 /// Returns the selected samples with their scenarios: the worst of each kind first, then those of each scenario.

@@ -8,7 +8,7 @@ use closecall_campaign::record::Record;
 use closecall_campaign::runner::Work;
 use closecall_campaign::saved::{SavedCampaign, SavedError};
 use closecall_campaign::summary::Summary;
-use closecall_campaign::verdict::{Judgement, judge};
+use closecall_campaign::verdict::{Allowed, Judgement, judge};
 
 use super::overview::Overview;
 
@@ -21,7 +21,7 @@ pub struct Tally {
     pub judge: Judge,
     /// Distributions, maps and the worst samples.
     pub overview: Overview,
-    max_flip_rate: f64,
+    allowed: Allowed,
 }
 
 impl Tally {
@@ -45,7 +45,7 @@ impl Tally {
     fn with(summary: Summary, works: &[Arc<Work>], gates: &GateSet) -> Self {
         let judge = Judge::new(works, gates, summary.inference);
         let overview = Overview::new(works.iter().map(|work| &work.file), &summary.controllers);
-        Self { summary, judge, overview, max_flip_rate: gates.max_flip_rate }
+        Self { summary, judge, overview, allowed: gates.into() }
     }
 
     /// Adds a journal record.
@@ -57,6 +57,6 @@ impl Tally {
 
     /// Returns the judgement of the records so far.
     pub fn judgement(&self) -> Judgement {
-        judge(&self.summary, &self.judge, self.max_flip_rate)
+        judge(&self.summary, &self.judge, self.allowed)
     }
 }

@@ -9,6 +9,8 @@ use closecall_campaign::probability::percent;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
 
+use super::overview::{ErrorGroup, Overview};
+
 /// Width of the names of the arms in the output, at least.
 const NAME_WIDTH: usize = 5;
 
@@ -30,6 +32,26 @@ impl fmt::Display for CountsText<'_> {
             )?;
         }
         writeln!(f, "Rates are conditional on the sampled scenario: they are not the risk on a road.")
+    }
+}
+
+/// The flaky samples of each scenario and arm, with the message of the first crash. Empty if there are none.
+#[derive(Clone, Copy, Debug)]
+pub struct FlakyText<'a>(pub &'a Overview);
+
+impl fmt::Display for FlakyText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for scenario in &self.0.scenarios {
+            for (arm, ErrorGroup { count, first_sample, message }) in &scenario.flaky {
+                let first_line = message.lines().next().unwrap_or_default();
+                writeln!(
+                    f,
+                    "FLAKY: {}: {count} × {arm}, run again after a crash, first in sample {first_sample}: {first_line}",
+                    scenario.name
+                )?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -79,6 +101,9 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
         write_arm_pairs(f, summary, counts)?;
     }
     let checks = &counts.checks;
+    if checks.not_checked > 0 {
+        writeln!(f, "  not checked: {} runs, because a check took too long", checks.not_checked)?;
+    }
     if let Some(rate) = checks.flip_rate() {
         writeln!(
             f,
@@ -125,6 +150,9 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
     write!(f, "  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps)?;
     if arm.errors > 0 {
         write!(f, "  {} ERRORS", arm.errors)?;
+    }
+    if arm.flaky > 0 {
+        write!(f, "  {} FLAKY", arm.flaky)?;
     }
     writeln!(f)?;
     Ok(())

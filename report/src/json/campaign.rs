@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::influence::influence;
 use super::stamp::stamped;
+use crate::campaign::overview::{ErrorGroup, Overview, ScenarioOverview};
 use crate::campaign::{CampaignReport, ensemble_json};
 
 /// Returns the result of a campaign: its counts, its verdict, what moves its result, and how it was made. `wall_s` is its wall time
@@ -19,11 +20,29 @@ pub fn campaign_report(report: &CampaignReport<'_>, wall_s: Option<f64>) -> Valu
     let (tally, manifest) = (report.tally, report.manifest);
     let mut value = campaign(&tally.summary, report.judged, wall_s);
     value["influence"] = influence(&tally.overview, manifest.sampling.design);
+    value["flaky_samples"] = flaky_samples(&tally.overview);
     let verdicts = ensemble_json(&tally.summary, manifest);
     if verdicts.as_array().is_some_and(|verdicts| !verdicts.is_empty()) {
         value["ensemble"] = verdicts;
     }
     stamped(value, Some(manifest.sampling.seed), Some(&manifest.settings()))
+}
+
+/// Returns the flaky samples of each scenario and arm, with the message of the first crash.
+fn flaky_samples(overview: &Overview) -> Value {
+    let of_scenario = |scenario: &ScenarioOverview| -> Vec<Value> {
+        let of_arm = |(arm, flaky): (&String, &ErrorGroup)| {
+            json!({
+                "scenario": scenario.name,
+                "controller": arm,
+                "samples": flaky.count,
+                "first_sample": flaky.first_sample,
+                "first_message": flaky.message,
+            })
+        };
+        scenario.flaky.iter().map(of_arm).collect()
+    };
+    json!(overview.scenarios.iter().flat_map(of_scenario).collect::<Vec<_>>())
 }
 
 /// Returns the counts of a campaign and its verdict. `wall_s` is its wall time (s), `None` for a merged campaign.
@@ -39,6 +58,7 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
     object.insert("expectations".to_owned(), json!(judged.expectations.iter().map(expectation).collect::<Vec<_>>()));
     object.insert("reasons".to_owned(), json!(judged.reasons));
     object.insert("probabilities".to_owned(), probabilities(judged));
+    object.insert("flaky_gate".to_owned(), json!(judged.flaky));
     object.insert("wall_s".to_owned(), json!(wall_s));
     let scenarios: Map<String, Value> = summary
         .scenarios
@@ -119,6 +139,7 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
     let mut object = Map::new();
     object.insert("samples".to_owned(), json!(counts.samples));
     object.insert("errors".to_owned(), json!(counts.errors()));
+    object.insert("flaky".to_owned(), json!(counts.flaky()));
     object.insert("invalid".to_owned(), json!(counts.invalid));
     object.insert("simulated_s".to_owned(), json!(counts.simulated_s));
     let mut controllers = Map::new();
@@ -130,6 +151,7 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
         controller.insert("interval_method".to_owned(), json!(summary.inference.method()));
         controller.insert("max_speed_deficit_mps".to_owned(), json!(arm.max_speed_deficit_mps));
         controller.insert("errors".to_owned(), json!(arm.errors));
+        controller.insert("flaky".to_owned(), json!(arm.flaky));
         controller.insert("engagements".to_owned(), json!(arm.engagements));
         controller.insert("engagement_rate".to_owned(), json!(arm.engagement_rate()));
         controller.insert("goals_in_reach".to_owned(), json!(arm.goals_in_reach));
@@ -189,7 +211,7 @@ fn arm_pair(result: &PairResult<'_>) -> Value {
 fn checks(counts: &CheckCounts) -> Value {
     let broken: Map<String, Value> =
         counts.broken().map(|(check, count)| (check.name().to_owned(), json!(count))).collect();
-    json!({ "runs": counts.runs, "flips": counts.flips, "flip_rate": counts.flip_rate(), "broken": broken })
+    json!({ "runs": counts.runs, "not_checked": counts.not_checked, "flips": counts.flips, "flip_rate": counts.flip_rate(), "broken": broken })
 }
 
 /// Returns the findings of the gate on the probability of a collision, by scenario.

@@ -113,6 +113,7 @@ impl NativeSettings {
         let crash = |error: ExecError| NativeError::Crash { controller: controller.clone(), reason: error.to_string() };
         let mut child = Child::start(&settings, folder).map_err(crash)?;
         let line = child.request(Vec::new(), LOAD_TIMEOUT).map_err(crash)?;
+        child.finish().map_err(crash)?;
         match serde_json::from_slice(&line) {
             Ok(Probe::Identity(identity)) => Ok(identity),
             Ok(Probe::Refused { reason, is_io }) => Err(NativeError::Refused { controller, reason, is_io }),
@@ -262,7 +263,7 @@ impl ControllerFactory for NativeFactory {
         if !self.is_worker {
             let table = serde_json::to_string(table).unwrap_or_default();
             let process = self.settings.process(&["step", &self.settings.text(), &table]);
-            return ExecFactory::new(process, self.folder.as_deref()).build(settings);
+            return ExecFactory::new(process, self.folder.as_deref()).repeating_time().build(settings);
         }
         let path = path_in(self.folder.as_deref(), &self.settings);
         match Loaded::open(self.settings.kind, &path) {

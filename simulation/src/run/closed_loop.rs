@@ -22,10 +22,14 @@ pub fn simulate(
     let mut controller = controller(scenario, settings_of(scenario), arm);
     loop {
         match run.go_on(observer)? {
-            Next::End(end) => return Ok(run.finish(end)),
+            Next::End(end) => {
+                controller.finish(run.time())?;
+                return Ok(run.finish(end));
+            }
             Next::Control => {
                 let command = controller.step(&run.input())?;
                 if let Some(end) = run.command(command, observer)? {
+                    controller.finish(run.time())?;
                     return Ok(run.finish(end));
                 }
             }

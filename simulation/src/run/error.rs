@@ -64,6 +64,11 @@ pub enum SampleError {
 }
 
 impl SampleError {
+    /// Returns true if the wall clock caused the error: the same run may have an outcome on another machine.
+    pub const fn is_late(&self) -> bool {
+        matches!(self, Self::Timeout { .. } | Self::Controller(ControllerError::Late { .. }))
+    }
+
     /// Returns a one-word name of the kind of error, for reports.
     pub fn kind(&self) -> &'static str {
         match self {

@@ -8,7 +8,7 @@ use closecall_controllers::CheckedDriver;
 use closecall_controllers::{EgoCommand, EgoInput, EgoSettings, EgoState, Looks, MisSettings, Neighbours, Reason};
 use closecall_sensors::{Perception, Scene, SceneVehicle};
 use closecall_traffic::{
-    CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Track, VehicleState,
+    CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Time, Track, VehicleState,
 };
 
 use super::ego_input::{odometry, sensor_availability};
@@ -193,6 +193,11 @@ impl<'a> Run<'a> {
             tracks: if self.looks_back { &self.tracks } else { &self.tracks_ahead },
             sensors: sensor_availability(self.perception.as_ref()),
         }
+    }
+
+    /// Returns the current time.
+    pub(super) fn time(&self) -> Time {
+        self.world.time()
     }
 
     /// Returns the scenario.

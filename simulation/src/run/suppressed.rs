@@ -3,6 +3,7 @@
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 
 use closecall_scenarios::MisState;
+use closecall_traffic::Time;
 
 /// An ego stack whose margin increase system does not drive in some of its states: there, cruise control and emergency
 /// braking drive alone. The system itself goes through its states as before.
@@ -27,5 +28,9 @@ impl EgoController for Suppressed {
             return Ok(command);
         }
         Ok(EgoCommand { acceleration_mps2: plain.acceleration_mps2, ..command })
+    }
+
+    fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
+        self.stack.finish(time)
     }
 }

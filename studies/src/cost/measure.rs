@@ -93,7 +93,7 @@ struct Values {
 pub fn cost(saved: &SavedCampaign) -> Result<Cost, CausesError> {
     let names: Vec<&String> = saved.manifest().scenarios.iter().map(|scenario| &scenario.name).collect();
     let mut found: Vec<Uneventful> = names.iter().map(|_| Uneventful::default()).collect();
-    for record in saved.folder().records()? {
+    for record in saved.folder().complete_records()? {
         let record = record?;
         let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
         let index = names.iter().position(|name| **name == record.scenario);

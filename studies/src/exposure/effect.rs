@@ -164,7 +164,7 @@ pub fn shares_of(saved: &SavedCampaign, scenario: Option<&str>) -> Result<Campai
     let name = saved.file(scenario)?.config().name.clone();
     let mut summary = Summary::of(&saved.works()?);
     let (mut runs, mut braked) = (0_u64, 0_u64);
-    for record in saved.folder().records()? {
+    for record in saved.folder().complete_records()? {
         let record = record?;
         if record.scenario == name
             && let Some(Ok(baseline)) = record.arms.first().map(|arm| arm.result.as_ref())

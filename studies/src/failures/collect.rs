@@ -85,11 +85,15 @@ pub fn explain_failures(
 /// Returns the error for a sample that does not fail, with some that do; or, if it fails in the journal, for one that does not
 /// repeat.
 pub(crate) fn passes(saved: &SavedCampaign, case: &Case) -> CausesError {
-    if has_failed(saved, case).unwrap_or(false) {
-        return CausesError::NotRepeated { sample: case.sample, controller: case.arm.controller.name().to_owned() };
-    }
-    let failing: Vec<String> =
-        rows(saved).unwrap_or_default().iter().take(5).map(|row| row.sample.to_string()).collect();
+    let rows = match (has_failed(saved, case), rows(saved)) {
+        (Ok(true), _) => {
+            return CausesError::NotRepeated { sample: case.sample, controller: case.arm.controller.name().to_owned() };
+        }
+        (Ok(false), Ok(rows)) => rows,
+        // A journal that cannot be read says neither that the sample passes nor that none fails.
+        (Err(error), _) | (_, Err(error)) => return error,
+    };
+    let failing: Vec<String> = rows.iter().take(5).map(|row| row.sample.to_string()).collect();
     let failing = if failing.is_empty() { "none".to_owned() } else { failing.join(", ") };
     CausesError::Passes { sample: case.sample, controller: case.arm.controller.name().to_owned(), failing }
 }
@@ -115,6 +119,10 @@ fn rows(saved: &SavedCampaign) -> Result<Vec<FailureRow>, CausesError> {
         let Some(row) = FailureRow::of(&record?) else { continue };
         let known = kept.iter().find(|known| known.is_same(&row) && known.time_s == row.time_s);
         rows.push(known.cloned().unwrap_or(row));
+    }
+    if rows.is_empty() {
+        // Only all samples together show that none fails.
+        saved.folder().complete_records()?.try_for_each(|record| record.map(drop))?;
     }
     rows.sort_by(order);
     Ok(rows)

@@ -164,6 +164,10 @@ impl EgoController for Marked<Box<dyn EgoController>> {
         mark(Mark::Answered);
         command
     }
+
+    fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
+        self.0.finish(time)
+    }
 }
 
 impl ControllerFactory for Marked<Arc<dyn ControllerFactory>> {

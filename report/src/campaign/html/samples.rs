@@ -109,6 +109,33 @@ pub(super) fn errors(scenario: &ScenarioOverview) -> Markup {
     html! { h3 { "Errors" } (table(&head, &rows)) }
 }
 
+/// Returns the flaky samples of a scenario, by arm; empty if there are none.
+pub(super) fn flaky(scenario: &ScenarioOverview) -> Markup {
+    if scenario.flaky.is_empty() {
+        return Markup::default();
+    }
+    let head = html! {
+        (text_heads(&["controller"]))
+        (number_heads(&["samples", "first"]))
+        th { "message of the first crash" }
+    };
+    let rows = html! {
+        @for (arm, flaky) in &scenario.flaky {
+            tr.collided {
+                td { (arm) }
+                (number(flaky.count))
+                (number(flaky.first_sample))
+                td { code { (flaky.message) } }
+            }
+        }
+    };
+    html! {
+        h3 { "Flaky" }
+        p { "These samples crashed or hung, and have an outcome only because they were run again in a new process." }
+        (table(&head, &rows))
+    }
+}
+
 /// Returns the samples with the longest wall times; empty if no wall time is known.
 pub(super) fn slowest(findings: &Findings<'_>) -> Markup {
     if findings.slowest.is_empty() {

@@ -21,6 +21,7 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
             h2 { (scenario.name) }
             @if let Some(file) = file { p.what { (file.config().description) } }
             (samples::errors(scenario))
+            (samples::flaky(scenario))
             (samples::worst(findings, scenario))
             (map(scenario)?)
             (influence::section(findings, scenario)?)

@@ -61,6 +61,8 @@ pub struct ScenarioOverview {
     pub worst: Vec<WorstSample>,
     /// Errors by arm and kind.
     pub errors: BTreeMap<(String, String), ErrorGroup>,
+    /// Samples with an outcome only because they were run again after a crash or a hang, by arm.
+    pub flaky: BTreeMap<String, ErrorGroup>,
     /// The samples with the smallest hashes of their number, for each fate: an even choice of all samples.
     points: BTreeMap<(Fate, u64), Point>,
     /// The number of points of each fate.
@@ -83,6 +85,7 @@ impl ScenarioOverview {
             margins: vec![vec![MarginBins::EMPTY; arms.len()]; MARGINS.len()],
             worst: Vec::with_capacity(MOST_WORST + 1),
             errors: BTreeMap::new(),
+            flaky: BTreeMap::new(),
             points: BTreeMap::new(),
             point_counts: [0; Fate::ALL.len()],
         }
@@ -126,6 +129,11 @@ impl ScenarioOverview {
         totals.samples += 1;
         match &arm.result {
             Ok(outcome) => {
+                if let Some(flaky) = &arm.flaky {
+                    let message = || flaky.first.message.clone();
+                    let first = || ErrorGroup { count: 0, first_sample: sample, message: message() };
+                    self.flaky.entry(arm.controller.clone()).or_insert_with(first).count += 1;
+                }
                 totals.failures += usize::from(outcome.ego_collided());
                 for (kind, bins) in MARGINS.iter().zip(&mut self.margins) {
                     bins[index].push(kind, outcome);

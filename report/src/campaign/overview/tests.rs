@@ -36,7 +36,7 @@ fn record(sample: u64, closing_mps: f64, class: &str, collided: [bool; 2]) -> Re
         let mut outcome = if collided { hit.clone() } else { miss.clone() };
         (outcome.sample, outcome.parameters) = (sample, parameters.clone());
         outcome.controller.clone_from(&controller);
-        ArmRecord { controller, result: Ok(outcome), checks: None }
+        ArmRecord::new(controller, Ok(outcome))
     };
     Record {
         scenario: "low-thw-overtake".to_owned(),

@@ -29,6 +29,12 @@ const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 /// Interval at which a process is polled for its end.
 const EXIT_POLL_INTERVAL: Duration = Duration::from_millis(1);
 
+/// Interval at which a process is looked at that has to end.
+const FINISH_POLL_INTERVAL: Duration = Duration::from_millis(10);
+
+/// Time in which the last lines of a process that has ended arrive, if another process holds its pipe open.
+const DRAIN_TIMEOUT: Duration = Duration::from_millis(50);
+
 /// Number of lines that are buffered. A process that writes more lines than that has to wait.
 const BUFFERED_LINES: usize = 2;
 
@@ -125,13 +131,64 @@ impl Child {
     /// # Errors
     /// [`ExecError`] if the process ends, or does not keep to its limits.
     pub fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
-        self.send(line);
-        let answer = self.wait(limit);
+        let answer = self.reject_unrequested_line().and_then(|()| {
+            self.send(line);
+            self.wait(limit)
+        });
         match &answer {
             Ok(Some(_)) => self.answered += 1,
             Ok(None) | Err(_) => self.has_failed = true,
         }
         answer
+    }
+
+    /// Closes the standard input of the process, and checks that it has written nothing but its answers. The process has a short time
+    /// to end by itself.
+    ///
+    /// # Errors
+    /// [`ExecError`] if a line is left over: an earlier line may have been taken for the answer to another question.
+    pub fn finish(&mut self) -> Result<(), ExecError> {
+        self.requests = None;
+        let started = Instant::now();
+        let mut ended: Option<Instant> = None;
+        let left_over = loop {
+            match self.answers.recv_timeout(FINISH_POLL_INTERVAL) {
+                Ok(line) => break Some(line),
+                Err(RecvTimeoutError::Disconnected) => break None,
+                Err(RecvTimeoutError::Timeout) if started.elapsed() >= EXIT_TIMEOUT => {
+                    // It has had its time to end by itself.
+                    self.has_failed = true;
+                    break None;
+                }
+                // A descendant may hold the pipe open after the end of the process. What the process has written still arrives.
+                Err(RecvTimeoutError::Timeout) if ended.is_some_and(|at| at.elapsed() >= DRAIN_TIMEOUT) => break None,
+                Err(RecvTimeoutError::Timeout) => {
+                    if ended.is_none() && self.has_ended() {
+                        ended = Some(Instant::now());
+                    }
+                }
+            }
+        };
+        match left_over {
+            None => Ok(()),
+            Some(line) => {
+                self.has_failed = true;
+                Err(match line {
+                    Line::Whole(line) => ExecError::OutOfTurn { answered: self.answered, line: excerpt(&line) },
+                    Line::TooLong => ExecError::LongLine { limit: MAX_LINE_BYTES },
+                })
+            }
+        }
+    }
+
+    /// Returns the process's number.
+    pub fn process_id(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// Lets the process be killed without time to end by itself.
+    pub const fn condemn(&mut self) {
+        self.has_failed = true;
     }
 
     /// Returns the number of answers so far.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, LeadVehicleSelector, Reason,
 };
-use closecall_traffic::Road;
+use closecall_traffic::{Road, Time};
 
 use super::child::Child;
 use super::error::ExecError;
@@ -25,12 +25,19 @@ pub struct ExecFactory {
     settings: ExecSettings,
     folder: Option<PathBuf>,
     name: String,
+    repeats_time: bool,
 }
 
 impl ExecFactory {
     /// Creates a factory of processes with these settings. They run in the given folder, or in that of this program.
     pub fn new(settings: ExecSettings, folder: Option<&Path>) -> Self {
-        Self { settings, folder: folder.map(Path::to_owned), name: NAME.to_owned() }
+        Self { settings, folder: folder.map(Path::to_owned), name: NAME.to_owned(), repeats_time: false }
+    }
+
+    /// Returns a factory of processes each of whose answers must repeat the time of its control step.
+    #[must_use]
+    pub(in crate::controller) fn repeating_time(self) -> Self {
+        Self { repeats_time: true, ..self }
     }
 
     /// Returns the factory under another name in reports.
@@ -82,6 +89,7 @@ impl ControllerFactory for ExecFactory {
             settings: self.settings.clone(),
             folder: self.folder.clone(),
             ego_settings: *settings,
+            repeats_time: self.repeats_time,
             lead_selector: LeadVehicleSelector::default(),
             child: None,
         })
@@ -93,6 +101,7 @@ struct ExecController {
     settings: ExecSettings,
     folder: Option<PathBuf>,
     ego_settings: EgoSettings,
+    repeats_time: bool,
     lead_selector: LeadVehicleSelector,
     child: Option<Child>,
 }
@@ -108,16 +117,24 @@ impl ExecController {
                 self.child.insert(child)
             }
         };
-        protocol::parse_answer(&child.request(protocol::step(input, front), self.settings.timeout())?)
+        let line = child.request(protocol::step(input, front), self.settings.timeout())?;
+        let asked = protocol::Asked {
+            time_ns: input.time.ns(),
+            must_be_repeated: self.repeats_time,
+            answered: child.answered(),
+        };
+        let answer = protocol::parse_answer(&line, asked);
+        if answer.is_err() {
+            child.condemn();
+        }
+        answer
     }
 }
 
 impl EgoController for ExecController {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         input.check_finite()?;
-        let answer = self
-            .request(input)
-            .map_err(|error| ControllerError::Own { reason: error.to_string(), time: input.time })?;
+        let answer = self.request(input).map_err(|error| failure(&error, input.time))?;
         Ok(EgoCommand {
             acceleration_mps2: answer.acceleration_mps2,
             state: answer.state,
@@ -125,4 +142,13 @@ impl EgoController for ExecController {
             plan: None,
         })
     }
+
+    fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
+        self.child.as_mut().map_or(Ok(()), Child::finish).map_err(|error| failure(&error, time))
+    }
+}
+
+fn failure(error: &ExecError, time: Time) -> ControllerError {
+    let reason = error.to_string();
+    if error.is_late() { ControllerError::Late { reason, time } } else { ControllerError::Own { reason, time } }
 }

@@ -66,6 +66,18 @@ pub enum ExecError {
         /// The beginning of the line.
         line: String,
     },
+    /// The process answered another question than the one it was asked.
+    #[error("the process answered {line:?} for the control step at {found} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
+    OtherStep {
+        /// The beginning of the line.
+        line: String,
+        /// The time of the control step (ns).
+        expected: i64,
+        /// The time that the answer repeats.
+        found: String,
+        /// Number of answers before, including the greeting.
+        answered: u64,
+    },
     /// The process wrote a line that exceeds the length limit.
     #[error("the process answered with a line of more than {limit} bytes")]
     LongLine {
@@ -112,6 +124,13 @@ pub enum ExecError {
         /// The memory limit (MiB).
         limit_mib: u64,
     },
+}
+
+impl ExecError {
+    /// Returns true if the wall clock caused the error.
+    pub const fn is_late(&self) -> bool {
+        matches!(self, Self::Late { .. } | Self::Hangs { .. })
+    }
 }
 
 /// Describes when an error happened by the number of answers before it. The first answer is the greeting.

@@ -29,7 +29,10 @@
 //!    four), `heading_rad`, `length_m`, `width_m`, `class` {`car`, `truck`, `motorcycle`, `background`}, `existence`, and
 //!    `lane` {`left`, `own`, `right`}. `sensors` has `front`, `surround`, `rear`: whether each works.
 //! 4. The process answers `{"acceleration_mps2":-0.4,"state":"following"}`, within `--controller-timeout-ms`. `state` is one of
-//!    `following`, `increasing`, `holding`, `releasing`, `emergency-braking`.
+//!    `following`, `increasing`, `holding`, `releasing`, `emergency-braking`. The answer may repeat the `time_ns` of its step, which is
+//!    then compared.
+//! 5. At the end of the run Closecall closes the standard input and reads what is left. A line that nobody asked for is an error,
+//!    here and before each step: another line may have been taken for the answer to another step.
 //!
 //! # Errors
 //! If the process does not give a valid answer, the sample ends as an error with a message that states the cause

@@ -13,6 +13,8 @@ pub(super) const PROTOCOL: u32 = 1;
 
 const ACCELERATION_KEY: &str = "acceleration_mps2";
 const STATE_KEY: &str = "state";
+/// The key under which an answer repeats the time of its control step.
+const TIME_KEY: &str = "time_ns";
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
@@ -167,9 +169,27 @@ pub(super) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
     }
 }
 
+/// The question to which a line must be the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Asked {
+    /// The time of the control step (ns).
+    pub(super) time_ns: i64,
+    /// Whether the answer must repeat the time. Else it may.
+    pub(super) must_be_repeated: bool,
+    /// Number of answers before, including the greeting.
+    pub(super) answered: u64,
+}
+
 /// Parses the answer to a control step.
-pub(super) fn parse_answer(line: &[u8]) -> Result<Answer, ExecError> {
+pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecError> {
     let object = object(line)?;
+    let repeated = object.get(TIME_KEY);
+    let is_own = repeated.map_or(!asked.must_be_repeated, |time| time.as_i64() == Some(asked.time_ns));
+    if !is_own {
+        let found = repeated.map_or_else(|| "an unstated number of".to_owned(), ToString::to_string);
+        let (line, found) = (excerpt(line), excerpt(found.as_bytes()));
+        return Err(ExecError::OtherStep { line, expected: asked.time_ns, found, answered: asked.answered });
+    }
     let acceleration_mps2 = object
         .get(ACCELERATION_KEY)
         .and_then(Value::as_f64)
@@ -212,19 +232,37 @@ fn key_error(line: &[u8], object: &Map<String, Value>, key: &'static str, expect
 mod tests {
     use super::*;
 
+    fn parsed(line: &[u8]) -> Result<Answer, ExecError> {
+        parse_answer(line, Asked { time_ns: 80_000_000, must_be_repeated: false, answered: 3 })
+    }
+
+    #[test]
+    fn an_answer_that_repeats_another_time_is_that_of_another_step() {
+        let line = |time: &str| format!("{{\"acceleration_mps2\":0,\"state\":\"following\"{time}}}");
+        for right in ["", ",\"time_ns\":80000000"] {
+            parsed(line(right).as_bytes()).unwrap();
+        }
+        for wrong in ["40000000", "null", "\"80000000\"", "8e7"] {
+            let error = parsed(line(&format!(",\"time_ns\":{wrong}")).as_bytes()).unwrap_err();
+            assert!(matches!(error, ExecError::OtherStep { expected: 80_000_000, .. }), "{wrong}: {error}");
+        }
+        let asked = Asked { time_ns: 80_000_000, must_be_repeated: true, answered: 3 };
+        assert!(matches!(parse_answer(line("").as_bytes(), asked), Err(ExecError::OtherStep { .. })));
+    }
+
     #[test]
     fn a_valid_answer_is_read_to_the_last_bit() {
         let read =
-            parse_answer(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
+            parsed(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
         assert_eq!(read, Answer { acceleration_mps2: -0.123_456_789_012_345_6, state: EgoState::Increasing });
-        assert_eq!(parse_answer(br#"{"acceleration_mps2": 1, "state": "following"}"#).unwrap().acceleration_mps2, 1.0);
+        assert_eq!(parsed(br#"{"acceleration_mps2": 1, "state": "following"}"#).unwrap().acceleration_mps2, 1.0);
     }
 
     #[test]
     fn an_acceleration_that_is_not_finite_is_quoted() {
         for value in ["NaN", "nan", "-nan", "Infinity", "-Infinity", "inf", "1e999"] {
             let line = format!("{{\"acceleration_mps2\": {value}, \"state\": \"following\"}}");
-            let error = parse_answer(line.as_bytes()).unwrap_err();
+            let error = parsed(line.as_bytes()).unwrap_err();
             assert!(matches!(&error, ExecError::NotFinite { value: named } if named == value), "{value}: {error}");
         }
     }
@@ -241,10 +279,10 @@ mod tests {
             (r#"{"acceleration_mps2": -1}"#, "`state` must be one of following"),
             (r#"{"acceleration_mps2": -1, "state": "driving"}"#, "it is \"driving\""),
         ] {
-            let error = parse_answer(line.as_bytes()).unwrap_err().to_string();
+            let error = parsed(line.as_bytes()).unwrap_err().to_string();
             assert!(error.contains(stated), "{line}: {error}");
         }
-        assert!(parse_answer(&[0xff, 0xfe]).is_err());
+        assert!(parsed(&[0xff, 0xfe]).is_err());
     }
 
     #[test]

@@ -1,0 +1,113 @@
+//! Whether the folder of a campaign is whole: `closecall check DIR`.
+//!
+//! | what is looked at | problem | repair |
+//! |---|---|---|
+//! | `manifest.json` | unreadable, another version, a changed scenario text | a copy of the folder |
+//! | `journal.jsonl` | a damaged line, a line that is there twice, missing samples | `--resume` |
+//! | `journal.jsonl` | a record of another sample, another order | a new campaign |
+//! | files made from the journal | missing | `--resume` |
+//!
+//! The commands that read a folder make the same checks of its records: see [`Folder::records`](crate::folder::Folder::records).
+
+use serde::Serialize;
+
+use crate::folder::{DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST};
+use crate::journal::{self, Entry};
+use crate::resume_command::resume_command;
+
+/// Something that is wrong with a folder.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Problem {
+    /// The file.
+    pub file: String,
+    /// The line, counted from 1, if it is one line.
+    pub line: Option<usize>,
+    /// What is wrong.
+    pub message: String,
+    /// What repairs it.
+    pub repair: String,
+}
+
+/// What is known of a folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Integrity {
+    /// Number of records that are those of their samples.
+    pub records: u64,
+    /// Number of records that the plan has beyond these.
+    pub missing: u64,
+    /// What is wrong.
+    pub problems: Vec<Problem>,
+}
+
+impl Integrity {
+    /// Looks at the folder of a campaign.
+    pub fn of(folder: &Folder) -> Self {
+        let mut found = Self::default();
+        let manifest = match folder.manifest() {
+            Ok(manifest) => manifest,
+            Err(error) => {
+                found.add_error(MANIFEST, &error, "put a copy of the folder in its place");
+                return found;
+            }
+        };
+        let resume = resume_command(manifest.command.iter().cloned(), false);
+        if let Err(error) = found.read_journal(folder, &resume) {
+            found.add_error(JOURNAL, &error, &format!("resume the campaign: {resume}"));
+            return found;
+        }
+        let is_paired = manifest.arms.len() > 1;
+        for file in DERIVED_FILES {
+            if found.missing == 0 && !folder.file(file).is_file() && (is_paired || file != "arm_pairs.parquet") {
+                found.add(file, None, "it is missing".to_owned(), format!("resume the campaign: {resume}"));
+            }
+        }
+        found
+    }
+
+    /// Returns true if nothing is wrong.
+    pub fn is_sound(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    /// Adds a problem.
+    pub fn add(&mut self, file: &str, line: Option<usize>, message: String, repair: String) {
+        self.problems.push(Problem { file: file.to_owned(), line, message, repair });
+    }
+
+    fn add_error(&mut self, file: &str, error: &FolderError, repair: &str) {
+        self.add(file, None, error.to_string(), repair.to_owned());
+    }
+
+    fn read_journal(&mut self, folder: &Folder, resume: &str) -> Result<(), FolderError> {
+        let path = folder.file(JOURNAL);
+        let mut plan = folder.plan()?;
+        let repair = || format!("resume the campaign: {resume}");
+        let entries = journal::read(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
+        for (index, entry) in entries.enumerate() {
+            match entry.map_err(|source| FolderError::Read { path: path.clone(), source })? {
+                Entry::Record { record, .. } if plan.is_last(&record) => {
+                    self.add(JOURNAL, Some(index + 1), "it repeats the line before".to_owned(), repair());
+                }
+                Entry::Record { record, .. } => match plan.check(&record) {
+                    Ok(()) => self.records += 1,
+                    Err(message) => {
+                        let repair = "put a copy of the folder in its place, or run the campaign into a new folder";
+                        self.add(JOURNAL, Some(index + 1), message, repair.to_owned());
+                        // What follows a wrong line is not where it belongs.
+                        return Ok(());
+                    }
+                },
+                Entry::Torn { line, reason, .. } => {
+                    self.add(JOURNAL, Some(line), reason, repair());
+                    return Ok(());
+                }
+            }
+        }
+        self.missing = plan.missing();
+        if self.missing > 0 {
+            let of = self.records + self.missing;
+            self.add(JOURNAL, None, format!("it has {} of the {of} samples", self.records), repair());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,219 @@
+//! Nothing is taken on trust: a journal is checked against its plan by every reader, a part of the samples says nothing about all, and
+//! a report that cannot be written does not cost the verdict.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::native_controllers::{compile, lib, records, with_fault};
+use crate::support::{closecall, code, folder, message, program, stderr, stdout};
+
+const CAMPAIGN: [&str; 8] =
+    ["campaign", "low-thw-overtake", "-n", "8", "--no-gate", "--sensors", "ground-truth", "--record=failures:0"];
+
+/// Runs a campaign into a folder.
+fn campaign(out: &Path, more: &[&str]) -> Output {
+    program().args(CAMPAIGN).args(["--out", out.to_str().unwrap()]).args(more).output().unwrap()
+}
+
+fn lines(out: &Path) -> Vec<String> {
+    fs::read_to_string(out.join("journal.jsonl")).unwrap().lines().map(str::to_owned).collect()
+}
+
+fn write_lines(out: &Path, lines: &[String]) {
+    fs::write(out.join("journal.jsonl"), lines.join("\n") + "\n").unwrap();
+}
+
+/// Returns a line of a journal with its record changed, and with the checksum of the changed record.
+fn changed(line: &str, change: impl FnOnce(&mut Value)) -> String {
+    let mut record: Value = serde_json::from_str(&line[17..]).unwrap();
+    change(&mut record);
+    let text = record.to_string();
+    format!("{} {text}", &blake3::hash(text.as_bytes()).to_hex()[..16])
+}
+
+/// Asserts that every command that reads the journal refuses it, and says why.
+fn assert_refused(folder: &Path, out: &Path, sound: &Path, expected: &str) {
+    let (out, sound) = (out.to_str().unwrap(), sound.to_str().unwrap());
+    let baseline = folder.join("refused.json");
+    let commands: [&[&str]; 4] = [
+        &["baseline", "save", out, baseline.to_str().unwrap()],
+        &["compare", sound, out],
+        &["compare", out, sound],
+        &["explain", out],
+    ];
+    for command in commands {
+        let output = closecall(command);
+        assert_eq!(code(&output), 3, "{command:?}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{command:?}: {}", stderr(&output));
+    }
+    assert!(!baseline.exists());
+}
+
+#[test]
+fn a_record_that_is_not_that_of_its_sample_is_refused_by_every_reader() {
+    let folder = folder();
+    let [out, sound] = ["out", "sound"].map(|name| folder.path().join(name));
+    stdout(&campaign(&out, &[]), 0);
+    stdout(&campaign(&sound, &[]), 0);
+    let kept = lines(&out);
+    let arms = |line: &str| serde_json::from_str::<Value>(&line[17..]).unwrap()["arms"].clone();
+    let outcome = |record: &mut Value, key: &str, value: Value| record["arms"][0]["result"]["Ok"][key] = value;
+    let wrong: [(String, &str); 5] = [
+        // The results of two samples are swapped: each line is whole, and has its checksum.
+        (changed(&kept[3], |record| record["arms"] = arms(&kept[4])), "sample 3 is sample 4 of the seed 0"),
+        (changed(&kept[3], |record| outcome(record, "seed", 7.into())), "sample 3 is sample 3 of the seed 7, not of 0"),
+        (changed(&kept[3], |record| outcome(record, "scenario", "another".into())), "has an outcome of `another`"),
+        (changed(&kept[3], |record| outcome(record, "controller", "acc".into())), "an outcome of the controller `acc`"),
+        (
+            changed(&kept[3], |record| record["arms"][0]["result"]["Ok"]["parameters"]["brake-mps2"] = 1.5.into()),
+            "sample 3 has other values than the seed 0 draws",
+        ),
+    ];
+    for (line, expected) in wrong {
+        let mut swapped = kept.clone();
+        swapped[3] = line;
+        write_lines(&out, &swapped);
+        let output = campaign(&out, &["--resume"]);
+        assert_eq!(code(&output), 3, "{expected}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{expected}: {}", stderr(&output));
+        assert!(lines(&out) == swapped, "the journal is unchanged");
+        assert_refused(folder.path(), &out, &sound, expected);
+        // What is next to it is wrong, too.
+        let replay = closecall(["replay", out.to_str().unwrap(), "5"]);
+        assert_eq!(code(&replay), 3, "{}", stderr(&replay));
+    }
+}
+
+#[test]
+fn a_part_of_the_samples_is_no_baseline_and_no_proof() {
+    let folder = folder();
+    let [out, sound] = ["out", "sound"].map(|name| folder.path().join(name));
+    // A scenario in which no sample fails: all of them show that, and a part does not.
+    for out in [&out, &sound] {
+        let words = CAMPAIGN.map(|word| if word == "low-thw-overtake" { "overtake-without-brake" } else { word });
+        stdout(&program().args(words).args(["--out", out.to_str().unwrap()]).output().unwrap(), 0);
+    }
+    let kept = lines(&out);
+    write_lines(&out, &kept[..5]);
+    assert_refused(folder.path(), &out, &sound, "it has 5 of the 8 samples of its campaign");
+    // A replay without a result to compare with does not say that it agrees.
+    let replay = closecall(["replay", out.to_str().unwrap(), "6"]);
+    assert_eq!(code(&replay), 4, "{}", stderr(&replay));
+    assert!(message(&replay).contains("not compared: the campaign's journal has no result of 1 of the 1 runs"));
+    fs::remove_file(out.join("journal.jsonl")).unwrap();
+    assert_eq!(code(&closecall(["replay", out.to_str().unwrap(), "2"])), 4);
+    assert_eq!(code(&closecall(["replay", sound.to_str().unwrap(), "2"])), 0);
+}
+
+#[test]
+fn a_line_that_is_there_twice_is_refused_and_does_not_block_a_resumption() {
+    let folder = folder();
+    let [out, sound] = ["out", "sound"].map(|name| folder.path().join(name));
+    stdout(&campaign(&out, &[]), 0);
+    stdout(&campaign(&sound, &[]), 0);
+    let kept = lines(&out);
+    for at in [1, 4, 8] {
+        let mut doubled = kept.clone();
+        doubled.insert(at, kept[at - 1].clone());
+        doubled.insert(at, kept[at - 1].clone());
+        write_lines(&out, &doubled);
+        assert_refused(folder.path(), &out, &sound, "is there twice");
+        let output = campaign(&out, &["--resume"]);
+        stdout(&output, 0);
+        assert!(message(&output).contains("2 lines of the journal that repeated the line before were removed"));
+        assert!(lines(&out) == kept, "{at}");
+    }
+}
+
+#[test]
+fn a_summary_that_cannot_be_written_does_not_cost_the_verdict() {
+    let folder = folder();
+    let run = |out: &str, more: &[&str]| {
+        program()
+            .args(["campaign", "overtake-without-brake", "-n", "8", "--sensors", "ground-truth"])
+            .args(["--record", "failures:0", "--out", folder.path().join(out).to_str().unwrap()])
+            .args(more)
+            .env("GITHUB_STEP_SUMMARY", folder.path().join("no/such/folder"))
+            .output()
+            .unwrap()
+    };
+    let cases = [
+        ("pass", &["--max-collisions", "0"][..], 0, "PASS"),
+        ("fail", &["--gate", "count(engaged) <= 0", "--gate", "min(min_thw_front_s) >= 100"], 1, "FAIL"),
+        ("strict", &["--max-collisions", "0", "--strict-artifacts"], 6, "PASS"),
+    ];
+    for (out, more, expected, verdict) in cases {
+        let output = run(out, more);
+        assert!(stdout(&output, expected).contains(verdict), "{}", stderr(&output));
+        let warning = "warning: the summary for the CI server (GITHUB_STEP_SUMMARY) is missing: ";
+        assert!(message(&output).contains(warning), "{}", stderr(&output));
+        for file in ["junit.xml", "outcomes.parquet", "report.html", "summary.md", "samples.xml"] {
+            assert!(folder.path().join(out).join(file).is_file(), "{out}: {file}");
+        }
+    }
+    let output = run("unused", &["--max-collisions", "0", "--no-out"]);
+    assert_eq!(code(&output), 2);
+}
+
+#[test]
+fn a_controller_that_fails_only_while_it_is_recorded_does_not_cost_the_verdict() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    for (name, more, expected) in [("out", &[][..], 0), ("strict", &["--strict-artifacts"][..], 5)] {
+        let out = folder.path().join(name);
+        let mut command = program();
+        command
+            .args(["campaign", "overtake-without-brake", "-n", "4", "--sensors", "object", "--max-collisions", "4"])
+            .args(["--record", "random:2", "--controller", &library, "--out", out.to_str().unwrap()])
+            .args(more);
+        let output = with_fault(&mut command, Some("recorded"));
+        assert!(stdout(&output, expected).contains("PASS"), "{}", stderr(&output));
+        let warnings = message(&output).matches("warning: the recording of sample ").count();
+        assert_eq!(warnings, 2, "{}", stderr(&output));
+        for file in ["junit.xml", "outcomes.parquet", "report.html", "summary.md", "samples.xml"] {
+            assert!(out.join(file).is_file(), "{file}");
+        }
+    }
+}
+
+#[test]
+fn a_mirrored_run_that_takes_too_long_is_not_checked_and_no_defect_of_the_simulator() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let out = folder.path().join("out");
+    let run = |fault: Option<&str>, more: &[&str]| {
+        let mut command = program();
+        command
+            .args(["campaign", "low-thw-overtake", "-n", "4", "--sensors", "object", "--no-gate", "--jobs", "1"])
+            .args(["--controller-timeout-ms", "300", "--record", "failures:0", "--controller", &library])
+            .args(["--out", out.to_str().unwrap()])
+            .args(more);
+        with_fault(&mut command, fault)
+    };
+    let text = stdout(&run(Some("mirror"), &[]), 0);
+    assert!(text.contains("not checked: 2 runs") && !text.contains("mirror image"), "{text}");
+    for record in &records(&out)[..2] {
+        let checks = record.arms[0].checks.as_ref().unwrap();
+        assert!(checks.broken.is_empty() && checks.not_checked.as_ref().unwrap().contains("no answer within 300 ms"));
+    }
+    // A resumption keeps that, and runs them again on request.
+    assert!(stdout(&run(None, &["--resume"]), 0).contains("not checked: 2 runs"));
+    let text = stdout(&run(None, &["--resume", "--retry-errors"]), 0);
+    assert!(text.contains("checked: 2 runs") && !text.contains("not checked: 2"), "{text}");
+}
+
+#[test]
+fn the_table_of_outcomes_does_not_depend_on_the_working_folder() {
+    let folder = folder();
+    let tables = ["one", "other"].map(|name| {
+        let own: PathBuf = folder.path().join(name);
+        fs::create_dir(&own).unwrap();
+        let output = program().current_dir(&own).args(CAMPAIGN).args(["--out", "out"]).output().unwrap();
+        stdout(&output, 0);
+        fs::read(own.join("out/outcomes.parquet")).unwrap()
+    });
+    assert!(tables[0] == tables[1]);
+}
