@@ -22,6 +22,7 @@ pub mod library;
 mod lidar_file;
 mod locate;
 pub mod member;
+mod overridden;
 mod placement;
 mod recorded;
 mod recorded_values;
