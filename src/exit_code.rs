@@ -93,7 +93,7 @@ impl From<&Judgement> for ExitCode {
         match judged.decision {
             Decision::Pass | Decision::Measured => Self::Pass,
             Decision::Fail => Self::Fail,
-            Decision::Inconclusive | Decision::NotJudged => Self::Inconclusive,
+            Decision::Inconclusive | Decision::NotJudged | Decision::Overridden => Self::Inconclusive,
             Decision::SampleError => Self::SampleError,
             Decision::Invalid => Self::Invalid,
         }

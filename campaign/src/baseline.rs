@@ -23,7 +23,7 @@ use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
-pub const BASELINE_VERSION: u32 = 1;
+pub const BASELINE_VERSION: u32 = 2;
 
 /// The results of a campaign, as far as a repository keeps them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +41,8 @@ pub struct Baseline {
     pub controller: String,
     /// The results of each scenario, by its name.
     pub scenarios: BTreeMap<String, ScenarioBaseline>,
+    /// BLAKE3 hash of all of the above, as JSON. It shows an edit; it does not keep anybody from writing another file.
+    pub content_blake3: String,
 }
 
 /// The results of one scenario.
@@ -96,20 +98,22 @@ impl Baseline {
                 scenario.push(record.sample, arm);
             }
         }
-        Ok(Self {
+        let baseline = Self {
+            content_blake3: String::new(),
             schema_version: BASELINE_VERSION,
             closecall_version: manifest.closecall_version.clone(),
             seed: manifest.sampling.seed,
             design: manifest.sampling.design,
             controller: manifest.arms.last().map(ToString::to_string).unwrap_or_default(),
             scenarios: collected.into_iter().map(|(name, scenario)| (name, scenario.finish())).collect(),
-        })
+        };
+        Ok(baseline.signed())
     }
 
     /// Reads a file that [`Baseline::write`] has written.
     ///
     /// # Errors
-    /// [`FolderError`] if the file cannot be read, or is not a baseline of version [`BASELINE_VERSION`].
+    /// [`FolderError`] if the file cannot be read, is not a baseline of version [`BASELINE_VERSION`], or was edited.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
@@ -119,7 +123,24 @@ impl Baseline {
         if value["schema_version"] != BASELINE_VERSION {
             return Err(content(1, format!("the file is not a baseline of version {BASELINE_VERSION}")));
         }
-        serde_json::from_value(value).map_err(|error| content(1, error.to_string()))
+        let baseline: Self = serde_json::from_value(value).map_err(|error| content(1, error.to_string()))?;
+        if baseline.content_blake3 != baseline.hash() {
+            let message = "the file was edited: its content does not have the hash that it states; save a new baseline";
+            return Err(content(1, message.to_owned()));
+        }
+        Ok(baseline)
+    }
+
+    /// Returns the same baseline with the hash of its content.
+    fn signed(self) -> Self {
+        Self { content_blake3: self.hash(), ..self }
+    }
+
+    /// Returns the hash of the content.
+    fn hash(&self) -> String {
+        let content = Self { content_blake3: String::new(), ..self.clone() };
+        // Numbers are written so that they read back to the bit. A value that cannot be written has no hash that a file could state.
+        serde_json::to_vec(&content).map_or_else(|error| error.to_string(), |bytes| blake3::hash(&bytes).to_string())
     }
 
     /// Writes the baseline as a JSON file. An existing file is replaced.
@@ -284,7 +305,9 @@ mod tests {
             design: Design::Random,
             controller: "mis".to_owned(),
             scenarios: BTreeMap::from([("headline".to_owned(), scenario)]),
+            content_blake3: String::new(),
         }
+        .signed()
     }
 
     #[test]
@@ -324,6 +347,30 @@ mod tests {
         let mut more = before.clone();
         more.scenarios.insert("another".to_owned(), ScenarioBaseline::default());
         assert_eq!(before.compare(&more, 0.05).unwrap().new_scenarios, ["another"]);
+    }
+
+    #[test]
+    fn an_edited_file_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("baseline.json");
+        baseline(&[3], 4.0).write(&path).unwrap();
+        assert_eq!(Baseline::read(&path).unwrap(), baseline(&[3], 4.0));
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (written, edited) in
+            [("\"p05\": 4.0", "\"p05\": 1.0"), ("\"collisions\": 1", "\"collisions\": 0"), ("\"mis\"", "\"acc\"")]
+        {
+            assert!(text.contains(written), "{text}");
+            std::fs::write(&path, text.replace(written, edited)).unwrap();
+            let error = Baseline::read(&path).unwrap_err().to_string();
+            assert!(error.contains("the file was edited"), "{edited}: {error}");
+        }
+        let more = text.replace("\n        3\n", "\n        3,\n        5\n");
+        assert_ne!(more, text);
+        std::fs::write(&path, more).unwrap();
+        assert!(Baseline::read(&path).is_err(), "a failing sample that is added hides a regression");
+        // Only the layout of the text may change.
+        std::fs::write(&path, text.replace('\n', "").replace("  ", "")).unwrap();
+        assert!(Baseline::read(&path).is_ok());
     }
 
     #[test]

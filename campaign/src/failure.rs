@@ -31,7 +31,8 @@ impl From<&ScenarioError> for FailureKind {
             | ScenarioError::TooLarge { .. }
             | ScenarioError::Empty { .. }
             | ScenarioError::Syntax { .. }
-            | ScenarioError::Value { .. } => Self::InvalidInput,
+            | ScenarioError::Value { .. }
+            | ScenarioError::UnusedParameter { .. } => Self::InvalidInput,
         }
     }
 }

@@ -79,6 +79,10 @@ pub struct ArmCounts {
     pub max_delta_v_mps: f64,
     /// Sum of the harm of all samples: see [`super::harm`].
     pub harm: f64,
+    /// Samples whose cost is known.
+    pub costed: u64,
+    /// Sums of the time lost (s), of the largest speed deficit (m/s), and of the hardest braking of the vehicle behind (m/s²).
+    pub cost: [f64; 3],
 }
 
 /// The result of one sample in one arm.
@@ -104,6 +108,8 @@ pub struct Tally {
     pub delta_v_mps: f64,
     /// Harm of all collisions, those of the ego and those of others.
     pub harm: f64,
+    /// Time lost (s), largest speed deficit (m/s), and hardest braking of the vehicle behind (m/s²); `None` in a journal without them.
+    pub cost: Option<[f64; 3]>,
 }
 
 impl ArmCounts {
@@ -124,6 +130,10 @@ impl ArmCounts {
         self.max_jerk_mps3 = worse(self.max_jerk_mps3, tally.jerk_mps3);
         self.max_delta_v_mps = worse(self.max_delta_v_mps, tally.delta_v_mps);
         self.harm += tally.harm;
+        if let Some(cost) = tally.cost {
+            self.costed += 1;
+            self.add_cost(cost);
+        }
     }
 
     /// Adds the counts of other samples.
@@ -139,6 +149,17 @@ impl ArmCounts {
         self.max_jerk_mps3 = worse(self.max_jerk_mps3, other.max_jerk_mps3);
         self.max_delta_v_mps = worse(self.max_delta_v_mps, other.max_delta_v_mps);
         self.harm += other.harm;
+        self.costed += other.costed;
+        self.add_cost(other.cost);
+    }
+
+    fn add_cost(&mut self, cost: [f64; 3]) {
+        self.cost.iter_mut().zip(cost).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// Returns the means of time lost (s), largest speed deficit (m/s) and hardest braking of the vehicle behind (m/s²); `None` of no samples.
+    pub fn mean_cost(&self) -> Option<[f64; 3]> {
+        (self.costed > 0).then(|| self.cost.map(|sum| sum / self.costed as f64))
     }
 
     /// Returns the share of the samples with an outcome in which the ego collides; `None` of no samples.
@@ -206,6 +227,10 @@ pub struct Pairs {
     pub induced_of_others: u64,
     /// Of `both`, those in which only vehicles other than the ego collide with the system.
     pub both_of_others: u64,
+    /// Samples in which some vehicle collides in the baseline, and none in the arm under test.
+    pub any_prevented: u64,
+    /// Samples in which some vehicle collides in the arm under test, and none in the baseline.
+    pub any_induced: u64,
     /// Harm saved by the system, over the samples in which it saves harm.
     pub prevented_harm: f64,
     /// Harm added by the system, over the samples in which it adds harm.
@@ -229,6 +254,10 @@ impl Pairs {
             Some(PairFate::Neither) => self.neither += 1,
             None => return,
         }
+        let some_collides = |tally: &Tally| tally.collided == Some(true) || tally.others_collided;
+        let (without, with) = (some_collides(baseline), some_collides(tested));
+        self.any_prevented += u64::from(without && !with);
+        self.any_induced += u64::from(with && !without);
         let more = tested.harm - baseline.harm;
         if more > 0.0 {
             self.induced_harm += more;
@@ -250,14 +279,19 @@ impl Pairs {
         self.neither += other.neither;
         self.induced_of_others += other.induced_of_others;
         self.both_of_others += other.both_of_others;
+        self.any_prevented += other.any_prevented;
+        self.any_induced += other.any_induced;
         self.prevented_harm += other.prevented_harm;
         self.induced_harm += other.induced_harm;
     }
 
-    /// Returns the probability of a split at least as uneven if the arms are alike (exact McNemar test, two-sided). It is
-    /// valid only for a number of samples that is fixed in advance; `None` otherwise.
+    /// Returns the probability of a split at least as uneven if the arms are alike (McNemar test, two-sided, mid-p). It is valid only for a number of samples
+    /// that is fixed in advance; `None` otherwise.
+    ///
+    /// The event is that some vehicle collides. *Prevented* and *induced* are not alike in the two arms: a collision of others alone in the tested arm is
+    /// held against the system, and one in the baseline not. If others collide in some samples, alike arms then induce more than they prevent.
     pub fn mcnemar_p(&self, inference: Inference) -> Option<f64> {
-        (inference == Inference::FixedSamples).then(|| mcnemar::two_sided_p(self.prevented, self.induced))
+        (inference == Inference::FixedSamples).then(|| mcnemar::mid_p(self.any_prevented, self.any_induced))
     }
 }
 
@@ -291,8 +325,23 @@ mod tests {
         pairs.push(&tally(false, 0.0), &Tally::default());
         assert_eq!((pairs.prevented, pairs.induced, pairs.both, pairs.neither), (1, 0, 1, 0));
         assert_eq!((pairs.prevented_harm, pairs.induced_harm), (0.5, 0.75));
-        assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(1.0));
+        assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(0.5));
         assert_eq!(pairs.mcnemar_p(Inference::Sequential), None);
+    }
+
+    #[test]
+    fn the_test_of_pairs_is_symmetric_in_the_arms_if_only_others_collide() {
+        let others = Tally { collided: Some(false), others_collided: true, ..Tally::default() };
+        let none = Tally { collided: Some(false), ..Tally::default() };
+        let mut pairs = Pairs::default();
+        // Alike arms: as many samples in which others collide with the system alone as without it alone.
+        for _ in 0..20 {
+            pairs.push(&none, &others);
+            pairs.push(&others, &none);
+        }
+        assert_eq!((pairs.prevented, pairs.induced), (0, 20), "the counts of the system's fault are not symmetric");
+        assert_eq!((pairs.any_prevented, pairs.any_induced), (20, 20));
+        assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(1.0));
     }
 
     #[test]

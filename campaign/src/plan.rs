@@ -9,12 +9,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use closecall_controllers::DriverConfig;
 use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
-use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::native::NativeError;
+use closecall_simulation::controller::{BuiltIn, ControllerChoice};
 
 use crate::execution::Campaign;
 use crate::fingerprint::Fingerprint;
@@ -47,6 +48,16 @@ pub enum PlanError {
         scenario: String,
         /// What is wrong.
         source: NativeError,
+    },
+    /// A margin increase system is to drive an ego stack that has none.
+    #[error(
+        "{scenario}: `{controller}` needs a margin increase system, and the ego stack has none: add `mis` to its `ego-stack`, or name another controller"
+    )]
+    WithoutMis {
+        /// The scenario.
+        scenario: String,
+        /// The controller.
+        controller: String,
     },
     /// Two arms have the same controller, so that they would have the same outcomes.
     #[error("`{controller}` is named twice: every arm needs a controller of its own")]
@@ -83,7 +94,7 @@ impl Plan {
     /// under test. If there are several, the first is the baseline, and those between are references.
     ///
     /// # Errors
-    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, or a variable of an FMU has no counterpart.
+    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, a scenario no system for one that is tested, or a variable of an FMU has no counterpart.
     pub fn new(
         scenarios: Vec<ScenarioFile>,
         sampling: Sampling,
@@ -111,6 +122,9 @@ impl Plan {
             if controllers[..index].contains(controller) {
                 return Err(PlanError::SameArm { controller: controller.to_string() });
             }
+        }
+        for file in &scenarios {
+            check_mis(file, &controllers)?;
         }
         for (file, native) in scenarios.iter().flat_map(|file| natives.iter().map(move |native| (file, native))) {
             // A scenario without a nominal sample is an error of its samples.
@@ -243,6 +257,24 @@ impl Plan {
             replaceable: false,
             command,
         })
+    }
+}
+
+/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none: it would be the baseline under another name.
+///
+/// # Errors
+/// [`PlanError::WithoutMis`] with the first such controller.
+pub fn check_mis(file: &ScenarioFile, controllers: &[ControllerChoice]) -> Result<(), PlanError> {
+    let lacks_mis = file.config().actors.iter().any(|actor| match &actor.driver {
+        DriverConfig::EgoStack(stack) => stack.mis.is_none(),
+        _ => false,
+    });
+    let needs_mis = |controller: &&ControllerChoice| controller.built_in().is_some_and(BuiltIn::needs_mis);
+    match controllers.iter().find(needs_mis).filter(|_| lacks_mis) {
+        Some(controller) => {
+            Err(PlanError::WithoutMis { scenario: file.config().name.clone(), controller: controller.to_string() })
+        }
+        None => Ok(()),
     }
 }
 

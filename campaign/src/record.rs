@@ -76,6 +76,9 @@ impl ArmRecord {
                     jerk_mps3: outcome.margins.max_jerk_mps3,
                     delta_v_mps: outcome.ego_delta_v_mps().unwrap_or(0.0),
                     harm: harm(outcome),
+                    cost: outcome.cost.map(|cost| {
+                        [cost.time_lost_s, outcome.margins.max_speed_deficit_mps, cost.imposed_braking_mps2]
+                    }),
                 }
             }
             Err(_) => Tally::default(),

@@ -1,38 +1,88 @@
-//! Samples that repeat the parameters of an earlier one.
+//! Samples that are no new evidence: they repeat an earlier one.
+//!
+//! The bounds of probabilities hold for samples that are drawn independently. A sample that repeats the parameters of an earlier one, or its outcome in every
+//! arm, shows the same encounter once more. Three hundred such samples are one sample.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
-use closecall_scenarios::parameters::{ParameterSpace, Variation};
-use closecall_traffic::Parameters;
+use closecall_scenarios::parameters::{ParameterSpace, SpaceEntry, Variation};
+use closecall_scenarios::outcome::Outcome;
+use closecall_traffic::{Measured, Parameters, Value};
 
 use super::record::Record;
 
-/// The parameters of the samples so far, if a scenario samples from finitely many: a repeated encounter is no new evidence.
+/// Smallest difference of two outcomes that are not the same (m, s, m/s, m/s², m/s³): an assumption, a tenth of what reports show; 1e-4 to 1e-2 are
+/// plausible.
+const RESOLUTION: f64 = 1e-3;
+/// Smallest spread of a parameter that varies, as a share of its values (-): an assumption; 1e-4 to 1e-2 are plausible. No measurement of traffic tells a
+/// thousandth apart.
+const LEAST_SPREAD: f64 = 1e-3;
+/// The quantiles between which the spread of a parameter is taken.
+const SPREAD: [f64; 2] = [0.05, 0.95];
+
+/// Returns true if some parameter varies, and by more than [`LEAST_SPREAD`].
+pub(crate) fn is_varied(space: &ParameterSpace) -> bool {
+    space.varying().any(|(_, entry)| spreads(entry))
+}
+
+fn spreads(entry: &SpaceEntry) -> bool {
+    match SPREAD.map(|u| entry.distribution.quantile(u)) {
+        [Value::Number(low), Value::Number(high)] => high - low > LEAST_SPREAD * low.abs().max(high.abs()),
+        _ => true,
+    }
+}
+
+/// By what samples repeat each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Same {
+    /// By their parameters, of which there are finitely many.
+    Parameters,
+    /// By their outcomes in every arm.
+    Outcome,
+}
+
+/// The samples so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Repeats {
-    /// Whether some vehicle has collided in the arm under test with these parameters; `None` if no two samples agree.
-    seen: Option<BTreeMap<String, bool>>,
+    /// By what samples repeat each other; `None` if every one counts, because no parameter varies.
+    by: Option<Same>,
+    /// Whether some vehicle has collided in the arm under test in a sample of this key.
+    seen: HashMap<u64, bool>,
 }
 
 impl Repeats {
     pub(crate) fn of(space: &ParameterSpace) -> Self {
-        Self { seen: (space.variation() == Variation::Discrete).then(BTreeMap::new) }
+        let by = match space.variation() {
+            Variation::None => None,
+            Variation::Discrete => Some(Same::Parameters),
+            Variation::Continuous => Some(Same::Outcome),
+        };
+        Self { by, seen: HashMap::new() }
     }
 
-    /// Returns true if a sample counts: its parameters are new, it ended in an error, or it is the first one with its
-    /// parameters in which vehicles collide. A collision is thus never left out.
+    /// Returns true if a sample counts: it is new, it ended in an error, or it is the first one of its kind in which vehicles collide. A collision is thus
+    /// never left out.
     pub(crate) fn counts(&mut self, record: &Record) -> bool {
-        let Some(seen) = &mut self.seen else { return true };
-        if record.arms.iter().any(|arm| arm.result.is_err()) {
+        let Some(by) = self.by else { return true };
+        let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
+        let Some((outcomes, tested)) = outcomes.and_then(|all| all.last().copied().map(|tested| (all, tested))) else {
             return true;
-        }
-        let Some(outcome) = record.arms.last().and_then(|arm| arm.result.as_ref().ok()) else { return true };
+        };
         let collides = record.tallies().last().is_some_and(|tested| tested.collided == Some(true))
-            || !outcome.collisions.is_empty();
-        match seen.get_mut(&key(&outcome.parameters)) {
-            Some(collided) => !std::mem::replace(collided, *collided || collides) && collides,
-            None => {
-                seen.insert(key(&outcome.parameters), collides);
+            || !tested.collisions.is_empty();
+        let mut hasher = DefaultHasher::new();
+        match by {
+            Same::Parameters => key(&tested.parameters).hash(&mut hasher),
+            Same::Outcome => outcomes.iter().for_each(|outcome| hash(outcome, &mut hasher)),
+        }
+        match self.seen.entry(hasher.finish()) {
+            std::collections::hash_map::Entry::Occupied(mut seen) => {
+                let collided = seen.get_mut();
+                !std::mem::replace(collided, *collided || collides) && collides
+            }
+            std::collections::hash_map::Entry::Vacant(vacant) => {
+                vacant.insert(collides);
                 true
             }
         }
@@ -41,4 +91,53 @@ impl Repeats {
 
 fn key(parameters: &Parameters) -> String {
     parameters.iter().map(|(name, value)| format!("{name}={value:?};")).collect()
+}
+
+/// Adds what happened in a run, and not why: neither its parameters nor its number.
+fn hash(outcome: &Outcome, hasher: &mut DefaultHasher) {
+    #[expect(clippy::cast_possible_truncation, reason = "a value beyond the range of the steps is no value of a run")]
+    let step = |value: f64| if value.is_nan() { i64::MAX } else { (value / RESOLUTION).round() as i64 };
+    let measured = |value: Measured| value.map(step).map_err(|absent| absent.to_string());
+    step(outcome.duration.s()).hash(hasher);
+    for collision in &outcome.collisions {
+        (&collision.between[0], &collision.between[1]).hash(hasher);
+        [collision.time.s(), collision.relative_speed_mps, collision.delta_v_mps[0]].map(step).hash(hasher);
+    }
+    for reached in &outcome.moments {
+        (reached.moment, step(reached.time.s())).hash(hasher);
+    }
+    let margins = &outcome.margins;
+    for value in [
+        margins.min_thw_front_s,
+        margins.min_thw_rear_s,
+        margins.min_gap_front_m,
+        margins.min_gap_rear_m,
+        margins.min_ttc_rear_s,
+    ] {
+        measured(value).hash(hasher);
+    }
+    [margins.max_deceleration_mps2, margins.max_jerk_mps3, margins.max_speed_deficit_mps].map(step).hash(hasher);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use closecall_scenarios::{ScenarioFile, library};
+
+    /// Returns whether the parameters of a scenario vary enough if the only one that is sampled lies between these bounds.
+    fn is_varied_between(min: f64, max: f64) -> bool {
+        let text = library::text("paper-figure").unwrap();
+        let sampled = format!("[parameters]\nfilm = {{ uniform = {{ min = {min:?}, max = {max:?} }} }}\n\n[[actor]]");
+        let text = text.replacen("[[actor]]", &sampled, 1);
+        super::is_varied(ScenarioFile::parse(Path::new("a.toml"), &text, &[]).unwrap().space())
+    }
+
+    #[test]
+    fn a_parameter_that_varies_by_less_than_a_thousandth_does_not_vary() {
+        assert!(!is_varied_between(30.0, 30.000_001));
+        assert!(!is_varied_between(30.0, 30.02));
+        assert!(is_varied_between(30.0, 30.2));
+        assert!(is_varied_between(0.0, 1e-6), "around zero there is no scale");
+    }
 }

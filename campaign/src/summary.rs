@@ -28,7 +28,7 @@ pub struct Counts {
     pub checks: CheckCounts,
     /// Simulated time of all runs (s).
     pub simulated_s: f64,
-    /// Samples that repeat the parameters of an earlier one. They count in `invalid`, `checks` and `simulated_s` only.
+    /// Samples that repeat the parameters or the outcome of an earlier one. They count in `invalid`, `checks` and `simulated_s` only.
     pub repeated: u64,
 }
 

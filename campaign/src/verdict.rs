@@ -6,7 +6,8 @@
 //! | a validity check failed, or what a scenario expects did not happen | [`Decision::Invalid`] | INVALID | 7 |
 //! | a gate or the check of a requirement is not met, or more samples are flaky than allowed | [`Decision::Fail`] | FAIL | 1 |
 //! | the samples do not decide a gate | [`Decision::Inconclusive`] | INCONCLUSIVE | 4 |
-//! | no gate and no requirement was checked | [`Decision::NotJudged`] | NOT JUDGED | 4 |
+//! | no gate and no requirement was checked, or the system under test was not there to be tested | [`Decision::NotJudged`] | NOT JUDGED | 4 |
+//! | `--set` weakened what a scenario is judged by | [`Decision::Overridden`] | OVERRIDDEN | 4 |
 //! | every gate that was checked is met | [`Decision::Pass`] | PASS | 0 |
 //! | the campaign is a measurement (`--no-gate`) | [`Decision::Measured`] | none | 0 |
 //!
@@ -42,9 +43,12 @@ pub enum Verdict {
     /// The samples do not decide a gate.
     #[serde(rename = "INCONCLUSIVE")]
     Inconclusive,
-    /// No gate and no requirement was checked.
+    /// No gate and no requirement was checked, or the system under test was not available or never acted.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
+    /// A setting of the command line weakened what a scenario is judged by.
+    #[serde(rename = "OVERRIDDEN")]
+    Overridden,
     /// Some sample ended in an error.
     #[serde(rename = "ERROR")]
     Error,
@@ -61,6 +65,7 @@ impl Verdict {
             Self::Fail => "FAIL",
             Self::Inconclusive => "INCONCLUSIVE",
             Self::NotJudged => "NOT JUDGED",
+            Self::Overridden => "OVERRIDDEN",
             Self::Error => "ERROR",
             Self::Invalid => "INVALID",
         }
@@ -82,8 +87,10 @@ pub enum Decision {
     Fail,
     /// The samples do not decide a gate.
     Inconclusive,
-    /// Nothing was checked.
+    /// Nothing was checked, or the system under test was not there to be tested.
     NotJudged,
+    /// A setting weakened what a scenario is judged by.
+    Overridden,
     /// Some sample ended in an error.
     SampleError,
     /// The campaign cannot be believed.
@@ -94,8 +101,8 @@ pub enum Decision {
 
 impl Decision {
     /// The findings in the order in which they decide.
-    pub const PRECEDENCE: [Self; 5] =
-        [Self::SampleError, Self::Invalid, Self::Fail, Self::Inconclusive, Self::NotJudged];
+    pub const PRECEDENCE: [Self; 6] =
+        [Self::SampleError, Self::Invalid, Self::Fail, Self::Inconclusive, Self::NotJudged, Self::Overridden];
 
     fn first_of(found: &[Self]) -> Option<Self> {
         Self::PRECEDENCE.into_iter().find(|decision| found.contains(decision))
@@ -108,6 +115,7 @@ impl Decision {
             Self::Fail => Some(Verdict::Fail),
             Self::Inconclusive => Some(Verdict::Inconclusive),
             Self::NotJudged => Some(Verdict::NotJudged),
+            Self::Overridden => Some(Verdict::Overridden),
             Self::SampleError => Some(Verdict::Error),
             Self::Invalid => Some(Verdict::Invalid),
             Self::Measured => None,
@@ -204,6 +212,14 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     judge_validity(&total.checks, allowed.max_flip_rate, &mut found);
     let expectations = judge_expectations(judge, &mut found);
     judge_samples(summary, judge, &mut found);
+    judge_action(judge, &mut found);
+    for (name, weakened) in judge.overridden() {
+        let what = weakened.join("; ");
+        found.add(
+            Decision::Overridden,
+            format!("OVERRIDDEN: {name}: --set weakened what the scenario is judged by: {what}"),
+        );
+    }
     let probabilities = judge_probabilities(summary, judge, &mut found);
     let gates = judge.gates();
     for gate in &gates {
@@ -332,10 +348,21 @@ fn judge_availability(summary: &Summary, found: &mut Found) {
                 percent(MAX_UNAVAILABLE_SHARE),
                 samples(tested.engagements)
             );
-            found.add(Decision::Inconclusive, reason);
+            found.add(Decision::NotJudged, reason);
         } else {
             found.note(sentence);
         }
+    }
+}
+
+/// A system that never slowed the ego for a vehicle behind was not tested by a scenario that asks what it prevents.
+fn judge_action(judge: &Judge, found: &mut Found) {
+    for (name, count) in judge.without_action() {
+        let reason = format!(
+            "{name}: the system under test never slowed the ego for a vehicle behind in {}, so that they do not decide what it does",
+            samples(count)
+        );
+        found.add(Decision::NotJudged, reason);
     }
 }
 
@@ -353,7 +380,10 @@ fn judge_samples(summary: &Summary, judge: &Judge, found: &mut Found) {
         }
         let repeated = judge.repeated(name);
         if repeated > 0 {
-            found.note(format!("{name}: {} have the parameters of an earlier one and do not count", samples(repeated)));
+            found.note(format!(
+                "{name}: {} have the parameters or the outcome of an earlier one and do not count",
+                samples(repeated)
+            ));
         }
     }
 }
@@ -364,7 +394,7 @@ fn judge_probabilities(summary: &Summary, judge: &Judge, found: &mut Found) -> V
     for (name, spec) in &specs {
         let Some(counts) = summary.tested(name) else { continue };
         if !judge.is_varied(name) {
-            let sentence = format!("{name}: no parameter varies, so that no probability can be bounded");
+            let sentence = format!("{name}: no parameter varies enough, so that no probability can be bounded");
             found.add(Decision::Inconclusive, sentence);
             continue;
         }

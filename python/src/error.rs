@@ -59,6 +59,7 @@ pub(crate) fn sample_exception(py: Python<'_>, sample: u64, error: &SampleError)
 fn of_scenario(error: &ScenarioError) -> Location {
     let key = match error {
         ScenarioError::Value { source, .. } => Some(source.path.to_string()),
+        ScenarioError::UnusedParameter { name, .. } => Some(format!("parameters.{name}")),
         _ => None,
     };
     let file = match error {
@@ -68,6 +69,7 @@ fn of_scenario(error: &ScenarioError) -> Location {
         | ScenarioError::Empty { path }
         | ScenarioError::Syntax { path, .. }
         | ScenarioError::Value { path, .. }
+        | ScenarioError::UnusedParameter { path, .. }
         | ScenarioError::Set { path, .. } => path.display().to_string(),
     };
     Location { file: Some(file), line: error.line().map(|line| line as u64), key }

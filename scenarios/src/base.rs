@@ -2,13 +2,16 @@
 //!
 //! A file whose first key is `base` names a scenario of the library. Its own keys replace those of the base: tables are merged
 //! key by key, lists and lists of tables are replaced as a whole. What the base is judged
-//! by (`requirements`, `checks`, `gate`) does not carry over. The result is one text, on which all later steps work, so that a
+//! by (`requirements`, `checks`, `gate`) does not carry over, and neither does a parameter that no value uses any more. The result is one text, on which all later steps work, so that a
 //! campaign's folder keeps the whole scenario.
 
 use toml_edit::{DocumentMut, Item, TableLike};
 
+use super::file::used_parameters;
 use super::{ScenarioError, library};
 
+/// The key of the table of parameters.
+const PARAMETERS: &str = "parameters";
 /// The key that names the base.
 const BASE: &str = "base";
 /// What a scenario is judged by. It does not carry over from the base: another question needs its own answer.
@@ -39,7 +42,21 @@ pub(super) fn expand(text: &str) -> Result<Option<String>, String> {
         whole.remove(key);
     }
     merge(whole.as_table_mut(), document.as_table());
+    remove_unused(&mut whole, &document);
     Ok(Some(whole.to_string()))
+}
+
+/// Removes the parameters of the base that no value uses any more. Those of the own text stay, so that its reader refuses them.
+fn remove_unused(whole: &mut DocumentMut, own: &DocumentMut) {
+    let Ok(document) = toml::from_str::<toml::Table>(&whole.to_string()) else { return };
+    let used = used_parameters(&document);
+    let own = own.get(PARAMETERS).and_then(Item::as_table_like);
+    let is_own = |name: &str| own.is_some_and(|own| own.contains_key(name));
+    let Some(parameters) = whole.get_mut(PARAMETERS).and_then(Item::as_table_like_mut) else { return };
+    let names: Vec<String> = parameters.iter().map(|(name, _)| name.to_owned()).collect();
+    for name in names.iter().filter(|name| !used.contains(&name.as_str()) && !is_own(name)) {
+        parameters.remove(name);
+    }
 }
 
 /// Returns the error of the whole text as one of the text that names the base: with the line of the same words there, or that of the
@@ -93,6 +110,18 @@ mod tests {
         assert_eq!(own.config().fault.rear_object.len(), 1);
         assert_ne!(own.config().sensors.mode, base.config().sensors.mode);
         assert_eq!(own.config().sensors.tracker, base.config().sensors.tracker);
+    }
+
+    #[test]
+    fn a_parameter_of_the_base_that_is_not_used_any_more_goes_and_an_own_one_is_refused() {
+        let whole = super::library::text("overtake-without-brake").unwrap();
+        let actors = &whole[whole.find("[[actor]]").unwrap()..whole.find("[sensors]").unwrap()];
+        let own = parse(&format!("base = \"low-thw-overtake\"\nname = \"own\"\n{actors}")).unwrap();
+        let names: Vec<String> = own.space().iter().map(|(name, _)| name.to_string()).collect();
+        assert!(!names.contains(&"brake-phase".to_owned()) && names.contains(&"closing-mps".to_owned()), "{names:?}");
+        let unused = "base = \"low-thw-overtake\"\nname = \"own\"\ntags = [\"$x\"]\nparameters.x = { uniform = { min = 0, max = 1 } }\n";
+        let error = parse(unused).unwrap().refuse_unused().unwrap_err().to_string();
+        assert!(error.contains("unused parameter: `x`"), "{error}");
     }
 
     #[test]

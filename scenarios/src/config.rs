@@ -48,6 +48,10 @@ pub struct ScenarioConfig {
     /// Least share of the samples in which everything that is expected must happen (-). Default: 0.95.
     #[serde(default = "default_expects_share")]
     pub expects_share: f64,
+    /// What settings of the command line weakened: checks, requirements, expectations. `--set` writes it, and a campaign with such a scenario does not
+    /// pass.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overridden: Vec<String>,
     /// Longest duration of a run (s).
     pub duration_s: Num,
     /// The road.

@@ -9,12 +9,12 @@ use crate::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_sensors::camera::Pipeline;
 use closecall_traffic::suggest::hint;
-use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
+use closecall_traffic::{ActorId, Check, ConfigError, KeyPath, ParameterName, Parameters, Segment};
 use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
 use super::recorded::RecordedError;
-use super::{Scenario, ScenarioConfig, base, lidar_file, locate, recorded};
+use super::{Scenario, ScenarioConfig, base, lidar_file, locate, overridden, recorded};
 
 /// Number of random samples that `check` checks in addition to the nominal values and the bounds.
 const CHECKED_SAMPLES: u64 = 64;
@@ -77,6 +77,16 @@ pub enum ScenarioError {
         /// The parameter values for which the check failed; empty if there are no parameters.
         at: String,
     },
+    /// A parameter is sampled, and no value of the scenario uses it: its samples would differ in nothing that a run could show.
+    #[error("failed to check {}{}: unused parameter: `{name}` is sampled, but no value uses it: write \"${name}\" where its value belongs, or remove it", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
+    UnusedParameter {
+        /// The file.
+        path: PathBuf,
+        /// The line of the parameter, counted from 1.
+        line: Option<usize>,
+        /// The parameter.
+        name: ParameterName,
+    },
     /// A setting (`--set`) cannot be applied.
     #[error("failed to apply --set to {}: {source}", path.display())]
     Set {
@@ -102,7 +112,7 @@ impl ScenarioError {
     pub const fn line(&self) -> Option<usize> {
         match self {
             Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
-            Self::Value { line, .. } => *line,
+            Self::Value { line, .. } | Self::UnusedParameter { line, .. } => *line,
             Self::Read { .. } | Self::TooLarge { .. } | Self::Empty { .. } | Self::Set { .. } => None,
         }
     }
@@ -115,7 +125,7 @@ pub struct ScenarioFile {
     text: String,
     config: ScenarioConfig,
     space: ParameterSpace,
-    unused: Vec<ParameterName>,
+    unused: Option<ParameterName>,
     trajectory_files: Vec<PathBuf>,
     settings: Vec<Setting>,
 }
@@ -161,11 +171,16 @@ impl ScenarioFile {
         // The unchanged text is parsed first, so that errors in the file have the line numbers of the file.
         let mut config = deserialize(path, text)?;
         // A setting may replace the only use of a parameter. Only a parameter that the file itself does not use is a mistake.
-        let unused = unused_parameters(&config, text);
+        let unused = unused_parameter(&config, text);
         let mut text = text.to_owned();
         if !settings.is_empty() {
             text = apply(path, &text, settings)?;
-            config = deserialize(path, &text)?;
+            let before = std::mem::replace(&mut config, deserialize(path, &text)?);
+            let weakened = overridden::weakened(&before, &config);
+            if weakened != config.overridden {
+                text = with_overridden(&text, &weakened);
+                config = deserialize(path, &text)?;
+            }
         }
         let trajectory_files = recorded::files(path, &config);
         if let Some(inlined) =
@@ -241,9 +256,17 @@ impl ScenarioFile {
         )
     }
 
-    /// Returns the parameters that no value of the file uses, which is most likely a mistake.
-    pub fn unused_parameters(&self) -> &[ParameterName] {
-        &self.unused
+    /// Refuses a file with a parameter that no value uses. The text of a saved campaign may have one, if a setting has replaced its only use.
+    ///
+    /// # Errors
+    /// [`ScenarioError::UnusedParameter`] for the first such parameter.
+    pub fn refuse_unused(self) -> Result<Self, ScenarioError> {
+        let Some(name) = self.unused else { return Ok(self) };
+        let line = locate::line_of(
+            &self.text,
+            &KeyPath(["parameters", name.as_str()].map(|key| Segment::Key(key.to_owned())).into()),
+        );
+        Err(ScenarioError::UnusedParameter { path: self.path, line, name })
     }
 
     /// Returns the name of the ego, or `None` if no actor has an ego stack.
@@ -306,6 +329,13 @@ fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, Scenar
     Ok(document.to_string())
 }
 
+/// Returns the text with the list of what its settings weakened.
+fn with_overridden(text: &str, weakened: &[String]) -> String {
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
+    document.insert(overridden::KEY, toml_edit::value(toml_edit::Array::from_iter(weakened)));
+    document.to_string()
+}
+
 /// Converts an error of recorded traffic. Its line is the first one that contains `recorded`.
 fn recorded_error(path: &Path, text: &str, error: &RecordedError) -> ScenarioError {
     let line = text.lines().position(|line| line.contains("recorded")).map_or(1, |index| index + 1);
@@ -322,14 +352,34 @@ fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError>
     })
 }
 
-/// Returns the parameters that no value uses.
-fn unused_parameters(config: &ScenarioConfig, text: &str) -> Vec<ParameterName> {
-    let Ok(document) = toml::from_str::<toml::Table>(text) else { return Vec::new() };
+/// The keys at the top level that no run uses: a parameter that only they name changes nothing.
+const NO_RUN_USES: [&str; 10] = [
+    "parameters",
+    "name",
+    "description",
+    "tags",
+    "requirements",
+    "checks",
+    "gate",
+    "expects",
+    "expects-share",
+    overridden::KEY,
+];
+
+/// Returns the names of the parameters that some value uses.
+pub(super) fn used_parameters(document: &toml::Table) -> Vec<&str> {
     let mut used = Vec::new();
-    for (_, value) in document.iter().filter(|(key, _)| *key != "parameters") {
+    for (_, value) in document.iter().filter(|(key, _)| !NO_RUN_USES.contains(&key.as_str())) {
         append_names(value, &mut used);
     }
-    config.parameters.0.keys().filter(|name| !used.contains(&name.as_str())).cloned().collect()
+    used
+}
+
+/// Returns a parameter that no value uses, if there is one.
+fn unused_parameter(config: &ScenarioConfig, text: &str) -> Option<ParameterName> {
+    let document = toml::from_str::<toml::Table>(text).ok()?;
+    let used = used_parameters(&document);
+    config.parameters.0.keys().find(|name| !used.contains(&name.as_str())).cloned()
 }
 
 /// Appends the names of all parameters that `value` uses.

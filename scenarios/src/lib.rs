@@ -32,6 +32,7 @@ mod locate;
 pub mod member;
 pub mod outcome;
 pub mod parameters;
+mod overridden;
 mod placement;
 mod recorded;
 mod recorded_values;

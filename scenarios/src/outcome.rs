@@ -182,6 +182,22 @@ pub struct Margins {
     pub max_speed_deficit_mps: f64,
 }
 
+/// What the ego costs itself and the vehicle behind it, from the true states, until its lead vehicle brakes for the first time or the ego collides.
+///
+/// No controller reports any of it, so that every controller is measured alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Largest amount by which the ego was slower than the vehicle ahead, or than its own speed at the start, before a vehicle behind had met the
+    /// conditions for engaging (m/s).
+    pub unprompted_deficit_mps: f64,
+    /// The same after a vehicle behind had met them (m/s): what a system does for which the vehicle behind is the reason.
+    pub prompted_deficit_mps: f64,
+    /// Largest time by which the ego was late (s): behind where it would have been at the speed of the vehicle ahead, or at its own speed at the start.
+    pub time_lost_s: f64,
+    /// Largest deceleration of the vehicle behind the ego in its lane (m/s²); 0 if there was none.
+    pub imposed_braking_mps2: f64,
+}
+
 /// What the margin increase system (MIS) did in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
@@ -245,6 +261,9 @@ pub struct Outcome {
     pub margins: Margins,
     /// What the margin increase system did, or the reason why there is no summary of it.
     pub mis: Result<MisSummary, Absent>,
+    /// What the ego cost itself and the vehicle behind it. `None` in a journal that was written without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<Cost>,
 }
 
 impl Outcome {

@@ -146,6 +146,7 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
         gate: GateConfig::default(),
         expects: Vec::new(),
         expects_share: EXPECTS_SHARE,
+        overridden: Vec::new(),
         duration_s: rounded(encounter.end.s()),
         road: RoadConfig {
             lanes: encounter.lanes,

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `-` | the text of standard input |
 //! | `FILE` | that file |
-//! | `FOLDER` | each `*.toml` directly in it except `closecall.toml`, in alphabetical order |
+//! | `FOLDER` | each `*.toml` directly in it except `closecall.toml`, in alphabetical order, then each scenario of its folders |
 //! | `NAME` | `NAME.toml`, else `scenarios/NAME.toml`, else the scenario of the library with that name |
 
 use std::io::{Error, ErrorKind, Read};
@@ -20,6 +20,8 @@ const STANDARD_INPUT: &str = "-";
 pub const SCENARIOS: &str = "scenarios";
 /// The name of a project file, which holds the settings of a repository: a TOML file that is no scenario.
 pub const PROJECT_FILE: &str = "closecall.toml";
+/// The keys of which a scenario has at least one.
+const KEYS_OF_SCENARIO: [&str; 3] = ["road", "actor", "base"];
 /// Largest length of a scenario on standard input (bytes).
 const MAX_LENGTH: u64 = 16 * 1024 * 1024;
 
@@ -61,28 +63,63 @@ pub fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, SourceError> {
 }
 
 fn scenario_files(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
-    let fail = |source| ScenarioError::Read { path: folder.to_owned(), source };
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(fail)? {
-        let path = entry.map_err(fail)?.path();
-        let is_toml = path.extension().is_some_and(|extension| extension == "toml");
-        if is_toml && path.is_file() && !path.ends_with(PROJECT_FILE) {
-            files.push(path);
-        }
-    }
+    let mut files = toml_files(folder)?;
+    let mut below = Vec::new();
+    append_below(folder, &mut below)?;
+    files.extend(below.into_iter().filter(|path| may_be_scenario(path)));
     if files.is_empty() {
         return Err(SourceError::NoScenario { folder: folder.to_owned() });
     }
-    files.sort();
     Ok(files)
+}
+
+/// Returns the entries of a folder, in alphabetical order.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, ScenarioError> {
+    let fail = |source| ScenarioError::Read { path: folder.to_owned(), source };
+    let entries = std::fs::read_dir(folder).map_err(fail)?;
+    let mut paths = entries.map(|entry| Ok(entry.map_err(fail)?.path())).collect::<Result<Vec<_>, _>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// Returns the TOML files directly in a folder, except a project file, in alphabetical order.
+fn toml_files(folder: &Path) -> Result<Vec<PathBuf>, ScenarioError> {
+    let is_wanted = |path: &PathBuf| {
+        let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+        is_toml && path.is_file() && !path.ends_with(PROJECT_FILE)
+    };
+    Ok(entries(folder)?.into_iter().filter(is_wanted).collect())
+}
+
+/// Appends the TOML files of the folders in a folder. A link is not followed, so that no folder is entered twice, and neither is a folder whose name begins with a dot.
+fn append_below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ScenarioError> {
+    let is_hidden = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    for path in entries(folder)? {
+        if path.is_dir() && !path.is_symlink() && !is_hidden(&path) {
+            files.extend(toml_files(&path)?);
+            append_below(&path, files)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns false for a TOML file that has no key of a scenario, such as the drivers of an ensemble or a fleet, which may lie below a folder of scenarios. A
+/// file that cannot be read as TOML may be a scenario with a mistake, and is not passed over.
+fn may_be_scenario(path: &Path) -> bool {
+    let document = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    document.is_none_or(|document| KEYS_OF_SCENARIO.iter().any(|key| document.contains_key(*key)))
 }
 
 /// Reads the scenario that one argument names, and applies the settings.
 ///
 /// # Errors
-/// [`ScenarioError`] if there is no such scenario, or if it is not valid. A name close to one of the library is answered
+/// [`ScenarioError`] if there is no such scenario, if it is not valid, or if no value uses one of its parameters. A name close to one of the library is answered
 /// with that name.
 pub fn load(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
+    read(path, settings)?.refuse_unused()
+}
+
+fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
     if path.as_os_str() == STANDARD_INPUT {
         return from_standard_input(settings);
     }
@@ -136,6 +173,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_parameter_that_no_value_uses_is_refused_unless_a_setting_replaced_its_use() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.toml");
+        let text = library::text("low-thw-overtake").unwrap();
+        let more = "[parameters]\nuseless = { uniform = { min = 0.0, max = 1.0 } }";
+        std::fs::write(&path, text.replace("[parameters]", more)).unwrap();
+        let error = load(&path, &[]).unwrap_err().to_string();
+        assert!(error.contains("unused parameter: `useless`"), "{error}");
+        std::fs::write(&path, text).unwrap();
+        let file = load(&path, &["actor.front.event.0.then.brake.deceleration-mps2=6".parse().unwrap()]).unwrap();
+        assert!(file.space().iter().any(|(name, _)| name.as_str() == "brake-mps2"));
+    }
+
+    #[test]
     fn a_folder_stands_for_its_scenario_files() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["b.toml", "a.toml", "closecall.toml", "notes.md"] {
@@ -146,6 +197,37 @@ mod tests {
         let empty = tempfile::tempdir().unwrap();
         assert!(expand(&[empty.path().to_owned()]).unwrap_err().to_string().contains("contains no scenario file"));
         assert!(expand(&[PathBuf::from("-"), PathBuf::from("-")]).is_err());
+    }
+
+    #[test]
+    fn a_folder_stands_for_the_scenarios_of_its_folders_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |path: &str, text: &str| {
+            let path = folder.path().join(path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        write("z.toml", "");
+        write("traffic/busy.toml", "road = {}\n");
+        write("traffic/closecall.toml", "[gate]\n");
+        write("traffic/deep/derived.toml", "base = 'a'\n");
+        write("fleets/cars.toml", "[[vehicle]]\n");
+        write("faults/broken.toml", "road = {");
+        write(".git/hidden.toml", "road = {}\n");
+        let found = expand(&[folder.path().to_owned()]).unwrap();
+        let expected = ["z.toml", "faults/broken.toml", "traffic/busy.toml", "traffic/deep/derived.toml"];
+        assert_eq!(found, expected.map(|path| folder.path().join(path)));
+    }
+
+    #[test]
+    fn every_scenario_of_the_library_is_in_its_folder() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
+        let found = expand(&[folder]).unwrap();
+        let mut stems: Vec<&str> = found.iter().map(|path| path.file_stem().unwrap().to_str().unwrap()).collect();
+        let mut names: Vec<&str> = library::names().collect();
+        stems.sort_unstable();
+        names.sort_unstable();
+        assert_eq!(stems, names);
     }
 
     #[test]

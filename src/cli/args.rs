@@ -13,7 +13,6 @@ use closecall_sensors::SensorMode;
 use super::CliError;
 use super::arms::ArmArgs;
 use super::help::heading;
-use super::output::print_error;
 
 /// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -149,13 +148,6 @@ impl SetArgs {
     /// Reads a scenario, applies the changes, and checks it.
     pub(super) fn load(&self, path: &Path) -> Result<ScenarioFile, ScenarioError> {
         let file = source::load(path, &self.settings)?;
-        for name in file.unused_parameters() {
-            print_error(format_args!(
-                "warning: {}: the parameter `{name}` is sampled, but not used: write \"${name}\" where its value \
-                 belongs, or remove it\n",
-                file.path().display()
-            ));
-        }
         file.check()?;
         Ok(file)
     }

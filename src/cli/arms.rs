@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::plan::check_mis;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::{ArmList, ControllerChoice};
+use closecall_scenarios::ScenarioFile;
 
 use super::CliError;
 use super::args::SensorsChoice;
@@ -14,7 +16,8 @@ use super::protect::of_controller;
 /// The controller under test.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ControllerArgs {
-    /// Controller of the ego vehicle: `acc`, `mis`, `mis-extended`, `gap-SECONDS` (cruise control with a longer time gap:
+    /// Controller of the ego vehicle: `acc`, `mis`, `mis-extended`, `blind` and `crawl` (slower from the start,
+    /// without looking back), `gap-SECONDS` (cruise control with a longer time gap:
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
     /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a
     /// program of your own, which reads a line per control step and answers with a line
@@ -109,9 +112,11 @@ impl ComparisonArgs {
         tested.limited(&arms)
     }
 
-    /// Returns the arms of a run.
-    pub(super) fn arms(&self, tested: &ArmArgs) -> Result<Vec<Arm>, CliError> {
-        let controllers = ControllerChoice::factories(&self.controllers(&tested.controller, false)?, None);
+    /// Returns the arms of a run of a scenario.
+    pub(super) fn arms(&self, tested: &ArmArgs, file: &ScenarioFile) -> Result<Vec<Arm>, CliError> {
+        let controllers = self.controllers(&tested.controller, false)?;
+        check_mis(file, &controllers)?;
+        let controllers = ControllerChoice::factories(&controllers, None);
         let sensors = tested.sensors.map(SensorsChoice::mode);
         Ok(controllers.into_iter().map(|controller| Arm { controller, sensors }).collect())
     }

@@ -1,7 +1,9 @@
 //! `closecall campaign`: runs many samples of scenarios, and judges the result.
 
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -53,9 +55,13 @@ pub(super) struct CampaignArgs {
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
     plan: PlanArgs,
-    /// Seed of the random numbers
-    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
-    seed: u64,
+    /// Seed of the random numbers [default: 0]
+    #[arg(long, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
+    seed: Option<u64>,
+    /// Seed of a campaign that judges: a number, or `secret`, which draws a seed that nobody knew before. The campaign states it in the end. `--preset pr`
+    /// without a seed draws one
+    #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
+    judge_seed: Option<JudgeSeed>,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`
     #[arg(long, default_value_t = Design::Random, help_heading = heading::SAMPLES)]
     design: Design,
@@ -105,9 +111,54 @@ pub(super) struct CampaignArgs {
     format: Format,
 }
 
+/// The seed of a campaign that judges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum JudgeSeed {
+    /// It is drawn when the campaign starts.
+    Secret,
+    /// It is named.
+    Number(u64),
+}
+
+impl FromStr for JudgeSeed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "secret" {
+            return Ok(Self::Secret);
+        }
+        closecall_campaign::arguments::seed(text).map(Self::Number).map_err(|error| format!("{error}, or `secret`"))
+    }
+}
+
 impl CampaignArgs {
-    fn sampling(&self) -> Sampling {
-        Sampling { seed: self.seed, design: self.design, samples: self.plan.samples() }
+    /// Returns true if the seed is to be drawn. The parts of a campaign need the same one.
+    fn draws_seed(&self) -> bool {
+        match self.judge_seed {
+            Some(JudgeSeed::Secret) => true,
+            Some(JudgeSeed::Number(_)) => false,
+            None => self.seed.is_none() && self.partition.is_none() && self.plan.judges_pull_requests(),
+        }
+    }
+
+    /// Returns the seed. A campaign that is resumed has the one that was drawn.
+    fn seed(&self) -> Result<u64, CliError> {
+        if !self.draws_seed() {
+            let judging = match self.judge_seed {
+                Some(JudgeSeed::Number(seed)) => Some(seed),
+                _ => self.seed,
+            };
+            return Ok(judging.unwrap_or(0));
+        }
+        if self.partition.is_some() {
+            return Err(CliError::usage("--judge-seed secret: the parts of a campaign need the same seed, so name it"));
+        }
+        let drawn = || RandomState::new().build_hasher().finish();
+        Ok(self.results.resumed().map_or_else(drawn, |manifest| manifest.sampling.seed))
+    }
+
+    fn sampling(&self) -> Result<Sampling, CliError> {
+        Ok(Sampling { seed: self.seed()?, design: self.design, samples: self.plan.samples() })
     }
 
     fn workers(&self) -> Result<Workers, CliError> {
@@ -121,7 +172,7 @@ impl CampaignArgs {
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
         let ensemble = self.ensemble.apply(files)?;
-        let mut plan = Plan::new(ensemble.entries, self.sampling(), controllers)?;
+        let mut plan = Plan::new(ensemble.entries, self.sampling()?, controllers)?;
         plan.without_effect = ensemble.without_effect;
         plan.use_sensors(self.sensors.map(SensorsChoice::mode))?;
         plan.partition = self.partition;
@@ -181,6 +232,9 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", VerdictText(&judged));
+            if args.draws_seed() {
+                outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
+            }
         }
     }
     // A report that cannot be written does not cost the verdict.

@@ -83,7 +83,6 @@ fn to_json(file: &Result<ScenarioFile, ScenarioError>, path: &Path) -> Value {
             "name": file.config().name,
             "requirements": file.config().requirements,
             "parameters": file.config().parameters.0.keys().map(ToString::to_string).collect::<Vec<_>>(),
-            "unused_parameters": file.unused_parameters().iter().map(ToString::to_string).collect::<Vec<_>>(),
         }),
         Err(error) => json!({
             "path": path,

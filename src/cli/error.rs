@@ -244,7 +244,7 @@ impl From<&CliError> for ExitCode {
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
-            CliError::Plan(PlanError::Controller { .. }) => Self::InvalidInput,
+            CliError::Plan(PlanError::Controller { .. } | PlanError::WithoutMis { .. }) => Self::InvalidInput,
             CliError::Usage { .. } | CliError::Plan(_) | CliError::Baseline(_) => Self::Usage,
         }
     }

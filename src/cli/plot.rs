@@ -76,7 +76,7 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
-    films(&scenario, RunKey { seed, sample }, &args.comparison.arms(&args.arm)?)
+    films(&scenario, RunKey { seed, sample }, &args.comparison.arms(&args.arm, &file)?)
 }
 
 /// Films a sample of a campaign as the campaign ran it, in every arm.

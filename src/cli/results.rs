@@ -12,6 +12,7 @@ use closecall_campaign::folder::{Folder, FolderError, LockedFolder, REPORT};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
 use closecall_campaign::resume_command::quoted;
+use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
 use closecall_report::campaign::{RecordedSample, Written};
@@ -62,6 +63,16 @@ pub(super) enum Place<'a> {
 }
 
 impl ResultsArgs {
+    /// Returns the manifest of the campaign that is to be resumed, if there is one.
+    pub(super) fn resumed(&self) -> Option<Manifest> {
+        let folder = match self.place().ok().filter(|_| self.resume)? {
+            Place::Named(path) => path,
+            Place::Default => Path::new(RESULTS),
+            Place::Nowhere => return None,
+        };
+        SavedCampaign::open(folder).ok().map(|saved| saved.manifest().clone())
+    }
+
     /// Returns the place of the results. A caller in its own process, such as a Python program, has no default folder.
     pub(super) fn place(&self) -> Result<Place<'_>, CliError> {
         match &self.out {

@@ -51,7 +51,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.sim.seed, sample: args.sample };
-    let arms = args.comparison.arms(&args.sim.arm)?;
+    let arms = args.comparison.arms(&args.sim.arm, &file)?;
     for isolated in arms.iter().filter_map(|arm| arm.controller.isolated()) {
         isolated.check_variables(&scenario, None)?;
     }

@@ -95,7 +95,7 @@ fn round(path: &Path, set: &SetArgs, args: &WatchingArgs) -> Result<(), CliError
     let (name, parameters) = (&file.config().name, file.space().iter().len());
     outln!("{}: valid, {name} with {parameters} parameters", path.display());
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
-    let arms = args.comparison.arms(&args.arm)?;
+    let arms = args.comparison.arms(&args.arm, &file)?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(&file, sampling, sample).map_err(fail)?;

@@ -21,6 +21,7 @@ mod durability;
 mod encounter_models;
 mod engagement;
 mod ensemble;
+mod evidence;
 mod exec_controller;
 mod exit_codes;
 mod faulty_controllers;

@@ -29,8 +29,10 @@ pub enum OpenReason {
     NoSamples,
     /// The gate compares arms, and the campaign has no baseline.
     NotPaired,
-    /// No parameter varies, so that a bound of a probability means nothing.
+    /// No parameter varies enough, so that a bound of a probability means nothing.
     NothingVaries,
+    /// A controller from outside reports the value of itself.
+    SelfReported,
 }
 
 impl OpenReason {
@@ -40,10 +42,48 @@ impl OpenReason {
             Self::TooFewSamples => "too few samples to decide",
             Self::NoSamples => "no sample has this value",
             Self::NotPaired => "it needs --paired",
-            Self::NothingVaries => "no parameter varies, so that no probability can be bounded",
+            Self::NothingVaries => "no parameter varies enough, so that no probability can be bounded",
+            Self::SelfReported => {
+                "a controller from outside reports it of itself: judge a measured value, such as slowed_for_rear"
+            }
         }
     }
 }
+
+/// What else the answer of a gate depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence {
+    /// Whether the campaign has a baseline.
+    pub is_paired: bool,
+    /// Whether some parameter of the scenario varies enough.
+    pub is_varied: bool,
+    /// Whether the baseline, and the arm under test, are controllers of this program.
+    pub is_built_in: [bool; 2],
+    /// What determines the number of samples.
+    pub inference: Inference,
+}
+
+/// Smallest number of samples by which a count, a sum, a mean or an extreme is met (-): an assumption; 10 to 59 are plausible. What no one of 20 samples
+/// shows has a probability of up to 14 %, with 95 % confidence.
+const LEAST_SAMPLES: u64 = 20;
+
+/// Returns the smallest number of samples by which a gate is met. A percentile needs as many as reach beyond it with the confidence of a bound: 59 for the 5th
+/// and the 95th, 299 for the 1st and the 99th. A scenario in which nothing varies has one sample.
+fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
+    match aggregate {
+        _ if !is_varied => 1,
+        Aggregate::Lower | Aggregate::Upper => 1,
+        Aggregate::Percentile(percent) => {
+            let inside = 0.01 * percent.max(100.0 - percent);
+            let reaching = |samples: &u64| inside >= 1.0 || 1.0 - inside.powf(*samples as f64) >= CONFIDENCE;
+            (LEAST_SAMPLES..MOST_ASKED).find(reaching).unwrap_or(MOST_ASKED)
+        }
+        _ => LEAST_SAMPLES,
+    }
+}
+
+/// Largest number of samples that a percentile asks for (-): that of the 99.99th.
+const MOST_ASKED: u64 = 29_956;
 
 /// The value of a gate, with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,8 +140,9 @@ impl Accumulator {
         }
     }
 
-    /// Returns the result. `is_varied` is false if no parameter of the scenario varies.
-    pub fn evaluate(&self, is_paired: bool, is_varied: bool, inference: Inference) -> Evaluation {
+    /// Returns the result.
+    pub fn evaluate(&self, evidence: &Evidence) -> Evaluation {
+        let Evidence { is_paired, is_varied, is_built_in, inference } = *evidence;
         let Expression { aggregate, operator, bound, .. } = self.expression;
         let (hits, samples) = (self.hits, self.samples);
         let interval_95 =
@@ -111,13 +152,22 @@ impl Accumulator {
         if self.expression.needs_pairs() && !is_paired {
             return open(OpenReason::NotPaired);
         }
+        let is_reported =
+            self.expression.reported_by().into_iter().zip(is_built_in).any(|(reported, own)| reported && !own);
+        if is_reported {
+            return open(OpenReason::SelfReported);
+        }
         let is_bound = matches!(aggregate, Aggregate::Lower | Aggregate::Upper);
         if is_bound && !is_varied {
             return open(OpenReason::NothingVaries);
         }
         let Some(found) = value.filter(|_| samples > 0) else { return open(OpenReason::NoSamples) };
+        let is_enough = samples >= least_samples(aggregate, is_varied);
+        // Few samples do not show a percentile at all. What they count or reach, they have.
         let answer = if operator.holds(found, bound) {
-            Answer::Met
+            if is_enough { Answer::Met } else { Answer::Open(OpenReason::TooFewSamples) }
+        } else if matches!(aggregate, Aggregate::Percentile(_)) && !is_enough {
+            Answer::Open(OpenReason::TooFewSamples)
         } else if is_bound && self.is_undecided(inference) {
             Answer::Open(OpenReason::TooFewSamples)
         } else {
@@ -186,5 +236,19 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
             }))
         }
         Quantity::Baseline(_) | Quantity::Pair(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_percentile_asks_for_as_many_samples_as_reach_beyond_it() {
+        let least = |percent| least_samples(Aggregate::Percentile(percent), true);
+        assert_eq!([least(99.0), least(1.0), least(95.0), least(5.0), least(50.0)], [299, 299, 59, 59, 20]);
+        assert_eq!([least(100.0), least(0.0), least(99.999)], [20, 20, MOST_ASKED]);
+        assert_eq!([Aggregate::Count, Aggregate::Max, Aggregate::Min].map(|of| least_samples(of, true)), [20; 3]);
+        assert_eq!(least_samples(Aggregate::Percentile(99.0), false), 1, "nothing varies");
     }
 }

@@ -2,15 +2,16 @@
 
 use std::sync::Arc;
 
-use closecall_scenarios::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
+use closecall_scenarios::criteria::{EGO_COLLIDED, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
 use closecall_scenarios::parameters::Variation;
+use closecall_simulation::Arm;
 
-use super::evaluate::{Accumulator, value};
+use super::evaluate::{Accumulator, Evidence, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
 use crate::ledger::Inference;
 use crate::record::Record;
-use crate::repeats::Repeats;
+use crate::repeats::{Repeats, is_varied};
 use crate::runner::Work;
 
 /// A gate that is being judged.
@@ -40,6 +41,11 @@ struct Judged {
     least_share: f64,
     happened: u64,
     samples: u64,
+    overridden: Vec<String>,
+    /// Whether the scenario asks what the system prevents.
+    asks_for_action: bool,
+    /// Samples in which the system under test slowed the ego for a vehicle behind.
+    acted: u64,
 }
 
 /// Gathers the evidence for every gate, requirement and expectation of a campaign.
@@ -47,6 +53,8 @@ struct Judged {
 pub struct Judge {
     is_paired: bool,
     is_measurement: bool,
+    /// Whether the baseline, and the arm under test, are controllers of this program.
+    is_built_in: [bool; 2],
     inference: Inference,
     scenarios: Vec<Judged>,
     all: Vec<Gate>,
@@ -56,10 +64,13 @@ impl Judge {
     /// Returns a judge without samples.
     pub fn new(works: &[Arc<Work>], set: &GateSet, inference: Inference) -> Self {
         let judged = |work: &Arc<Work>| {
-            let (config, variation) = (work.file.config(), work.file.space().variation());
+            let config = work.file.config();
+            let of_prevented = |check: &closecall_scenarios::criteria::Expression| {
+                check.quantity == Quantity::Pair(PairFlag::Prevented)
+            };
             Judged {
                 scenario: config.name.clone(),
-                is_varied: variation != Variation::None,
+                is_varied: is_varied(work.file.space()),
                 repeats: Repeats::of(work.file.space()),
                 repeated: 0,
                 gates: set.of_scenario(&work.file).iter().map(Gate::new).collect(),
@@ -69,11 +80,17 @@ impl Judge {
                 least_share: config.expects_share,
                 happened: 0,
                 samples: 0,
+                overridden: config.overridden.clone(),
+                asks_for_action: config.checks.values().flatten().any(of_prevented),
+                acted: 0,
             }
         };
+        let arms = works.first().map_or(&[][..], |work| &work.arms);
+        let is_built_in = |arm: Option<&Arm>| arm.is_none_or(|arm| arm.controller.is_built_in());
         Self {
             is_paired: works.first().is_some_and(|work| work.arms.len() > 1),
             is_measurement: set.is_measurement,
+            is_built_in: [is_built_in(arms.first()), is_built_in(arms.last())],
             inference,
             scenarios: works.iter().map(judged).collect(),
             all: set.of_all().map(Gate::new).collect(),
@@ -98,9 +115,21 @@ impl Judge {
         self.is_measurement
     }
 
-    /// Returns the samples of a scenario that repeat the parameters of an earlier one, and are not counted as evidence.
+    /// Returns the samples of a scenario that repeat the parameters or the outcome of an earlier one, and are not counted as evidence.
     pub fn repeated(&self, scenario: &str) -> u64 {
         self.scenarios.iter().find(|judged| judged.scenario == scenario).map_or(0, |judged| judged.repeated)
+    }
+
+    /// Returns what settings weakened, by scenario.
+    pub fn overridden(&self) -> impl Iterator<Item = (&str, &[String])> {
+        let judged = self.scenarios.iter().filter(|judged| !judged.overridden.is_empty());
+        judged.map(|judged| (judged.scenario.as_str(), judged.overridden.as_slice()))
+    }
+
+    /// Returns the scenarios that ask what the system prevents, and in which it never slowed the ego for a vehicle behind, with their numbers of samples.
+    pub fn without_action(&self) -> impl Iterator<Item = (&str, u64)> {
+        let idle = |judged: &&Judged| judged.asks_for_action && judged.samples > 0 && judged.acted == 0;
+        self.scenarios.iter().filter(idle).map(|judged| (judged.scenario.as_str(), judged.samples))
     }
 
     /// Returns true if some parameter of the scenario varies.
@@ -119,7 +148,12 @@ impl Judge {
             scenario: scenario.map(str::to_owned),
             expression: gate.spec.expression,
             source: gate.spec.source.clone(),
-            evaluation: gate.accumulator.evaluate(self.is_paired, is_varied, self.inference),
+            evaluation: gate.accumulator.evaluate(&Evidence {
+                is_paired: self.is_paired,
+                is_varied,
+                is_built_in: self.is_built_in,
+                inference: self.inference,
+            }),
         };
         let is_any_varied = self.scenarios.iter().any(|judged| judged.is_varied);
         let all = self.all.iter().map(|gate| result(gate, None, is_any_varied));
@@ -169,6 +203,9 @@ impl Judged {
             return;
         }
         self.samples += 1;
+        let acted = Measure::named(SLOWED_FOR_REAR).and_then(|measure| value(Quantity::Tested(measure), record));
+        // A journal without the value does not show that the system was idle.
+        self.acted += u64::from(acted != Some(0.0));
         let holds = |quantity: Quantity| value(quantity, record) == Some(1.0);
         let collided = Measure::named(EGO_COLLIDED);
         let is_paired = record.arms.len() > 1;

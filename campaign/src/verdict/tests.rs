@@ -20,7 +20,7 @@ fn availability(unavailable: u64, engaged: u64) -> Found {
 fn a_system_that_is_not_available_in_most_samples_is_not_tested_whether_it_engages_or_not() {
     for engaged in [0, 1, 10] {
         let found = availability(6, engaged);
-        assert_eq!(found.decisions, [Decision::Inconclusive], "{engaged} engagements");
+        assert_eq!(found.decisions, [Decision::NotJudged], "{engaged} engagements");
         assert!(found.reasons[0].contains("in 6 of 10 samples, more than 50 %"), "{}", found.reasons[0]);
     }
     let half = availability(5, 0);
@@ -30,5 +30,7 @@ fn a_system_that_is_not_available_in_most_samples_is_not_tested_whether_it_engag
 
 #[test]
 fn a_gate_that_fails_decides_before_a_system_that_is_not_available() {
-    assert_eq!(Decision::first_of(&[Decision::Inconclusive, Decision::Fail]), Some(Decision::Fail));
+    assert_eq!(Decision::first_of(&[Decision::NotJudged, Decision::Fail]), Some(Decision::Fail));
+    assert_eq!(Decision::first_of(&[Decision::Overridden, Decision::Fail]), Some(Decision::Fail));
+    assert_eq!(Decision::first_of(&[Decision::Overridden]), Some(Decision::Overridden));
 }

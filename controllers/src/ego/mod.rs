@@ -10,6 +10,7 @@ mod r157_driver;
 mod r157_fuzzy;
 mod reason;
 mod settings;
+mod slower;
 mod stack;
 mod surroundings;
 
@@ -26,5 +27,6 @@ pub use r157_driver::R157Driver;
 pub use r157_fuzzy::R157Fuzzy;
 pub use reason::Reason;
 pub use settings::{EgoSettings, EgoStackConfig};
+pub use slower::{Slower, Slowing};
 pub use stack::EgoStack;
 pub use surroundings::{Front, LeadVehicleSelector};

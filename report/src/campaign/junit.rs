@@ -6,7 +6,7 @@
 //! | gate, requirement check | met | not met | the samples do not decide it | it cannot be checked in this campaign, or the campaign is only measured |
 //! | probability gate | shown | refuted | not decided | |
 //! | `at most N flaky samples` | met | not met | | the campaign is only measured |
-//! | `verdict` | PASS, measured | | ERROR, INVALID, INCONCLUSIVE, NOT JUDGED | FAIL: the gates say it |
+//! | `verdict` | PASS, measured | | ERROR, INVALID, INCONCLUSIVE, NOT JUDGED, OVERRIDDEN | FAIL: the gates say it |
 //!
 //! The failures are the failed gates and requirement checks, and nothing else. Samples stand in `samples.xml`.
 
@@ -91,7 +91,9 @@ fn cases(judged: &Judgement) -> Vec<Case> {
         status: match judged.verdict() {
             None | Some(Verdict::Pass) => Status::Passed,
             Some(Verdict::Fail) => Status::Skipped,
-            Some(Verdict::Error | Verdict::Invalid | Verdict::Inconclusive | Verdict::NotJudged) => Status::Error,
+            Some(
+                Verdict::Error | Verdict::Invalid | Verdict::Inconclusive | Verdict::NotJudged | Verdict::Overridden,
+            ) => Status::Error,
         },
         message: format!("{}: {}", judged.word(), judged.reasons.join("; ")),
     });

@@ -118,7 +118,8 @@ fn arm_pairs(summary: &Summary) -> String {
 
 fn pairs(counts: &Counts, inference: Inference) -> String {
     let pairs = &counts.pairs;
-    let p_value = pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" Exact McNemar p {p:.1e}."));
+    let p_value =
+        pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" McNemar mid-p of any collision {p:.1e}."));
     format!(
         "**{} prevented, {} induced**, {} in both arms, {} in neither.{p_value} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
         pairs.prevented,

@@ -17,6 +17,7 @@ pub mod junit;
 pub mod markdown;
 pub mod outcomes;
 pub mod overview;
+mod pareto;
 mod recordings;
 pub mod samples_xml;
 mod tally;

@@ -308,6 +308,9 @@ fn margin_columns(columns: &mut Columns) {
     columns.number("max_deceleration_mps2", "m/s²", move |row| Some(margins(row)?.max_deceleration_mps2));
     columns.number("max_jerk_mps3", "m/s³", move |row| Some(margins(row)?.max_jerk_mps3));
     columns.number("max_speed_deficit_mps", "m/s", move |row| Some(margins(row)?.max_speed_deficit_mps));
+    for (name, unit) in [("unprompted_deficit_mps", "m/s"), ("time_lost_s", "s"), ("imposed_braking_mps2", "m/s²")] {
+        columns.number(name, unit, move |row| Measure::named(name)?.of(row.outcome()?));
+    }
 }
 
 fn mis_columns(columns: &mut Columns) {

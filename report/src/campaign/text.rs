@@ -10,6 +10,7 @@ use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
 
 use super::overview::{ErrorGroup, Overview};
+use super::pareto::ParetoText;
 
 /// Width of the names of the arms in the output, at least.
 const NAME_WIDTH: usize = 5;
@@ -76,7 +77,8 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
         let [prevented, induced] = [pairs.prevented, pairs.induced];
         write!(f, "  pairs: {prevented} prevented, {induced} induced, {} both, {} neither", pairs.both, pairs.neither)?;
         if let Some(p) = pairs.mcnemar_p(summary.inference) {
-            write!(f, "  (exact McNemar p {p:.2e})")?;
+            let [without, with] = [pairs.any_prevented, pairs.any_induced];
+            write!(f, "  (any vehicle: {without} to {with}, McNemar mid-p {p:.2e})")?;
         }
         writeln!(f)?;
         let of_others = pairs.induced_of_others + pairs.both_of_others;
@@ -99,6 +101,9 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
     }
     if summary.has_references() {
         write_arm_pairs(f, summary, counts)?;
+        if let Some(pareto) = ParetoText::of(summary, counts) {
+            write!(f, "{pareto}")?;
+        }
     }
     let checks = &counts.checks;
     if checks.not_checked > 0 {
@@ -120,7 +125,7 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
 fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts) -> fmt::Result {
     writeln!(
         f,
-        "  all pairs of arms (95 % intervals of the shares; p: exact McNemar, corrected for the pairs by {CORRECTION}):"
+        "  all pairs of arms (95 % intervals of the shares; p: McNemar mid-p of any collision, corrected for the pairs by {CORRECTION}):"
     )?;
     for result in pair_results(summary, counts) {
         let pairs = result.pairs;

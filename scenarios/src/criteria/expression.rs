@@ -113,6 +113,13 @@ impl Expression {
         self.quantity.needs_pairs() || self.condition.is_some_and(Quantity::needs_pairs)
     }
 
+    /// Returns the arms of which the gate judges what they report of themselves: the baseline, and the arm under test.
+    pub fn reported_by(&self) -> [bool; 2] {
+        let quantities = || std::iter::once(self.quantity).chain(self.condition);
+        let baseline = quantities().any(|of| matches!(of, Quantity::Baseline(measure) if measure.is_reported()));
+        [baseline, quantities().any(|of| matches!(of, Quantity::Tested(measure) if measure.is_reported()))]
+    }
+
     /// Returns the left-hand side, which identifies what is judged.
     pub fn subject(&self) -> String {
         let condition = self.condition.map_or_else(String::new, |condition| format!(" | {condition}"));

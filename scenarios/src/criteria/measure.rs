@@ -4,7 +4,7 @@
 //! of `outcomes.parquet` where there is one.
 
 use crate::harm::harm;
-use crate::outcome::{EndReason, Margins, MisSummary, Moment, Outcome};
+use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome};
 use closecall_traffic::Measured;
 
 /// Whether a measure counts or quantifies.
@@ -46,11 +46,19 @@ impl Measure {
         (self.value)(outcome)
     }
 
+    /// Returns true if the controller reports the measure of itself, so that it is no evidence of a controller from outside.
+    pub fn is_reported(&self) -> bool {
+        REPORTED.contains(&self.name)
+    }
+
     /// Returns the measure with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         MEASURES.iter().find(|measure| measure.name == name)
     }
 }
+
+/// The measures that rest on the states that a controller reports.
+const REPORTED: [&str; 3] = ["engaged", "goal_in_reach", "thw_gain_s"];
 
 /// The flags of a pair of arms on the same sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,11 +121,22 @@ fn mis(outcome: &Outcome, of: fn(&MisSummary) -> Measured) -> Option<f64> {
     of(outcome.mis.as_ref().ok()?).ok()
 }
 
+/// Amount by which an ego may be slower than its lead vehicle without a reason (m/s): an assumption, above what a cruise control needs to keep its gap; 0.2
+/// to 1 are plausible.
+const SLOWED_MPS: f64 = 0.5;
+
+fn cost(outcome: &Outcome, of: fn(&Cost) -> f64) -> Option<f64> {
+    outcome.cost.as_ref().map(of)
+}
+
 /// Front time headway that the ego gained from the engagement to the critical distance (s).
 fn thw_gain_s(outcome: &Outcome) -> Option<f64> {
     let at_engagement_s = mis(outcome, |mis| mis.thw_front_at_engagement_s)?;
     Some(mis(outcome, |mis| mis.thw_front_at_critical_s)? - at_engagement_s)
 }
+
+/// The measure of a system that acts for a vehicle behind, whatever it reports.
+pub const SLOWED_FOR_REAR: &str = "slowed_for_rear";
 
 /// The measure that gates judge after the validity checks.
 pub const EGO_COLLIDED: &str = "ego_collided";
@@ -139,6 +158,16 @@ pub const MEASURES: &[Measure] = &[
     flag("goal_in_reach", "the system says, when it engages, that its goal is in reach", |outcome| {
         is(outcome.mis.as_ref().is_ok_and(|mis| mis.goal_in_reach == Some(true)))
     }),
+    flag(
+        "slowed_unprompted",
+        "the ego is slower than the lead vehicle by more than 0.5 m/s before a vehicle behind is within 100 m and approaches at 10 km/h or more",
+        |outcome| cost(outcome, |cost| if cost.unprompted_deficit_mps > SLOWED_MPS { 1.0 } else { 0.0 }),
+    ),
+    flag(
+        SLOWED_FOR_REAR,
+        "the ego is slower than the lead vehicle by more than 0.5 m/s after a vehicle behind is within 100 m and approaches at 10 km/h or more",
+        |outcome| cost(outcome, |cost| if cost.prompted_deficit_mps > SLOWED_MPS { 1.0 } else { 0.0 }),
+    ),
     flag("ended_in_standstill", "the ego and the vehicles near it come to a stop", |outcome| {
         is(outcome.end == EndReason::Standstill)
     }),
@@ -183,6 +212,19 @@ pub const MEASURES: &[Measure] = &[
     number("max_speed_deficit_mps", "most by which the ego is slower than the lead vehicle", |outcome| {
         Some(outcome.margins.max_speed_deficit_mps)
     }),
+    number(
+        "unprompted_deficit_mps",
+        "most by which the ego is slower than the lead vehicle before a vehicle behind gives a reason, and before the lead vehicle brakes",
+        |outcome| cost(outcome, |cost| cost.unprompted_deficit_mps),
+    ),
+    number("time_lost_s", "most by which the ego is late before the lead vehicle brakes", |outcome| {
+        cost(outcome, |cost| cost.time_lost_s)
+    }),
+    number(
+        "imposed_braking_mps2",
+        "largest deceleration of the vehicle behind before the lead vehicle brakes",
+        |outcome| cost(outcome, |cost| cost.imposed_braking_mps2),
+    ),
     number("delta_v_mps", "largest change of the ego's velocity in a collision; 0 if it does not collide", |outcome| {
         Some(outcome.ego_delta_v_mps().unwrap_or(0.0))
     }),

@@ -13,4 +13,4 @@ mod measure;
 
 pub use config::{FlagName, GateConfig};
 pub use expression::{Aggregate, Expression, ExpressionError, Operator, Quantity};
-pub use measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag};
+pub use measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag, SLOWED_FOR_REAR};

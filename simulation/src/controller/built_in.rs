@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver, R157Fuzzy};
+use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver, R157Fuzzy, Slower, Slowing};
 
 use super::TimeGap;
 use crate::run::ControllerFactory;
@@ -17,6 +17,10 @@ pub enum BuiltIn {
     Mis,
     /// The scenario's complete ego stack, with a margin increase system that engages earlier and may brake harder.
     MisExtended,
+    /// As [`BuiltIn::Acc`], but slowing down gently from the first second on, without looking back.
+    Blind,
+    /// As [`BuiltIn::Blind`], twice as hard and twice as far.
+    Crawl,
     /// As [`BuiltIn::Acc`], with another constant time gap.
     Gap(TimeGap),
     /// As [`BuiltIn::Acc`], with the minimum following distance of UN Regulation 157.
@@ -34,6 +38,8 @@ impl fmt::Display for BuiltIn {
             Self::Acc => f.write_str("acc"),
             Self::Mis => f.write_str("mis"),
             Self::MisExtended => f.write_str("mis-extended"),
+            Self::Blind => f.write_str("blind"),
+            Self::Crawl => f.write_str("crawl"),
             Self::Gap(gap) => write!(f, "gap-{gap}"),
             Self::R157Gap => f.write_str("r157-gap"),
             Self::R157Driver => f.write_str("r157-driver"),
@@ -44,8 +50,21 @@ impl fmt::Display for BuiltIn {
 
 impl BuiltIn {
     /// The controllers whose name has no number.
-    pub(super) const FIXED: [Self; 6] =
-        [Self::Acc, Self::Mis, Self::MisExtended, Self::R157Gap, Self::R157Driver, Self::R157Fsm];
+    pub(super) const FIXED: [Self; 8] = [
+        Self::Acc,
+        Self::Mis,
+        Self::MisExtended,
+        Self::Blind,
+        Self::Crawl,
+        Self::R157Gap,
+        Self::R157Driver,
+        Self::R157Fsm,
+    ];
+
+    /// Returns true if the controller is a margin increase system, so that it needs a stack that has one.
+    pub const fn needs_mis(self) -> bool {
+        matches!(self, Self::Mis | Self::MisExtended)
+    }
 
     /// Returns a factory of this controller.
     pub fn factory(self) -> Arc<dyn ControllerFactory> {
@@ -64,9 +83,13 @@ impl ControllerFactory for BuiltInFactory {
         &self.name
     }
 
+    fn is_built_in(&self) -> bool {
+        true
+    }
+
     fn settings(&self, settings: &EgoSettings) -> EgoSettings {
         match self.built_in {
-            BuiltIn::Acc => settings.without_mis(),
+            BuiltIn::Acc | BuiltIn::Blind | BuiltIn::Crawl => settings.without_mis(),
             BuiltIn::Mis => *settings,
             BuiltIn::MisExtended => settings.with_extended_mis(),
             BuiltIn::Gap(gap) => settings.with_time_gap(gap.s()),
@@ -88,6 +111,8 @@ impl ControllerFactory for BuiltInFactory {
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         let settings = self.settings(settings);
         match self.built_in {
+            BuiltIn::Blind => Box::new(Slower::new(settings, Slowing::BLIND)),
+            BuiltIn::Crawl => Box::new(Slower::new(settings, Slowing::CRAWL)),
             BuiltIn::R157Driver => Box::new(R157Driver::new(settings)),
             BuiltIn::R157Fsm => Box::new(R157Fuzzy::new(settings)),
             _ => Box::new(EgoStack::new(settings)),

@@ -19,6 +19,11 @@ pub trait ControllerFactory: Send + Sync {
     }
     /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
+    /// Returns whether the controller is one of this program, so that the states that it reports are those of its code. What another one reports of itself
+    /// is never evidence.
+    fn is_built_in(&self) -> bool {
+        false
+    }
     /// Returns whether the controller uses the sensors that look back. If it does not, their tracks do not reach it, and mode
     /// [`SensorMode::Full`] simulates them only for an observer of the steps.
     fn looks_back(&self, _: &EgoSettings) -> bool {

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::computing_time::ComputingTime;
 use super::equipment::controller;
 use super::state::{Next, Run, settings_of};
 use super::{Arm, Observer, RunKey, SampleError};
@@ -20,6 +21,7 @@ pub fn simulate(
 ) -> Result<Outcome, SampleError> {
     let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm), observer.wants_steps())?;
     let mut controller = controller(scenario, settings_of(scenario), arm);
+    let mut computing = (!arm.controller.is_built_in()).then(ComputingTime::default);
     loop {
         match run.go_on(observer)? {
             Next::End(end) => {
@@ -27,7 +29,11 @@ pub fn simulate(
                 return Ok(run.finish(end));
             }
             Next::Control => {
-                let command = controller.step(&run.input())?;
+                let input = run.input();
+                let command = match &mut computing {
+                    Some(computing) => computing.of(input.time, || controller.step(&input)),
+                    None => controller.step(&input),
+                }?;
                 if let Some(end) = run.command(command, observer)? {
                     controller.finish(run.time())?;
                     return Ok(run.finish(end));

@@ -89,8 +89,9 @@ impl MarginMeter {
         Self { extremes, last_acceleration_mps2: None, start_speed_mps: None, last_lead: None, step_s }
     }
 
-    /// Updates the extremes by one physics step. It must not be called after the ego's first collision.
-    pub(crate) fn observe(&mut self, own: &VehicleState, now: &CurrentMargins) {
+    /// Updates the extremes by one physics step, and returns the speed with which that of the ego is compared (m/s), if there is one now. It must not be
+    /// called after the ego's first collision.
+    pub(crate) fn observe(&mut self, own: &VehicleState, now: &CurrentMargins) -> Option<f64> {
         let extremes = &mut self.extremes;
         keep_least(&mut extremes.min_thw_front_s, now.thw_front_s);
         keep_least(&mut extremes.min_thw_rear_s, now.thw_rear_s);
@@ -104,12 +105,12 @@ impl MarginMeter {
             extremes.max_jerk_mps3 = extremes.max_jerk_mps3.max(jerk_mps3);
         }
         self.last_acceleration_mps2 = Some(own.acceleration_mps2);
-        self.observe_speed_deficit(own.speed_mps, now.lead);
+        self.observe_speed_deficit(own.speed_mps, now.lead)
     }
 
     /// Compares the ego's speed with a reference: the lead vehicle's speed once it has been ahead for [`SETTLED_LEAD_S`],
     /// or the ego's own speed at the start if there is no lead vehicle.
-    fn observe_speed_deficit(&mut self, own_mps: f64, lead: Result<Lead, Absent>) {
+    fn observe_speed_deficit(&mut self, own_mps: f64, lead: Result<Lead, Absent>) -> Option<f64> {
         let start_speed_mps = *self.start_speed_mps.get_or_insert(own_mps);
         let reference_mps = match lead {
             Ok(lead) => {
@@ -117,14 +118,15 @@ impl MarginMeter {
                 let steps = same.map_or(0, |last| last.steps + 1);
                 self.last_lead = Some(LeadDuration { actor: lead.actor, steps });
                 if f64::from(steps) * self.step_s < SETTLED_LEAD_S {
-                    return;
+                    return None;
                 }
                 lead.speed_mps
             }
             Err(Absent::NoLead) => start_speed_mps,
-            Err(_) => return,
+            Err(_) => return None,
         };
         self.extremes.max_speed_deficit_mps = self.extremes.max_speed_deficit_mps.max(reference_mps - own_mps);
+        Some(reference_mps)
     }
 
     /// Sets the smallest gap to zero after a collision of the ego: the front gap if the other vehicle `is_ahead`, otherwise

@@ -12,6 +12,8 @@
 mod arm;
 mod auditor;
 mod closed_loop;
+mod computing_time;
+mod cost;
 mod delayed_truth;
 mod ego_input;
 mod equipment;

@@ -11,6 +11,7 @@ use closecall_traffic::{
     CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Time, Track, VehicleState,
 };
 
+use super::cost::{CostMeter, Instant, Rear};
 use super::ego_input::{odometry, sensor_availability};
 use super::equipment::perception;
 use super::events::Events;
@@ -59,6 +60,7 @@ pub(super) struct Run<'a> {
     events: Events,
     encounter: Encounter,
     meter: MarginMeter,
+    cost: CostMeter,
     mis: MisLog,
     moments: Moments,
     critical_gap_m: f64,
@@ -124,6 +126,7 @@ impl<'a> Run<'a> {
             events: Events::new(&scenario),
             encounter: Encounter::default(),
             meter: MarginMeter::new(scenario.physics_step.s()),
+            cost: CostMeter::new(scenario.physics_step.s()),
             mis: MisLog::default(),
             moments: Moments::default(),
             critical_gap_m: settings.mis().unwrap_or(&MisSettings::PAPER).critical_gap_m,
@@ -234,7 +237,17 @@ impl<'a> Run<'a> {
         if self.world.is_wrecked(ego) {
             return;
         }
-        self.meter.observe(own, &self.margins);
+        let reference_mps = self.meter.observe(own, &self.margins);
+        let rear = self.margins.follower.zip(self.margins.gap_rear_m.ok()).map(|(actor, gap_m)| {
+            let state = self.world.state(actor);
+            Rear { gap_m, speed_mps: state.speed_mps, acceleration_mps2: state.acceleration_mps2 }
+        });
+        self.cost.observe(&Instant {
+            own_mps: own.speed_mps,
+            reference_mps,
+            lead_brakes: self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light),
+            rear,
+        });
         let follower = self.margins.follower.zip(self.margins.thw_rear_s.ok());
         let follower = follower.map(|(actor, thw_s)| Follower { actor, thw_s });
         let before = self.encounter.phase();
@@ -371,6 +384,7 @@ impl<'a> Run<'a> {
             moments: self.moments.finish(),
             margins: self.meter.finish(),
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
+            cost: Some(self.cost.finish()),
         }
     }
 }

@@ -12,7 +12,7 @@ const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     match verdict {
         Some(Verdict::Pass) => "pass",
         Some(Verdict::Fail) => "fail",
-        Some(Verdict::Inconclusive | Verdict::NotJudged) => "inconclusive",
+        Some(Verdict::Inconclusive | Verdict::NotJudged | Verdict::Overridden) => "inconclusive",
         Some(Verdict::Invalid | Verdict::Error) => "invalid",
         None => "open",
     }

@@ -10,7 +10,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
 use crate::table::ROWS_PER_GROUP;
-use closecall_scenarios::outcome::{ClosedBy, EndReason, Margins, Phase};
+use closecall_scenarios::outcome::{ClosedBy, Cost, EndReason, Margins, Phase};
 
 fn parameters(rear_class: &str) -> Parameters {
     let values = [("closing-mps", Value::Number(6.5)), ("rear-class", Value::Label(rear_class.to_owned()))];
@@ -61,6 +61,12 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
         moments: Vec::new(),
         margins,
         mis: if controller == "acc" { Err(Absent::NoMis) } else { Ok(mis) },
+        cost: Some(Cost {
+            unprompted_deficit_mps: 0.25,
+            prompted_deficit_mps: 8.5,
+            time_lost_s: 1.75,
+            imposed_braking_mps2: 0.5,
+        }),
     }
 }
 

@@ -1,0 +1,105 @@
+//! What the arm under test adds to its references: whether one of them does at least as much at no higher cost.
+
+use std::fmt;
+
+use closecall_campaign::summary::{Counts, Summary};
+
+/// What an arm does, and what it costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Standing<'a> {
+    arm: &'a str,
+    prevented: u64,
+    induced: u64,
+    /// Means over the samples of the time lost (s), of the largest speed deficit (m/s), and of the hardest braking of the vehicle behind (m/s²).
+    cost: [f64; 3],
+}
+
+impl Standing<'_> {
+    /// Returns true if this arm prevents as much as `other`, induces no more, and costs no more. What is not a number decides nothing.
+    fn is_as_good_as(&self, other: &Self) -> bool {
+        let costs_no_more = self.cost.iter().zip(other.cost).all(|(own, other)| *own <= other);
+        self.prevented >= other.prevented && self.induced <= other.induced && costs_no_more
+    }
+}
+
+/// Writes what each arm prevents, induces and costs.
+impl fmt::Display for Standing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [lost_s, slower_mps, imposed_mps2] = self.cost;
+        write!(
+            f,
+            "{}: {} prevented, {} induced, {lost_s:.1} s late, {slower_mps:.1} m/s slower, the vehicle behind brakes by {imposed_mps2:.1} m/s²",
+            self.arm, self.prevented, self.induced
+        )
+    }
+}
+
+/// The statement of one scenario.
+pub(super) struct ParetoText<'a> {
+    tested: Standing<'a>,
+    references: Vec<Standing<'a>>,
+}
+
+impl<'a> ParetoText<'a> {
+    /// Returns the statement; `None` without a reference.
+    pub(super) fn of(summary: &'a Summary, counts: &Counts) -> Option<Self> {
+        let standing = |pair: &closecall_campaign::arm_pairs::ArmPair| {
+            let arm = counts.arms.get(pair.tested)?;
+            Some(Standing {
+                arm: summary.controllers.get(pair.tested)?,
+                prevented: pair.pairs.prevented,
+                induced: pair.pairs.induced,
+                cost: arm.mean_cost()?,
+            })
+        };
+        let with_baseline = counts.arm_pairs.iter().filter(|pair| pair.baseline == 0);
+        let mut references: Vec<Standing<'_>> = with_baseline.filter_map(standing).collect();
+        let tested = references.pop()?;
+        (!references.is_empty()).then_some(Self { tested, references })
+    }
+}
+
+impl fmt::Display for ParetoText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { tested, references } = self;
+        let better: Vec<&str> = references
+            .iter()
+            .filter(|reference| reference.is_as_good_as(tested))
+            .map(|reference| reference.arm)
+            .collect();
+        if better.is_empty() {
+            writeln!(
+                f,
+                "  no reference prevents as much as {} without inducing more or costing more (means over the samples):",
+                tested.arm
+            )?;
+        } else {
+            let better = better.join(" and ");
+            writeln!(
+                f,
+                "  {} adds nothing to {better}: as much prevented, no more induced, no higher cost (means over the samples):",
+                tested.arm
+            )?;
+        }
+        references.iter().chain([tested]).try_for_each(|standing| writeln!(f, "    {standing}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn standing(arm: &str, prevented: u64, cost: [f64; 3]) -> Standing<'_> {
+        Standing { arm, prevented, induced: 1, cost }
+    }
+
+    #[test]
+    fn an_arm_adds_nothing_to_one_that_does_as_much_at_no_higher_cost() {
+        let tested = standing("mis", 70, [2.0, 8.0, 0.5]);
+        let text = |reference| ParetoText { tested, references: vec![reference] }.to_string();
+        assert!(text(standing("gap", 70, [2.0, 8.0, 0.5])).contains("mis adds nothing to gap"));
+        assert!(text(standing("blind", 90, [3.0, 9.0, 0.5])).contains("no reference"), "it costs more");
+        assert!(text(standing("gap", 69, [0.0, 0.0, 0.0])).contains("no reference"), "it prevents less");
+        assert!(text(standing("gap", 90, [f64::NAN, 0.0, 0.0])).contains("no reference"), "nobody knows its cost");
+    }
+}

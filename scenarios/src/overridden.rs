@@ -1,0 +1,79 @@
+//! Settings of the command line that weaken what a scenario is judged by.
+//!
+//! `--set` may change every value. If it removes a check, moves its bound to the easier side, or asks for less to happen, the scenario that is judged
+//! is not the one that the file states. The text then names what was weakened, under the key `overridden`, so that a saved campaign, a part of it and a
+//! replay know it as well.
+
+use super::ScenarioConfig;
+use crate::criteria::{Expression, Operator};
+
+/// The key of the text that names what was weakened.
+pub(super) const KEY: &str = "overridden";
+
+/// Returns what `after` demands less than `before`.
+pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
+    let mut found = before.overridden.clone();
+    for (mark, asked) in &before.checks {
+        let kept = after.checks.get(mark).map_or(&[][..], Vec::as_slice);
+        let is_kept = |old: &Expression| kept.iter().any(|new| is_as_strict(new, old));
+        found.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
+    }
+    let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
+    found.extend(requirements.map(|mark| format!("requirement {mark}")));
+    let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
+    found.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
+    // A share that is not a number is weaker than any.
+    let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
+    found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
+    found
+}
+
+fn is_as_strict(new: &Expression, old: &Expression) -> bool {
+    let is_bound_kept = match old.operator {
+        Operator::AtMost => new.bound <= old.bound,
+        Operator::AtLeast => new.bound >= old.bound,
+    };
+    new.subject() == old.subject() && new.operator == old.operator && is_bound_kept
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::{ScenarioFile, library};
+
+    fn overridden(settings: &[&str]) -> Vec<String> {
+        let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
+        let text = library::text("low-thw-overtake").unwrap();
+        let file = ScenarioFile::parse(Path::new("a.toml"), text, &settings).unwrap();
+        // What a saved campaign reads is the text.
+        let again = ScenarioFile::parse(Path::new("a.toml"), file.text(), &[]).unwrap();
+        assert_eq!(again.config().overridden, file.config().overridden);
+        file.config().overridden.clone()
+    }
+
+    #[test]
+    fn a_check_that_a_setting_weakens_is_named() {
+        for (setting, part) in [
+            ("checks.MIS-1=['lower(prevented | baseline.ego_collided) >= 0.1']", "MIS-1: lower(prevented"),
+            ("checks.MIS-1=['share(prevented | baseline.ego_collided) >= 0.5']", "MIS-1: lower(prevented"),
+            ("checks.MIS-2=[]", "MIS-2: upper(induced) <= 0.03"),
+            ("checks.MIS-2=['upper(induced) <= 0.03']", "MIS-2: upper(others_collided_alone)"),
+            ("requirements=[]", "requirement MIS-1"),
+            ("expects=['lead_braked']", "expects rear_near"),
+            ("expects-share=0.1", "expects-share 0.95"),
+        ] {
+            let found = overridden(&[setting]);
+            assert!(found.iter().any(|what| what.starts_with(part)), "{setting}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_check_that_a_setting_leaves_or_tightens_is_not() {
+        for setting in
+            ["duration-s=30", "expects-share=0.99", "checks.MIS-1=['lower(prevented | baseline.ego_collided) >= 0.6']"]
+        {
+            assert_eq!(overridden(&[setting]), Vec::<String>::new(), "{setting}");
+        }
+    }
+}

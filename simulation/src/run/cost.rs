@@ -1,0 +1,148 @@
+//! What the ego costs itself and the vehicle behind it, before anything happens ahead.
+//!
+//! ```text
+//!   start ───────────▶ R meets the conditions ────────────▶ F brakes, or the ego collides
+//!   │ slowing is unprompted │      slowing has a reason       │ the meter has ended
+//! ```
+//!
+//! R is the vehicle behind the ego in its lane, F the lead vehicle. The conditions are those of the system: R is within 100 m, and approaches at
+//! 10 km/h or more. An ego that slows down makes R approach, so that the closing speed counts against the lead vehicle's speed if that is higher: nobody
+//! gives the reason for his own slowing. All values are true states, whatever a controller says of itself.
+
+use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M};
+
+use closecall_scenarios::outcome::Cost;
+
+/// Error of a tracked closing speed that is not held against a controller (m/s): an assumption; 0.2 to 1 are plausible. A system that engages at 10 km/h as
+/// it measures them engages at a little less now and then.
+const CLOSING_TOLERANCE_MPS: f64 = 0.5;
+
+/// The vehicle behind the ego in its lane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rear {
+    /// Gap to the ego (m).
+    pub(super) gap_m: f64,
+    /// Its speed (m/s).
+    pub(super) speed_mps: f64,
+    /// Its acceleration (m/s²).
+    pub(super) acceleration_mps2: f64,
+}
+
+/// What the meter sees of one physics step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Instant {
+    /// Speed of the ego (m/s).
+    pub(super) own_mps: f64,
+    /// Speed with which that of the ego is compared (m/s), if there is one.
+    pub(super) reference_mps: Option<f64>,
+    /// Whether the brake light of the lead vehicle is on.
+    pub(super) lead_brakes: bool,
+    /// The vehicle behind, if there is one.
+    pub(super) rear: Option<Rear>,
+}
+
+/// Collects the cost of a run.
+#[derive(Debug)]
+pub(super) struct CostMeter {
+    cost: Cost,
+    is_prompted: bool,
+    has_ended: bool,
+    late_s: f64,
+    step_s: f64,
+}
+
+impl CostMeter {
+    pub(super) fn new(step_s: f64) -> Self {
+        Self { cost: Cost::default(), is_prompted: false, has_ended: false, late_s: 0.0, step_s }
+    }
+
+    /// Adds one physics step. It must not be called after the ego's first collision.
+    pub(super) fn observe(&mut self, now: &Instant) {
+        self.has_ended |= now.lead_brakes;
+        if self.has_ended {
+            return;
+        }
+        if let Some(rear) = now.rear {
+            self.cost.imposed_braking_mps2 = self.cost.imposed_braking_mps2.max(-rear.acceleration_mps2);
+            let closing_mps = rear.speed_mps - now.reference_mps.unwrap_or(now.own_mps).max(now.own_mps);
+            self.is_prompted |=
+                rear.gap_m <= ENGAGEMENT_GAP_M && closing_mps >= ENGAGEMENT_CLOSING_MPS - CLOSING_TOLERANCE_MPS;
+        }
+        let Some(reference_mps) = now.reference_mps else { return };
+        let deficit_mps = reference_mps - now.own_mps;
+        let largest = match self.is_prompted {
+            true => &mut self.cost.prompted_deficit_mps,
+            false => &mut self.cost.unprompted_deficit_mps,
+        };
+        *largest = largest.max(deficit_mps);
+        if reference_mps > 0.0 {
+            self.late_s += self.step_s * deficit_mps / reference_mps;
+            self.cost.time_lost_s = self.cost.time_lost_s.max(self.late_s);
+        }
+    }
+
+    /// Returns the cost.
+    pub(super) fn finish(self) -> Cost {
+        self.cost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_S: f64 = 0.01;
+
+    /// An ego behind a lead vehicle of 30 m/s.
+    fn at(own_mps: f64, gap_m: f64, rear_mps: f64) -> Instant {
+        let rear = Some(Rear { gap_m, speed_mps: rear_mps, acceleration_mps2: 0.0 });
+        Instant { own_mps, reference_mps: Some(30.0), lead_brakes: false, rear }
+    }
+
+    fn cost_of(steps: &[Instant]) -> Cost {
+        let mut meter = CostMeter::new(STEP_S);
+        steps.iter().for_each(|step| meter.observe(step));
+        meter.finish()
+    }
+
+    #[test]
+    fn slowing_counts_as_unprompted_until_a_vehicle_behind_gives_a_reason() {
+        assert_eq!(cost_of(&[at(29.0, 120.0, 35.0)]).unprompted_deficit_mps, 1.0, "too far away");
+        assert_eq!(cost_of(&[at(29.0, 90.0, 32.0)]).unprompted_deficit_mps, 1.0, "too slow");
+        assert_eq!(cost_of(&[at(29.0, 90.0, 35.0)]).unprompted_deficit_mps, 0.0, "near and fast");
+        let late = [at(29.0, 120.0, 35.0), at(30.0, 90.0, 35.0), at(22.0, 80.0, 35.0)];
+        assert_eq!(cost_of(&late).unprompted_deficit_mps, 1.0, "what follows has a reason");
+        assert_eq!(cost_of(&late).prompted_deficit_mps, 8.0);
+        let alone = Instant { rear: None, ..at(25.0, 0.0, 0.0) };
+        assert_eq!(cost_of(&[alone]).unprompted_deficit_mps, 5.0, "nobody is behind");
+    }
+
+    #[test]
+    fn an_ego_that_slows_down_does_not_give_itself_the_reason() {
+        // The rear vehicle closes at 10 m/s, of which 9 are the ego's own.
+        assert_eq!(cost_of(&[at(21.0, 50.0, 31.0)]).unprompted_deficit_mps, 9.0);
+    }
+
+    #[test]
+    fn nothing_counts_once_the_lead_vehicle_brakes() {
+        let braking = Instant { lead_brakes: true, ..at(30.0, 120.0, 35.0) };
+        assert_eq!(cost_of(&[braking, at(10.0, 120.0, 35.0)]), Cost::default());
+    }
+
+    #[test]
+    fn time_lost_is_the_most_that_the_ego_was_late() {
+        let mut steps = vec![at(20.0, 50.0, 40.0); 300];
+        steps.extend(vec![at(40.0, 50.0, 40.0); 300]);
+        let lost_s = cost_of(&steps).time_lost_s;
+        assert!((lost_s - 1.0).abs() < 1e-9, "{lost_s}");
+    }
+
+    #[test]
+    fn braking_of_the_vehicle_behind_is_the_hardest() {
+        let braking = |by_mps2: f64| {
+            let rear = at(30.0, 50.0, 35.0).rear.map(|rear| Rear { acceleration_mps2: -by_mps2, ..rear });
+            Instant { rear, ..at(30.0, 50.0, 35.0) }
+        };
+        assert_eq!(cost_of(&[braking(-1.0), braking(3.0), braking(2.0)]).imposed_braking_mps2, 3.0);
+    }
+}

@@ -1,0 +1,301 @@
+//! PASS means evidence: what only looks like it gives neither PASS nor exit code 0.
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use closecall_testing::has_python;
+
+use crate::support::{closecall, code, folder, headline_with, json, library, message, stderr, stdout};
+
+/// Egos that are slower than the rest from the first second on, and do not look back.
+const BLIND: [&str; 2] = ["blind", "crawl"];
+
+fn campaign(scenario: &Path, more: &[&str]) -> Output {
+    closecall(["campaign", scenario.to_str().unwrap()].iter().chain(more))
+}
+
+fn traffic(name: &str) -> PathBuf {
+    library("low-thw-overtake").with_file_name("traffic").join(name).with_extension("toml")
+}
+
+/// Writes a scenario, and returns its path.
+fn scenario(folder: &Path, text: &str) -> PathBuf {
+    let path = folder.join("own.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+/// The scenario `paper-figure` with these parameters, and with `from` replaced by `to`.
+fn paper_figure_with(parameters: &str, from: &str, to: &str) -> String {
+    let text = std::fs::read_to_string(library("paper-figure")).unwrap();
+    assert!(text.contains(from), "{from}");
+    text.replacen(from, to, 1).replacen("[[actor]]", &format!("[parameters]\n{parameters}\n\n[[actor]]"), 1)
+}
+
+#[test]
+fn an_ego_that_is_slower_and_does_not_look_back_fails_the_headline() {
+    for controller in BLIND {
+        let args = ["-n", "200", "--seed", "46", "--paired", "--sensors", "object", "--controller", controller];
+        let text = stdout(&campaign(&library("low-thw-overtake"), &args), 1);
+        assert!(text.contains("FAIL\n") && text.contains("NOT MET: low-thw-overtake: MIS-9"), "{text}");
+        // It prevents more than the system does: the demand on what is prevented does not tell them apart.
+        assert!(text.contains("\n  met: low-thw-overtake: MIS-1"), "{text}");
+    }
+}
+
+#[test]
+fn an_ego_that_is_slower_fails_where_nobody_comes_and_where_nothing_happens() {
+    for controller in BLIND {
+        for name in ["empty-wet-road", "slow-approach", "overtake-without-brake"] {
+            let args = ["-n", "80", "--seed", "46", "--paired", "--sensors", "object", "--controller", controller];
+            let output = campaign(&library(name), &args);
+            let text = stdout(&output, 1);
+            let is_refused = |line: &str| line.contains("NOT MET") && line.contains("upper(slowed_unprompted) <= 0.05");
+            assert!(text.lines().any(is_refused), "{name} {controller}: {text}");
+        }
+    }
+}
+
+#[test]
+fn the_system_passes_the_headline_on_seeds_that_nobody_tuned_on() {
+    for seed in ["460", "461"] {
+        let args = ["-n", "800", "--seed", seed, "--arms", "acc,blind,crawl,mis", "--sensors", "object"];
+        let text = stdout(&campaign(&library("low-thw-overtake"), &args), 0);
+        assert!(text.contains("met: low-thw-overtake: MIS-9: upper(slowed_unprompted) <= 0.05"), "{text}");
+    }
+}
+
+#[test]
+fn a_parameter_that_nothing_uses_is_refused() {
+    let folder = folder();
+    let unused = "useless = { uniform = { min = 0.0, max = 1.0 }, assumed = \"nothing\" }\n";
+    let path = scenario(folder.path(), &headline_with("[parameters]", &format!("[parameters]\n{unused}")));
+    for command in ["check", "campaign", "run"] {
+        let output = closecall([command, path.to_str().unwrap()]);
+        assert_eq!(code(&output), 3, "{command}: {}", stderr(&output));
+        assert!(message(&output).contains("unused parameter: `useless`"), "{}", message(&output));
+    }
+}
+
+#[test]
+fn three_hundred_runs_that_are_alike_are_one_sample() {
+    let folder = folder();
+    // The run uses the value, and nothing depends on it: true tracks see as far as they like.
+    let parameters = "sight-m = { uniform = { min = 5000.0, max = 10000.0 }, assumed = \"nothing depends on it\" }";
+    let text = paper_figure_with(parameters, "visibility-m = 10000.0", "visibility-m = \"$sight-m\"");
+    let path = scenario(folder.path(), &text);
+    let args = ["-n", "300", "--sensors", "ground-truth", "--paired", "--max-probability", "0.01"];
+    let text = stdout(&campaign(&path, &args), 4);
+    assert!(text.contains("299 samples have the parameters or the outcome of an earlier one"), "{text}");
+    assert!(!text.contains("PASS"), "{text}");
+}
+
+#[test]
+fn a_parameter_that_varies_by_a_millionth_bounds_nothing() {
+    let folder = folder();
+    let parameters = "speed-mps = { uniform = { min = 30.0, max = 30.000001 }, assumed = \"hardly anything\" }";
+    let text = paper_figure_with(
+        parameters,
+        "speed-mps = 30.0 } }\ndriver = { ego-stack",
+        "speed-mps = \"$speed-mps\" } }\ndriver = { ego-stack",
+    );
+    let checked =
+        text.replace("[\"count(ego_collided) <= 0\"]", "[\"lower(prevented | baseline.ego_collided) >= 0.5\"]");
+    let path = scenario(folder.path(), &checked);
+    for sensors in ["ground-truth", "object"] {
+        let text = stdout(&campaign(&path, &["-n", "60", "--sensors", sensors, "--paired"]), 4);
+        assert!(text.contains("no parameter varies enough"), "{text}");
+    }
+}
+
+#[test]
+fn a_weakened_check_gives_overridden_and_exit_code_4() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let run = |setting: &str, format: &str| {
+        let _ = std::fs::remove_dir_all(&out);
+        let args = [
+            "-n",
+            "80",
+            "--sensors",
+            "object",
+            "--paired",
+            "--set",
+            setting,
+            "--format",
+            format,
+            "--record",
+            "worst:0",
+        ];
+        closecall(
+            ["campaign", library("overtake-without-brake").to_str().unwrap(), "--out", out.to_str().unwrap()]
+                .iter()
+                .chain(&args),
+        )
+    };
+    assert!(stdout(&run("duration-s=55", "human"), 0).contains("PASS"), "a setting that weakens nothing");
+    let weaker = "checks.MIS-6=['max(max_speed_deficit_mps) <= 100', 'p95(max_deceleration_mps2) <= 2']";
+    let text = stdout(&run(weaker, "human"), 4);
+    assert!(text.contains("OVERRIDDEN\n") && text.contains("MIS-6: max(max_speed_deficit_mps) <= 10"), "{text}");
+    assert_eq!(json(&run(weaker, "json"), 4)["verdict"], "OVERRIDDEN");
+    let junit = std::fs::read_to_string(out.join("junit.xml")).unwrap();
+    assert!(junit.contains("OVERRIDDEN: overtake-without-brake") && junit.contains("errors=\"1\""), "{junit}");
+    // What is saved knows it, too.
+    let parts = ["1/2", "2/2"].map(|part| {
+        let folder = folder.path().join(part.replace('/', "-"));
+        let args = ["-n", "80", "--sensors", "object", "--paired", "--set", weaker, "--partition", part];
+        let path = library("overtake-without-brake");
+        let campaign = ["campaign", path.to_str().unwrap(), "--record", "worst:0", "--out", folder.to_str().unwrap()];
+        closecall(campaign.iter().chain(&args));
+        folder
+    });
+    let merged = folder.path().join("merged");
+    let [one, two, merged] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
+    let args = ["tool", "merge", one, two, "--out", merged, "--record", "worst:0"];
+    assert!(stdout(&closecall(args), 4).contains("OVERRIDDEN"));
+}
+
+#[test]
+fn a_single_sample_meets_no_count_extreme_or_percentile() {
+    let gates = [
+        "p99(min_gap_front_m) >= 0",
+        "count(others_collided) <= 5",
+        "max(max_jerk_mps3) <= 1000",
+        "mean(harm) <= 1000",
+    ];
+    for gate in gates {
+        let one = campaign(&library("slow-approach"), &["-n", "1", "--sensors", "object", "--gate", gate]);
+        assert!(stdout(&one, 4).contains("too few samples to decide"), "{gate}");
+    }
+    // A count that is too high with one sample stays so with more.
+    let args = ["-n", "1", "--sensors", "object", "--gate", "count(rear_passed) <= 0"];
+    stdout(&campaign(&library("slow-approach"), &args), 1);
+}
+
+#[test]
+fn a_system_that_the_ego_does_not_have_is_refused() {
+    let folder = folder();
+    let without = headline_with(", mis = { max-deceleration-mps2 = 1.0, critical-gap-m = 5.0 }", "");
+    let path = scenario(folder.path(), &without);
+    for command in ["campaign", "run"] {
+        for controller in ["mis", "mis-extended"] {
+            let output = closecall([command, path.to_str().unwrap(), "--controller", controller]);
+            assert_eq!(code(&output), 3, "{}", stderr(&output));
+            assert!(message(&output).contains("needs a margin increase system"), "{}", message(&output));
+        }
+    }
+    stdout(&closecall(["run", path.to_str().unwrap(), "--controller", "acc", "--sensors", "object"]), 0);
+}
+
+#[test]
+fn an_edited_baseline_is_refused_instead_of_no_regression() {
+    let folder = folder();
+    let [out, file] = ["out", "baseline.json"].map(|name| folder.path().join(name));
+    let [out_text, file_text] = [&out, &file].map(|path| path.to_str().unwrap());
+    let args = ["-n", "24", "--sensors", "object", "--controller", "acc", "--no-gate", "--record", "worst:0"];
+    let path = library("low-thw-overtake");
+    let campaign = ["campaign", path.to_str().unwrap(), "--out", out_text];
+    stdout(&closecall(campaign.iter().chain(&args)), 0);
+    stdout(&closecall(["baseline", "save", out_text, file_text]), 0);
+    let compare = || closecall(["baseline", "compare", out_text, file_text]);
+    assert!(stdout(&compare(), 0).contains("NO REGRESSION"));
+    let text = std::fs::read_to_string(&file).unwrap();
+    let edited = text.replacen("\"failing\": [", "\"failing\": [\n        1000000,", 1);
+    assert_ne!(edited, text);
+    std::fs::write(&file, edited).unwrap();
+    let output = compare();
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(message(&output).contains("the file was edited"), "{}", message(&output));
+}
+
+/// A controller in Python whose steps run `step`, which sets `state` and `acceleration`.
+fn python_controller(folder: &Path, step: &str) -> String {
+    let script = folder.join("controller.py");
+    let text = format!(
+        "import json, sys, time\nfor line in sys.stdin:\n    message = json.loads(line)\n    state, acceleration = 'following', 0.0\n    if message['type'] == \
+         'hello':\n        answer = {{'type': 'hello', 'protocol': 1}}\n    else:\n        {step}\n        answer = {{'acceleration_mps2': acceleration, 'state': \
+         state}}\n    print(json.dumps(answer), flush=True)\n"
+    );
+    std::fs::write(&script, text).unwrap();
+    format!("exec:python3 {}", script.display())
+}
+
+#[test]
+fn what_a_controller_from_outside_says_of_itself_is_no_evidence() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    // It claims to act, and does nothing.
+    let controller = python_controller(folder.path(), "state = 'increasing'");
+    let path = library("overtake-without-brake");
+    let gated = |gate: &str, expected| {
+        let args = [
+            "-n",
+            "20",
+            "--sensors",
+            "ground-truth",
+            "--set",
+            "duration-s=8",
+            "--set",
+            "checks={}",
+            "--set",
+            "expects=[]",
+            "--controller",
+            &controller,
+            "--gate",
+            gate,
+        ];
+        stdout(&campaign(&path, &args), expected)
+    };
+    assert!(gated("share(engaged) >= 1", 4).contains("a controller from outside reports it of itself"));
+    assert!(gated("share(slowed_for_rear) >= 1", 1).contains("NOT MET"), "the measured value");
+}
+
+#[test]
+fn a_controller_that_computes_for_longer_than_its_period_ends_its_sample_as_an_error() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let controller = python_controller(folder.path(), "time.sleep(0.06)");
+    let args =
+        ["-n", "1", "--sensors", "ground-truth", "--set", "duration-s=8", "--no-gate", "--controller", &controller];
+    let output = campaign(&library("overtake-without-brake"), &args);
+    assert!(stdout(&output, 5).contains("ERROR"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_secret_seed_is_drawn_stated_and_resumed() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let path = library("overtake-without-brake");
+    let args = ["-n", "2", "--sensors", "object", "--judge-seed", "secret", "--no-gate", "--record", "worst:0"];
+    let seed_of =
+        |text: &str| text.split_once("drawn for this campaign: --seed ").unwrap().1.lines().next().unwrap().to_owned();
+    let first = seed_of(&stdout(&campaign(&path, &args), 0));
+    let kept = |more: &[&str]| {
+        let kept = ["campaign", path.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        seed_of(&stdout(&closecall(kept.iter().chain(&args).chain(more)), 0))
+    };
+    let second = kept(&[]);
+    assert_ne!(first, second, "nobody knows the seed before");
+    assert_eq!(kept(&["--resume"]), second, "the campaign goes on with its seed");
+    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(manifest.contains(&format!("\"seed\": {second}")), "{manifest}");
+    let refused = campaign(&path, &["--judge-seed", "secret", "--seed", "1"]);
+    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+}
+
+#[test]
+fn a_twin_finds_what_the_system_induces_where_nothing_happens() {
+    // Both scenarios are findings: see the README.
+    for path in
+        [library("rear-vehicles-one-after-another-without-brake"), library("rear-vehicle-is-followed-without-brake")]
+    {
+        let text = stdout(&campaign(&path, &["-n", "400", "--seed", "46", "--paired", "--sensors", "object"]), 1);
+        assert!(text.contains("MIS-3: count(induced) <= 0"), "{text}");
+    }
+    let busy = traffic("busy-overtake-without-brake");
+    assert!(busy.is_file(), "{}", busy.display());
+}
