@@ -1,5 +1,6 @@
 //! Variations of a scenario that must not change its outcome. The validity checks run them.
 
+use closecall_sensors::lidar::ClusteringCheck;
 use closecall_traffic::{Road, Time, VehicleState};
 
 use super::{Actor, Event, Scenario, Trigger};
@@ -19,6 +20,13 @@ impl Scenario {
         let last = self.actors.len() - 1;
         let actors = self.actors.iter().rev().map(|actor| actor.renumbered(|index| last - index)).collect();
         Self { actors, ego: last - self.ego, ..self.clone() }
+    }
+
+    /// Returns the same scenario whose LiDARs cluster each scan a second time, by
+    /// `linfa-clustering`.
+    #[must_use]
+    pub fn with_clustering_check(&self, check: ClusteringCheck) -> Self {
+        Self { sensors: self.sensors.with_clustering_check(check), ..self.clone() }
     }
 
     /// Returns the mirror image, in which left and right are swapped. Returns `None` on a curved road: positions are measured

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
 use crate::faults::{Faults, OdometryErrors};
 use crate::image_detector::ImageDetector;
-use crate::lidar::{FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
+use crate::lidar::{ClusteringCheck, ClusteringMethod, FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
     Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
@@ -49,6 +49,10 @@ impl SensorMode {
 pub struct SensorsConfig {
     /// Level of detail at which the sensors are simulated; `full` by default.
     pub mode: Choice<SensorMode>,
+    /// The implementation of DBSCAN that clusters the points of all LiDARs; `grid` by default. The
+    /// clusters are the same.
+    #[serde(skip_serializing_if = "is_default_method")]
+    pub clustering: Choice<ClusteringMethod>,
     /// The radar that looks ahead.
     pub front_radar: ObjectSensorConfig,
     /// The short-range sensors around the ego.
@@ -71,10 +75,15 @@ pub struct SensorsConfig {
     pub tracker: TrackerConfig,
 }
 
+fn is_default_method(method: &Choice<ClusteringMethod>) -> bool {
+    *method == Choice::Fixed(ClusteringMethod::default())
+}
+
 impl Default for SensorsConfig {
     fn default() -> Self {
         Self {
             mode: Choice::Fixed(SensorMode::default()),
+            clustering: Choice::Fixed(ClusteringMethod::default()),
             front_radar: ObjectSensorConfig::default(),
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
@@ -109,7 +118,8 @@ impl Check for SensorsConfig {
             None => None,
         };
         let additional_rear_lidars = self.check_additional([Some(rear_lidar), front_lidar], parameters)?;
-        Ok(Sensors {
+        let clustering = parameters.word(&self.clustering, "clustering")?;
+        let sensors = Sensors {
             mode: parameters.word(&self.mode, "mode")?,
             full: FullModel {
                 front_radar: self.front_radar.check_front_radar(parameters).map_err(within("front-radar"))?,
@@ -123,7 +133,8 @@ impl Check for SensorsConfig {
             rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
             altered: Alterations::default(),
             has_rear: true,
-        })
+        };
+        Ok(sensors.with_lidars(|lidar| Lidar { clustering, ..lidar }))
     }
 }
 
@@ -189,6 +200,25 @@ impl Sensors {
     #[must_use]
     pub fn with_mode(self, mode: SensorMode) -> Self {
         Self { mode, ..self }
+    }
+
+    /// Returns the same sensors with other LiDARs.
+    fn with_lidars(self, change: impl Fn(Lidar) -> Lidar) -> Self {
+        let FullModel { front_lidar, rear_lidar, additional_rear_lidars, .. } = self.full;
+        let full = FullModel {
+            front_lidar: front_lidar.map(&change),
+            rear_lidar: change(rear_lidar),
+            additional_rear_lidars: additional_rear_lidars.map(|lidar| lidar.map(&change)),
+            ..self.full
+        };
+        Self { full, ..self }
+    }
+
+    /// Returns the same sensors whose LiDARs cluster each scan a second time, by
+    /// `linfa-clustering`. A run ends with [`SensorError::Clusterings`] if a label differs.
+    #[must_use]
+    pub fn with_clustering_check(self, check: ClusteringCheck) -> Self {
+        self.with_lidars(|lidar| Lidar { clustering_check: Some(check), ..lidar })
     }
 
     /// Returns the same sensors with stages that are replaced by the truth, or made worse.
@@ -352,6 +382,18 @@ mod tests {
         assert_eq!(error, "`front-radar.confirm-hits` is 4, but a number from 1 to `confirm-window` is needed");
         let error = check("surround = { half-angle-deg = 30 }").unwrap_err().to_string();
         assert_eq!(error, "`surround.half-angle-deg` contradicts `surround`: the surround sensors look all round");
+    }
+
+    #[test]
+    fn the_clustering_is_that_of_all_lidars() {
+        let method = |text: &str| -> Vec<ClusteringMethod> {
+            let full = check(text).unwrap().full_model();
+            full.rear_lidars().chain(full.front_lidar).map(|lidar| lidar.clustering).collect()
+        };
+        assert_eq!(method(""), [ClusteringMethod::Grid]);
+        let several = "clustering = \"linfa\"\nfront-lidar = {}\nadditional-rear-lidars = [{ name = \"left\" }]";
+        assert_eq!(method(several), [ClusteringMethod::Linfa; 3]);
+        assert!(toml::from_str::<SensorsConfig>("clustering = \"k-means\"").is_err());
     }
 
     #[test]

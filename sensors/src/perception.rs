@@ -135,6 +135,17 @@ pub enum SensorError {
         /// The scene's time.
         time: Time,
     },
+    /// Two implementations of DBSCAN give different clusters, in a run that compares them. The
+    /// boxes of that scan are not used.
+    #[error("{different} of {points} clustered points have another label by linfa-clustering at {time}")]
+    Clusterings {
+        /// Number of points whose labels differ.
+        different: usize,
+        /// Number of points.
+        points: usize,
+        /// End of the scan.
+        time: Time,
+    },
     /// The classifier could not be loaded or run.
     #[error("failed to classify: {reason}")]
     Classifier {

@@ -1,4 +1,5 @@
-//! The clusters of the LiDAR in all scenarios of the library are those of the definition of DBSCAN.
+//! The clusters of the LiDAR in all scenarios of the library are those of the definition of DBSCAN,
+//! with either implementation.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use std::path::{Path, PathBuf};
@@ -40,6 +41,7 @@ impl Observer for Comparison {
             self.scans += 1;
             self.points += points.len();
             self.different += usize::from(labels != expected);
+            self.different += usize::from(ClusteredPoints::by_linfa(points).labels != expected);
         }
     }
 }

@@ -14,13 +14,16 @@ pub enum Invariance {
     Threads,
     /// Left and right are exchanged.
     Mirror,
+    /// The points of the LiDARs are clustered a second time, by `linfa-clustering`.
+    Clustering,
     /// The time step is halved; broken if that run ends in an error.
     HalfStep,
 }
 
 impl Invariance {
     /// Every check.
-    pub const ALL: [Self; 5] = [Self::Repetition, Self::ActorOrder, Self::Threads, Self::Mirror, Self::HalfStep];
+    pub const ALL: [Self; 6] =
+        [Self::Repetition, Self::ActorOrder, Self::Threads, Self::Mirror, Self::Clustering, Self::HalfStep];
 
     /// Returns the name in reports.
     pub const fn name(self) -> &'static str {
@@ -29,6 +32,7 @@ impl Invariance {
             Self::ActorOrder => "actor-order",
             Self::Threads => "threads",
             Self::Mirror => "mirror",
+            Self::Clustering => "clustering",
             Self::HalfStep => "half-step",
         }
     }
@@ -40,6 +44,7 @@ impl Invariance {
             Self::ActorOrder => "another order of the actors gave another outcome",
             Self::Threads => "another number of threads gave another outcome",
             Self::Mirror => "the mirrored world gave an outcome that is not the mirror image",
+            Self::Clustering => "linfa-clustering gave other clusters of the LiDAR's points",
             Self::HalfStep => "half the time step ended in an error",
         }
     }

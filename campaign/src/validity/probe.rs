@@ -5,6 +5,7 @@ use std::thread;
 use closecall_scenarios::Scenario;
 use closecall_scenarios::outcome::Outcome;
 use closecall_sensors::SensorMode;
+use closecall_sensors::lidar::ClusteringCheck;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 
 use super::mirror::is_mirror_image;
@@ -27,16 +28,21 @@ type Run = Result<Outcome, SampleError>;
 impl CheckedRun<'_> {
     /// Checks this run, whose outcome is `outcome`.
     ///
-    /// One run on a new thread changes the order of the actors and the number of threads together. Only if its outcome
-    /// differs do further runs determine the cause.
+    /// One run on a new thread changes the order of the actors and the number of threads together,
+    /// and clusters each scan of the LiDARs twice. Only if its outcome differs do further runs
+    /// determine the cause.
     pub(crate) fn check(&self, outcome: &Outcome) -> ArmChecks {
-        let reversed = self.scenario.reversed();
-        let (reordered, halved) =
-            on_new_thread(|| self.run(&reversed, self.arm), || self.run(&self.scenario.at_half_step(), self.arm));
+        self.check_with(ClusteringCheck::default(), outcome)
+    }
+
+    fn check_with(&self, clustering: ClusteringCheck, outcome: &Outcome) -> ArmChecks {
+        let changed = self.scenario.reversed().with_clustering_check(clustering);
+        let (changed, halved) =
+            on_new_thread(|| self.run(&changed, self.arm), || self.run(&self.scenario.at_half_step(), self.arm));
         let (mut broken, mut late) = (Vec::new(), Vec::new());
-        match &reordered {
+        match &changed {
             Err(error) if error.is_late() => late.push((Invariance::ActorOrder, error.clone())),
-            reordered if !is_same(reordered, outcome) => broken.push(self.cause(&reversed, outcome)),
+            changed if !is_same(changed, outcome) => broken.push(self.cause(clustering, outcome)),
             _ => {}
         }
         match self.is_mirrored(outcome) {
@@ -56,12 +62,14 @@ impl CheckedRun<'_> {
     }
 
     /// Returns the change that makes the outcome differ. If no single change does so again, the run is not repeatable.
-    fn cause(&self, reversed: &Scenario, outcome: &Outcome) -> Invariance {
+    fn cause(&self, clustering: ClusteringCheck, outcome: &Outcome) -> Invariance {
         // A run that took too long says nothing.
         let differs = |run: Run| in_time(run).is_ok_and(|run| !is_same(&run, outcome));
         if differs(self.run(self.scenario, self.arm)) {
             Invariance::Repetition
-        } else if differs(self.run(reversed, self.arm)) {
+        } else if differs(self.run(&self.scenario.with_clustering_check(clustering), self.arm)) {
+            Invariance::Clustering
+        } else if differs(self.run(&self.scenario.reversed(), self.arm)) {
             Invariance::ActorOrder
         } else if differs(on_new_thread(|| self.run(self.scenario, self.arm), || ()).0) {
             Invariance::Threads
@@ -111,4 +119,29 @@ fn on_new_thread<T: Send, U>(there: impl Fn() -> T + Sync, here: impl FnOnce() -
         let there = handle.ok().and_then(|handle| handle.join().ok()).unwrap_or_else(&there);
         (there, here())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use closecall_sensors::lidar::ClusteredPoints;
+    use closecall_simulation::controller::BuiltIn;
+    use closecall_scenarios::ScenarioFile;
+
+    use super::*;
+
+    #[test]
+    fn another_clustering_of_the_scans_breaks_the_check() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
+        let settings = ["sensors.rear-camera.pipeline=off".parse().unwrap(), "duration-s=4".parse().unwrap()];
+        let file = ScenarioFile::load(&path, &settings).unwrap();
+        let scenario = &file.concrete(&file.space().nominal()).unwrap();
+        let arm = &Arm { controller: BuiltIn::Mis.factory(), sensors: Some(SensorMode::Full) };
+        let checked = CheckedRun { scenario, key: RunKey { seed: 1, sample: 0 }, arm };
+        let outcome = checked.run(scenario, arm).unwrap();
+        assert_eq!(checked.check(&outcome).broken, []);
+        let planted = ClusteringCheck { core_points: ClusteredPoints::CORE_POINTS + 1 };
+        assert_eq!(checked.check_with(planted, &outcome).broken, [Invariance::Clustering]);
+    }
 }

@@ -17,18 +17,23 @@
 //! Thinning never joins clusters that DBSCAN would keep apart. It may split a cluster that is connected only by gaps of
 //! more than 0.43 of the radius, which is the radius less two diagonals of a cell.
 //!
-//! DBSCAN is that of `linfa-clustering`, over the search for neighbours in [`neighbours`](super::neighbours). A point that lies exactly at
-//! the radius is a neighbour.
+//! DBSCAN is that of [`dbscan`](super::dbscan), or that of `linfa-clustering` over the search for
+//! neighbours in [`neighbours`](super::neighbours). Both give the same labels. A point that lies
+//! exactly at the radius is a neighbour.
 
-use closecall_traffic::maths;
+use closecall_traffic::{Time, maths};
 use linfa::ParamGuard;
 use linfa::traits::Transformer;
 use linfa_clustering::Dbscan;
 use linfa_nn::distance::L2Dist;
 use ndarray::{Array1, ArrayView2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::dbscan::Dbscan as GridDbscan;
 use super::ground::Candidate;
 use super::neighbours::GridSearch;
+use crate::SensorError;
 
 /// Radius along the road at the sensor (m).
 const ALONG_M: f32 = 0.8;
@@ -43,11 +48,41 @@ pub(crate) const CORE_POINTS: usize = 3;
 /// Radius in the stretched plane.
 const RADIUS: f64 = 1.0;
 /// Number of thinning cells per radius. All points of a cell are within the radius of each other.
-const CELLS_PER_RADIUS: f32 = 5.0;
+const CELLS_PER_RADIUS: f32 = CELLS_IN_RADIUS as f32;
+const CELLS_IN_RADIUS: usize = 5;
 /// Number of thinning cells along the road, which cover the region of interest.
 const CELLS_ALONG: usize = 525;
 /// Number of thinning cells across the road, which cover the region of interest.
 const CELLS_ACROSS: usize = 200;
+
+/// Number of cells with a side of one radius that cover the same region.
+const GRID_CELLS: usize = (CELLS_ALONG / CELLS_IN_RADIUS + 1) * (CELLS_ACROSS / CELLS_IN_RADIUS + 1);
+
+/// The implementation of DBSCAN that clusters the points of a LiDAR. All give the same clusters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClusteringMethod {
+    /// Closecall's own, over a grid: the faster one. The validity checks of a campaign compare it
+    /// with the other.
+    #[default]
+    Grid,
+    /// The one of `linfa-clustering`, with Closecall's grid as its index.
+    Linfa,
+}
+
+/// A second clustering of each scan by `linfa-clustering`, whose labels must be the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ClusteringCheck {
+    /// Number of core points of the second clustering: [`ClusteredPoints::CORE_POINTS`], unless a
+    /// difference is planted.
+    pub core_points: usize,
+}
+
+impl Default for ClusteringCheck {
+    fn default() -> Self {
+        Self { core_points: CORE_POINTS }
+    }
+}
 
 /// Label of a point that belongs to no cluster.
 pub(crate) const NOISE: u32 = u32::MAX;
@@ -67,9 +102,9 @@ impl ClusteredPoints {
     /// Radius within which points are neighbours.
     pub const RADIUS: f64 = RADIUS;
 
-    /// Clusters points. Allocates what `linfa-clustering` and the search for neighbours do, and nothing else.
-    pub fn new(points: Vec<[f64; 2]>) -> Self {
-        let labels = dbscan(&points, RADIUS, CORE_POINTS).into_raw_vec_and_offset().0;
+    /// Clusters points with `linfa-clustering`.
+    pub fn by_linfa(points: Vec<[f64; 2]>) -> Self {
+        let labels = linfa_dbscan(&points, RADIUS, CORE_POINTS).into_raw_vec_and_offset().0;
         Self { points, labels }
     }
 }
@@ -89,6 +124,9 @@ pub(crate) struct Clustering {
     row_of: Vec<u32>,
     /// Stretched coordinates of the candidates that were kept.
     rows: Vec<[f64; 2]>,
+    /// The implementation of DBSCAN.
+    pub(crate) method: ClusteringMethod,
+    grid: GridDbscan,
     /// New number of each cluster that is merged into no other one.
     renumbered: Vec<u32>,
     /// The vehicles of the clusters that the truth gives.
@@ -111,6 +149,8 @@ impl Clustering {
             cell_of: Vec::with_capacity(candidates),
             row_of: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(candidates),
+            method: ClusteringMethod::default(),
+            grid: GridDbscan::with_capacity(candidates, GRID_CELLS),
             renumbered: Vec::with_capacity(super::RESERVED_CLUSTERS),
             vehicles: Vec::new(),
         }
@@ -119,11 +159,34 @@ impl Clustering {
     /// Assigns the candidates to clusters.
     pub(crate) fn run(&mut self, candidates: &[Candidate]) {
         self.thin(candidates);
-        let of_rows = dbscan(&self.rows, RADIUS, CORE_POINTS);
-        self.count = of_rows.iter().flatten().max().map_or(0, |last| last + 1);
-        let label = |row: u32| of_rows[row as usize].and_then(|label| u32::try_from(label).ok()).unwrap_or(NOISE);
         self.labels.clear();
-        self.labels.extend(self.row_of.iter().map(|&row| label(row)));
+        match self.method {
+            ClusteringMethod::Grid => {
+                self.count = self.grid.run(&self.rows, RADIUS, CORE_POINTS) as usize;
+                let of_rows = &self.grid.labels;
+                self.labels.extend(self.row_of.iter().map(|&row| of_rows[row as usize].unwrap_or(NOISE)));
+            }
+            ClusteringMethod::Linfa => {
+                let of_rows = linfa_dbscan(&self.rows, RADIUS, CORE_POINTS);
+                self.count = of_rows.iter().flatten().max().map_or(0, |last| last + 1);
+                let label = |row: u32| of_rows[row as usize].and_then(|label| u32::try_from(label).ok());
+                self.labels.extend(self.row_of.iter().map(|&row| label(row).unwrap_or(NOISE)));
+            }
+        }
+    }
+
+    /// Clusters the points of the latest run once more with `linfa-clustering`.
+    ///
+    /// # Errors
+    /// [`SensorError::Clusterings`] if a label differs. The clusters of the latest run remain.
+    pub(crate) fn compare(&self, check: ClusteringCheck, time: Time) -> Result<(), SensorError> {
+        let (points, labels) = self.rows();
+        let again = linfa_dbscan(points, RADIUS, check.core_points);
+        let different = labels.iter().zip(&again).filter(|(label, again)| label != again).count();
+        if different > 0 {
+            return Err(SensorError::Clusterings { different, points: points.len(), time });
+        }
+        Ok(())
     }
 
     /// Returns the points that the latest run has given to DBSCAN, in the stretched plane, with their labels.
@@ -205,7 +268,7 @@ impl Clustering {
 
 /// Returns the cluster of each point by linfa's DBSCAN, `None` for noise. Needs two core points or more, and a radius above 0.
 #[expect(clippy::expect_used, reason = "the caller passes constants")]
-fn dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<Option<usize>> {
+fn linfa_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<Option<usize>> {
     let params = Dbscan::params_with(core_points, L2Dist, GridSearch { cell: radius }).tolerance(radius);
     params.check().expect("two core points or more, a radius above 0").transform(&ArrayView2::from(points))
 }
@@ -240,6 +303,26 @@ mod tests {
         expected: Vec<i64>,
     }
 
+    fn indices(grid: &GridDbscan) -> Vec<Option<usize>> {
+        grid.labels.iter().map(|label| label.map(|label| label as usize)).collect()
+    }
+
+    fn grid_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Vec<Option<usize>> {
+        let mut grid = GridDbscan::default();
+        grid.run(points, radius, core_points);
+        indices(&grid)
+    }
+
+    #[test]
+    fn a_planted_difference_between_the_clusterings_is_an_error() {
+        let mut clustering = Clustering::default();
+        // Three points that four core points make noise.
+        clustering.run(&candidates(&[(100.0, 0.0), (100.0, 0.22), (100.0, 0.44)]));
+        let compared = |core_points| clustering.compare(ClusteringCheck { core_points }, Time::ZERO);
+        assert_eq!(compared(CORE_POINTS), Ok(()));
+        assert_eq!(compared(4), Err(SensorError::Clusterings { different: 3, points: 3, time: Time::ZERO }));
+    }
+
     #[test]
     fn clusters_match_scikit_learn_up_to_numbering() {
         let golden = include_str!("../../tests/golden/dbscan.csv");
@@ -257,7 +340,9 @@ mod tests {
         assert_eq!(sets.len(), 4);
         for GoldenSet { name, radius, core_points, points, expected } in sets {
             let mut pairs: Vec<(usize, i64)> = Vec::new();
-            for (label, &expected) in dbscan(&points, radius, core_points).iter().zip(&expected) {
+            let labels = linfa_dbscan(&points, radius, core_points).to_vec();
+            assert_eq!(grid_dbscan(&points, radius, core_points), labels, "{name}");
+            for (label, &expected) in labels.iter().zip(&expected) {
                 match label {
                     None => assert_eq!(expected, -1, "{name}"),
                     Some(label) => pairs.push((*label, expected)),
@@ -279,10 +364,9 @@ mod tests {
     #[test]
     fn points_exactly_at_the_radius_are_neighbours() {
         // With only the nearer points as neighbours, the first three were no core points, and all were noise.
-        assert_eq!(
-            dbscan(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.5, 0.0]], 1.0, 3).to_vec(),
-            [Some(0), Some(0), Some(0), None]
-        );
+        let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.5, 0.0]];
+        assert_eq!(linfa_dbscan(&points, 1.0, 3).to_vec(), [Some(0), Some(0), Some(0), None]);
+        assert_eq!(grid_dbscan(&points, 1.0, 3), [Some(0), Some(0), Some(0), None]);
     }
 
     /// Points in clumps, so that clusters, their borders and noise all occur. Coordinates are whole quarters in half of the cases, so
@@ -304,11 +388,18 @@ mod tests {
         #[test]
         fn the_labels_are_those_of_the_definition(
             points in clumps(),
+            earlier in clumps(),
             radius in prop::sample::select(vec![0.25, 0.7, 1.0, 1.25, 1.9]),
             core_points in 2..6_usize,
         ) {
-            let labels = dbscan(&points, radius, core_points).to_vec();
-            prop_assert_eq!(labels, dbscan_by_definition(&points, radius, core_points));
+            let expected = dbscan_by_definition(&points, radius, core_points);
+            prop_assert_eq!(&linfa_dbscan(&points, radius, core_points).to_vec(), &expected);
+            // The memory of an earlier scan leaves no trace.
+            let mut grid = GridDbscan::default();
+            grid.run(&earlier, radius, core_points);
+            let count = grid.run(&points, radius, core_points);
+            prop_assert_eq!(indices(&grid), expected.clone());
+            prop_assert_eq!(count as usize, expected.iter().flatten().max().map_or(0, |last| last + 1));
         }
     }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ground::REACH_M;
 use super::kind::NOMINAL_RANGE_M;
-use super::{LidarKind, LidarKindConfig, LidarModel};
+use super::{ClusteringCheck, ClusteringMethod, LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
 
 /// The state of the registration plates.
@@ -159,6 +159,10 @@ pub struct Lidar {
     pub(crate) yaw_rad: f64,
     /// Whether the points are the truth: no noise, no loss, no weather.
     pub(crate) is_exact: bool,
+    /// The implementation of DBSCAN that clusters the points.
+    pub(crate) clustering: ClusteringMethod,
+    /// Whether each clustering is compared with that of another implementation.
+    pub(crate) clustering_check: Option<ClusteringCheck>,
 }
 
 /// Range of a LiDAR whose points are the truth (m): more than that of the region of interest.
@@ -265,6 +269,8 @@ impl LidarConfig {
             plate_reflectivity: parameters.word(&self.plates, "plates")?.reflectivity(),
             yaw_rad: 0.0,
             is_exact: false,
+            clustering: ClusteringMethod::default(),
+            clustering_check: None,
         })
     }
 
@@ -328,6 +334,8 @@ impl Default for Lidar {
             plate_reflectivity: Plates::InUse.reflectivity(),
             yaw_rad: 0.0,
             is_exact: false,
+            clustering: ClusteringMethod::default(),
+            clustering_check: None,
         }
     }
 }

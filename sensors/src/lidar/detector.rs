@@ -5,7 +5,7 @@ use closecall_traffic::{ClassScores, Time, VehicleClass, maths};
 use super::across::across;
 use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
-use super::clustering::{ClusteredPoints, Clustering, NOISE};
+use super::clustering::{ClusteredPoints, Clustering, ClusteringCheck, ClusteringMethod, NOISE};
 use super::ground::{Candidate, select_candidates};
 use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
@@ -52,6 +52,8 @@ const SIDE_SPACING_M: f64 = 0.5;
 pub struct Detector {
     candidates: Vec<Candidate>,
     clustering: Clustering,
+    /// Whether each clustering is compared with another implementation.
+    check: Option<ClusteringCheck>,
     /// Indices of the clustered points in the scan, cluster by cluster.
     members: Vec<u32>,
     /// Index in `members` at which each cluster begins, followed by the length of `members`.
@@ -70,6 +72,7 @@ impl Detector {
         Self {
             candidates: Vec::with_capacity(points),
             clustering: Clustering::with_capacity(points),
+            check: None,
             members: Vec::with_capacity(points),
             starts: Vec::with_capacity(RESERVED_CLUSTERS + 1),
             fits: Vec::with_capacity(RESERVED_CLUSTERS),
@@ -77,6 +80,14 @@ impl Detector {
             is_pair: Vec::with_capacity(RESERVED_CLUSTERS),
             detections: Vec::with_capacity(RESERVED_CLUSTERS),
         }
+    }
+
+    /// Returns the detector with this implementation of DBSCAN, which is compared with another one
+    /// if `check` is given.
+    pub(crate) fn with_clustering(mut self, method: ClusteringMethod, check: Option<ClusteringCheck>) -> Self {
+        self.clustering.method = method;
+        self.check = check;
+        self
     }
 
     /// Detects boxes in a scan.
@@ -167,6 +178,9 @@ impl Detector {
     pub fn cluster(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<(), SensorError> {
         select_candidates(scan, lane, scan.end, &mut self.candidates)?;
         self.clustering.run(&self.candidates);
+        if let Some(check) = self.check {
+            self.clustering.compare(check, scan.end)?;
+        }
         self.group_by_cluster();
         Ok(())
     }

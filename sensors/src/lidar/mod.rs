@@ -16,6 +16,7 @@ mod cast;
 mod classify;
 mod clustering;
 mod config;
+mod dbscan;
 mod detector;
 mod echo;
 mod edges;
@@ -50,7 +51,7 @@ mod viewpoint;
 pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
 pub use crate::tracking::LaneGeometry;
-pub use clustering::ClusteredPoints;
+pub use clustering::{ClusteredPoints, ClusteringCheck, ClusteringMethod};
 pub(crate) use config::{FRONT_NAME, REAR_NAME, intern_name};
 pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;

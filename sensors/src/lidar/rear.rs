@@ -19,7 +19,9 @@ pub struct RearLidar {
 impl RearLidar {
     /// Creates a rear LiDAR with this configuration.
     pub fn new(lidar: Lidar) -> Self {
-        Self { scanner: Scanner::new(lidar), detector: Detector::with_capacity(lidar.kind.beams()), lane: None }
+        let detector = Detector::with_capacity(lidar.kind.beams());
+        let detector = detector.with_clustering(lidar.clustering, lidar.clustering_check);
+        Self { scanner: Scanner::new(lidar), detector, lane: None }
     }
 
     /// Scans the scene. The scan ends at the scene's time. Draws exactly one number from `rng`.

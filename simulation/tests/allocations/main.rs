@@ -1,5 +1,4 @@
-//! Counts allocations of memory: in steady state, the steps of the loop allocate nothing of ours. Two libraries allocate in mode
-//! `full`, the network of the camera and linfa's DBSCAN. What they allocate is counted apart and subtracted.
+//! Counts allocations of memory: in steady state, the steps of the loop allocate nothing.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod counting;
@@ -10,7 +9,6 @@ use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_sensors::camera::{Backend, Classifier, Crop};
-use closecall_sensors::lidar::ClusteredPoints;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Check, Time, VehicleState};
@@ -21,17 +19,11 @@ use counting::allocations;
 const STEADY_FROM_S: f64 = 3.0;
 const SEED: u64 = 9;
 
-/// Notes the number of allocations in each physics step, less those of DBSCAN.
+/// Notes the number of allocations in each physics step.
 #[derive(Default)]
 struct StepCounter {
     steps: Vec<Step>,
     before: u64,
-    /// Allocations of the current step that do not count: those of DBSCAN in the loop, and all that this counter makes.
-    apart: u64,
-    /// Time of the latest scan of each LiDAR.
-    scans: Vec<Time>,
-    /// Allocations of DBSCAN in all steps.
-    of_dbscan: u64,
     has_event: bool,
 }
 
@@ -47,25 +39,7 @@ struct Step {
 }
 
 impl Observer for StepCounter {
-    fn step(&mut self, view: &StepView<'_>) {
-        let before = allocations();
-        let lidars = view.perception.lidars();
-        self.scans.resize(lidars.len(), Time::ZERO);
-        for (mounted, latest) in lidars.iter().zip(&mut self.scans) {
-            let time = mounted.lidar.latest().end;
-            if std::mem::replace(latest, time) == time {
-                continue;
-            }
-            let points = mounted.lidar.clustered().unwrap().points;
-            let before = allocations();
-            ClusteredPoints::new(points);
-            // The same points make the same allocations as in the loop.
-            let of_dbscan = allocations() - before;
-            self.of_dbscan += of_dbscan;
-            self.apart += of_dbscan;
-        }
-        self.apart += allocations() - before;
-    }
+    fn step(&mut self, _: &StepView<'_>) {}
 
     fn event(&mut self, _: Time, _: &RunEvent) {
         self.has_event = true;
@@ -74,8 +48,7 @@ impl Observer for StepCounter {
     fn moved(&mut self, time: Time, _: &mut dyn Iterator<Item = VehicleState>) {
         let now = allocations();
         // Growing the list is no allocation of the loop.
-        let of_step = now - self.before - std::mem::take(&mut self.apart);
-        self.steps.push(Step { time_s: time.s(), allocations: of_step, has_event: self.has_event });
+        self.steps.push(Step { time_s: time.s(), allocations: now - self.before, has_event: self.has_event });
         self.has_event = false;
         self.before = allocations();
     }
@@ -149,7 +122,7 @@ fn allocating(steps: &[Step], of_a_call: u64) -> Vec<(f64, u64)> {
 }
 
 #[test]
-fn the_full_chain_without_the_camera_allocates_nothing_but_what_dbscan_does() {
+fn the_full_chain_without_the_camera_allocates_nothing() {
     for (scenario, sample, settings) in FULL_SCENES {
         let settings = [settings, &["sensors.rear-camera.pipeline=off"]].concat();
         let steps = steady(steps(scenario, &settings, SensorMode::Full, sample));
@@ -178,7 +151,7 @@ fn allocations_of_the_network() -> u64 {
 }
 
 #[test]
-fn the_full_chain_allocates_nothing_but_what_dbscan_and_the_network_do() {
+fn the_camera_allocates_nothing_but_what_the_network_does() {
     let of_the_network = allocations_of_the_network();
     // With fewer, a few allocations of ours could pass for a call of the network.
     assert!(of_the_network > 20, "{of_the_network}");
