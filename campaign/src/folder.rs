@@ -30,7 +30,7 @@ use super::wall_times::{self, WallTime, WallTimes};
 pub use crate::folder_error::FolderError;
 
 pub(crate) const MANIFEST: &str = "manifest.json";
-const JOURNAL: &str = "journal.jsonl";
+pub(crate) const JOURNAL: &str = "journal.jsonl";
 const WALL_TIMES: &str = "wall-times.jsonl";
 
 /// The report for human readers, in a campaign's folder.
@@ -55,6 +55,10 @@ pub(crate) const FILES: [&str; 12] = [
     "summary.md",
     "causes.json",
 ];
+
+/// The files that are made from the journal.
+pub(crate) const DERIVED_FILES: [&str; 7] =
+    ["outcomes.parquet", "timings.parquet", "arm_pairs.parquet", "junit.xml", "samples.xml", REPORT, "summary.md"];
 
 /// The reports of a campaign's folder that a reader opens first.
 pub const REPORT_FILES: [&str; 5] = [REPORT, "summary.md", "junit.xml", "outcomes.parquet", "recordings/index.html"];
@@ -222,7 +226,7 @@ impl Folder {
     }
 
     /// Returns the plan of the manifest, which the journal follows.
-    fn plan(&self) -> Result<JournalPlan, FolderError> {
+    pub(crate) fn plan(&self) -> Result<JournalPlan, FolderError> {
         let path = self.file(MANIFEST);
         JournalPlan::new(&self.path, &self.manifest()?).map_err(|error| match error {
             SavedError::Folder(error) => error,

@@ -117,8 +117,7 @@ impl JournalPlan {
     /// # Errors
     /// What is wrong, in words.
     pub(crate) fn check(&mut self, record: &Record) -> Result<(), String> {
-        if self.last.as_ref().is_some_and(|(scenario, sample)| (scenario, *sample) == (&record.scenario, record.sample))
-        {
+        if self.is_last(record) {
             let (sample, scenario) = (record.sample, &record.scenario);
             return Err(format!("sample {sample} of `{scenario}` is there twice; --resume removes a repeated line"));
         }
@@ -143,6 +142,11 @@ impl JournalPlan {
         self.next = (work, sample + 1);
         self.last = Some((record.scenario.clone(), record.sample));
         Ok(())
+    }
+
+    /// Returns true if a record is of the same sample as the last one.
+    pub(crate) fn is_last(&self, record: &Record) -> bool {
+        self.last.as_ref().is_some_and(|(scenario, sample)| (scenario, *sample) == (&record.scenario, record.sample))
     }
 
     /// Returns the next sample of the plan: the index of its scenario, and its number.

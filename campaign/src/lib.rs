@@ -32,6 +32,7 @@ pub mod gate;
 pub mod host;
 mod identity;
 pub mod inputs;
+pub mod integrity;
 pub mod interrupt;
 pub mod journal;
 pub mod ledger;

@@ -1,8 +1,11 @@
-//! `closecall check`: checks scenario files without running them, or one of them at every change.
+//! `closecall check`: checks scenario files without running them, or one of them at every change; and folders of campaigns.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
+use closecall_campaign::folder::Folder;
+use closecall_campaign::integrity::Problem;
+use closecall_report::campaign::check_folder;
 use closecall_report::json::stamped;
 use closecall_scenarios::source::expand;
 use closecall_scenarios::{ScenarioError, ScenarioFile};
@@ -20,11 +23,11 @@ use crate::exit_code::ExitCode;
 #[command(after_help = examples([
     "closecall check scenarios",
     "closecall check late-braking.toml --set brake-mps2=6 --format json",
-    "closecall check late-braking.toml --watch -n 3 --sensors object",
+    "closecall check closecall-results",
 ]))]
 #[command(mut_args(only_with_watch))]
 pub(super) struct CheckArgs {
-    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input
+    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input; or folders of campaigns
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
@@ -51,6 +54,14 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         };
         return watch(scenario, &args.set, &args.watching);
     }
+    let is_campaign = |path: &&PathBuf| path.join("manifest.json").is_file() || path.join("journal.jsonl").is_file();
+    let campaigns: Vec<&PathBuf> = args.scenarios.iter().filter(is_campaign).collect();
+    if !campaigns.is_empty() {
+        if campaigns.len() < args.scenarios.len() {
+            return Err(CliError::usage("a check is of scenarios or of folders of campaigns, not of both"));
+        }
+        return Ok(check_campaigns(&campaigns, args.format));
+    }
     let checked: Vec<_> = expand(&args.scenarios)?.into_iter().map(|path| (args.set.load(&path), path)).collect();
     let codes: Vec<ExitCode> =
         checked.iter().filter_map(|(file, _)| Some(ExitCode::from(file.as_ref().err()?))).collect();
@@ -63,6 +74,36 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         Format::Human => checked.into_iter().for_each(|(file, path)| print(file, &path)),
     }
     Ok(ExitCode::first_of(codes))
+}
+
+/// Checks whether folders of campaigns are whole.
+fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
+    let checked: Vec<_> = paths.iter().map(|path| (path, check_folder(&Folder::open(path)))).collect();
+    let is_sound = checked.iter().all(|(_, found)| found.is_sound());
+    match format {
+        Format::Json => {
+            let campaigns: Vec<Value> = checked
+                .iter()
+                .map(|(path, found)| {
+                    let (records, missing, problems) = (found.records, found.missing, &found.problems);
+                    json!({ "path": path, "sound": found.is_sound(), "records": records, "missing": missing, "problems": problems })
+                })
+                .collect();
+            outln!("{:#}", stamped(json!({ "valid": is_sound, "campaigns": campaigns }), None, None));
+        }
+        Format::Human => {
+            for (path, found) in checked {
+                for Problem { file, line, message, repair } in &found.problems {
+                    let line = line.map_or_else(String::new, |line| format!(":{line}"));
+                    outln!("{}{line}: {message}\n  repair: {repair}", path.join(file).display());
+                }
+                if found.is_sound() {
+                    outln!("{}: sound, {} samples", path.display(), found.records);
+                }
+            }
+        }
+    }
+    if is_sound { ExitCode::Pass } else { ExitCode::InvalidInput }
 }
 
 fn print(file: Result<ScenarioFile, ScenarioError>, path: &Path) {

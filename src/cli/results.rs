@@ -201,7 +201,9 @@ fn may_go_on(error: &FolderError) -> bool {
 pub(super) fn print_results(folder: &Folder, recorded: &[RecordedSample]) {
     print_report_files(folder);
     let word = |path: &Path| quoted(&path.display().to_string());
-    print_error(format_args!("look: {OPEN} {}\n", word(&folder.file(REPORT))));
+    if folder.file(REPORT).is_file() {
+        print_error(format_args!("look: {OPEN} {}\n", word(&folder.file(REPORT))));
+    }
     for RecordedSample { scenario, sample, reasons, path } in recorded.iter().take(NAMED_RECORDINGS) {
         let why = reasons.join(", ");
         print_error(format_args!("look: closecall view {}  # {why}: sample {sample} of {scenario}\n", word(path)));

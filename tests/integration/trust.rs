@@ -217,3 +217,51 @@ fn the_table_of_outcomes_does_not_depend_on_the_working_folder() {
     });
     assert!(tables[0] == tables[1]);
 }
+
+/// Returns the problems that `closecall check` finds in a folder.
+fn problems(out: &Path, expected: i32) -> String {
+    stdout(&closecall(["check", out.to_str().unwrap()]), expected)
+}
+
+#[test]
+fn a_check_of_a_folder_names_each_problem_and_its_repair() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    stdout(&campaign(&out, &[]), 0);
+    assert!(problems(&out, 0).ends_with("out: sound, 8 samples\n"));
+    let kept = lines(&out);
+    let resumed = || {
+        let found = problems(&out, 3);
+        let command = found.lines().find_map(|line| line.split_once("repair: resume the campaign: ")).unwrap().1;
+        assert!(command.contains(out.to_str().unwrap()) && command.ends_with("--resume"), "{found}");
+        stdout(&campaign(&out, &["--resume"]), 0);
+        assert!(lines(&out) == kept);
+        assert!(problems(&out, 0).contains("sound"));
+        found
+    };
+    write_lines(&out, &kept[..6]);
+    assert!(resumed().contains("journal.jsonl: it has 6 of the 8 samples"));
+    write_lines(&out, &[&kept[..2], &kept[1..]].concat());
+    assert!(resumed().contains("journal.jsonl:3: it repeats the line before"));
+    let mut damaged = kept.clone();
+    damaged[4] = damaged[4].replace("\"seed\"", "\"sead\"");
+    write_lines(&out, &damaged);
+    assert!(resumed().contains("journal.jsonl:5: the line does not agree with its checksum"));
+    fs::remove_file(out.join("summary.md")).unwrap();
+    assert!(resumed().contains("summary.md: it is missing"));
+    // A table of other samples.
+    let other = folder.path().join("other");
+    stdout(&campaign(&other, &["--seed", "1"]), 0);
+    fs::copy(other.join("outcomes.parquet"), out.join("outcomes.parquet")).unwrap();
+    assert!(problems(&out, 3).contains("outcomes.parquet: it is not the table of this journal"));
+    stdout(&campaign(&out, &["--resume"]), 0);
+    // What --resume cannot repair.
+    let mut exchanged = kept.clone();
+    exchanged.swap(2, 5);
+    write_lines(&out, &exchanged);
+    let found = problems(&out, 3);
+    assert!(found.contains("journal.jsonl:3: sample 5 of `low-thw-overtake` is not the next sample"), "{found}");
+    assert!(found.contains("run the campaign into a new folder"), "{found}");
+    fs::write(out.join("manifest.json"), "{}").unwrap();
+    assert!(problems(&out, 3).contains("there is no `manifest_version`"));
+}

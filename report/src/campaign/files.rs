@@ -9,15 +9,16 @@
 
 use std::fs::OpenOptions;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::{Folder, FolderError, RECORDINGS, RECORDINGS_PAGE, REPORT};
-use closecall_campaign::manifest::Manifest;
+use closecall_campaign::integrity::Integrity;
+use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::record::{ArmRecord, Record};
 use closecall_campaign::runner::Work;
-use closecall_campaign::saved::SavedError;
+use closecall_campaign::saved::{SavedCampaign, SavedError};
 use closecall_campaign::selection::Selection;
 use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::ScenarioFile;
@@ -250,6 +251,42 @@ impl CampaignReport<'_> {
         let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)
     }
+}
+
+/// Looks at a campaign's folder: its manifest, its journal, and whether the table of outcomes is the one that the journal makes.
+pub fn check_folder(folder: &Folder) -> Integrity {
+    const TABLE: &str = "outcomes.parquet";
+    let mut found = Integrity::of(folder);
+    if !found.is_sound() {
+        return found;
+    }
+    match is_table_of_journal(folder, TABLE) {
+        Ok(true) => {}
+        Ok(false) => {
+            let message = "it is not the table of this journal".to_owned();
+            found.add(TABLE, None, message, "resume the campaign with --resume, which writes it again".to_owned());
+        }
+        Err(error) => found.add(TABLE, None, error.to_string(), "resume the campaign with --resume".to_owned()),
+    }
+    found
+}
+
+/// Returns true if the table has the bytes that the journal makes. Another release may write other bytes.
+fn is_table_of_journal(folder: &Folder, table: &str) -> Result<bool, ReportError> {
+    let saved = SavedCampaign::of(folder.clone())?;
+    let release = |version: &str| version.split('+').next().unwrap_or_default().to_owned();
+    if release(&saved.manifest().closecall_version) != release(&version()) {
+        return Ok(true);
+    }
+    let path = folder.file(table);
+    let read = |path: &Path| std::fs::read(path).map_err(|source| FolderError::Read { path: path.to_owned(), source });
+    let temporary = tempfile::tempdir().map_err(|source| WriteError::new(&path, source))?;
+    let again = temporary.path().join(table);
+    let works = saved.works()?;
+    let nominal: Vec<_> = works.iter().map(|work| work.file.space().nominal()).collect();
+    let rows = rows(folder, saved.manifest())?;
+    write_outcomes(&again, Some(saved.manifest()), &parameter_columns(&nominal), rows)?;
+    Ok(read(&path)? == read(&again)?)
 }
 
 /// The wall time of each scenario (s), by name.

@@ -27,7 +27,7 @@ pub mod timings;
 pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};
 pub use ensemble::{ensemble_json, ensemble_text};
-pub use files::{ArtifactError, CampaignReport, ReportError, Written};
+pub use files::{ArtifactError, CampaignReport, ReportError, Written, check_folder};
 pub use recordings::RecordedSample;
 pub use tally::Tally;
 pub use text::{CountsText, FlakyText, VerdictText};
