@@ -26,8 +26,7 @@ fn outcomes_of_the_library_have_the_stated_bits() {
     assert!(stated.outcomes.len() >= LEAST_SCENARIOS, "{}", stated.outcomes.len());
     assert_eq!(generator::functions(), stated.functions, "the mathematical functions are not those of {DIGESTS}");
     let now = generator::digests().unwrap();
-    let changed: Vec<&String> =
-        now.outcomes.iter().filter(|(name, of)| stated.outcomes.get(*name) != Some(of)).map(|(name, _)| name).collect();
+    let changed: Vec<_> = now.outcomes.iter().filter(|(name, of)| stated.outcomes.get(*name) != Some(of)).collect();
     assert!(
         changed.is_empty() && now == stated,
         "other outcomes than before: {changed:?}. If that is meant, `cargo run --release -p closecall-xtask -- write-references` writes {DIGESTS}; \

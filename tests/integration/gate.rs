@@ -24,7 +24,8 @@ use closecall_traffic::Time;
 
 use crate::support::library;
 
-const SAMPLES: u64 = 200;
+/// Samples of each scenario: as many as a 99th percentile needs.
+const SAMPLES: u64 = 300;
 /// Samples of each scenario in which a share is judged that is well below one, but not zero: enough to decide.
 const SHARE_SAMPLES: u64 = 1_200;
 /// Samples of each scenario with a fault: enough to fail.
@@ -99,6 +100,11 @@ impl ControllerFactory for Fault {
 
     fn has_mis(&self, settings: &EgoSettings) -> bool {
         settings.mis().is_some()
+    }
+
+    /// The states are those of the system of this program, with a fault.
+    fn is_built_in(&self) -> bool {
+        true
     }
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {

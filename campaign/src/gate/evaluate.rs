@@ -1,6 +1,7 @@
 //! Evaluates one gate over the samples of one scenario.
 
 use closecall_scenarios::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
+use closecall_traffic::maths::powf;
 use closecall_traffic::statistics::quantiles::quantile;
 
 use crate::ledger::{Inference, PairFate};
@@ -75,7 +76,7 @@ fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
         Aggregate::Lower | Aggregate::Upper => 1,
         Aggregate::Percentile(percent) => {
             let inside = 0.01 * percent.max(100.0 - percent);
-            let reaching = |samples: &u64| inside >= 1.0 || 1.0 - inside.powf(*samples as f64) >= CONFIDENCE;
+            let reaching = |samples: &u64| inside >= 1.0 || 1.0 - powf(inside, *samples as f64) >= CONFIDENCE;
             (LEAST_SAMPLES..MOST_ASKED).find(reaching).unwrap_or(MOST_ASKED)
         }
         _ => LEAST_SAMPLES,
@@ -163,12 +164,11 @@ impl Accumulator {
         }
         let Some(found) = value.filter(|_| samples > 0) else { return open(OpenReason::NoSamples) };
         let is_enough = samples >= least_samples(aggregate, is_varied);
+        let is_percentile = matches!(aggregate, Aggregate::Percentile(_));
         // Few samples do not show a percentile at all. What they count or reach, they have.
         let answer = if operator.holds(found, bound) {
             if is_enough { Answer::Met } else { Answer::Open(OpenReason::TooFewSamples) }
-        } else if matches!(aggregate, Aggregate::Percentile(_)) && !is_enough {
-            Answer::Open(OpenReason::TooFewSamples)
-        } else if is_bound && self.is_undecided(inference) {
+        } else if is_percentile && !is_enough || is_bound && self.is_undecided(inference) {
             Answer::Open(OpenReason::TooFewSamples)
         } else {
             Answer::Missed
