@@ -11,8 +11,8 @@
 
 use std::path::Path;
 
-use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::Parameters;
 
 use crate::ledger::Inference;

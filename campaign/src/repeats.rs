@@ -6,8 +6,8 @@
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use closecall_scenarios::parameters::{ParameterSpace, SpaceEntry, Variation};
 use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::parameters::{ParameterSpace, SpaceEntry, Variation};
 use closecall_traffic::{Measured, Parameters, Value};
 
 use super::record::Record;

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_recorded::trajectory_data::{
-    AxisOptions, BadRows, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, read_with,
-    refuse_duplicates,
+    AxisOptions, BadRows, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, read_with, refuse_duplicates,
 };
 use closecall_scenarios::{ScenarioError, ScenarioFile, Setting, source};
 use closecall_sensors::SensorMode;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::plan::check_mis;
+use closecall_scenarios::ScenarioFile;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::{ArmList, ControllerChoice};
-use closecall_scenarios::ScenarioFile;
 
 use super::CliError;
 use super::args::SensorsChoice;

@@ -14,7 +14,9 @@ use closecall_recorded::aerial::AerialError;
 use closecall_recorded::encounter::{NoEncounter, track_suggestion};
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
-use closecall_recorded::trajectory_data::{TrajectoryFileError, TrajectoryFileProblem, WriteError as TrajectoryWriteError};
+use closecall_recorded::trajectory_data::{
+    TrajectoryFileError, TrajectoryFileProblem, WriteError as TrajectoryWriteError,
+};
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;

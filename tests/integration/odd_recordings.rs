@@ -79,7 +79,8 @@ fn recorded_traffic_with_fewer_frames_keeps_its_lane_changes() {
     let folder = folder();
     let whole = lane_changes(&clean, &[]).0.len();
     for (name, step) in [("second", 2), ("fourth", 4)] {
-        let found = lane_changes(&thinned(&clean, &folder.path().join(name), |frame, _| frame % step == 0), &[]).0.len();
+        let found =
+            lane_changes(&thinned(&clean, &folder.path().join(name), |frame, _| frame % step == 0), &[]).0.len();
         assert!(found.abs_diff(whole) <= 1, "{name}: {found} instead of {whole}");
     }
     let lost = lane_changes(&thinned(&clean, &folder.path().join("lost"), |_, line| line % 50 != 7), &[]).0.len();
@@ -132,7 +133,9 @@ fn lanes_against_the_lateral_position_are_refused_by_the_axis() {
 #[test]
 fn spreadsheets_of_other_countries_and_whole_numbers_as_floats_are_read() {
     let Some(first) = odd("semicolon_comma.csv") else { return };
-    for file in [first, odd("float_ids.csv").unwrap(), odd("float_lanes.csv").unwrap(), odd("every_second_frame.csv").unwrap()] {
+    for file in
+        [first, odd("float_ids.csv").unwrap(), odd("float_lanes.csv").unwrap(), odd("every_second_frame.csv").unwrap()]
+    {
         let changes = lane_changes(&file, &[]).0;
         assert_eq!(changes.len(), 2, "{}: {changes:?}", file.display());
     }

@@ -125,9 +125,9 @@ fn on_new_thread<T: Send, U>(there: impl Fn() -> T + Sync, here: impl FnOnce() -
 mod tests {
     use std::path::Path;
 
+    use closecall_scenarios::ScenarioFile;
     use closecall_sensors::lidar::ClusteredPoints;
     use closecall_simulation::controller::BuiltIn;
-    use closecall_scenarios::ScenarioFile;
 
     use super::*;
 

@@ -33,9 +33,8 @@ pub(super) fn step(before: &Row, row: &Row, clock: FrameClock) -> Result<Step, R
         return Err(ReadError::new(later.line, problem));
     }
     let needed_ns = period.ns().saturating_mul(frames) / clock.frames;
-    let is_near = |needed_ns: i64| {
-        step.ns().saturating_sub(needed_ns).unsigned_abs() as f64 <= UNEVENNESS * period.ns() as f64
-    };
+    let is_near =
+        |needed_ns: i64| step.ns().saturating_sub(needed_ns).unsigned_abs() as f64 <= UNEVENNESS * period.ns() as f64;
     if frames >= 1 && is_near(needed_ns) {
         return Ok(if frames == clock.frames { Step::Next } else { Step::Gap });
     }

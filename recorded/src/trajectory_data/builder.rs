@@ -121,11 +121,7 @@ impl TrackBuilder {
 
     /// Returns how the rows so far became tracks.
     pub(super) fn continuity(&self) -> Continuity {
-        Continuity {
-            vehicles: self.pieces.len() as u64,
-            pieces: self.pieces.values().sum(),
-            ..self.continuity
-        }
+        Continuity { vehicles: self.pieces.len() as u64, pieces: self.pieces.values().sum(), ..self.continuity }
     }
 
     /// Returns the complete tracks that [`TrackBuilder::pop`] has not removed yet.

@@ -65,7 +65,9 @@ pub enum TrajectoryFileProblem {
         what: &'static str,
     },
     /// The file is in a format of another program.
-    #[error("this is {what}, which is not read; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)")]
+    #[error(
+        "this is {what}, which is not read; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)"
+    )]
     Foreign {
         /// The format.
         what: &'static str,
@@ -79,7 +81,9 @@ pub enum TrajectoryFileProblem {
         asked: &'static str,
     },
     /// The last line is not terminated.
-    #[error("the last line does not end, and its last field is shorter than the one before: the file may be cut there; if it is whole, end the line")]
+    #[error(
+        "the last line does not end, and its last field is shorter than the one before: the file may be cut there; if it is whole, end the line"
+    )]
     CutLine,
     /// A line exceeds the permitted length.
     #[error("the line is longer than {allowed} bytes")]

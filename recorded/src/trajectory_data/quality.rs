@@ -2,8 +2,8 @@
 //!
 //! | flaw | what counts |
 //! |---|---|
-//! | gap | a piece of a vehicle's track beyond the first: frames are missing before it |
-//! | jump | a step that contradicts the recorded speed: it deviates by more than 10 m/s along the road, or moves faster than 5 m/s sideways, and the deviation is at least 0.5 m |
+//! | gap | a piece of a vehicle's track beyond the first: frames are missing before it, for too long to be bridged |
+//! | jump | a piece before which no frame is missing, and a step that contradicts the recorded speed: it deviates by more than 10 m/s along the road, or moves faster than 5 m/s sideways, and the deviation is at least 0.5 m |
 //! | acceleration | a track point with more than 12 m/s² (no tyre brakes harder), recorded or derived from two speeds that differ by at least 0.5 m/s |
 //! | overlap | two vehicles in one lane at one instant whose boxes overlap lengthwise |
 //! | reused number | a piece that cannot be the same vehicle: other class or size, or out of reach of the previous piece |
@@ -221,8 +221,15 @@ impl QualityInspector {
         let Some(before) = self.vehicles.insert(track.vehicle_id, seen) else { return };
         let line = lines.first().copied();
         let missing_s = (first.time - before.time).s();
-        let gap = || format!("vehicle {} is missing for {missing_s:.2} s before", track.vehicle_id);
-        self.flaws.gaps.record(line, track.track_id, first.time, gap);
+        // The reader splits a track where no frame is missing only at a jump.
+        let step_s = track.points.get(1).map_or(0.0, |second| (second.time - first.time).s());
+        if missing_s > 0.0 && missing_s <= 1.5 * step_s {
+            let jump = || format!("vehicle {} moves as no vehicle does: the track was split", track.vehicle_id);
+            self.flaws.jumps.record(line, track.track_id, first.time, jump);
+        } else {
+            let gap = || format!("vehicle {} is missing for {missing_s:.2} s before", track.vehicle_id);
+            self.flaws.gaps.record(line, track.track_id, first.time, gap);
+        }
         let differs = |a: f64, b: f64| !((a - b).abs() <= SAME_SIZE_M);
         let other = before.class != class
             || differs(before.dimensions.length_m, dimensions.length_m)

@@ -8,11 +8,11 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_scenarios::outcome::Outcome;
 use closecall_simulation::{Arm, NoObserver, RunKey};
 use closecall_traffic::maths;
 use serde::{Deserialize, Serialize};
