@@ -12,6 +12,7 @@ use closecall_sensors::SensorMode;
 use super::CliError;
 use super::arms::ArmArgs;
 use super::help::heading;
+use super::output::print_error;
 
 /// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

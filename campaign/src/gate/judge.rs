@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use closecall_scenarios::criteria::{EGO_COLLIDED, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
-use closecall_scenarios::parameters::Variation;
 use closecall_simulation::Arm;
 
 use super::evaluate::{Accumulator, Evidence, value};
