@@ -49,11 +49,20 @@ pub(super) struct CostMeter {
     has_ended: bool,
     late_s: f64,
     step_s: f64,
+    /// The last speed with which that of the ego was compared, or its own at the start (m/s).
+    last_reference_mps: Option<f64>,
 }
 
 impl CostMeter {
     pub(super) fn new(step_s: f64) -> Self {
-        Self { cost: Cost::default(), is_prompted: false, has_ended: false, late_s: 0.0, step_s }
+        Self {
+            cost: Cost::default(),
+            is_prompted: false,
+            has_ended: false,
+            late_s: 0.0,
+            step_s,
+            last_reference_mps: None,
+        }
     }
 
     /// Adds one physics step. It must not be called after the ego's first collision.
@@ -62,9 +71,13 @@ impl CostMeter {
         if self.has_ended {
             return;
         }
+        // A lead vehicle counts after a second only. Until then an ego that slows down would give itself the reason.
+        let last_mps = *self.last_reference_mps.get_or_insert(now.own_mps);
+        let reference_mps = now.reference_mps.unwrap_or(last_mps);
+        self.last_reference_mps = Some(reference_mps);
         if let Some(rear) = now.rear {
             self.cost.imposed_braking_mps2 = self.cost.imposed_braking_mps2.max(-rear.acceleration_mps2);
-            let closing_mps = rear.speed_mps - now.reference_mps.unwrap_or(now.own_mps).max(now.own_mps);
+            let closing_mps = rear.speed_mps - reference_mps.max(now.own_mps);
             self.is_prompted |=
                 rear.gap_m <= ENGAGEMENT_GAP_M && closing_mps >= ENGAGEMENT_CLOSING_MPS - CLOSING_TOLERANCE_MPS;
         }
@@ -121,6 +134,13 @@ mod tests {
     fn an_ego_that_slows_down_does_not_give_itself_the_reason() {
         // The rear vehicle closes at 10 m/s, of which 9 are the ego's own.
         assert_eq!(cost_of(&[at(21.0, 50.0, 31.0)]).unprompted_deficit_mps, 9.0);
+    }
+
+    #[test]
+    fn an_ego_does_not_give_itself_the_reason_before_the_lead_vehicle_counts() {
+        let unsettled = |own_mps| Instant { reference_mps: None, ..at(own_mps, 70.0, 31.5) };
+        let steps = [unsettled(30.0), unsettled(28.5), at(28.0, 69.0, 31.5)];
+        assert_eq!(cost_of(&steps).unprompted_deficit_mps, 2.0);
     }
 
     #[test]
