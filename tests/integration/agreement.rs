@@ -168,7 +168,9 @@ fn verdict_of(part: &Path, records: &[Record], gates: &[String], out: &Path) -> 
         let all = json["gates"].as_array().unwrap();
         let gate =
             all.iter().find(|gate| gate["scenario"].is_null() && gate["subject"] == "count(ego_collided)").unwrap();
-        assert_eq!(gate["passed"].as_bool(), Some(collided <= limit), "{context}: {collided} collisions");
+        // Few samples do not decide that a limit is met.
+        let passed = gate["passed"].as_bool().unwrap_or(true);
+        assert_eq!(passed, collided <= limit, "{context}: {collided} collisions");
     }
 
     // The files.

@@ -110,10 +110,10 @@ fn a_wrong_table_of_crates_is_found() {
         wrong(&table(&page.replacen(from, to, 1)), &workspace)
     };
     // An import that the page lacks, one that does not exist, one that points upwards.
-    assert_eq!(problems("| controllers, traffic |", "| traffic |").len(), 1);
-    assert_eq!(problems("| controllers, traffic |", "| controllers, statistics, traffic |").len(), 1);
-    assert_eq!(problems("| controllers, traffic |", "| controllers, simulation, traffic |").len(), 2);
+    assert_eq!(problems("| sensors, traffic |", "| traffic |").len(), 1);
+    assert_eq!(problems("| sensors, traffic |", "| controllers, sensors, traffic |").len(), 1);
+    assert_eq!(problems("| sensors, traffic |", "| sensors, simulation, traffic |").len(), 2);
     // A crate that the page lacks, one that does not exist, and one in another folder.
-    assert_eq!(problems("| native |", "| foreign |").len(), 3 + 2);
-    assert_eq!(problems("| `native` |", "| `controllers/native` |").len(), 1);
+    assert_eq!(problems("| studies |", "| foreign |").len(), 3 + 2);
+    assert_eq!(problems("| `studies` |", "| `campaign/studies` |").len(), 1);
 }

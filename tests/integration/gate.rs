@@ -47,6 +47,9 @@ const LIBRARY: [&str; 12] = [
     "cut-in-into-margin",
 ];
 
+/// The scenario that the system fails, and the requirement: it is more than 10 m/s slower than the vehicle ahead in more than
+/// 1 % of the samples.
+const MISSED: (&str, &str) = ("cut-in-into-margin", "MIS-6");
 /// The scenarios in which the lead vehicle brakes, so that shares of collisions are judged.
 const BRAKING: [&str; 4] =
     ["low-thw-overtake", "lead-brakes-at-any-time", "lead-brakes-partially", "rear-follower-stays-lead-brakes"];
@@ -193,8 +196,10 @@ fn violated(judged: &Judgement) -> Vec<&str> {
 }
 
 #[test]
-fn the_mis_passes_every_requirement_of_the_library() {
-    let (braking, others): (Vec<&str>, Vec<&str>) = LIBRARY.iter().partition(|name| BRAKING.contains(name));
+fn the_mis_passes_the_requirements_of_the_library_but_the_one_that_the_readme_names() {
+    let is_missed = |name: &&&str| **name == MISSED.0;
+    let (braking, others): (Vec<&str>, Vec<&str>) =
+        LIBRARY.iter().filter(|name| !is_missed(name)).partition(|name| BRAKING.contains(name));
     let mut headline = None;
     for (names, samples) in [(others, SAMPLES), (braking, SHARE_SAMPLES)] {
         let (summary, judged) = judged(&names, &BuiltIn::Mis.factory(), samples);
@@ -202,6 +207,8 @@ fn the_mis_passes_every_requirement_of_the_library() {
         assert!(judged.requirements.iter().all(|requirement| requirement.standing == Standing::Pass));
         headline = summary.scenarios.into_iter().find(|(name, _)| name == "low-thw-overtake").or(headline);
     }
+    let (_, missed) = judged(&[MISSED.0], &BuiltIn::Mis.factory(), SAMPLES);
+    assert_eq!(violated(&missed), [MISSED.1], "{:#?}", missed.reasons);
     let (_, headline) = headline.unwrap();
     assert!(headline.pairs.prevented > headline.pairs.induced);
     assert_eq!(headline.pairs.prevented + headline.pairs.both, headline.arms[0].collisions);

@@ -59,7 +59,7 @@ fn a_failed_sensor_leaves_the_system_not_available_with_its_reason_and_no_gate_p
     // The same campaigns pass if the sensors work during the encounter.
     for name in ["camera-dead", "front-radar-dead", "surround-dead", "object-frozen"] {
         let path = unjudged(folder.path(), name, true);
-        let args = ["campaign", path.to_str().unwrap(), "-n", "4", "--seed", "1", "--paired", "--no-validity-checks"];
+        let args = ["campaign", path.to_str().unwrap(), "-n", "24", "--seed", "1", "--paired", "--no-validity-checks"];
         let text = stdout(&closecall(args.iter().chain(&["--max-collisions", "1000"])), 0);
         assert!(text.contains("PASS"), "{name}: {text}");
     }

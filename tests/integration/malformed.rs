@@ -108,13 +108,13 @@ fn a_missing_scenario_file_is_named() {
 }
 
 #[test]
-fn an_unused_parameter_causes_a_warning() {
+fn a_parameter_that_nothing_uses_is_refused() {
     let folder = folder();
     let path = folder.path().join("scenario.toml");
     fs::write(&path, headline_with("deceleration-mps2 = \"$brake-mps2\"", "deceleration-mps2 = 6.0")).unwrap();
     for command in ["check", "run"] {
         let output = closecall([command, path.to_str().unwrap()]);
-        assert_eq!(code(&output), 0);
+        assert_eq!(code(&output), 3);
         assert!(stderr(&output).contains("brake-mps2"), "{command}: {}", stderr(&output));
     }
 }
