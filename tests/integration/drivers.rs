@@ -222,7 +222,19 @@ fn traced(actors: &str, duration_s: f64) -> BTreeMap<String, Vec<Row>> {
     std::fs::write(&path, format!("{road}{actors}{ego}")).unwrap();
     let path = path.to_str().unwrap();
     stdout(&closecall(["check", path]), 0);
-    stdout(&closecall(["run", path, "--controller", "acc", "--sensors", "ground-truth", "--trace", trace.to_str().unwrap()]), 0);
+    stdout(
+        &closecall([
+            "run",
+            path,
+            "--controller",
+            "acc",
+            "--sensors",
+            "ground-truth",
+            "--trace",
+            trace.to_str().unwrap(),
+        ]),
+        0,
+    );
     let mut rows: BTreeMap<String, Vec<Row>> = BTreeMap::new();
     for line in std::fs::read_to_string(&trace).unwrap().lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();

@@ -93,7 +93,10 @@ fn each_step_runs_and_its_transfer_is_a_campaign_with_the_margin_increase_system
     assert!(fs::metadata(out.join("sample.rrd")).unwrap().len() > 10_000);
     let path = |name: &str| out.join(name).to_str().unwrap().to_owned();
     for step in 1..=5 {
-        let run = json(&closecall(["run", &path(&format!("step-{step}.toml")), "--format", "json"]), 0);
+        let run = json(
+            &closecall(["run", &path(&format!("step-{step}.toml")), "--controller", "acc", "--format", "json"]),
+            0,
+        );
         assert!(run["collisions"].as_array().unwrap().is_empty(), "{run}");
     }
     // The validity checks mirror the scenario, with its lane change.
