@@ -12,9 +12,6 @@ use closecall_traffic::{Measured, Parameters, Value};
 
 use super::record::Record;
 
-/// Smallest difference of two outcomes that are not the same (m, s, m/s, m/s², m/s³): an assumption, a tenth of what reports show; 1e-4 to 1e-2 are
-/// plausible.
-const RESOLUTION: f64 = 1e-3;
 /// Smallest spread of a parameter that varies, as a share of its values (-): an assumption; 1e-4 to 1e-2 are plausible. No measurement of traffic tells a
 /// thousandth apart.
 const LEAST_SPREAD: f64 = 1e-3;
@@ -95,16 +92,15 @@ fn key(parameters: &Parameters) -> String {
 
 /// Adds what happened in a run, and not why: neither its parameters nor its number.
 fn hash(outcome: &Outcome, hasher: &mut DefaultHasher) {
-    #[expect(clippy::cast_possible_truncation, reason = "a value beyond the range of the steps is no value of a run")]
-    let step = |value: f64| if value.is_nan() { i64::MAX } else { (value / RESOLUTION).round() as i64 };
-    let measured = |value: Measured| value.map(step).map_err(|absent| absent.to_string());
-    step(outcome.duration.s()).hash(hasher);
+    // To the bit: a coarser comparison would leave out samples of a scenario in which one parameter varies, and shift its shares.
+    let measured = |value: Measured| value.map(f64::to_bits).map_err(|absent| absent.to_string());
+    outcome.duration.hash(hasher);
     for collision in &outcome.collisions {
         (&collision.between[0], &collision.between[1]).hash(hasher);
-        [collision.time.s(), collision.relative_speed_mps, collision.delta_v_mps[0]].map(step).hash(hasher);
+        [collision.time.s(), collision.relative_speed_mps, collision.delta_v_mps[0]].map(f64::to_bits).hash(hasher);
     }
     for reached in &outcome.moments {
-        (reached.moment, step(reached.time.s())).hash(hasher);
+        (reached.moment, reached.time).hash(hasher);
     }
     let margins = &outcome.margins;
     for value in [
@@ -116,7 +112,9 @@ fn hash(outcome: &Outcome, hasher: &mut DefaultHasher) {
     ] {
         measured(value).hash(hasher);
     }
-    [margins.max_deceleration_mps2, margins.max_jerk_mps3, margins.max_speed_deficit_mps].map(step).hash(hasher);
+    [margins.max_deceleration_mps2, margins.max_jerk_mps3, margins.max_speed_deficit_mps]
+        .map(f64::to_bits)
+        .hash(hasher);
 }
 
 #[cfg(test)]

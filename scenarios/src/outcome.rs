@@ -233,7 +233,7 @@ pub struct Unavailability {
 }
 
 /// The result of one run. A collision is a result, not an error. A run that cannot be completed has no outcome but a
-/// [`SampleError`](crate::SampleError).
+/// `closecall_simulation::SampleError`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The scenario's name.

@@ -45,7 +45,8 @@ mod tests {
     fn overridden(settings: &[&str]) -> Vec<String> {
         let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
         let text = library::text("low-thw-overtake").unwrap();
-        let file = ScenarioFile::parse(Path::new("a.toml"), text, &settings).unwrap();
+        let text = text.replacen("\nduration-s", "\nexpects-share = 0.95\nduration-s", 1);
+        let file = ScenarioFile::parse(Path::new("a.toml"), &text, &settings).unwrap();
         // What a saved campaign reads is the text.
         let again = ScenarioFile::parse(Path::new("a.toml"), file.text(), &[]).unwrap();
         assert_eq!(again.config().overridden, file.config().overridden);

@@ -133,7 +133,7 @@ fn a_summary_that_cannot_be_written_does_not_cost_the_verdict() {
     let folder = folder();
     let run = |out: &str, more: &[&str]| {
         program()
-            .args(["campaign", "overtake-without-brake", "-n", "8", "--sensors", "ground-truth"])
+            .args(["campaign", "overtake-without-brake", "-n", "80", "--sensors", "ground-truth"])
             .args(["--record", "failures:0", "--out", folder.path().join(out).to_str().unwrap()])
             .args(more)
             .env("GITHUB_STEP_SUMMARY", folder.path().join("no/such/folder"))
@@ -166,7 +166,7 @@ fn a_controller_that_fails_only_while_it_is_recorded_does_not_cost_the_verdict()
         let out = folder.path().join(name);
         let mut command = program();
         command
-            .args(["campaign", "overtake-without-brake", "-n", "4", "--sensors", "object", "--max-collisions", "4"])
+            .args(["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--max-collisions", "4"])
             .args(["--record", "random:2", "--controller", &library, "--out", out.to_str().unwrap()])
             .args(more);
         let output = with_fault(&mut command, Some("recorded"));

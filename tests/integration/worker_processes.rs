@@ -110,7 +110,8 @@ fn a_library_that_crashes_in_each_fifth_run_of_its_process_is_never_repeated_sil
         assert!(junit.contains("<failure message=\"flaky samples: 5, at most"), "{name}: {junit}");
     }
     let more = ["--max-collisions", "24", "--max-flaky", "5", "--retry-crashed", "1", "--format", "json"];
-    let report = json(&crashing_in_the_fifth_run(&library, &folder.path().join("allowed"), &more), 0);
+    // 24 samples do not decide every requirement of the scenario.
+    let report = json(&crashing_in_the_fifth_run(&library, &folder.path().join("allowed"), &more), 4);
     assert_eq!((&report["flaky"], &report["flaky_gate"]["max"]), (&5.into(), &5.into()));
     assert_eq!(report["flaky_samples"][0]["first_message"], crash);
 }

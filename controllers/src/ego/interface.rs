@@ -142,7 +142,7 @@ pub enum ControllerError {
 /// A controller may fail or even panic: that sample then ends as an error, and the campaign continues.
 ///
 /// ```
-/// use crate::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
+/// use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
 ///
 /// /// Brakes gently while any track is behind the ego.
 /// struct GentleBraking;

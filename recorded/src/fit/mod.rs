@@ -33,7 +33,7 @@
 //! parametric bootstrap (1,000 samples, with the form refitted to each), because the parameters are fitted to the same
 //! values. With fewer than 5 values nothing is fitted.
 //!
-//! [`correlated`] adds Spearman's rank correlations, which scenarios sample by a Gaussian copula ([`crate::parameters`]).
+//! [`correlated`] adds Spearman's rank correlations, which scenarios sample by a Gaussian copula (`closecall_scenarios::parameters`).
 
 mod correlation;
 mod distribution;

@@ -50,7 +50,7 @@ impl Axes {
     }
 }
 
-/// Rejects rows whose lanes lie in the opposite order of their numbers.
+/// Rejects rows in which more neighbouring lanes lie in the opposite order of their numbers than in their order.
 pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
     let mut lanes: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.lane > 0) {
@@ -65,11 +65,10 @@ pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
         })
         .collect();
     let (mut agree, mut contradict) = (0, 0);
-    for (index, (_, left_m)) in middles.iter().enumerate() {
-        for (_, right_m) in &middles[index + 1..] {
-            agree += usize::from(left_m - right_m > LEAST_DISTANCE_M);
-            contradict += usize::from(right_m - left_m > LEAST_DISTANCE_M);
-        }
+    // Ramps and bays have numbers beside the count: only neighbours are compared.
+    for pair in middles.windows(2).filter(|pair| pair[0].0 + 1 == pair[1].0) {
+        agree += usize::from(pair[0].1 - pair[1].1 > LEAST_DISTANCE_M);
+        contradict += usize::from(pair[1].1 - pair[0].1 > LEAST_DISTANCE_M);
     }
     let (Some(first), Some(last)) = (middles.first(), middles.last()) else { return Ok(()) };
     if contradict <= agree {

@@ -98,8 +98,9 @@ fn write_both_ways(folder: &Path) {
         "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
     for frame in 1..=30 {
         let x_m = 400.0 - 1.2 * f64::from(frame);
-        // The vehicle changes from the lane next to the median (laneId 3) to the outer lane.
-        let (y_m, lane) = if frame < 16 { (13.5, 3) } else { (9.5, 2) };
+        // The vehicle changes from the lane next to the median (laneId 3) to the outer lane, within ten frames.
+        let y_m = 13.5 - 0.4 * f64::from((frame - 10).clamp(0, 10));
+        let lane = if y_m + 0.9 > 12.5 { 3 } else { 2 };
         rows += &format!("{frame},1,{x_m:.2},{y_m},4.5,1.8,-30.0,0,0.5,0,0,{lane}\n");
     }
     for frame in 1..=30 {

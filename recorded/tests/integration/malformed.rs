@@ -211,7 +211,7 @@ fn a_vehicle_that_reappears_gets_a_second_track() {
     let at = |frame: i64, y: &str| {
         ngsim(&[(1, &frame.to_string()), (3, &(1_163_368_300_000 + 100 * frame).to_string()), (5, y)])
     };
-    let text = [at(5, "900"), at(2, "880"), at(1, "870"), at(6, "910")].join("\n") + "\n";
+    let text = [at(11, "900"), at(2, "880"), at(1, "870"), at(12, "910")].join("\n") + "\n";
     let data = read_from(text.as_bytes(), "x/i80.txt".as_ref()).unwrap();
     assert_eq!(data.name, "i80");
     let tracks: Vec<_> =

@@ -35,7 +35,7 @@ fn malformed_in_car_logs_are_rejected() {
         (with("0.08,2.4,-5.6,-30,1.9,1.8"), vec!["line 4", "`speed_mps`", "0 to 150"]),
         (with("0.08,2.4,-5.6,30,190,1.8"), vec!["line 4", "`left_marking_m`", "-20 to 20"]),
         (with("x,2.4,-5.6,30,1.9,1.8"), vec!["line 4", "`time_s`", "is `x`"]),
-        (in_car(&good).trim_end().to_owned(), vec!["line 4", "does not end"]),
+        (in_car(&good).trim_end().trim_end_matches('8').to_owned(), vec!["line 4", "does not end"]),
         (in_car(&["0,0,0,,1.9,1.8", "0.04,0,0,,1.9,1.8"]), vec!["no rows"]),
     ] {
         let error = read_text(text.as_bytes()).expect_err(&text);
