@@ -10,7 +10,6 @@
 //! The points of `clusters` and `rejected` are those of the sensor to the bit. Each has its beam (`beam`: column · layers + layer), the
 //! time after the start of the sweep at which it was measured (`offset_ns`), and its intensity as a reflectivity (`intensity`).
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float32Array, UInt16Array, UInt32Array};
@@ -28,6 +27,8 @@ use super::stream::Writer;
 use super::vehicles::yaw_rotation;
 use crate::run::film::{Film, Frame, NO_CLUSTER, Scan};
 
+/// Number of scans that are encoded at a time.
+const SCANS_PER_PIECE: usize = 8;
 /// Radius of the ball that shows a point (m).
 const POINT_RADIUS_M: f32 = 0.05;
 
@@ -55,13 +56,14 @@ fn write_lidar(writer: &Writer<'_>, root: &str, kept: Vec<(Time, &Scan)>) -> Res
     let (times, scans): (Vec<Time>, Vec<&Scan>) = kept.into_iter().unzip();
     let is_clustered = |scan: &Scan, point: usize| scan.clusters[point] != NO_CLUSTER;
     let shade = |scan: &Scan, point: usize| palette::intensity(scan.shade(point));
-    let write = |name: &str, layer: Layer, is_measured| {
-        write_layer(writer, &format!("{root}/{name}"), &times, &layer, is_measured)
-    };
-    let of_cluster = |scan: &Scan, point: usize| palette::cluster(scan.clusters[point]);
-    write("clusters", layer(&scans, |scan, point| is_clustered(scan, point).then(|| of_cluster(scan, point))), true)?;
-    write("intensity", layer(&scans, |scan, point| is_clustered(scan, point).then(|| shade(scan, point))), false)?;
-    write("rejected", layer(&scans, |scan, point| (!is_clustered(scan, point)).then(|| shade(scan, point))), true)?;
+    let path = |layer: &str| format!("{root}/{layer}");
+    let of_cluster =
+        |scan: &Scan, point: usize| is_clustered(scan, point).then(|| palette::cluster(scan.clusters[point]));
+    write_layer(writer, &path("clusters"), &times, &scans, of_cluster, true)?;
+    let by_intensity = |scan: &Scan, point: usize| is_clustered(scan, point).then(|| shade(scan, point));
+    write_layer(writer, &path("intensity"), &times, &scans, by_intensity, false)?;
+    let rejected = |scan: &Scan, point: usize| (!is_clustered(scan, point)).then(|| shade(scan, point));
+    write_layer(writer, &path("rejected"), &times, &scans, rejected, true)?;
     write_boxes(writer, &format!("{root}/boxes"), &times, &scans)?;
     Ok(["intensity", "rejected", "boxes"].map(|layer| format!("{root}/{layer}")).to_vec())
 }
@@ -76,16 +78,13 @@ struct Layer {
     intensities: Vec<f32>,
     /// Number of points of each scan.
     lengths: Vec<usize>,
-    /// Index of the first point of each scan.
-    starts: Vec<usize>,
 }
 
 /// Returns the layer of the points for which `colour` returns a colour.
-fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Layer {
+fn layer(scans: &[&Scan], colour: &impl Fn(&Scan, usize) -> Option<Rgba>) -> Layer {
     let mut layer = Layer::default();
     for scan in scans {
         let first = layer.points_m.len();
-        layer.starts.push(first);
         for (point, at_m) in scan.points_m().enumerate() {
             if let Some(colour) = colour(scan, point) {
                 layer.points_m.push(at_m);
@@ -100,40 +99,40 @@ fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Laye
     layer
 }
 
-/// Writes a layer, with what the sensor has measured of its points unless another layer has the same ones.
+/// Writes the layer of the points for which `colour` returns a colour, with what the sensor has measured of them unless
+/// another layer has the same ones. A few scans at a time are in memory as a layer.
 fn write_layer(
     writer: &Writer<'_>,
     entity: &str,
     times: &[Time],
-    layer: &Layer,
+    scans: &[&Scan],
+    colour: impl Fn(&Scan, usize) -> Option<Rgba>,
     is_measured: bool,
 ) -> Result<(), RecordingError> {
     writer.write_static(entity, &Points3D::update_fields().with_radii([POINT_RADIUS_M]))?;
-    writer.write_rows(entity, times, |range| {
-        let first = layer.starts[range.start];
-        let last = layer.starts.get(range.end).copied().unwrap_or(layer.points_m.len());
+    writer.write_rows_in_pieces(entity, times, SCANS_PER_PIECE, |range| {
+        let layer = layer(&scans[range], &colour);
+        let measured = if is_measured { Some(layer.measured()?) } else { None };
         let points = Points3D::update_fields()
-            .with_positions(layer.points_m[first..last].iter().copied())
-            .with_colors(layer.colours[first..last].iter().copied())
-            .columns(layer.lengths[range.clone()].iter().copied())?;
-        let measured = if is_measured { Some(layer.measured(first..last, &layer.lengths[range])?) } else { None };
+            .with_positions(layer.points_m)
+            .with_colors(layer.colours)
+            .columns(layer.lengths)?;
         Ok(points.chain(measured.into_iter().flatten()))
     })
 }
 
 impl Layer {
     /// Returns what the sensor has measured of the points besides their position.
-    fn measured(&self, points: Range<usize>, lengths: &[usize]) -> SerializationResult<[SerializedComponentColumn; 3]> {
+    fn measured(&self) -> SerializationResult<[SerializedComponentColumn; 3]> {
         let column = |name: &'static str, array: ArrayRef| {
             let component = ComponentIdentifier::from(name);
             let descriptor = ComponentDescriptor { archetype: None, component, component_type: None };
-            SerializedComponentBatch::new(array, descriptor).partitioned(lengths.iter().copied())
+            SerializedComponentBatch::new(array, descriptor).partitioned(self.lengths.iter().copied())
         };
-        let intensities = &self.intensities[points.clone()];
         Ok([
-            column("beam", Arc::new(UInt16Array::from(self.beams[points.clone()].to_vec())))?,
-            column("offset_ns", Arc::new(UInt32Array::from(self.offsets_ns[points].to_vec())))?,
-            column("intensity", Arc::new(Float32Array::from(intensities.to_vec())))?,
+            column("beam", Arc::new(UInt16Array::from(self.beams.clone())))?,
+            column("offset_ns", Arc::new(UInt32Array::from(self.offsets_ns.clone())))?,
+            column("intensity", Arc::new(Float32Array::from(self.intensities.clone())))?,
         ])
     }
 }

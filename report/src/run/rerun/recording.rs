@@ -36,11 +36,11 @@ impl Recording {
     /// Creates an empty recording. The viewer keeps one layout for each `application`.
     pub(super) fn new(application: &'static str, name: &str) -> Result<Self, RecordingError> {
         let stream = |kind| Stream::new(&StoreId::new(kind, application, name));
-        Ok(Self {
-            layout: stream(StoreKind::Blueprint)?,
-            fixed: stream(StoreKind::Recording)?,
-            moving: stream(StoreKind::Recording)?,
-        })
+        // The threads of the largest stream start first and end last. The allocator then gives them the memory that those of
+        // the recording before have left.
+        let moving = stream(StoreKind::Recording)?;
+        let fixed = stream(StoreKind::Recording)?;
+        Ok(Self { layout: stream(StoreKind::Blueprint)?, fixed, moving })
     }
 
     /// Adds components that hold on all timelines at all times.

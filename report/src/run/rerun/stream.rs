@@ -98,6 +98,28 @@ impl<'a> Writer<'a> {
         self.write_curve(entity, times, build)
     }
 
+    /// Writes rows like [`Self::write_rows`], in pieces of at most `piece` rows, for rows of many values: a recording is
+    /// encoded piece by piece, and each is in memory several times then.
+    pub(super) fn write_rows_in_pieces(
+        &self,
+        entity: &str,
+        times: &[Time],
+        piece: usize,
+        build: impl BuildColumns,
+    ) -> Result<(), RecordingError> {
+        let until_critical = times.partition_point(|&time| time <= self.critical);
+        if let Some(shown) = until_critical.checked_sub(1) {
+            let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
+            self.recording.send_columns(self.path(entity), self.copy_time(), columns)?;
+            self.clear_copy(entity, times[0])?;
+        }
+        (0..times.len()).step_by(piece).try_for_each(|first| {
+            let rows = first..(first + piece).min(times.len());
+            let columns = build(rows.clone()).map_err(RecordingStreamError::from)?;
+            self.recording.send_columns(self.path(entity), self.timelines(&times[rows]), columns)
+        })
+    }
+
     /// Writes rows like [`Self::write_rows`], without a copy. For data that a view shows over the whole run at once.
     pub(super) fn write_curve(
         &self,
