@@ -2,7 +2,7 @@
 //!
 //! The gates judge the last arm against the first one. With references between them, each arm is also compared with each arm
 //! before it. The p-values of all pairs of one scenario are corrected for the number of pairs (Holm: see
-//! [`closecall_traffic::statistics::holm`]); the intervals are those of each pair alone.
+//! [`closecall_traffic::statistics::holm`]); the intervals hold for each pair alone.
 
 use closecall_traffic::statistics::holm;
 

@@ -69,7 +69,7 @@ pub struct Folder {
     path: PathBuf,
 }
 
-/// How an outcome compares with that of the journal.
+/// How an outcome compares with the outcome in the journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Agreement {
     /// Every bit is the same.

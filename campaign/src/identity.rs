@@ -1,4 +1,4 @@
-//! Whose record a record is: its scenario, seed, sample, arms and parameters must be those of the plan.
+//! Whether a record belongs to its sample: scenario, seed, sample, arms and parameters must equal the plan.
 //!
 //! ```text
 //!  plan ─▶ scenario, sample, names of the arms, seed, drawn values
@@ -38,7 +38,7 @@ pub(crate) fn of_work(work: &Work) -> Identity<'_, impl Iterator<Item = &str> + 
 }
 
 impl<'a, Names: Iterator<Item = &'a str> + Clone> Identity<'_, Names> {
-    /// Checks that a record is that of the sample.
+    /// Checks that a record belongs to the sample.
     ///
     /// # Errors
     /// What differs, in words.
@@ -56,7 +56,7 @@ impl<'a, Names: Iterator<Item = &'a str> + Clone> Identity<'_, Names> {
         record.arms.iter().try_for_each(|arm| self.check_arm(arm, sample, &mut drawn))
     }
 
-    /// Checks that the outcome of an arm, if there is one, is that of the sample. `drawn` keeps the values of the sample from arm to arm.
+    /// Checks that the outcome of an arm, if there is one, belongs to the sample. `drawn` keeps the values of the sample from arm to arm.
     ///
     /// # Errors
     /// What differs, in words.

@@ -83,7 +83,7 @@ fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
     }
 }
 
-/// Largest number of samples that a percentile asks for (-): that of the 99.99th.
+/// Largest number of samples that a percentile asks for (-). The 99.99th percentile asks for it.
 const MOST_ASKED: u64 = 29_956;
 
 /// The value of a gate, with its interval.

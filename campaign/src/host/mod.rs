@@ -93,7 +93,7 @@ impl fmt::Display for Question {
 struct Answer<Q = Question> {
     /// The question as it was asked.
     question: Q,
-    /// The number of the process of which the one that answers is a copy; `None` if it is none.
+    /// The number of the process that was copied, if the answer comes from a copy; `None` otherwise.
     copied_from: Option<u32>,
     record: ArmRecord,
     /// Wall time, without the validity checks (s).
