@@ -48,7 +48,7 @@ pub struct PairResult<'a> {
     pub prevented_95: [f64; 2],
     /// The 95 % interval of the share of samples that the later arm induces.
     pub induced_95: [f64; 2],
-    /// p-value of the exact McNemar test; `None` if the number of samples was not fixed in advance.
+    /// Mid-p value of the McNemar test of *some vehicle collides*; `None` if the number of samples was not fixed in advance.
     pub mcnemar_p: Option<f64>,
     /// The same, corrected for the number of pairs (Holm).
     pub corrected_p: Option<f64>,

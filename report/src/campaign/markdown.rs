@@ -111,7 +111,7 @@ fn arm_pairs(summary: &Summary) -> String {
         }
     }
     text.push_str(&format!(
-        "\n<sub>All pairs of arms. Exact McNemar p, corrected for the number of pairs ({CORRECTION}).</sub>\n\n"
+        "\n<sub>All pairs of arms. McNemar mid-p, corrected for the number of pairs ({CORRECTION}).</sub>\n\n"
     ));
     text
 }

@@ -96,8 +96,9 @@ fn pairs(scenarios: &[(String, Counts)], inference: Inference) -> io::Result<Mar
         h2 { "What the controller under test changes" }
         (table(&head, &rows))
         p.note {
-            "McNemar p (exact, two-sided): the probability of a split at least this uneven if both arms are alike. It is "
-            "valid only if the number of samples was fixed in advance. Harm: " (harm::WEIGHT) "."
+            "McNemar p (mid-p, two-sided), of the samples in which some vehicle collides in one arm alone: the probability of "
+            "a split at least this uneven if both arms are alike. It is valid only if the number of samples was fixed in "
+            "advance. Harm: " (harm::WEIGHT) "."
         }
     })
 }
@@ -133,7 +134,7 @@ fn arm_pairs(summary: &Summary) -> Markup {
         h2 { "All pairs of arms" }
         (table(&head, &rows))
         p.note {
-            "Each arm with each arm before it, on the same samples. Exact McNemar p, corrected for the number of pairs of a "
+            "Each arm with each arm before it, on the same samples. McNemar mid-p, corrected for the number of pairs of a "
             "scenario (" (CORRECTION) "). The intervals are exact, each for its own share of the samples."
         }
     }
