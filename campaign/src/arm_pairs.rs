@@ -45,9 +45,9 @@ pub struct PairResult<'a> {
     /// What the later arm changes.
     pub pairs: &'a Pairs,
     /// The 95 % interval of the share of samples that the later arm prevents.
-    pub prevented_95: [f64; 2],
+    pub prevented_95: Option<[f64; 2]>,
     /// The 95 % interval of the share of samples that the later arm induces.
-    pub induced_95: [f64; 2],
+    pub induced_95: Option<[f64; 2]>,
     /// Mid-p value of the McNemar test of *some vehicle collides*; `None` if the number of samples was not fixed in advance.
     pub mcnemar_p: Option<f64>,
     /// The same, corrected for the number of pairs (Holm).

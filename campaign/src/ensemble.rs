@@ -2,9 +2,14 @@
 //!
 //! Each entry SCENARIO@MEMBER is a scenario of its own, with gates of its own. The verdict here is a statement about the
 //! members of one scenario together: which share of the baseline's collisions is prevented, in which share of the samples
-//! a collision is induced, and how much harm changes. The members are no sample of drivers: no weights are assumed, and no
-//! interval is stated over members. Of an even number of members, the less favourable of the two in the middle is
-//! the median, so that the median is always a member.
+//! a collision is induced, and how much harm changes. The members are no sample of drivers: no weights are assumed. Of an
+//! even number of members, the less favourable of the two in the middle is the median, so that the median is always a
+//! member.
+//!
+//! The member that looks worst is chosen by the data, so its own 95 % interval covers the worst share in fewer than 95 %
+//! of repetitions. The intervals of median and worst come from intervals that hold for all m members at once (Bonferroni:
+//! each with 1 - 0.05/m). If all of them hold, the worst share lies between the worst of their lower and the worst of
+//! their upper bounds, and likewise the median.
 
 use std::collections::BTreeMap;
 
@@ -54,10 +59,12 @@ impl Quantity {
         !matches!(self, Self::HarmChange)
     }
 
-    /// Returns the value of one entry and, of a share, its 95 % interval; `None` if it is not defined.
-    fn of(self, counts: &Counts, inference: Inference, tested: usize) -> Option<(f64, Option<[f64; 2]>)> {
-        let share =
-            |hits: u64, of: u64| (of > 0).then(|| (hits as f64 / of as f64, Some(inference.interval_95(hits, of))));
+    /// Returns what one entry shows; `None` if the quantity is not defined.
+    fn of(self, counts: &Counts, tested: usize) -> Option<Observed> {
+        let share = |hits: u64, samples: u64| {
+            (samples > 0)
+                .then(|| Observed { value: hits as f64 / samples as f64, hits_of_samples: Some([hits, samples]) })
+        };
         let with_baseline = |pair: &&ArmPair| (pair.baseline, pair.tested) == (0, tested);
         let pairs = match counts.arm_pairs.iter().find(with_baseline) {
             Some(pair) if tested + 1 < counts.arms.len() => &pair.pairs,
@@ -67,9 +74,23 @@ impl Quantity {
         match self {
             Self::Prevented => share(pairs.prevented, pairs.prevented + pairs.both),
             Self::Induced => share(pairs.induced, all),
-            Self::HarmChange => (all > 0).then(|| ((pairs.induced_harm - pairs.prevented_harm) / all as f64, None)),
+            Self::HarmChange => (all > 0).then(|| Observed {
+                value: (pairs.induced_harm - pairs.prevented_harm) / all as f64,
+                hits_of_samples: None,
+            }),
             Self::Collisions => counts.arms.get(tested).and_then(|arm| share(arm.collisions, arm.outcomes)),
         }
+    }
+
+    /// Returns the interval of the value at a rank, the most favourable first, from intervals that hold at once: both bounds
+    /// are those at the same rank.
+    fn interval_of_rank(self, intervals: &[[f64; 2]], rank: usize) -> Option<[f64; 2]> {
+        let bound = |side: usize| {
+            let mut bounds: Vec<f64> = intervals.iter().map(|interval| interval[side]).collect();
+            bounds.sort_by(|a, b| self.badness(*a).total_cmp(&self.badness(*b)));
+            bounds.get(rank).copied()
+        };
+        Some([bound(0)?, bound(1)?])
     }
 
     /// Returns how unfavourable a value is: larger is worse.
@@ -78,6 +99,18 @@ impl Quantity {
     }
 }
 
+/// What one entry shows.
+#[derive(Clone, Copy, Debug)]
+struct Observed {
+    /// The value of the quantity.
+    value: f64,
+    /// Hits and samples of a share.
+    hits_of_samples: Option<[u64; 2]>,
+}
+
+/// Share of repetitions in which the interval of the median or the worst member covers the true value, at least (-).
+const COVERAGE: f64 = 0.95;
+
 /// The value of one member.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MemberValue {
@@ -85,7 +118,8 @@ pub struct MemberValue {
     pub member: String,
     /// The value.
     pub value: f64,
-    /// The 95 % interval of a share.
+    /// The 95 % interval of a share: of the member alone in [`Spread::values`], simultaneous over the members in
+    /// [`Spread::median`] and [`Spread::worst`]. `None` if no bound is valid.
     pub interval_95: Option<[f64; 2]>,
 }
 
@@ -154,25 +188,44 @@ pub fn verdicts_of_arm(summary: &Summary, without_effect: &[(String, String)], t
 /// Returns median and worst member, or `None` if the quantity is defined for no member.
 fn spread(quantity: Quantity, entries: &[(&str, &Counts)], inference: Inference, tested: usize) -> Option<Spread> {
     let mut undefined = Vec::new();
-    let mut values = Vec::new();
+    let mut observed = Vec::new();
     for (member, counts) in entries {
-        match quantity.of(counts, inference, tested) {
-            Some((value, interval_95)) => {
-                values.push(MemberValue { member: (*member).to_owned(), value, interval_95 });
-            }
+        match quantity.of(counts, tested) {
+            Some(value) => observed.push((*member, value)),
             None => undefined.push((*member).to_owned()),
         }
     }
+    let interval = |observed: Observed, coverage: f64| {
+        let [hits, samples] = observed.hits_of_samples?;
+        inference.interval(hits, samples, coverage)
+    };
+    let mut values: Vec<MemberValue> = observed
+        .iter()
+        .map(|&(member, observed)| MemberValue {
+            member: member.to_owned(),
+            value: observed.value,
+            interval_95: interval(observed, COVERAGE),
+        })
+        .collect();
     values.sort_by(|a, b| {
         quantity.badness(a.value).total_cmp(&quantity.badness(b.value)).then_with(|| a.member.cmp(&b.member))
     });
-    let median = values.get(values.len() / 2)?.clone();
-    let worst = values.last()?.clone();
+    let at_once = 1.0 - (1.0 - COVERAGE) / observed.len().max(1) as f64;
+    let intervals: Option<Vec<[f64; 2]>> = observed.iter().map(|&(_, observed)| interval(observed, at_once)).collect();
+    let ranked = |rank: usize| {
+        let member = values.get(rank)?;
+        let interval_95 = intervals.as_deref().and_then(|intervals| quantity.interval_of_rank(intervals, rank));
+        Some(MemberValue { interval_95, ..member.clone() })
+    };
+    let (median, worst) = (ranked(values.len() / 2)?, ranked(values.len().checked_sub(1)?)?);
     Some(Spread { quantity, median, worst, values, undefined })
 }
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::Stream;
+    use rand::{RngExt, SeedableRng};
+
     use super::*;
     use crate::ledger::{ArmCounts, Pairs};
 
@@ -215,6 +268,42 @@ mod tests {
         assert_eq!(named(2), ("slow", -0.025, "alert", 0.005));
         let interval = verdict.spreads[0].worst.interval_95.unwrap();
         assert!(interval[0] < 0.6 && 0.6 < interval[1] && verdict.spreads[2].worst.interval_95.is_none());
+    }
+
+    /// Twelve alike members: the one that looks worst is so by chance. Its own interval would miss the true share in every
+    /// second repetition.
+    #[test]
+    fn the_interval_of_the_worst_member_covers_the_worst_share() {
+        const MEMBERS: usize = 12;
+        const SAMPLES: u64 = 300;
+        const REPETITIONS: usize = 1_000;
+        for truths in [[0.05; MEMBERS], std::array::from_fn(|member| 0.01 + 0.005 * member as f64)] {
+            let worst_truth = truths[MEMBERS - 1];
+            let mut random = Stream::seed_from_u64(1);
+            let covered = |interval: Option<[f64; 2]>| {
+                interval.is_some_and(|[low, high]| low <= worst_truth && worst_truth <= high)
+            };
+            let (mut at_once, mut alone) = (0, 0);
+            for _ in 0..REPETITIONS {
+                let entries: Vec<(String, Pairs)> = truths
+                    .iter()
+                    .enumerate()
+                    .map(|(member, truth)| {
+                        let induced = (0..SAMPLES).filter(|_| random.random_bool(*truth)).count() as u64;
+                        let neither = SAMPLES - induced;
+                        (format!("a@{member}"), Pairs { induced, neither, ..Pairs::default() })
+                    })
+                    .collect();
+                let entries: Vec<(&str, Pairs)> = entries.iter().map(|(name, pairs)| (name.as_str(), *pairs)).collect();
+                let verdicts = verdicts(&summary(&entries), &[]);
+                let induced = &verdicts[0].spreads[0];
+                assert_eq!(induced.quantity, Quantity::Induced);
+                at_once += usize::from(covered(induced.worst.interval_95));
+                alone += usize::from(covered(induced.values.last().unwrap().interval_95));
+            }
+            assert!(at_once >= 940, "{at_once} of {REPETITIONS}");
+            assert!(alone < at_once, "{alone} of {REPETITIONS} by the interval of the member alone");
+        }
     }
 
     #[test]

@@ -17,31 +17,42 @@ pub enum Inference {
     FixedSamples,
     /// The number follows from the outcomes or the clock: a confidence sequence, valid for every stopping rule.
     Sequential,
+    /// The samples are points of a design, Sobol or grid: they are not independent, and no bound of a probability is valid.
+    Design,
 }
 
 impl Inference {
-    /// Returns the one-sided upper bound of a probability.
-    pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
+    /// Returns the one-sided upper bound of a probability; `None` if no bound is valid.
+    pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> Option<f64> {
         match self {
-            Self::FixedSamples => interval::upper_bound(hits, samples, confidence),
-            Self::Sequential => sequence::upper_bound(hits, samples, confidence),
+            Self::FixedSamples => Some(interval::upper_bound(hits, samples, confidence)),
+            Self::Sequential => Some(sequence::upper_bound(hits, samples, confidence)),
+            Self::Design => None,
         }
     }
 
-    /// Returns the one-sided lower bound of a probability.
-    pub fn lower_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
+    /// Returns the one-sided lower bound of a probability; `None` if no bound is valid.
+    pub fn lower_bound(self, hits: u64, samples: u64, confidence: f64) -> Option<f64> {
         match self {
-            Self::FixedSamples => interval::lower_bound(hits, samples, confidence),
-            Self::Sequential => sequence::lower_bound(hits, samples, confidence),
+            Self::FixedSamples => Some(interval::lower_bound(hits, samples, confidence)),
+            Self::Sequential => Some(sequence::lower_bound(hits, samples, confidence)),
+            Self::Design => None,
         }
     }
 
-    /// Returns the two-sided interval at 95 %.
-    pub fn interval_95(self, hits: u64, samples: u64) -> [f64; 2] {
+    /// Returns the two-sided interval that covers the probability in a share `coverage` of repetitions; `None` if no bound
+    /// is valid.
+    pub fn interval(self, hits: u64, samples: u64, coverage: f64) -> Option<[f64; 2]> {
         match self {
-            Self::FixedSamples => interval::clopper_pearson(hits, samples, COVERAGE),
-            Self::Sequential => sequence::interval(hits, samples, COVERAGE),
+            Self::FixedSamples => Some(interval::clopper_pearson(hits, samples, coverage)),
+            Self::Sequential => Some(sequence::interval(hits, samples, coverage)),
+            Self::Design => None,
         }
+    }
+
+    /// Returns the two-sided interval at 95 %; `None` if no bound is valid.
+    pub fn interval_95(self, hits: u64, samples: u64) -> Option<[f64; 2]> {
+        self.interval(hits, samples, COVERAGE)
     }
 
     /// Returns the name of the method, for reports.
@@ -49,6 +60,7 @@ impl Inference {
         match self {
             Self::FixedSamples => "clopper-pearson",
             Self::Sequential => "confidence-sequence",
+            Self::Design => "none",
         }
     }
 }
@@ -176,8 +188,8 @@ impl ArmCounts {
         (self.outcomes > 0).then(|| count as f64 / self.outcomes as f64)
     }
 
-    /// Returns the 95 % interval of the probability of a collision, given the sampled scenario.
-    pub fn interval_95(&self, inference: Inference) -> [f64; 2] {
+    /// Returns the 95 % interval of the probability of a collision, given the sampled scenario; `None` if no bound is valid.
+    pub fn interval_95(&self, inference: Inference) -> Option<[f64; 2]> {
         inference.interval_95(self.collisions, self.outcomes)
     }
 }
@@ -327,6 +339,7 @@ mod tests {
         assert_eq!((pairs.prevented_harm, pairs.induced_harm), (0.5, 0.75));
         assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(0.5));
         assert_eq!(pairs.mcnemar_p(Inference::Sequential), None);
+        assert_eq!(pairs.mcnemar_p(Inference::Design), None);
     }
 
     #[test]

@@ -13,6 +13,7 @@
 
 use serde::Serialize;
 
+use super::gate::OpenReason;
 use super::ledger::{ArmCounts, Inference};
 use closecall_traffic::statistics::binomial::at_most;
 pub use closecall_traffic::statistics::format::percent;
@@ -76,15 +77,25 @@ impl ProbabilityGate {
         let (hits, samples) = (counts.collisions, counts.outcomes);
         let upper_bound = inference.upper_bound(hits, samples, self.confidence);
         let lower_bound = inference.lower_bound(hits, samples, self.confidence_to_fail(scenarios));
-        let answer = if upper_bound <= self.max {
+        let (max, confidence) = (self.max, self.confidence);
+        let (Some(upper_bound), Some(lower_bound)) = (upper_bound, lower_bound) else {
+            return Finding {
+                answer: Answer::Open,
+                max,
+                confidence,
+                lower_bound: 0.0,
+                upper_bound: 1.0,
+                missing: None,
+            };
+        };
+        let answer = if upper_bound <= max {
             Answer::Below
-        } else if lower_bound >= self.max {
+        } else if lower_bound >= max {
             Answer::Above
         } else {
             Answer::Open
         };
         let missing = (answer == Answer::Open).then(|| self.missing(hits, samples, inference));
-        let (max, confidence) = (self.max, self.confidence);
         Finding { answer, max, confidence, lower_bound, upper_bound, missing }
     }
 
@@ -107,6 +118,7 @@ impl ProbabilityGate {
         let passes = |hits, samples| match inference {
             Inference::FixedSamples => at_most(hits, samples, self.max) <= 1.0 - self.confidence,
             Inference::Sequential => is_certain(evidence_below(hits, samples, self.max), self.confidence),
+            Inference::Design => false,
         };
         let more = |total: Option<u64>| total.map(|total| total.saturating_sub(samples));
         // At a rate that is not below what is allowed no number is enough: there is nothing to look for.
@@ -141,7 +153,7 @@ pub struct Finding {
     pub lower_bound: f64,
     /// One-sided upper bound of the probability.
     pub upper_bound: f64,
-    /// How many samples more are needed, where they do not say.
+    /// How many samples more are needed, where they do not say; `None` also if no number of samples of this design says it.
     pub missing: Option<Missing>,
 }
 
@@ -170,7 +182,7 @@ impl Finding {
             (Answer::Open, missing) => format!(
                 "the collision probability is between {low} and {high} ({hits} of {samples}, {confidence} confidence), \
                  {allowed} allowed: {}",
-                missing.map(|missing| missing.sentence()).unwrap_or_default()
+                missing.map_or_else(|| OpenReason::DependentSamples.text().to_owned(), |missing| missing.sentence())
             ),
         }
     }
@@ -207,6 +219,12 @@ mod tests {
         assert_eq!(open.answer, Answer::Open);
         assert_eq!(open.missing, Some(Missing { without_collisions: Some(99), at_observed_rate: Some(99) }));
         assert_eq!(judge(0.01, 0, 0, Inference::FixedSamples).answer, Answer::Open, "nothing says nothing");
+        let of_design = judge(0.01, 0, 100_000, Inference::Design);
+        assert_eq!(
+            (of_design.answer, of_design.missing),
+            (Answer::Open, None),
+            "points of a design show no probability"
+        );
     }
 
     #[test]
@@ -224,8 +242,9 @@ mod tests {
         for collisions in 0..60 {
             for outcomes in collisions.max(1)..60 {
                 let counts = ArmCounts { outcomes, collisions, ..ArmCounts::default() };
-                let upper_bound = Inference::Sequential.upper_bound(collisions, outcomes, 0.95);
-                let lower_bound = Inference::Sequential.lower_bound(collisions, outcomes, gate.confidence_to_fail(3));
+                let upper_bound = Inference::Sequential.upper_bound(collisions, outcomes, 0.95).unwrap();
+                let lower_bound =
+                    Inference::Sequential.lower_bound(collisions, outcomes, gate.confidence_to_fail(3)).unwrap();
                 let answers = upper_bound <= gate.max() || lower_bound >= gate.max();
                 assert_eq!(gate.is_settled(&counts, 3), answers, "{collisions} of {outcomes}");
             }

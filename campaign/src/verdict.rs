@@ -235,9 +235,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     }
     let requirements = judge.requirements(&gates);
     let has_criteria = |requirement: &RequirementResult| {
-        gates
-            .iter()
-            .any(|gate| gate.scenario.as_deref() == Some(&requirement.scenario) && gate.is_of(&requirement.mark))
+        gates.iter().any(|gate| gate.scenario == requirement.scenario && gate.is_of(&requirement.mark))
     };
     for requirement in requirements.iter().filter(|requirement| !has_criteria(requirement)) {
         found.note(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));

@@ -177,7 +177,7 @@ impl CampaignArgs {
         plan.use_sensors(self.sensors.map(SensorsChoice::mode))?;
         plan.partition = self.partition;
         plan.checks = self.plan.checks()?;
-        plan.inference = self.plan.inference();
+        plan.inference = self.plan.inference(self.design)?;
         plan.workers = self.workers()?;
         plan.retry_crashed = self.retry_crashed;
         Ok(plan)

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use closecall_campaign::arguments::{confidence, positive, probability, share};
-use closecall_campaign::gate::{AssemblyError, GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec, Scope};
+use closecall_campaign::gate::{AssemblyError, GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec};
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::criteria::Expression;
@@ -22,10 +22,10 @@ pub(super) struct GateArgs {
     #[arg(long, conflicts_with_all = ["require", "max_collisions", "max_other_collisions", "max_probability", "max_induced",
         "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk", "max_flaky"], help_heading = heading::GATES)]
     no_gate: bool,
-    /// Fail if the ego collides in more than K samples
+    /// Fail if the ego collides in more than K samples of any scenario
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_collisions: Option<u64>,
-    /// Fail if vehicles other than the ego collide with each other in more than K samples
+    /// Fail if vehicles other than the ego collide with each other in more than K samples of any scenario
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_other_collisions: Option<u64>,
     /// Pass only if the samples show, for every scenario, that the probability of a collision of the ego is at most P.
@@ -35,7 +35,8 @@ pub(super) struct GateArgs {
     /// Confidence with which --max-probability is to be shown, above 0.5 and below 1 [default: 0.95]
     #[arg(long, value_name = "C", value_parser = confidence, requires = "max_probability", help_heading = heading::GATES)]
     confidence: Option<f64>,
-    /// Fail if the ego collides in more than K samples in which it does not collide with the baseline; needs --paired
+    /// Fail if the ego collides in more than K samples of any scenario in which it does not collide with the baseline; needs
+    /// --paired
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     pub(super) max_induced: Option<u64>,
     /// Pass only if, in every scenario, at least this share (0 to 1) of the baseline's collisions is prevented, with 95 %
@@ -90,7 +91,7 @@ impl GateArgs {
     }
 
     /// Returns the criteria that the options stand for.
-    fn criteria(&self) -> Result<Vec<(Expression, Scope)>, CliError> {
+    fn criteria(&self) -> Result<Vec<Expression>, CliError> {
         let options = GateOptions {
             max_collisions: self.max_collisions,
             max_other_collisions: self.max_other_collisions,
@@ -102,8 +103,7 @@ impl GateArgs {
             max_speed_deficit_mps: self.max_speed_deficit_mps,
             max_jerk: self.max_jerk,
         };
-        let own = self.require.iter().map(|&expression| (expression, Scope::EachScenario));
-        Ok(own.chain(options.criteria().map_err(CliError::usage)?).collect())
+        Ok(self.require.iter().copied().chain(options.criteria().map_err(CliError::usage)?).collect())
     }
 
     /// Returns the gate on the probability of a collision.

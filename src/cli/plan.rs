@@ -8,6 +8,7 @@ use closecall_campaign::gate::PresetGates;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::stop::duration;
 use closecall_campaign::validity::CheckPlan;
+use closecall_scenarios::sampling::Design;
 
 use super::CliError;
 use super::help::heading;
@@ -94,10 +95,7 @@ impl PlanArgs {
 
     /// Returns the largest number of samples of each scenario.
     pub(super) fn samples(&self) -> u64 {
-        let default = match self.inference() {
-            Inference::FixedSamples => SAMPLES,
-            Inference::Sequential => MAX_SAMPLES,
-        };
+        let default = if self.is_sequential() { MAX_SAMPLES } else { SAMPLES };
         self.samples.or(self.preset.map(Preset::samples)).unwrap_or(default)
     }
 
@@ -111,9 +109,21 @@ impl PlanArgs {
         self.preset.is_some()
     }
 
-    /// Returns what determines the number of samples.
-    pub(super) fn inference(&self) -> Inference {
-        if self.until_certain || self.time_budget.is_some() { Inference::Sequential } else { Inference::FixedSamples }
+    /// Returns which bounds of a probability the samples of a design allow.
+    pub(super) fn inference(&self, design: Design) -> Result<Inference, CliError> {
+        match (design, self.is_sequential()) {
+            (Design::Random, true) => Ok(Inference::Sequential),
+            (Design::Random, false) => Ok(Inference::FixedSamples),
+            (_, false) => Ok(Inference::Design),
+            (design, true) => Err(CliError::usage(format!(
+                "--time-budget needs independent samples, and those of --design {design} are not: use --design random"
+            ))),
+        }
+    }
+
+    /// Returns true if the outcomes or the clock determine the number of samples.
+    const fn is_sequential(&self) -> bool {
+        self.until_certain || self.time_budget.is_some()
     }
 
     /// Returns the samples that are checked.

@@ -299,3 +299,54 @@ fn a_twin_finds_what_the_system_induces_where_nothing_happens() {
     let busy = traffic("busy-overtake-without-brake");
     assert!(busy.is_file(), "{}", busy.display());
 }
+
+#[test]
+fn the_points_of_a_design_bound_no_probability() {
+    for design in ["sobol", "grid"] {
+        let folder = folder();
+        let text = paper_figure_with(
+            "brake-mps2 = { uniform = { min = 5.0, max = 6.0 }, assumed = \"any range does\" }",
+            "deceleration-mps2 = 6.0",
+            "deceleration-mps2 = \"$brake-mps2\"",
+        );
+        let text = format!("{text}\n[gate]\nmax-probability = 0.9\n");
+        let path = scenario(folder.path(), &text);
+        let more =
+            ["-n", "64", "--paired", "--sensors", "object", "--design", design, "--gate", "upper(induced) <= 0.9"];
+        let value = json(&campaign(&path, &[&more[..], &["--format", "json"]].concat()), 4);
+        assert_eq!(value["verdict"], "INCONCLUSIVE", "{design}");
+        for arm in ["acc", "mis"] {
+            assert!(value["controllers"][arm]["interval_95"].is_null(), "{design} {arm}");
+        }
+        assert!(value["paired"]["mcnemar_p"].is_null(), "{design}");
+        let text = stdout(&campaign(&path, &more), 4);
+        assert!(text.contains("--design sobol and grid are not independent") && !text.contains("(95 %"), "{text}");
+    }
+    let message = message(&campaign(&library("low-thw-overtake"), &["--design", "grid", "--time-budget", "1s"]), 2);
+    assert!(message.contains("--design random"), "{message}");
+}
+
+#[test]
+fn a_limit_of_collisions_holds_for_each_scenario() {
+    let scenarios = ["low-thw-overtake", "low-thw-overtake-at-cut-out"];
+    let paths = scenarios.map(library);
+    let run = |limit: u64, exit_code: i32| {
+        let limit = limit.to_string();
+        let more =
+            ["-n", "60", "--controller", "acc", "--sensors", "ground-truth", "--format", "json", "--max-collisions"];
+        let paths = paths.iter().map(|path| path.to_str().unwrap());
+        json(&closecall(["campaign"].into_iter().chain(paths).chain(more).chain([limit.as_str()])), exit_code)
+    };
+    let value = run(0, 1);
+    let collisions =
+        scenarios.map(|name| value["scenarios"][name]["controllers"]["acc"]["collisions"].as_u64().unwrap());
+    let most = collisions.into_iter().max().unwrap();
+    assert!(collisions.iter().sum::<u64>() > most, "{collisions:?}");
+    let passed = |value: &serde_json::Value| -> Vec<Option<bool>> {
+        let is_limit = |gate: &&serde_json::Value| gate["subject"] == "count(ego_collided)";
+        value["gates"].as_array().unwrap().iter().filter(is_limit).map(|gate| gate["passed"].as_bool()).collect()
+    };
+    // Together they collide more often than is allowed, and that is not asked.
+    assert_eq!(passed(&run(most, 0)), [Some(true); 2]);
+    assert!(passed(&run(most - 1, 1)).contains(&Some(false)));
+}

@@ -78,7 +78,7 @@ fn the_intervals_of_a_thousand_campaigns_cover_the_true_probability() {
     let covered = (0..CAMPAIGNS)
         .filter(|seed| {
             let counts = run(*seed, SAMPLES, |_| false, |_| {});
-            let [low, high] = counts.interval_95(Inference::FixedSamples);
+            let [low, high] = counts.interval_95(Inference::FixedSamples).unwrap();
             low <= TRUTH && TRUTH <= high
         })
         .count();

@@ -27,6 +27,7 @@ use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::BuiltIn;
+use closecall_traffic::statistics::interval::clopper_pearson;
 use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
 
 /// Collision probability of the scenario, by construction.
@@ -81,7 +82,7 @@ pub(crate) fn main(words: Vec<String>) -> Result<ExitCode, Box<dyn std::error::E
     let (mut covered, mut below, mut above, mut outside) = (0_u64, 0_u64, 0_u64, 0_u64);
     for seed in 0..campaigns {
         let fixed = run(seed, FIXED, |_| false)?.counts;
-        let [low, high] = Inference::FixedSamples.interval_95(fixed.collisions, fixed.outcomes);
+        let [low, high] = clopper_pearson(fixed.collisions, fixed.outcomes, 0.95);
         covered += u64::from(low <= TRUTH && TRUTH <= high);
         let peeked = run(seed, MOST, |counts| gate.is_settled(counts, 1))?;
         let answer = gate.judge(&peeked.counts, 1, Inference::Sequential).answer;

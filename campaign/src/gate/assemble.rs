@@ -3,7 +3,7 @@
 use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
 
-use super::{GateSet, GateSource, GateSpec, ProjectError, ProjectFile, Scope};
+use super::{GateSet, GateSource, GateSpec, ProjectError, ProjectFile};
 
 /// The gates that a preset adds.
 #[derive(Clone, Copy, Debug)]
@@ -48,21 +48,21 @@ impl GateSet {
     /// [`AssemblyError`] if a gate does not fit the campaign.
     pub fn assemble(
         &mut self,
-        command_line: Vec<(Expression, Scope)>,
+        command_line: Vec<Expression>,
         preset: Option<PresetGates>,
         is_paired: bool,
         design: Design,
     ) -> Result<(), AssemblyError> {
-        for (expression, scope) in command_line {
+        for expression in command_line {
             if expression.needs_pairs() && !is_paired {
                 return Err(AssemblyError::NoBaseline { expression });
             }
-            self.push(GateSpec { expression, source: GateSource::CommandLine, scope });
+            self.push(GateSpec { expression, source: GateSource::CommandLine });
         }
         for (name, text) in preset.iter().flat_map(|preset| preset.require.iter().map(|text| (preset.name, text))) {
             let expression: Result<Expression, _> = text.parse();
             let expression = expression.map_err(|error| AssemblyError::Preset { message: error.to_string() })?;
-            self.push(GateSpec { expression, source: GateSource::Preset(name), scope: Scope::EachScenario });
+            self.push(GateSpec { expression, source: GateSource::Preset(name) });
         }
         let here = std::env::current_dir().ok();
         if let Some(project) = here.map(|folder| ProjectFile::find(&folder)).transpose()?.flatten() {

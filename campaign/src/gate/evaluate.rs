@@ -34,6 +34,8 @@ pub enum OpenReason {
     NothingVaries,
     /// A controller from outside reports the value of itself.
     SelfReported,
+    /// The samples are points of a design, and a bound of a probability needs independent ones.
+    DependentSamples,
 }
 
 impl OpenReason {
@@ -43,6 +45,9 @@ impl OpenReason {
             Self::TooFewSamples => "too few samples to decide",
             Self::NoSamples => "no sample has this value",
             Self::NotPaired => "it needs --paired",
+            Self::DependentSamples => {
+                "the samples of --design sobol and grid are not independent, so that no probability can be bounded"
+            }
             Self::NothingVaries => "no parameter varies enough, so that no probability can be bounded",
             Self::SelfReported => {
                 "a controller from outside reports it of itself: judge a measured value, such as slowed_for_rear"
@@ -146,8 +151,9 @@ impl Accumulator {
         let Evidence { is_paired, is_varied, is_built_in, inference } = *evidence;
         let Expression { aggregate, operator, bound, .. } = self.expression;
         let (hits, samples) = (self.hits, self.samples);
-        let interval_95 =
-            (aggregate.is_of_flag() && samples > 0 && is_varied).then(|| inference.interval_95(hits, samples));
+        let interval_95 = (aggregate.is_of_flag() && samples > 0 && is_varied)
+            .then(|| inference.interval_95(hits, samples))
+            .flatten();
         let value = (samples > 0 || aggregate == Aggregate::Count).then(|| self.value(inference)).flatten();
         let open = |reason| Evaluation { value, interval_95, samples, answer: Answer::Open(reason) };
         if self.expression.needs_pairs() && !is_paired {
@@ -161,6 +167,9 @@ impl Accumulator {
         let is_bound = matches!(aggregate, Aggregate::Lower | Aggregate::Upper);
         if is_bound && !is_varied {
             return open(OpenReason::NothingVaries);
+        }
+        if is_bound && inference == Inference::Design {
+            return open(OpenReason::DependentSamples);
         }
         let Some(found) = value.filter(|_| samples > 0) else { return open(OpenReason::NoSamples) };
         let is_enough = samples >= least_samples(aggregate, is_varied);
@@ -182,7 +191,7 @@ impl Accumulator {
             Aggregate::Lower => inference.upper_bound(self.hits, self.samples, CONFIDENCE),
             _ => inference.lower_bound(self.hits, self.samples, CONFIDENCE),
         };
-        self.expression.operator.holds(other, self.expression.bound)
+        other.is_none_or(|other| self.expression.operator.holds(other, self.expression.bound))
     }
 
     fn value(&self, inference: Inference) -> Option<f64> {
@@ -190,8 +199,8 @@ impl Accumulator {
         match self.expression.aggregate {
             Aggregate::Count => Some(hits as f64),
             Aggregate::Share => Some(hits as f64 / samples as f64),
-            Aggregate::Lower => Some(inference.lower_bound(hits, samples, CONFIDENCE)),
-            Aggregate::Upper => Some(inference.upper_bound(hits, samples, CONFIDENCE)),
+            Aggregate::Lower => inference.lower_bound(hits, samples, CONFIDENCE),
+            Aggregate::Upper => inference.upper_bound(hits, samples, CONFIDENCE),
             Aggregate::Min => self.smallest,
             Aggregate::Max => self.largest,
             Aggregate::Mean => Some(self.sum / samples as f64),

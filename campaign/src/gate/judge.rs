@@ -56,7 +56,6 @@ pub struct Judge {
     is_built_in: [bool; 2],
     inference: Inference,
     scenarios: Vec<Judged>,
-    all: Vec<Gate>,
 }
 
 impl Judge {
@@ -92,7 +91,6 @@ impl Judge {
             is_built_in: [is_built_in(arms.first()), is_built_in(arms.last())],
             inference,
             scenarios: works.iter().map(judged).collect(),
-            all: set.of_all().map(Gate::new).collect(),
         }
     }
 
@@ -104,7 +102,7 @@ impl Judge {
             return;
         }
         judged.observe_expectations(record);
-        for gate in judged.gates.iter_mut().chain(&mut self.all) {
+        for gate in &mut judged.gates {
             gate.accumulator.push(record);
         }
     }
@@ -143,8 +141,8 @@ impl Judge {
 
     /// Returns the result of every gate and requirement check, scenario by scenario.
     pub fn gates(&self) -> Vec<GateResult> {
-        let result = |gate: &Gate, scenario: Option<&str>, is_varied: bool| GateResult {
-            scenario: scenario.map(str::to_owned),
+        let result = |gate: &Gate, scenario: &str, is_varied: bool| GateResult {
+            scenario: scenario.to_owned(),
             expression: gate.spec.expression,
             source: gate.spec.source.clone(),
             evaluation: gate.accumulator.evaluate(&Evidence {
@@ -154,12 +152,10 @@ impl Judge {
                 inference: self.inference,
             }),
         };
-        let is_any_varied = self.scenarios.iter().any(|judged| judged.is_varied);
-        let all = self.all.iter().map(|gate| result(gate, None, is_any_varied));
-        let each = self.scenarios.iter().flat_map(|judged| {
-            judged.gates.iter().map(|gate| result(gate, Some(&judged.scenario), judged.is_varied)).collect::<Vec<_>>()
-        });
-        each.chain(all).collect()
+        let of_scenario = |judged: &Judged| -> Vec<GateResult> {
+            judged.gates.iter().map(|gate| result(gate, &judged.scenario, judged.is_varied)).collect()
+        };
+        self.scenarios.iter().flat_map(of_scenario).collect()
     }
 
     /// Returns how each requirement fares in each scenario that names it, in the order of the marks.
@@ -167,8 +163,7 @@ impl Judge {
         let mut results = Vec::new();
         for judged in &self.scenarios {
             for mark in &judged.requirements {
-                let is_check =
-                    |gate: &&GateResult| gate.scenario.as_deref() == Some(&judged.scenario) && gate.is_of(mark);
+                let is_check = |gate: &&GateResult| gate.scenario == judged.scenario && gate.is_of(mark);
                 let standing = gates.iter().filter(is_check).map(GateResult::standing).max();
                 results.push(RequirementResult {
                     mark: mark.clone(),

@@ -2,16 +2,14 @@
 
 use closecall_scenarios::criteria::Expression;
 
-use super::Scope;
-
 /// The options, each `None` if it is not given. All bounds are inclusive.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GateOptions {
-    /// Most samples in which the ego collides, over all scenarios.
+    /// Most samples in which the ego collides of any scenario.
     pub max_collisions: Option<u64>,
-    /// Most samples in which vehicles other than the ego collide, over all scenarios.
+    /// Most samples in which vehicles other than the ego collide in any scenario.
     pub max_other_collisions: Option<u64>,
-    /// Most induced collisions, over all scenarios.
+    /// Most induced collisions in any scenario.
     pub max_induced: Option<u64>,
     /// Least share of the baseline's collisions that is prevented, with 95 % confidence.
     pub min_prevented: Option<f64>,
@@ -32,21 +30,18 @@ impl GateOptions {
     ///
     /// # Errors
     /// The message of a criterion that cannot be read: a bound that is not finite.
-    pub fn criteria(&self) -> Result<Vec<(Expression, Scope)>, String> {
-        let each = |text: String| (text, Scope::EachScenario);
-        let all = |text: String| (text, Scope::AllScenarios);
+    pub fn criteria(&self) -> Result<Vec<Expression>, String> {
         let options = [
-            self.max_collisions.map(|most| all(format!("count(ego_collided) <= {most}"))),
-            self.max_other_collisions.map(|most| all(format!("count(others_collided) <= {most}"))),
-            self.max_induced.map(|most| all(format!("count(induced) <= {most}"))),
-            self.min_prevented.map(|least| each(format!("lower(prevented | baseline.ego_collided) >= {least}"))),
-            self.max_harm.map(|most| each(format!("sum(harm) <= {most}"))),
-            self.min_rear_thw.map(|least| each(format!("min(min_thw_rear_s) >= {least}"))),
-            self.max_engagement_rate.map(|most| each(format!("share(engaged) <= {most}"))),
-            self.max_speed_deficit_mps.map(|most| each(format!("max(max_speed_deficit_mps) <= {most}"))),
-            self.max_jerk.map(|most| each(format!("max(max_jerk_mps3) <= {most}"))),
+            self.max_collisions.map(|most| format!("count(ego_collided) <= {most}")),
+            self.max_other_collisions.map(|most| format!("count(others_collided) <= {most}")),
+            self.max_induced.map(|most| format!("count(induced) <= {most}")),
+            self.min_prevented.map(|least| format!("lower(prevented | baseline.ego_collided) >= {least}")),
+            self.max_harm.map(|most| format!("sum(harm) <= {most}")),
+            self.min_rear_thw.map(|least| format!("min(min_thw_rear_s) >= {least}")),
+            self.max_engagement_rate.map(|most| format!("share(engaged) <= {most}")),
+            self.max_speed_deficit_mps.map(|most| format!("max(max_speed_deficit_mps) <= {most}")),
+            self.max_jerk.map(|most| format!("max(max_jerk_mps3) <= {most}")),
         ];
-        let criterion = |(text, scope): (String, Scope)| Ok((text.parse().map_err(|error| format!("{error}"))?, scope));
-        options.into_iter().flatten().map(criterion).collect()
+        options.into_iter().flatten().map(|text| text.parse().map_err(|error| format!("{error}"))).collect()
     }
 }

@@ -6,7 +6,7 @@ use closecall_scenarios::criteria::GateConfig;
 use closecall_scenarios::source::PROJECT_FILE;
 use serde::Deserialize;
 
-use super::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};
+use super::{GateSet, GateSource, GateSpec, ProbabilitySpec};
 use crate::probability::ProbabilityGate;
 
 /// A project file that cannot be used.
@@ -57,10 +57,9 @@ impl ProjectFile {
     pub fn add_to(self, set: &mut GateSet) -> Result<(), ProjectError> {
         let source = GateSource::ProjectFile(self.path.clone());
         for expression in self.gate.require {
-            // A bound for all scenarios together replaces one for each.
             let is_replaced = set.specs.iter().any(|spec| spec.expression.subject() == expression.subject());
             if !is_replaced {
-                set.push(GateSpec { expression, source: source.clone(), scope: Scope::EachScenario });
+                set.push(GateSpec { expression, source: source.clone() });
             }
         }
         if let (None, Some(max)) = (&set.probability, self.gate.max_probability) {

@@ -35,8 +35,8 @@ impl Standing {
 /// One gate with its answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateResult {
-    /// The scenario; `None` if the gate is judged on all scenarios together.
-    pub scenario: Option<String>,
+    /// The scenario.
+    pub scenario: String,
     /// The criterion.
     pub expression: Expression,
     /// Where it comes from.
@@ -68,7 +68,7 @@ impl GateResult {
 
     /// Returns a name that no other gate of the campaign has.
     pub fn name(&self) -> String {
-        let scenario = self.scenario.as_deref().unwrap_or("all scenarios");
+        let scenario = &self.scenario;
         match &self.source {
             GateSource::Requirement(mark) => format!("{scenario}: {mark}: {}", self.expression),
             _ => format!("{scenario}: {}", self.expression),

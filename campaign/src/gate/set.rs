@@ -43,24 +43,13 @@ impl fmt::Display for GateSource {
     }
 }
 
-/// The samples that a gate is judged on.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Scope {
-    /// The samples of each scenario, one scenario at a time.
-    EachScenario,
-    /// The samples of all scenarios together; for counts only.
-    AllScenarios,
-}
-
-/// One criterion with its origin.
+/// One criterion with its origin. It is judged on the samples of each scenario, one scenario at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateSpec {
     /// The criterion.
     pub expression: Expression,
     /// Where it comes from.
     pub source: GateSource,
-    /// The samples that it is judged on.
-    pub scope: Scope,
 }
 
 /// A gate on the probability of a collision, with its origin.
@@ -104,7 +93,7 @@ impl GateSet {
     pub fn of(expressions: impl IntoIterator<Item = Expression>) -> Self {
         let mut set = Self::default();
         for expression in expressions {
-            set.push(GateSpec { expression, source: GateSource::CommandLine, scope: Scope::EachScenario });
+            set.push(GateSpec { expression, source: GateSource::CommandLine });
         }
         set
     }
@@ -113,9 +102,7 @@ impl GateSet {
     pub fn push(&mut self, spec: GateSpec) {
         let subject = spec.expression.subject();
         let is_known = |known: &GateSpec| {
-            known.expression.subject() == subject
-                && known.expression.operator == spec.expression.operator
-                && known.scope == spec.scope
+            known.expression.subject() == subject && known.expression.operator == spec.expression.operator
         };
         if !self.specs.iter().any(is_known) {
             self.specs.push(spec);
@@ -125,31 +112,18 @@ impl GateSet {
     /// Returns the gates of one scenario: those of the campaign, those of its file that these do not replace, and the checks
     /// of its requirements.
     pub fn of_scenario(&self, file: &ScenarioFile) -> Vec<GateSpec> {
-        let mut set = Self {
-            specs: self.specs.iter().filter(|spec| spec.scope == Scope::EachScenario).cloned().collect(),
-            ..Self::default()
-        };
-        let scope = Scope::EachScenario;
+        let mut set = Self { specs: self.specs.clone(), ..Self::default() };
         for &expression in &file.config().gate.require {
-            // A bound for all scenarios together replaces that of a scenario.
-            if self.of_all().any(|spec| spec.expression.subject() == expression.subject()) {
-                continue;
-            }
-            set.push(GateSpec { expression, source: GateSource::Scenario, scope: scope.clone() });
+            set.push(GateSpec { expression, source: GateSource::Scenario });
         }
         let mut specs = if self.is_measurement { Vec::new() } else { set.specs };
         for (mark, expressions) in &file.config().checks {
             for &expression in expressions {
                 let source = GateSource::Requirement(mark.clone());
-                specs.push(GateSpec { expression, source, scope: scope.clone() });
+                specs.push(GateSpec { expression, source });
             }
         }
         specs
-    }
-
-    /// Returns the criteria that are judged on all scenarios together.
-    pub fn of_all(&self) -> impl Iterator<Item = &GateSpec> {
-        self.specs.iter().filter(|spec| spec.scope == Scope::AllScenarios && !self.is_measurement)
     }
 
     /// Returns the gate on the probability of a collision of one scenario.

@@ -57,7 +57,7 @@ fn columns(rows: &[(&String, PairResult<'_>)]) -> Vec<ArrayRef> {
     let number = |of: fn(&PairResult<'_>) -> f64| -> ArrayRef {
         Arc::new(Float64Array::from_iter_values(rows.iter().map(|(_, result)| of(result))))
     };
-    let p_value = |of: fn(&PairResult<'_>) -> Option<f64>| -> ArrayRef {
+    let optional = |of: fn(&PairResult<'_>) -> Option<f64>| -> ArrayRef {
         Arc::new(rows.iter().map(|(_, result)| of(result)).collect::<Float64Array>())
     };
     vec![
@@ -65,16 +65,16 @@ fn columns(rows: &[(&String, PairResult<'_>)]) -> Vec<ArrayRef> {
         Arc::new(StringArray::from_iter_values(rows.iter().map(|(_, result)| result.baseline))),
         Arc::new(StringArray::from_iter_values(rows.iter().map(|(_, result)| result.tested))),
         count(|result| result.pairs.prevented),
-        number(|result| result.prevented_95[0]),
-        number(|result| result.prevented_95[1]),
+        optional(|result| Some(result.prevented_95?[0])),
+        optional(|result| Some(result.prevented_95?[1])),
         count(|result| result.pairs.induced),
-        number(|result| result.induced_95[0]),
-        number(|result| result.induced_95[1]),
+        optional(|result| Some(result.induced_95?[0])),
+        optional(|result| Some(result.induced_95?[1])),
         count(|result| result.pairs.both),
         count(|result| result.pairs.neither),
         number(|result| result.pairs.prevented_harm),
         number(|result| result.pairs.induced_harm),
-        p_value(|result| result.mcnemar_p),
-        p_value(|result| result.corrected_p),
+        optional(|result| result.mcnemar_p),
+        optional(|result| result.corrected_p),
     ]
 }

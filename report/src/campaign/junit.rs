@@ -50,7 +50,7 @@ const CAMPAIGN_SUITE: &str = "campaign";
 fn cases(judged: &Judgement) -> Vec<Case> {
     let is_measured = judged.verdict().is_none();
     let gate = |gate: &GateResult| Case {
-        suite: gate.scenario.clone().unwrap_or_else(|| CAMPAIGN_SUITE.to_owned()),
+        suite: gate.scenario.clone(),
         name: gate.name(),
         status: match gate.standing() {
             Standing::Pass => Status::Passed,

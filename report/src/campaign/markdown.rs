@@ -59,16 +59,14 @@ fn counts(summary: &Summary) -> String {
         .to_owned();
     for (name, counts) in &summary.scenarios {
         for (controller, arm) in summary.controllers.iter().zip(&counts.arms) {
-            let [low, high] = arm.interval_95(summary.inference);
             let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), percent);
             text.push_str(&format!(
-                "| {} | {} | {} | {} | {rate} | {} to {} | {} |\n",
+                "| {} | {} | {} | {} | {rate} | {} | {} |\n",
                 cell(name),
                 cell(controller),
                 arm.outcomes,
                 arm.collisions,
-                percent(low),
-                percent(high),
+                interval(arm.interval_95(summary.inference)),
                 arm.errors,
             ));
         }
@@ -85,6 +83,11 @@ fn counts(summary: &Summary) -> String {
     text
 }
 
+/// Returns an interval in words, or a dash if no interval is valid.
+fn interval(interval: Option<[f64; 2]>) -> String {
+    interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", percent(low), percent(high)))
+}
+
 /// Returns the table of all pairs of arms.
 fn arm_pairs(summary: &Summary) -> String {
     let mut text =
@@ -93,7 +96,6 @@ fn arm_pairs(summary: &Summary) -> String {
             .to_owned();
     for (name, counts) in &summary.scenarios {
         for result in pair_results(summary, counts) {
-            let interval = |[low, high]: [f64; 2]| format!("{} to {}", percent(low), percent(high));
             let (pairs, p_value) =
                 (result.pairs, result.corrected_p.map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}")));
             text.push_str(&format!(

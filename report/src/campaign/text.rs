@@ -32,6 +32,9 @@ impl fmt::Display for CountsText<'_> {
                 "Intervals are confidence sequences: they are valid for any rule that determines the number of samples."
             )?;
         }
+        if summary.inference == Inference::Design {
+            writeln!(f, "No rate has an interval: the samples of --design sobol and grid are not independent.")?;
+        }
         writeln!(f, "Rates are conditional on the sampled scenario: they are not the risk on a road.")
     }
 }
@@ -129,10 +132,12 @@ fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Count
     )?;
     for result in pair_results(summary, counts) {
         let pairs = result.pairs;
-        let interval = |[low, high]: [f64; 2]| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high);
+        let interval = |interval: Option<[f64; 2]>| {
+            interval.map_or_else(String::new, |[low, high]| format!(" ({:.1} to {:.1} %)", 100.0 * low, 100.0 * high))
+        };
         write!(f, "    {:<28}", format!("{} -> {}:", result.baseline, result.tested))?;
-        write!(f, " {} prevented ({}),", pairs.prevented, interval(result.prevented_95))?;
-        write!(f, " {} induced ({}),", pairs.induced, interval(result.induced_95))?;
+        write!(f, " {} prevented{},", pairs.prevented, interval(result.prevented_95))?;
+        write!(f, " {} induced{},", pairs.induced, interval(result.induced_95))?;
         write!(f, " {} both, {} neither", pairs.both, pairs.neither)?;
         writeln!(f, "{}", result.corrected_p.map_or_else(String::new, |p| format!(", p {p:.2e}")))?;
     }
@@ -140,9 +145,11 @@ fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Count
 }
 
 fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference: Inference) -> fmt::Result {
-    let [low, high] = arm.interval_95(inference).map(|bound| 100.0 * bound);
     let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
-    write!(f, "  {name} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions)?;
+    write!(f, "  {name} {:>6} collisions  {rate:>7}", arm.collisions)?;
+    if let Some([low, high]) = arm.interval_95(inference) {
+        write!(f, "  (95 %: {:.1} to {:.1} %)", 100.0 * low, 100.0 * high)?;
+    }
     if arm.collisions > 0 {
         write!(f, "  delta-v up to {:.1} m/s", arm.max_delta_v_mps)?;
     }

@@ -148,6 +148,9 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
         controller.insert("collisions".to_owned(), json!(arm.collisions));
         controller.insert("collision_rate".to_owned(), json!(arm.collision_rate()));
         controller.insert("interval_95".to_owned(), json!(arm.interval_95(summary.inference)));
+        if summary.inference == Inference::Design {
+            controller.insert("interval_95_absent".to_owned(), json!(DEPENDENT));
+        }
         controller.insert("interval_method".to_owned(), json!(summary.inference.method()));
         controller.insert("max_speed_deficit_mps".to_owned(), json!(arm.max_speed_deficit_mps));
         controller.insert("errors".to_owned(), json!(arm.errors));
@@ -170,6 +173,9 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
     object
 }
 
+/// Why the samples of a design have no interval and no test.
+const DEPENDENT: &str = "the samples of --design sobol and grid are not independent";
+
 fn paired(pairs: &Pairs, inference: Inference) -> Value {
     let mut object = json!({
         "prevented": pairs.prevented,
@@ -183,8 +189,12 @@ fn paired(pairs: &Pairs, inference: Inference) -> Value {
         "harm_weight": harm::WEIGHT,
         "mcnemar_p": pairs.mcnemar_p(inference),
     });
-    if inference == Inference::Sequential {
-        object["mcnemar_p_absent"] = json!("the number of samples was not fixed in advance");
+    match inference {
+        Inference::FixedSamples => {}
+        Inference::Sequential => {
+            object["mcnemar_p_absent"] = json!("the number of samples was not fixed in advance");
+        }
+        Inference::Design => object["mcnemar_p_absent"] = json!(DEPENDENT),
     }
     object
 }

@@ -236,13 +236,12 @@ fn rows_of(name: &str, samples: u64, summary: &Summary) -> Result<String, Box<dy
 
 /// Returns the cells of one row behind the name of the arm.
 fn cells(summary: &Summary, without: &ArmCounts, with: &ArmCounts, pairs: &Pairs) -> String {
-    let share = |hits: u64, of: u64| {
-        let [low, high] = summary.inference.interval_95(hits, of).map(|bound| 100.0 * bound);
-        if of == 0 {
-            "-".to_owned()
-        } else {
-            format!("{:.1} % ({low:.1} to {high:.1})", 100.0 * hits as f64 / of as f64)
+    let share = |hits: u64, of: u64| match summary.inference.interval_95(hits, of) {
+        Some([low, high]) if of > 0 => {
+            let share = 100.0 * hits as f64 / of as f64;
+            format!("{share:.1} % ({:.1} to {:.1})", 100.0 * low, 100.0 * high)
         }
+        _ => "-".to_owned(),
     };
     [
         without.collisions.to_string(),

@@ -20,7 +20,7 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
     let scenarios = &summary.scenarios;
     let arms = || scenarios.iter().flat_map(|(_, counts)| &counts.arms);
     // All bars have one scale, so that they can be compared.
-    let most = arms().map(|arm| arm.interval_95(summary.inference)[1]).fold(0.0, f64::max);
+    let most = arms().map(|arm| bar_interval(arm, summary.inference)[1]).fold(0.0, f64::max);
     let head = html! {
         (text_heads(&["scenario", "controller"]))
         (number_heads(&["samples", "collisions", "rate", "95 % interval"]))
@@ -51,15 +51,20 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
     })
 }
 
+/// Returns the interval of the rate of collisions, or the rate alone if no interval is valid.
+fn bar_interval(arm: &ArmCounts, inference: Inference) -> [f64; 2] {
+    arm.interval_95(inference).unwrap_or([arm.collision_rate().unwrap_or_default(); 2])
+}
+
 fn arm_cells(arm: &ArmCounts, inference: Inference, most: f64, is_tested: bool) -> io::Result<Markup> {
-    let [low, high] = arm.interval_95(inference);
+    let interval = arm.interval_95(inference);
     let rate = arm.collision_rate();
     Ok(html! {
         (number(arm.outcomes))
         (number(arm.collisions))
         (number(rate.map_or_else(|| "-".to_owned(), percent)))
-        (number(format!("{} to {}", percent(low), percent(high))))
-        td.bar { (charts::rate(rate, [low, high], most, is_tested)?) }
+        (number(interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", percent(low), percent(high)))))
+        td.bar { (charts::rate(rate, bar_interval(arm, inference), most, is_tested)?) }
         (number(if arm.collisions > 0 { format!("{:.1}", arm.max_delta_v_mps) } else { String::new() }))
         (number(arm.engagements))
         (number(arm.goals_in_reach))
@@ -109,7 +114,9 @@ fn arm_pairs(summary: &Summary) -> Markup {
         (text_heads(&["scenario", "from", "to"]))
         (number_heads(&["prevented", "95 % interval", "induced", "95 % interval", "both", "neither", "McNemar p", "corrected"]))
     };
-    let interval = |[low, high]: [f64; 2]| format!("{} to {}", percent(low), percent(high));
+    let interval = |interval: Option<[f64; 2]>| {
+        interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", percent(low), percent(high)))
+    };
     let p_text = |p: Option<f64>| p.map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}"));
     let rows = html! {
         @for (name, counts) in &summary.scenarios {

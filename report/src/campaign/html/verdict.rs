@@ -81,7 +81,7 @@ pub(super) fn gates(findings: &Findings<'_>) -> Markup {
         @for gate in gates {
             @let Evaluation { value, interval_95, samples, .. } = gate.evaluation;
             tr {
-                td { (gate.scenario.as_deref().unwrap_or("all scenarios")) }
+                td { (gate.scenario) }
                 td { code { (gate.expression.to_string()) } }
                 td { (badge(gate.standing())) }
                 (number(value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"))))
