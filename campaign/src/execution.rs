@@ -12,14 +12,14 @@ use super::identity::of_work;
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
-use super::remote::{RemoteError, RemoteWorkers};
+use super::remote::RemoteError;
 use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
 use super::stop::StopFlag;
 use super::summary::Summary;
 use super::verdict::{self, Judgement};
 use super::wall_times::WallTime;
-use super::workers::{Finished, Workers, WorkersError};
+use super::workers::{Finished, SampleRunner, Workers, WorkersError};
 
 /// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order of their numbers.
 #[derive(Clone)]
@@ -32,8 +32,8 @@ pub struct Campaign {
     pub workers: Workers,
     /// What determines the number of samples.
     pub inference: Inference,
-    /// The machines that run the samples, if this one does not.
-    pub remote: Option<Arc<RemoteWorkers>>,
+    /// What runs the samples, if the threads of this process do not.
+    pub remote: Option<Arc<dyn SampleRunner>>,
     /// True if samples of the journal that ended in an error are run again.
     pub retry_errors: bool,
     /// True if the campaign goes on without its folder when results can no longer be written, as on a full disk, and still
@@ -305,15 +305,15 @@ impl Campaign {
     pub(super) fn run_samples(
         &self,
         (number, work): (usize, &Arc<Work>),
-        samples: impl Iterator<Item = u64>,
+        mut samples: impl Iterator<Item = u64>,
         mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), CampaignError> {
-        let on_finished = |finished: Finished| match refusal(&finished.record) {
+        let mut on_finished = |finished: Finished| match refusal(&finished.record) {
             Some(reason) => Err(CampaignError::Refused { reason: reason.to_owned() }),
             None => on_finished(finished),
         };
         match &self.remote {
-            Some(remote) => remote.run((number, work), samples, &self.stop, on_finished),
+            Some(remote) => remote.run((number, work), &mut samples, &self.stop, &mut on_finished),
             None => self.workers.run(work, samples, &self.stop, on_finished),
         }
     }

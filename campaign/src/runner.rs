@@ -90,8 +90,8 @@ impl Samples for Work {
     /// Runs one sample in one arm, in a worker process if its controller is isolated, and checks it if the plan of the checks includes it.
     fn run(&self, sample: u64, index: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let arm = &self.arms[index];
-        if let Some(isolated) = arm.controller.isolated() {
-            return host::run(self, (index, isolated), sample, limit);
+        if arm.controller.isolated().is_some() {
+            return host::run(self, index, sample, limit);
         }
         let mut done = None;
         arm.controller.in_thread(&mut || done = Some(self.run_here(sample, arm, on_outcome)));

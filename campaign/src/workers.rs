@@ -21,6 +21,7 @@ use std::time::{Duration, Instant};
 
 use closecall_simulation::{Arm, SampleError};
 
+use super::execution::CampaignError;
 use super::record::{ArmRecord, Record, SampleFailure};
 use super::runner::{ArmRun, OnOutcome, Work};
 use super::stop::StopFlag;
@@ -91,6 +92,25 @@ pub(crate) trait Samples: Send + Sync + 'static {
     /// before its validity checks, if it is checked in this process.
     fn run(&self, sample: u64, arm: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun;
 }
+
+/// Runs the samples of a campaign elsewhere than on threads of this process.
+pub trait SampleRunner: Send + Sync {
+    /// Runs the given samples of the scenario `work`, which is given with its index in the campaign, and passes each result
+    /// to `on_finished` in the order of `samples`, as [`Workers::run`] does.
+    ///
+    /// # Errors
+    /// The error of `on_finished`, or another [`CampaignError`]. No further result is passed on then.
+    fn run(
+        &self,
+        work: (usize, &Arc<Work>),
+        samples: &mut dyn Iterator<Item = u64>,
+        stop: &StopFlag,
+        on_finished: &mut OnFinished<'_>,
+    ) -> Result<(), CampaignError>;
+}
+
+/// Takes the next result. The run ends if it breaks.
+pub type OnFinished<'a> = dyn FnMut(Finished) -> Result<ControlFlow<()>, CampaignError> + 'a;
 
 impl Workers {
     /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when

@@ -19,88 +19,153 @@ use crate::runner::{ArmRun, Work};
 /// The kind of a failure of the controller.
 const KIND: &str = "controller";
 
+/// A process with its pipes.
+pub(super) trait Peer {
+    /// Sends a line and waits for its answer. Returns `None` if there is none within `limit`.
+    ///
+    /// # Errors
+    /// [`ExecError`] if the process ends, writes what nobody has asked for, or does not keep to its limits.
+    fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError>;
+
+    /// Lets the process be killed without time to end by itself.
+    fn condemn(&mut self);
+}
+
+impl Peer for Child {
+    fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        Self::request_within(self, line, limit)
+    }
+
+    fn condemn(&mut self) {
+        Self::condemn(self);
+    }
+}
+
+/// Processes and clock: those of the operating system, or simulated ones.
+pub(super) trait World {
+    /// A process.
+    type Peer: Peer;
+
+    /// Starts a worker process for an arm, gives it its task, and returns it with the identity of the task.
+    ///
+    /// # Errors
+    /// [`ExecError`] if it cannot be started.
+    fn start(&self, work: &Work, arm: usize) -> Result<(Self::Peer, String), ExecError>;
+
+    /// Returns the time since some moment.
+    fn now(&self) -> Duration;
+
+    /// Reads the answer to a question, and checks that it is one.
+    fn read(&self, work: &Work, question: &Question, line: &[u8]) -> Result<Answer, Trouble> {
+        read(work, question, line)
+    }
+}
+
 /// A worker process, and what it is asked.
-struct Worker {
-    child: Child,
+struct Worker<P> {
+    peer: P,
     /// The identity of its task.
     task: String,
     /// Number of questions so far.
     asked: u64,
 }
 
+/// The worker processes of a thread.
+pub(super) struct Client<W: World> {
+    world: W,
+    /// The processes by the address of the work and the index of the arm. A thread of a campaign serves one work, and keeps
+    /// it alive.
+    workers: BTreeMap<(usize, usize), Worker<W::Peer>>,
+}
+
 thread_local! {
-    /// The processes of this thread, by the address of the work and the index of the arm. A thread of a campaign serves one work,
-    /// and keeps it alive.
-    static WORKERS: RefCell<BTreeMap<(usize, usize), Worker>> = const { RefCell::new(BTreeMap::new()) };
+    static CLIENT: RefCell<Client<OperatingSystem>> = RefCell::new(Client::new(OperatingSystem(Instant::now())));
 }
 
 /// Why a process has not run a sample. The process is gone.
-enum Trouble {
+pub(super) enum Trouble {
     /// It crashed or hung: another process may not.
     Crash(SampleFailure),
     /// It is not to be trusted, or the time of the sample is over.
     Other(SampleFailure),
 }
 
-/// Runs one sample in a worker process. `arm` is the index of the arm, and its controller. `limit` is the time limit of the sample.
-///
-/// A process that crashes or hangs costs the sample that it runs. Only if the work says so is the sample run again in a new process,
-/// and its record then says that it is flaky.
-pub(crate) fn run(work: &Work, (arm, isolated): (usize, Isolated), sample: u64, limit: Duration) -> ArmRun {
-    let started = Instant::now();
-    let mut first: Option<SampleFailure> = None;
-    let mut crashes = 0;
-    let failure = loop {
-        let left = limit.saturating_sub(started.elapsed());
-        match ask(work, (arm, &isolated), (sample, left)) {
-            Ok(Answer { record, wall_s, check_s, .. }) => {
-                let flaky = first.map(|first| Flaky { crashes, first });
-                return ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
-            }
-            Err(Trouble::Other(failure)) => break failure,
-            Err(Trouble::Crash(failure)) => {
-                crashes += 1;
-                first.get_or_insert(failure);
-            }
-        }
-        if let Some(failure) = first.take_if(|_| crashes > work.retry_crashed) {
-            break failure;
-        }
-    };
-    ArmRun {
-        record: ArmRecord::new(isolated.name().to_owned(), Err(failure)),
-        wall_s: started.elapsed().as_secs_f64(),
-        check_s: 0.0,
-    }
+/// Runs one sample of an isolated arm in a worker process of this thread. `limit` is the time limit of the sample.
+pub(crate) fn run(work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
+    CLIENT.with_borrow_mut(|client| client.run(work, arm, sample, limit))
 }
 
-/// Asks the process of this thread for one sample. Starts a process if there is none. Only a process that has answered is kept.
-fn ask(work: &Work, (arm, isolated): (usize, &Isolated), (sample, limit): (u64, Duration)) -> Result<Answer, Trouble> {
-    let key = (std::ptr::from_ref(work) as usize, arm);
-    let kept = WORKERS.with_borrow_mut(|workers| workers.remove(&key));
-    let mut worker = match kept {
-        Some(worker) => worker,
-        None => start(work, arm, isolated).map_err(|error| Trouble::Crash(failure(&error)))?,
-    };
-    worker.asked += 1;
-    let question = Question { task: worker.task.clone(), arm, sample, number: worker.asked };
-    let answer = match worker.child.request_within(line(&question), limit) {
-        Ok(Some(line)) => read(work, &question, &line),
-        Ok(None) => Err(Trouble::Other(SampleError::Timeout { limit_s: limit.as_secs_f64() }.into())),
-        Err(error @ (ExecError::OutOfTurn { .. } | ExecError::LongLine { .. })) => Err(Trouble::Other(failure(&error))),
-        Err(error) => Err(Trouble::Crash(failure(&error))),
-    };
-    match &answer {
-        Ok(answer) if !answer.is_last => drop(WORKERS.with_borrow_mut(|workers| workers.insert(key, worker))),
-        Ok(_) => {}
-        // A process that has answered another question may go on writing.
-        Err(_) => worker.child.condemn(),
+impl<W: World> Client<W> {
+    /// Returns a client without processes.
+    pub(super) const fn new(world: W) -> Self {
+        Self { world, workers: BTreeMap::new() }
     }
-    answer
+
+    /// Runs one sample in a worker process.
+    ///
+    /// A process that crashes or hangs costs the sample that it runs. Only if the work says so is the sample run again in a
+    /// new process, and its record then says that it is flaky.
+    pub(super) fn run(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
+        let started = self.world.now();
+        let mut first: Option<SampleFailure> = None;
+        let mut crashes = 0;
+        let failure = loop {
+            let left = limit.saturating_sub(self.world.now() - started);
+            match self.ask(work, arm, sample, left) {
+                Ok(Answer { record, wall_s, check_s, .. }) => {
+                    let flaky = first.map(|first| Flaky { crashes, first });
+                    return ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
+                }
+                Err(Trouble::Other(failure)) => break failure,
+                Err(Trouble::Crash(failure)) => {
+                    crashes += 1;
+                    first.get_or_insert(failure);
+                }
+            }
+            if let Some(failure) = first.take_if(|_| crashes > work.retry_crashed) {
+                break failure;
+            }
+        };
+        ArmRun {
+            record: ArmRecord::new(work.arms[arm].controller.name().to_owned(), Err(failure)),
+            wall_s: (self.world.now() - started).as_secs_f64(),
+            check_s: 0.0,
+        }
+    }
+
+    /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process that has answered is
+    /// kept.
+    fn ask(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> Result<Answer, Trouble> {
+        let key = (std::ptr::from_ref(work) as usize, arm);
+        let mut worker = match self.workers.remove(&key) {
+            Some(worker) => worker,
+            None => {
+                let started = self.world.start(work, arm).map_err(|error| Trouble::Crash(failure(&error)))?;
+                Worker { peer: started.0, task: started.1, asked: 0 }
+            }
+        };
+        worker.asked += 1;
+        let question = Question { task: worker.task.clone(), arm, sample, number: worker.asked };
+        let answer = match worker.peer.request_within(line(&question), limit) {
+            Ok(Some(line)) => self.world.read(work, &question, &line),
+            Ok(None) => Err(Trouble::Other(SampleError::Timeout { limit_s: limit.as_secs_f64() }.into())),
+            Err(error @ (ExecError::OutOfTurn { .. } | ExecError::LongLine { .. })) => {
+                Err(Trouble::Other(failure(&error)))
+            }
+            Err(error) => Err(Trouble::Crash(failure(&error))),
+        };
+        match &answer {
+            Ok(answer) if !answer.is_last => drop(self.workers.insert(key, worker)),
+            Ok(_) => {}
+            // A process that has answered another question may go on writing.
+            Err(_) => worker.peer.condemn(),
+        }
+        answer
+    }
 }
 
 /// Reads the answer to a question, and checks that it is one.
-fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answer, Trouble> {
+pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answer, Trouble> {
     let wrong = |what: String| {
         let message = format!("the answer of the controller's process is not that of the sample: {what}");
         Trouble::Other(SampleFailure { kind: KIND.to_owned(), message })
@@ -130,8 +195,26 @@ fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answer, Trouble
     }
 }
 
+/// The processes and the clock of the operating system. The moment is the one from which the clock counts.
+struct OperatingSystem(Instant);
+
+impl World for OperatingSystem {
+    type Peer = Child;
+
+    fn start(&self, work: &Work, arm: usize) -> Result<(Child, String), ExecError> {
+        let controller = &work.arms[arm].controller;
+        let not_isolated = || ExecError::Command { command: controller.name().to_owned() };
+        let isolated = controller.isolated().ok_or_else(not_isolated)?;
+        start(work, arm, &isolated)
+    }
+
+    fn now(&self) -> Duration {
+        self.0.elapsed()
+    }
+}
+
 /// Starts a worker process, and gives it its task.
-fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<Worker, ExecError> {
+fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String), ExecError> {
     let library = match inference_backend() {
         Backend::Tract => None,
         Backend::OnnxRuntime(library) => Some(library.display().to_string()),
@@ -150,7 +233,7 @@ fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<Worker, ExecErr
     });
     let identity = task_identity(task.strip_suffix(b"\n").unwrap_or(&task));
     child.send(task);
-    Ok(Worker { child, task: identity, asked: 0 })
+    Ok((child, identity))
 }
 
 fn line(message: &impl serde::Serialize) -> Vec<u8> {

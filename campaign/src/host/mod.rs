@@ -23,6 +23,8 @@
 
 mod client;
 mod serve;
+#[cfg(test)]
+mod simulated_world;
 
 pub(crate) use client::run;
 pub use serve::serve;

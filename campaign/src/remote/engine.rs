@@ -12,6 +12,7 @@ use crate::folder::FolderError;
 use crate::manifest::Manifest;
 use crate::plan::PlanError;
 use crate::saved::SavedError;
+use crate::workers::SampleRunner;
 
 static ENGINE: Mutex<Option<Arc<dyn Engine>>> = Mutex::new(None);
 
@@ -173,7 +174,7 @@ pub fn set_engine(engine: Arc<dyn Engine>) {
 ///
 /// # Errors
 /// [`RemoteError`] if the program has no engine, a file cannot be shipped, or the cluster cannot be used.
-pub fn connect(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<RemoteWorkers>>, RemoteError> {
+pub fn connect(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<dyn SampleRunner>>, RemoteError> {
     let Some(address) = address else { return Ok(None) };
     let engine = ENGINE.lock().unwrap_or_else(PoisonError::into_inner).clone().ok_or(RemoteError::NoEngine)?;
     let cluster = engine.connect(address, &Shipment::of(manifest)?)?;

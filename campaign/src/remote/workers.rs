@@ -5,7 +5,6 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -16,7 +15,7 @@ use crate::execution::CampaignError;
 use crate::manifest::Manifest;
 use crate::runner::Work;
 use crate::stop::StopFlag;
-use crate::workers::{Finished, Samples};
+use crate::workers::{Finished, OnFinished, SampleRunner, Samples};
 
 /// Time that a block is to take (s).
 const BLOCK_S: f64 = 1.0;
@@ -90,6 +89,21 @@ impl Pace {
     }
 }
 
+impl SampleRunner for RemoteWorkers {
+    fn run(
+        &self,
+        (number, work): (usize, &Arc<Work>),
+        samples: &mut dyn Iterator<Item = u64>,
+        stop: &StopFlag,
+        on_finished: &mut OnFinished<'_>,
+    ) -> Result<(), CampaignError> {
+        let done = self.run_blocks((number, work), samples, stop, on_finished);
+        // After an error, a stop or an end before the last sample, blocks are left.
+        self.cluster.cancel();
+        done
+    }
+}
+
 impl RemoteWorkers {
     /// Returns the workers of a cluster for the campaign of `manifest`.
     pub fn new(cluster: Box<dyn Cluster>, manifest: &Manifest) -> Self {
@@ -97,32 +111,12 @@ impl RemoteWorkers {
         Self { cluster, version, configuration, blocks: AtomicU64::new(0) }
     }
 
-    /// Runs the given samples of the scenario with index `number`, and passes each result to `on_finished` in the order of
-    /// `samples`, as [`Workers::run`] does.
-    ///
-    /// # Errors
-    /// The error of `on_finished`, or [`RemoteError`]. No further result is passed on then.
-    ///
-    /// [`Workers::run`]: crate::workers::Workers::run
-    pub(crate) fn run(
-        &self,
-        (number, work): (usize, &Arc<Work>),
-        samples: impl Iterator<Item = u64>,
-        stop: &StopFlag,
-        on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, CampaignError>,
-    ) -> Result<(), CampaignError> {
-        let done = self.run_blocks((number, work), samples, stop, on_finished);
-        // After an error, a stop or an end before the last sample, blocks are left.
-        self.cluster.cancel();
-        done
-    }
-
     fn run_blocks(
         &self,
         (number, work): (usize, &Arc<Work>),
-        mut samples: impl Iterator<Item = u64>,
+        mut samples: &mut dyn Iterator<Item = u64>,
         stop: &StopFlag,
-        mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, CampaignError>,
+        on_finished: &mut OnFinished<'_>,
     ) -> Result<(), CampaignError> {
         let (mut blocks, mut pace) = (VecDeque::<Block>::new(), Pace::default());
         let mut stopped: Option<Instant> = None;

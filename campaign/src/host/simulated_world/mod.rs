@@ -1,0 +1,74 @@
+//! Campaigns in a simulated world: worker processes, their pipes and the clock follow a schedule that a seed determines.
+//!
+//! ```text
+//!  seed ─▶ faults ─▶ simulated processes ─▶ Client ─▶ Campaign::run ─▶ journal ─▶ resume ─▶ verdict
+//!                 └▶ kills, damaged journals ─────────────────────────────┘
+//! ```
+//!
+//! The client, the campaign, the journal, the repair and the verdict are those of the program. A schedule runs a small
+//! campaign in a folder, interrupts and resumes it, and ends with a run without faults. Whatever happens,
+//!
+//! 1. an outcome in the journal is the one of its sample,
+//! 2. no verdict and no baseline comes from a part of the samples,
+//! 3. no PASS hides a sample without an outcome,
+//! 4. the last run completes the campaign to the records of an undisturbed one.
+//!
+//! The idea is that of FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled Transactional Key Value Store",
+//! SIGMOD 2021). `CLOSECALL_SCHEDULES=1000000` sets the number of schedules, `CLOSECALL_SCHEDULE=SEED` runs one of them.
+
+mod machine;
+mod process;
+mod schedule;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use machine::Reader;
+use schedule::{Setup, Violation};
+
+/// Number of schedules of a plain test run.
+const SCHEDULES: u64 = 10_000;
+
+fn number_from_env(name: &str) -> Option<u64> {
+    std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is no number: `{text}`")))
+}
+
+/// Runs schedules, and returns the first violation by seed, with the number of schedules that met a fault.
+fn run(setup: &Setup, reader: Reader, seeds: std::ops::Range<u64>) -> (Option<(u64, Violation)>, usize) {
+    let results: Vec<_> = seeds.into_par_iter().map(|seed| (seed, setup.run(seed, reader))).collect();
+    let disturbed = results.iter().filter(|(_, result)| !matches!(result, Ok(0))).count();
+    let first = results.into_iter().find_map(|(seed, result)| Some((seed, result.err()?)));
+    (first, disturbed)
+}
+
+#[test]
+fn no_schedule_files_a_wrong_outcome_or_hides_a_lost_one() {
+    let setup = Arc::new(Setup::new());
+    let seeds = match number_from_env("CLOSECALL_SCHEDULE") {
+        Some(seed) => seed..seed + 1,
+        None => 0..number_from_env("CLOSECALL_SCHEDULES").unwrap_or(SCHEDULES),
+    };
+    let count = seeds.end - seeds.start;
+    let (violation, disturbed) = run(&setup, Reader::OfTheProgram, seeds);
+    if let Some((seed, violation)) = violation {
+        panic!("CLOSECALL_SCHEDULE={seed}: {violation}");
+    }
+    assert!(count == 1 || disturbed as u64 > count / 2, "{disturbed} of {count} schedules have a fault");
+}
+
+/// Without the check of the identity, an answer to another question is filed under the sample that was asked for.
+#[test]
+fn a_client_that_believes_every_answer_is_found_out() {
+    let (violation, _) = run(&Setup::new(), Reader::Believing, 0..2_000);
+    let (_, violation) = violation.expect("some schedule shows it");
+    assert!(matches!(violation, Violation::OtherOutcome { .. }), "{violation}");
+}
+
+/// Without the count of what is retried, a crash leaves no trace.
+#[test]
+fn a_client_that_repeats_in_silence_is_found_out() {
+    let (violation, _) = run(&Setup::new(), Reader::Silent, 0..2_000);
+    let (_, violation) = violation.expect("some schedule shows it");
+    assert!(matches!(violation, Violation::SilentRetry { .. }), "{violation}");
+}

@@ -1,0 +1,272 @@
+//! A simulated worker process: it answers from a table of true records, unless the schedule has a fault for it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use closecall_simulation::controller::exec::ExecError;
+use closecall_traffic::Stream;
+use rand::RngExt;
+
+use crate::host::client::Peer;
+use crate::host::{Answer, Question};
+use crate::record::{ArmRecord, SampleFailure};
+
+/// Time that a sample takes, without a fault.
+const ANSWER_TIME: Duration = Duration::from_millis(10);
+/// The signal that ends a process that crashes: SIGSEGV.
+const SIGSEGV: i32 = 11;
+
+/// The true records: by arm, then by sample.
+pub(super) type Truth = Vec<Vec<ArmRecord>>;
+
+/// What all processes of a schedule share.
+pub(super) struct State {
+    /// The clock.
+    pub(super) now: Duration,
+    pub(super) random: Stream,
+    /// Probability of a fault at each question (-).
+    pub(super) rate: f64,
+    /// Number of faults so far.
+    pub(super) faults: u64,
+    /// Crashes during the run of a sample in an arm, which is asked for now.
+    pub(super) crashes: u32,
+}
+
+impl State {
+    /// Draws whether there is a fault now.
+    pub(super) fn has_fault(&mut self) -> bool {
+        let is_faulty = self.rate > 0.0 && self.random.random_bool(self.rate);
+        self.faults += u64::from(is_faulty);
+        is_faulty
+    }
+}
+
+pub(super) fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What arrives in the pipe.
+enum Arrival {
+    Line(Vec<u8>),
+    TooLong,
+    /// The process has ended.
+    End,
+}
+
+/// A simulated process.
+pub(super) struct Process {
+    pub(super) state: Arc<Mutex<State>>,
+    pub(super) truth: Arc<Truth>,
+    pub(super) arm: usize,
+    pub(super) task: String,
+    /// What arrives, by the time of its arrival (ns) and the order in which it was written.
+    pipe: BTreeMap<(u128, usize), Arrival>,
+    /// Number of messages that were written.
+    written: usize,
+    /// Number of answers that were taken.
+    answered: u64,
+    /// The questions so far, the last one first.
+    earlier: VecDeque<Question>,
+}
+
+/// What a process does instead of answering once.
+#[derive(Clone, Copy)]
+enum Fault {
+    /// It answers twice.
+    Twice,
+    /// An earlier answer comes once more, before the right one.
+    EarlierAgain,
+    /// A copy of the process (`fork`) has run ahead, and answers the next sample.
+    AnotherSample,
+    /// It repeats the question, and gives the record of another sample.
+    AnotherRecord,
+    /// It gives the record of the other arm.
+    AnotherArm,
+    /// It answers for another campaign.
+    AnotherTask,
+    /// Its copy answers, and says so.
+    Copy,
+    /// Both it and its copy answer, in either order.
+    ProcessAndCopy,
+    /// It ends in the middle of its answer.
+    Cut,
+    /// It prints what is no answer.
+    Print,
+    TooLong,
+    CrashBefore,
+    CrashAfter,
+    Hang,
+    /// It answers after the time limit.
+    Late,
+    /// It reports that a call hangs, and ends.
+    HangingCall,
+}
+
+const FAULTS: [Fault; 16] = [
+    Fault::Twice,
+    Fault::EarlierAgain,
+    Fault::AnotherSample,
+    Fault::AnotherRecord,
+    Fault::AnotherArm,
+    Fault::AnotherTask,
+    Fault::Copy,
+    Fault::ProcessAndCopy,
+    Fault::Cut,
+    Fault::Print,
+    Fault::TooLong,
+    Fault::CrashBefore,
+    Fault::CrashAfter,
+    Fault::Hang,
+    Fault::Late,
+    Fault::HangingCall,
+];
+
+impl Process {
+    pub(super) fn new(state: Arc<Mutex<State>>, truth: Arc<Truth>, arm: usize) -> Self {
+        let task = format!("task of arm {arm}");
+        let (pipe, earlier) = (BTreeMap::new(), VecDeque::new());
+        Self { state, truth, arm, task, pipe, written: 0, answered: 0, earlier }
+    }
+
+    fn write(&mut self, at: Duration, arrival: Arrival) {
+        self.pipe.insert((at.as_nanos(), self.written), arrival);
+        self.written += 1;
+    }
+
+    /// Returns the answer to a question with the record of a sample in an arm.
+    fn answer(&self, question: &Question, arm: usize, sample: u64) -> Answer {
+        let records = &self.truth[arm];
+        let record = records[usize::try_from(sample).unwrap() % records.len()].clone();
+        Answer { question: question.clone(), copied_from: None, record, wall_s: 0.01, check_s: 0.0, is_last: false }
+    }
+
+    /// Runs a sample: writes what the process writes, and when.
+    fn serve(&mut self, state: &mut State, question: &Question, limit: Duration) {
+        let right = self.answer(question, self.arm, question.sample);
+        let at = state.now + ANSWER_TIME;
+        let line = |answer: &Answer| Arrival::Line(serde_json::to_vec(answer).unwrap());
+        if !state.has_fault() {
+            return self.write(at, line(&right));
+        }
+        // Before the next question, or during it.
+        let soon = at + ANSWER_TIME.mul_f64(2.0 * state.random.random::<f64>());
+        let before = state.now + ANSWER_TIME.mul_f64(state.random.random::<f64>());
+        let other = question.sample + 1;
+        let copy = Answer { copied_from: Some(1), ..self.answer(question, self.arm, question.sample) };
+        match FAULTS[state.random.random_range(0..FAULTS.len())] {
+            Fault::Twice => {
+                self.write(at, line(&right));
+                self.write(soon, line(&right));
+            }
+            Fault::EarlierAgain => {
+                let earlier = self.earlier.front().unwrap_or(question).clone();
+                let again = self.answer(&earlier, self.arm, earlier.sample);
+                self.write(before, line(&again));
+                self.write(at, line(&right));
+            }
+            Fault::AnotherSample => {
+                let next = Question { sample: other, number: question.number + 1, ..question.clone() };
+                let answer = self.answer(&next, self.arm, other);
+                self.write(at, line(&answer));
+            }
+            Fault::AnotherRecord => {
+                let answer = self.answer(question, self.arm, other);
+                self.write(at, line(&answer));
+            }
+            Fault::AnotherArm => {
+                let answer = self.answer(question, 1 - self.arm, question.sample);
+                self.write(at, line(&answer));
+            }
+            Fault::AnotherTask => {
+                let question = Question { task: "another task".to_owned(), ..question.clone() };
+                let answer = self.answer(&question, self.arm, question.sample);
+                self.write(at, line(&answer));
+            }
+            Fault::Copy => self.write(at, line(&copy)),
+            Fault::ProcessAndCopy => {
+                let [first, second] = if state.random.random() { [&right, &copy] } else { [&copy, &right] };
+                self.write(at, line(first));
+                self.write(soon, line(second));
+            }
+            Fault::Cut => {
+                let mut bytes = serde_json::to_vec(&right).unwrap();
+                bytes.truncate(state.random.random_range(1..bytes.len()));
+                self.write(at, Arrival::Line(bytes));
+                self.write(at, Arrival::End);
+            }
+            Fault::Print => {
+                self.write(before, Arrival::Line(b"warning: no map".to_vec()));
+                self.write(at, line(&right));
+            }
+            Fault::TooLong => self.write(at, Arrival::TooLong),
+            Fault::CrashBefore => self.write(at, Arrival::End),
+            Fault::CrashAfter => {
+                self.write(at, line(&right));
+                self.write(soon, Arrival::End);
+            }
+            Fault::Hang => {}
+            Fault::Late => self.write(state.now + limit + ANSWER_TIME, line(&right)),
+            Fault::HangingCall => {
+                let failure = SampleFailure { kind: "controller".to_owned(), message: "no answer in time".to_owned() };
+                let record = ArmRecord::new(right.record.controller.clone(), Err(failure));
+                self.write(at, line(&Answer { record, is_last: true, ..right }));
+                state.crashes += 1;
+            }
+        }
+    }
+
+    /// Takes what has arrived until `until`, the earliest first.
+    fn take(&mut self, until: Duration) -> Option<(Duration, Arrival)> {
+        let first = self.pipe.first_entry().filter(|first| first.key().0 <= until.as_nanos())?;
+        let at = Duration::from_nanos(u64::try_from(first.key().0).unwrap());
+        Some((at, first.remove()))
+    }
+
+    fn ended(&self, state: &mut State) -> ExecError {
+        state.crashes += 1;
+        ExecError::Ended { status: ExitStatus::from_raw(SIGSEGV), answered: self.answered, stderr: String::new() }
+    }
+}
+
+impl Peer for Process {
+    /// As the process of the operating system: what has arrived before the question is a line that nobody has asked for.
+    fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        let shared = Arc::clone(&self.state);
+        let mut state = lock(&shared);
+        let (now, answered) = (state.now, self.answered);
+        match self.take(now) {
+            None => {}
+            Some((_, Arrival::Line(line))) => {
+                let line = String::from_utf8_lossy(&line).into_owned();
+                return Err(ExecError::OutOfTurn { answered, line });
+            }
+            Some((_, Arrival::TooLong)) => return Err(ExecError::LongLine { limit: 1 }),
+            Some((_, Arrival::End)) => return Err(self.ended(&mut state)),
+        }
+        let question: Question = serde_json::from_slice(&line).unwrap();
+        self.serve(&mut state, &question, limit);
+        self.earlier.push_front(question);
+        match self.take(now + limit) {
+            None => {
+                state.now = now + limit;
+                Ok(None)
+            }
+            Some((at, arrival)) => {
+                state.now = at;
+                match arrival {
+                    Arrival::Line(line) => {
+                        self.answered += 1;
+                        Ok(Some(line))
+                    }
+                    Arrival::TooLong => Err(ExecError::LongLine { limit: 1 }),
+                    Arrival::End => Err(self.ended(&mut state)),
+                }
+            }
+        }
+    }
+
+    fn condemn(&mut self) {}
+}
