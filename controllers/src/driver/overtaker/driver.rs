@@ -88,6 +88,8 @@ impl Change {
 pub(crate) struct OvertakerDriver {
     pub(super) settings: Overtaker,
     model: FollowModel,
+    /// The model behind the second leader.
+    beyond_model: FollowModel,
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     pub(super) phase: Phase,
@@ -100,6 +102,7 @@ impl OvertakerDriver {
         Self {
             settings,
             model: settings.follow.model(),
+            beyond_model: settings.follow.model(),
             desired_mps: settings.follow.desired_mps(),
             perception: None,
             phase: Phase::Approaching,
@@ -155,11 +158,11 @@ impl Step<'_> {
     }
 
     /// Returns the perceived vehicle ahead, unless it is the overtaken one beside the driver's path: a vehicle observed
-    /// ahead one reaction time ago, in the original lane, may have been passed since. An overtaken vehicle that comes
-    /// into the driver's path is an ordinary lead vehicle.
+    /// ahead one reaction time ago, in the original lane, may have been passed since. The next vehicle in the path then
+    /// takes its place. An overtaken vehicle that comes into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        let ahead = self.scene.ahead.as_ref();
-        ahead.filter(|ahead| Some(ahead.actor) != overtaken || ahead.is_in_path(self.input))
+        let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
+        leaders.find(|leader| Some(leader.actor) != overtaken || leader.is_in_path(self.input))
     }
 
     /// Returns the present lateral position of the intended path (m).
@@ -321,7 +324,12 @@ impl OvertakerDriver {
     pub(super) fn cruise(&mut self, step: &Step<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
         let lead = ahead.map(|vehicle| &vehicle.lead);
         let requested_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, lead);
-        let acceleration_mps2 = brake_for_brake_light(requested_mps2, step.speed_mps, ahead);
+        let requested_mps2 = brake_for_brake_light(requested_mps2, step.speed_mps, ahead);
+        let nearest = step.scene.ahead.as_ref().zip(ahead).is_some_and(|(nearest, ahead)| nearest.actor == ahead.actor);
+        let beyond = step.scene.beyond.as_ref().filter(|_| nearest);
+        let beyond_mps2 = beyond
+            .map(|beyond| self.beyond_model.acceleration_mps2(step.speed_mps, step.desired_mps, Some(&beyond.lead)));
+        let acceleration_mps2 = self.settings.perception.respond_mps2(requested_mps2, beyond_mps2);
         DriverAction { acceleration_mps2, ..DriverAction::default() }
     }
 
