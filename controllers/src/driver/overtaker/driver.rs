@@ -165,6 +165,13 @@ impl Step<'_> {
         leaders.find(|leader| Some(leader.actor) != overtaken || leader.is_in_path(self.input))
     }
 
+    /// Returns the vehicle that is being overtaken: the nearest one ahead in the original lane `origin`. If the first one leaves
+    /// that lane as well, it is the next one.
+    fn overtaken_in(&self, origin: Lane) -> Option<&PerceivedVehicle> {
+        let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
+        leaders.find(|leader| self.input.road.lane_at(leader.d_m) == origin)
+    }
+
     /// Returns the present lateral position of the intended path (m).
     fn path_d_m(&self) -> f64 {
         self.input.own.d_m - self.input.lateral_deviation_m
@@ -259,8 +266,9 @@ impl OvertakerDriver {
     fn continue_change(&mut self, step: &Step<'_>, mut change: Change) -> DriverAction {
         let own = step.input.own;
         let in_target_lane = step.input.road.lane_at(own.d_m) == change.target;
-        let overtaken = self.overtaken(step, change.overtaken);
+        let overtaken = step.overtaken_in(change.origin);
         if let Some(ahead) = overtaken {
+            change.overtaken = Some(ahead.actor);
             change.clear_at = step.clear_at(&change, ahead);
         }
         let distance_to_clear_m = change.distance_to_clear_m(own.s_m);
@@ -347,11 +355,6 @@ impl OvertakerDriver {
     fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
         let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
         !self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
-    }
-
-    /// Returns the vehicle that is being overtaken while it is the nearest one ahead.
-    fn overtaken<'a>(&self, step: &Step<'a>, actor: Option<usize>) -> Option<&'a PerceivedVehicle> {
-        step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) == actor)
     }
 
     /// Returns the criterion by which the driver accepts an adjacent lane.
