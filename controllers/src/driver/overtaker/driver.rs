@@ -2,7 +2,7 @@
 
 use closecall_traffic::{Indicator, Lane, MINIMUM_JERK_PEAK, Side, Stream, Time};
 
-use super::acceptance::{GapAcceptance, Tolerance};
+use super::acceptance::{GapAcceptance, MIN_GAIN_MPS, Tolerance};
 use super::conflict::Course;
 use super::follow::FollowModel;
 use super::{Overtaker, path};
@@ -235,7 +235,7 @@ impl OvertakerDriver {
             return self.cruise(step, step.scene.ahead.as_ref());
         };
         let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_START);
-        let wants_to_overtake = step.desired_mps > ahead.lead.speed_mps;
+        let wants_to_overtake = step.desired_mps >= ahead.lead.speed_mps + MIN_GAIN_MPS;
         if !wants_to_overtake || !acceptance.accepts(lane) {
             return self.cruise(step, Some(ahead));
         }
@@ -408,4 +408,42 @@ fn has_passed(step: &Step<'_>, overtaken: Option<usize>) -> bool {
     let adjacent = if step.side == Side::Left { near.right.as_ref() } else { near.left.as_ref() };
     let follower = adjacent.and_then(|lane| lane.follower.as_ref());
     overtaken.is_some() && follower.map(|follower| follower.actor) == overtaken
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, stream};
+
+    use super::*;
+    use crate::driver::testing::{car_ahead, overtaker_config, with_input};
+    use crate::driver::{LaneNeighbours, Lead, Neighbours};
+
+    /// Returns the actions of a driver at 30 m/s in its first seconds, 14 m behind a vehicle at `lead_mps` and with a free
+    /// passing lane. The vehicle shows its brake light, though it keeps its speed, once the driver has pulled out.
+    fn actions(lead_mps: f64) -> Vec<DriverAction> {
+        let mut driver = overtaker_config(0.5, 0.05).check(&Parameters::default()).unwrap().driver();
+        let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+        let mut pulled_out = false;
+        let mut time = Time::ZERO;
+        let mut actions = Vec::new();
+        while time < Time::from_s(2.5) {
+            let gap_m = 14.0 - (30.0 - lead_mps) * time.s();
+            let lead = Lead { gap_m, speed_mps: lead_mps, acceleration_mps2: 0.0 };
+            let own = LaneNeighbours { lead: Some(car_ahead(lead, pulled_out)), ..LaneNeighbours::default() };
+            let left = Some(LaneNeighbours::default());
+            let neighbours = Neighbours { own, left, ..Neighbours::default() };
+            let action = with_input(time, &neighbours, |input| driver.step(input, &mut rng).unwrap());
+            pulled_out |= action.lane_change.is_some();
+            actions.push(action);
+            time += PHYSICS_STEP;
+        }
+        actions
+    }
+
+    #[test]
+    fn a_driver_does_not_pull_out_for_a_gain_of_millimetres_per_second() {
+        let pulls_out = |lead_mps| actions(lead_mps).iter().any(|action| action.lane_change.is_some());
+        assert!(!pulls_out(29.995) && !pulls_out(29.1));
+        assert!(pulls_out(28.9));
+    }
 }

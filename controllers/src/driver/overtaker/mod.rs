@@ -9,7 +9,7 @@
 //!                  └── back in lane ── returning ◀── gap in the original lane ─────────────────────────┘ scenario asks
 //! ```
 //!
-//! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a
+//! A driver overtakes only for a least gain of speed. In the phase *approaching* with a free passing lane, it keeps its speed: it does not slow down behind a
 //! vehicle that it is about to overtake. It pulls out so that, as far as it can predict, the time headway has the value
 //! given by the scenario when its centre crosses the lane marking, or earlier, so that its gap does not fall below its own
 //! safe gap, cc0 + cc1·v (s₀ + T·v with the Intelligent Driver Model). On a quintic path of duration T, that is T/2 after
