@@ -8,7 +8,9 @@ use super::follow::FollowModel;
 use super::{Overtaker, path};
 use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
-use crate::driver::wiedemann99::{EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light};
+use crate::driver::wiedemann99::{
+    EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light, brake_while_overtaking,
+};
 use crate::driver::{
     BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Looks, check_finite, finite,
 };
@@ -284,7 +286,7 @@ impl OvertakerDriver {
         }
         let following_mps2 = self.follow_in_target(step, &change);
         let requested_mps2 =
-            brake_before_overtaking(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
+            brake_while_overtaking(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
         let mut action =
             DriverAction { acceleration_mps2: requested_mps2, indicator: step.indicator(), ..DriverAction::default() };
         if let Some(ahead) = overtaken {
@@ -445,5 +447,14 @@ mod tests {
         let pulls_out = |lead_mps| actions(lead_mps).iter().any(|action| action.lane_change.is_some());
         assert!(!pulls_out(29.995) && !pulls_out(29.1));
         assert!(pulls_out(28.9));
+    }
+
+    #[test]
+    fn a_driver_who_is_overtaking_does_not_coast_for_a_brake_light() {
+        let actions = actions(28.9);
+        assert!(actions.iter().any(|action| action.lane_change.is_some()));
+        // The gap closes at 1.1 m/s, and the lane change is done before it is used up.
+        let strongest_mps2 = actions.iter().map(|action| action.acceleration_mps2).fold(0.0, f64::min);
+        assert!(strongest_mps2 > -0.7, "{strongest_mps2}");
     }
 }

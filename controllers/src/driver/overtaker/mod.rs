@@ -17,7 +17,7 @@
 //! car-following model (Wiedemann 99 or the Intelligent Driver Model). It signals from two
 //! seconds before it pulls out.
 //!
-//! The brake light of the vehicle ahead makes the driver release the accelerator. If the gap closes as fast as drivers
+//! The brake light of the vehicle ahead makes the driver release the accelerator, unless it is already pulling out. If the gap closes as fast as drivers
 //! brake at (a time to collision below 10 s), the driver brakes at least as strongly as that vehicle, one reaction time after
 //! the light.
 //!

@@ -146,19 +146,25 @@ pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
-/// Limits the acceleration as [`coast_for_brake_light`] does, for a driver who is about to overtake the vehicle ahead. If
-/// the gap closes as fast as drivers brake at, the driver brakes at least as strongly as that vehicle, even if steering alone
-/// would avoid it: the brake light says that the prediction may be wrong.
+/// Limits the acceleration as [`coast_for_brake_light`] and [`brake_while_overtaking`] do, for a driver who is about to
+/// overtake the vehicle ahead.
 pub(crate) fn brake_before_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
-    let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
+    brake_while_overtaking(coast_for_brake_light(requested_mps2, speed_mps, ahead), speed_mps, ahead)
+}
+
+/// Returns `requested_mps2`, or at most the acceleration of the vehicle that is being overtaken if that one shows its brake
+/// light and the gap closes as fast as drivers brake at. The driver then brakes even if steering alone would avoid a collision:
+/// the brake light says that the prediction may be wrong. The light alone does not make a driver who is already pulling out
+/// release the accelerator: it leaves the lane of that vehicle.
+pub(crate) fn brake_while_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
         Some(vehicle)
             if vehicle.brake_light
                 && speed_mps - vehicle.lead.speed_mps > BRAKE_ONSET_PER_S * vehicle.lead.gap_m.max(0.0) =>
         {
-            limited_mps2.min(vehicle.lead.acceleration_mps2)
+            requested_mps2.min(vehicle.lead.acceleration_mps2)
         }
-        _ => limited_mps2,
+        _ => requested_mps2,
     }
 }
 
