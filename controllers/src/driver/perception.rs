@@ -9,6 +9,8 @@
 //!   delay: they know their own motion at once, and assume that other vehicles continue as perceived (temporal
 //!   anticipation; Treiber, Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*,
 //!   Physica A 360 (2006) 71–88). Only a change in the motion of another vehicle is perceived late.
+//! - *Urgency.* The shorter the perceived time to collision with the vehicle ahead, the shorter is the reaction time
+//!   (Summala 2000; see [`reaction`](super::reaction)).
 //! - *Looming threshold.* A driver can tell how large a speed difference is only if the visual angle of the vehicle ahead
 //!   changes faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident
 //!   Analysis and Prevention 28 (1996) 415–421). In reconstructed crashes drivers reacted at 0.012 to 0.04 rad/s (Maddox
@@ -48,7 +50,7 @@ use closecall_traffic::{Lane, PHYSICS_STEP, Side, Stream, Time};
 use self::known::{KnownVehicle, PerceivedMotion};
 use self::observation::{Observation, ObservedVehicle};
 use super::attention::{Attention, Lapse};
-use super::reaction::MAX_REACTION_S;
+use super::reaction::{MAX_REACTION_S, shortened_by_urgency};
 use super::{DriverInput, Lead};
 
 /// Slowest change of the visual angle that a driver can scale (rad/s) (Hoffmann and Mortimer 1996).
@@ -119,7 +121,10 @@ impl PerceivedScene {
 /// The perception of one driver: memory, attention and estimates.
 #[derive(Clone, Debug)]
 pub(crate) struct Perception {
-    reaction: Time,
+    /// Reaction time where nothing is urgent (s).
+    reaction_s: f64,
+    /// Perceived 1/TTC with the vehicle ahead at the last step (1/s).
+    inverse_ttc_per_s: f64,
     attention: Attention,
     /// The side whose adjacent lane the driver observes, if any.
     side: Option<Side>,
@@ -139,7 +144,8 @@ impl Perception {
     /// lane the driver observes, if any.
     pub(crate) fn new(reaction_s: f64, side: Option<Side>) -> Self {
         Self {
-            reaction: Time::from_s(reaction_s),
+            reaction_s,
+            inverse_ttc_per_s: 0.0,
             attention: Attention::default(),
             side,
             memory: Vec::with_capacity(MEMORY_CAPACITY),
@@ -171,7 +177,7 @@ impl Perception {
         if !self.attention.is_looking_away(input.time, rng) || self.memory.is_empty() {
             self.store(input);
         }
-        let due = input.time - self.reaction;
+        let due = input.time - Time::from_s(shortened_by_urgency(self.reaction_s, self.inverse_ttc_per_s));
         while self.current + 1 < self.memory.len() && self.observation(self.current + 1).time <= due {
             self.current += 1;
         }
@@ -182,6 +188,9 @@ impl Perception {
             own_speed_then_mps: observation.own_speed_mps,
         };
         let [mut ahead, beyond] = self.perceive(self.leaders(&observation), &observation, &extrapolation, input.time);
+        self.inverse_ttc_per_s = ahead
+            .as_ref()
+            .map_or(0.0, |ahead| (input.own.speed_mps - ahead.lead.speed_mps) / ahead.lead.gap_m.max(MIN_GAP_M));
         if let (Some(ahead), Some(beyond)) = (ahead.as_mut(), beyond.as_ref()) {
             self.anticipate(ahead, beyond);
         }

@@ -238,3 +238,25 @@ fn a_driver_sees_position_and_speed_of_the_second_leader_through_a_car_but_not_t
     assert!((beyond.lead.gap_m - (110.0 - 17.0 * 2.0)).abs() < 1e-9 && beyond.lead.speed_mps == 13.0, "{beyond:?}");
     assert_eq!(seen(VehicleClass::Truck), None);
 }
+
+/// Returns the time after which a driver with a reaction time of 1.25 s perceives a brake light that goes on at 3 s (s), 30 m
+/// behind a vehicle that is slower by `closing_mps` at that moment.
+fn light_perceived_after_s(closing_mps: f64) -> f64 {
+    let mut perception = Perception::new(1.25, None);
+    let mut time = Time::ZERO;
+    loop {
+        let on = time >= Time::from_s(3.0);
+        let gap_m = 30.0 - closing_mps * (time.s() - 3.0);
+        if observe(&mut perception, time, steady(gap_m, 30.0 - closing_mps), on).brake_light {
+            return (time - Time::from_s(3.0)).s();
+        }
+        time += PHYSICS_STEP;
+    }
+}
+
+#[test]
+fn a_driver_reacts_faster_where_the_time_to_collision_is_short() {
+    assert!((light_perceived_after_s(0.0) - 1.25).abs() < 1e-9);
+    // At 10 m/s the time to collision is 3 s.
+    assert!((light_perceived_after_s(10.0) - 1.0).abs() < 0.011, "{}", light_perceived_after_s(10.0));
+}
