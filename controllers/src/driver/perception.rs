@@ -228,6 +228,9 @@ impl Perception {
     /// Returns the vehicle ahead and the second leader of an observation. If the second leader is the vehicle ahead by now, it
     /// takes that place at once.
     fn leaders(&self, observation: &Observation) -> [Option<ObservedVehicle>; 2] {
+        if !self.settings.looks_beyond() {
+            return [observation.ahead, None];
+        }
         let latest = self.observation(self.memory.len() - 1);
         match (latest.ahead, observation.beyond) {
             (Some(now), Some(beyond)) if now.actor == beyond.actor => [Some(beyond), None],
