@@ -85,6 +85,17 @@ impl HumanDriver {
         }
     }
 
+    /// Returns the gap at which the driver follows a vehicle at `speed_mps` in equilibrium (m), or `None` for a driver that does not
+    /// follow.
+    pub fn settled_gap_m(&self, speed_mps: f64) -> Option<f64> {
+        match self {
+            Self::Prescribed(_) => None,
+            Self::Wiedemann99(settings) => Some(settings.settled_gap_m(speed_mps)),
+            Self::Idm(settings) => Some(settings.safe_gap_m(speed_mps)),
+            Self::Overtaker(settings) => Some(settings.follow.settled_gap_m(speed_mps)),
+        }
+    }
+
     /// Builds a new driver for one run. It allocates memory here and in its first step, and none afterwards.
     pub fn build(&self) -> Box<dyn Driver> {
         match self {

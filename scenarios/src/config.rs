@@ -161,8 +161,8 @@ pub struct AbsoluteStartConfig {
     pub speed_mps: Num,
 }
 
-/// A position and a speed relative to another actor. Give exactly one of `gap-m` and `thw-s`, and exactly one of `speed-mps`
-/// and `closing-mps`.
+/// A position and a speed relative to another actor. Give exactly one of `gap-m`, `thw-s` and `settled`, and exactly one of
+/// `speed-mps` and `closing-mps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RelativeStartConfig {
@@ -172,6 +172,9 @@ pub struct RelativeStartConfig {
     pub gap_m: Option<Num>,
     /// Time headway between the two vehicles (s), with the speed of the vehicle that is behind.
     pub thw_s: Option<Num>,
+    /// `true`: the gap at which the driver of this actor follows in equilibrium, cc0 + cc1·v + cc2/2 or s₀ + T·v. The actor is
+    /// behind, and its driver follows by Wiedemann 99 or the Intelligent Driver Model.
+    pub settled: Option<bool>,
     /// Speed (m/s).
     pub speed_mps: Option<Num>,
     /// Speed at which the gap closes (m/s).

@@ -1,7 +1,10 @@
 //! Computes the states of the vehicles at the start of a run.
 
+use closecall_controllers::CheckedDriver;
 use closecall_traffic::metrics::touching_distance_m;
-use closecall_traffic::{ActorId, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState};
+use closecall_traffic::{
+    ActorId, Check, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState,
+};
 
 use super::config::{ActorConfig, RelativeStartConfig, StartConfig};
 
@@ -127,11 +130,15 @@ impl Placement<'_> {
         };
         let gap = Alternative { key: "gap-m", value: start.gap_m.as_ref() };
         let thw = Alternative { key: "thw-s", value: start.thw_s.as_ref() };
-        let gap_m = match exactly_one(gap, thw, "one of `gap-m` and `thw-s`")? {
-            Given::First(num) => self.parameters.number(num, gap.key, GAP_RANGE_M)?,
-            Given::Second(num) => {
-                let follower_mps = if direction > 0.0 { reference.speed_mps } else { speed_mps };
-                self.parameters.number(num, thw.key, THW_RANGE_S)? * follower_mps
+        let gap_m = if start.settled == Some(true) {
+            self.settled_gap_m(index, start, direction, speed_mps)?
+        } else {
+            match exactly_one(gap, thw, "one of `gap-m`, `thw-s` and `settled`")? {
+                Given::First(num) => self.parameters.number(num, gap.key, GAP_RANGE_M)?,
+                Given::Second(num) => {
+                    let follower_mps = if direction > 0.0 { reference.speed_mps } else { speed_mps };
+                    self.parameters.number(num, thw.key, THW_RANGE_S)? * follower_mps
+                }
             }
         };
         let [own, other] = [index, other].map(|index| self.vehicles[index].dimensions.length_m);
@@ -141,6 +148,35 @@ impl Placement<'_> {
         };
         let s_m = reference.s_m + direction * (gap_m + touching_distance_m(own, other));
         Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
+    }
+
+    /// Returns the gap at which the driver of an actor behind its reference follows in equilibrium at `speed_mps` (m).
+    fn settled_gap_m(
+        &self,
+        index: usize,
+        start: &RelativeStartConfig,
+        direction: f64,
+        speed_mps: f64,
+    ) -> Result<f64, ConfigError> {
+        let refuse = |other: &'static str, rule: &str| {
+            ConfigError::new("settled", Problem::Contradiction { other, rule: rule.to_owned() })
+        };
+        for (other, given) in [("gap-m", &start.gap_m), ("thw-s", &start.thw_s)] {
+            if given.is_some() {
+                return Err(refuse(other, "only one of them may be given"));
+            }
+        }
+        if direction > 0.0 {
+            return Err(refuse("ahead", "only a vehicle that is behind follows"));
+        }
+        let driver = self.actors[index].driver.check(self.parameters)?;
+        let gap_m = match &driver {
+            CheckedDriver::Human(human) => human.settled_gap_m(speed_mps),
+            CheckedDriver::Ego(_) => None,
+        };
+        gap_m.ok_or_else(|| {
+            refuse("driver", "only drivers that follow by Wiedemann 99 or the Intelligent Driver Model have such a gap")
+        })
     }
 
     fn find(&self, id: &ActorId) -> Result<usize, ConfigError> {

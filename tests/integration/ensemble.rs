@@ -195,6 +195,7 @@ fn each_property_of_a_member_changes_when_a_driver_brakes() {
         cc1_s: Some(0.5.into()),
         desired_speed_mps: Some(30.0.into()),
         reaction_s: Some(ReactionConfig::Value(0.8.into())),
+        perception: Some(PerceptionConfig { anticipation: Some(0.0.into()), evidence: None }),
         ..Wiedemann99Config::default()
     };
     let onset_s = brakes_at_s(&typical, 6.0);
@@ -212,7 +213,7 @@ fn each_property_of_a_member_changes_when_a_driver_brakes() {
     let full_s = brakes_at_s(&Wiedemann99Config { perception: Some(full), ..typical.clone() }, 6.0);
     assert!((1.8..2.0).contains(&full_s), "before the brake light directly ahead: {full_s}");
 
-    let evidence = PerceptionConfig { anticipation: None, evidence: Some(EvidenceConfig::default()) };
+    let evidence = PerceptionConfig { anticipation: Some(0.0.into()), evidence: Some(EvidenceConfig::default()) };
     let accumulating = Wiedemann99Config {
         perception: Some(evidence),
         reaction_s: Some(ReactionConfig::Value(0.1.into())),

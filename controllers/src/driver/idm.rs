@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::attention::{Lapse, LapseConfig, check_lapse};
 use super::pedals::{Pedals, check_brake_build_up};
-use super::perception::{Perception, PerceptionConfig, PerceptionSettings, check_perception};
+use super::perception::{PerceivedVehicle, Perception, PerceptionConfig, PerceptionSettings, check_perception};
 use super::reaction::{Reaction, ReactionChange, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
 use super::{Driver, DriverAction, DriverError, DriverInput, Lead, Looks, check_finite, check_hardest_braking, finite};
@@ -162,10 +162,13 @@ impl Driver for IdmDriver {
                     .with_lapses(self.model.lapse)
                     .with_settings(self.model.perception)
             };
-            let ahead = self.perception.get_or_insert_with(new).observe(input, rng).ahead;
-            let requested_mps2 =
-                self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));
-            let requested_mps2 = brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref());
+            let scene = self.perception.get_or_insert_with(new).observe(input, rng);
+            let [ahead, beyond] = [scene.ahead.as_ref(), scene.beyond.as_ref()];
+            let follow =
+                |leader: &PerceivedVehicle| self.model.acceleration_mps2(speed_mps, desired_mps, Some(&leader.lead));
+            let free = || self.model.acceleration_mps2(speed_mps, desired_mps, None);
+            let requested_mps2 = brake_for_brake_light(ahead.map_or_else(free, follow), speed_mps, ahead);
+            let requested_mps2 = self.model.perception.respond_mps2(requested_mps2, beyond.map(follow));
             self.pedals.apply_mps2(requested_mps2, input.time)
         } else {
             self.model.acceleration_mps2(speed_mps, desired_mps, nearest_lead(input).as_ref())

@@ -53,9 +53,9 @@ pub struct Neighbours {
     /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on
     /// would hit it.
     pub in_path: Option<Neighbour>,
-    /// The nearest vehicle ahead of the one that is ahead (the nearer of the lead vehicle in the own lane and the one in
-    /// the path), in the path of that one: the driver may see its brake light through the windows between. `None` if there is
-    /// none, or if the driver does not look that far.
+    /// The second leader: the nearest vehicle in the path that is ahead of the one ahead (the nearer of the lead vehicle in
+    /// the own lane and the one in the path). The driver may see it through the windows between. `None` if there is none, or
+    /// if the driver does not look that far.
     pub beyond: Option<Neighbour>,
 }
 

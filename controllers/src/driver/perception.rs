@@ -9,6 +9,8 @@
 //!   delay: they know their own motion at once, and assume that other vehicles continue as perceived (temporal
 //!   anticipation; Treiber, Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*,
 //!   Physica A 360 (2006) 71–88). Only a change in the motion of another vehicle is perceived late.
+//! - *Urgency.* The shorter the perceived time to collision with the vehicle ahead, the shorter is the reaction time
+//!   (Summala 2000; see [`reaction`](super::reaction)).
 //! - *Looming threshold.* A driver can tell how large a speed difference is only if the visual angle of the vehicle ahead
 //!   changes faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident
 //!   Analysis and Prevention 28 (1996) 415–421). In reconstructed crashes drivers reacted at 0.012 to 0.04 rad/s (Maddox
@@ -22,14 +24,21 @@
 //! - *Brake light.* The brake light is perceived with the same delay as everything else. The deceleration itself is
 //!   perceived only gradually, from the change of speed. Until then, a driver who sees the brake light go on assumes a
 //!   moderate deceleration.
-//! - *Anticipation.* A driver may look through the vehicle ahead. It then expects that vehicle to brake once it perceives the
-//!   brake light of the one beyond (spatial anticipation; Treiber, Kesting and Helbing 2006).
+//! - *Second leader.* A driver also sees the next vehicle beyond the one ahead: through the windows of a car, past a
+//!   motorcycle, and behind a truck only where its rear reaches past the truck. It perceives position and speed of the second
+//!   leader as it does those of the vehicle ahead, and expects the vehicle ahead to brake once it perceives the brake light of
+//!   the second leader (spatial anticipation; Treiber, Kesting and Helbing 2006). The sensitivity to the second leader is
+//!   half of the one to the vehicle ahead (Hoogendoorn and Ossen 2006; see [`PerceptionConfig`]).
+//! - *Leader that leaves.* A lane change takes seconds, and the driver foresees its end. Once the vehicle ahead is out of the
+//!   lane, the driver reacts to the next vehicle at once, with what it knows about that one, if it was in view one reaction
+//!   time ago.
 //! - *Evidence.* A driver may accumulate looming evidence instead of using the threshold and the brake light:
 //!   see [`evidence`].
 
 mod acceleration;
 mod config;
 mod evidence;
+mod known;
 mod observation;
 
 pub(crate) use config::check_perception;
@@ -38,11 +47,10 @@ pub use evidence::{Evidence, EvidenceConfig};
 
 use closecall_traffic::{Lane, PHYSICS_STEP, Side, Stream, Time};
 
-use self::acceleration::AccelerationEstimate;
-use self::evidence::{Belief, Looming};
+use self::known::{KnownVehicle, PerceivedMotion};
 use self::observation::{Observation, ObservedVehicle};
 use super::attention::{Attention, Lapse};
-use super::reaction::MAX_REACTION_S;
+use super::reaction::{MAX_REACTION_S, shortened_by_urgency};
 use super::{DriverInput, Lead};
 
 /// Slowest change of the visual angle that a driver can scale (rad/s) (Hoffmann and Mortimer 1996).
@@ -95,6 +103,8 @@ pub(crate) struct PerceivedLane {
 pub(crate) struct PerceivedScene {
     /// The nearest vehicle ahead, in the driver's lane or in its path.
     pub(crate) ahead: Option<PerceivedVehicle>,
+    /// The second leader: the next vehicle in the path.
+    pub(crate) beyond: Option<PerceivedVehicle>,
     /// The observed side and the lane there, next to the driver's lane at the observation; `None` if there is none.
     adjacent: Option<(Side, PerceivedLane)>,
     /// The driver's lane at the observation.
@@ -111,9 +121,11 @@ impl PerceivedScene {
 /// The perception of one driver: memory, attention and estimates.
 #[derive(Clone, Debug)]
 pub(crate) struct Perception {
-    reaction: Time,
+    /// Reaction time where nothing is urgent (s).
+    reaction_s: f64,
+    /// Perceived 1/TTC with the vehicle ahead at the last step (1/s).
+    inverse_ttc_per_s: f64,
     attention: Attention,
-    speed_estimate: Option<SpeedEstimate>,
     /// The side whose adjacent lane the driver observes, if any.
     side: Option<Side>,
     /// Ring buffer of observations.
@@ -122,23 +134,9 @@ pub(crate) struct Perception {
     oldest: usize,
     /// Index of the observation in use, counted from the oldest.
     current: usize,
-    acceleration_estimate: AccelerationEstimate,
     settings: PerceptionSettings,
-    /// Perceived acceleration of the vehicle beyond the one ahead.
-    beyond_estimate: AccelerationEstimate,
-    /// What a driver who accumulates evidence expects of the vehicle ahead.
-    belief: Option<Belief>,
-    /// Time of the observation from which evidence was last accumulated.
-    accumulated: Option<Time>,
-}
-
-/// Perceived speed of the vehicle ahead.
-#[derive(Clone, Copy, Debug)]
-struct SpeedEstimate {
-    actor: u32,
-    speed_mps: f64,
-    /// True while the driver has noticed the difference to the own speed and attends to it.
-    attended: bool,
+    /// What the driver knows about the vehicle ahead and about the second leader.
+    known: [Option<KnownVehicle>; 2],
 }
 
 impl Perception {
@@ -146,18 +144,15 @@ impl Perception {
     /// lane the driver observes, if any.
     pub(crate) fn new(reaction_s: f64, side: Option<Side>) -> Self {
         Self {
-            reaction: Time::from_s(reaction_s),
+            reaction_s,
+            inverse_ttc_per_s: 0.0,
             attention: Attention::default(),
-            speed_estimate: None,
             side,
             memory: Vec::with_capacity(MEMORY_CAPACITY),
             oldest: 0,
             current: 0,
-            acceleration_estimate: AccelerationEstimate::new(u32::MAX, Time::ZERO),
             settings: PerceptionSettings::default(),
-            beyond_estimate: AccelerationEstimate::new(u32::MAX, Time::ZERO),
-            belief: None,
-            accumulated: None,
+            known: [None; 2],
         }
     }
 
@@ -182,7 +177,7 @@ impl Perception {
         if !self.attention.is_looking_away(input.time, rng) || self.memory.is_empty() {
             self.store(input);
         }
-        let due = input.time - self.reaction;
+        let due = input.time - Time::from_s(shortened_by_urgency(self.reaction_s, self.inverse_ttc_per_s));
         while self.current + 1 < self.memory.len() && self.observation(self.current + 1).time <= due {
             self.current += 1;
         }
@@ -192,13 +187,12 @@ impl Perception {
             own_travel_m: input.own.s_m - observation.own_s_m,
             own_speed_then_mps: observation.own_speed_mps,
         };
-        let reckoned_mps2 = self.acceleration_estimate.update_mps2(observation.ahead.as_ref(), input.time);
-        let mut ahead = match self.settings.evidence {
-            None => self.ahead_above_threshold(&observation, &extrapolation, reckoned_mps2),
-            Some(_) => self.ahead_as_believed(&observation, &extrapolation),
-        };
-        if self.settings.looks_beyond() {
-            self.anticipate(&observation, input.time, ahead.as_mut());
+        let [mut ahead, beyond] = self.perceive(self.leaders(&observation), &observation, &extrapolation, input.time);
+        self.inverse_ttc_per_s = ahead
+            .as_ref()
+            .map_or(0.0, |ahead| (input.own.speed_mps - ahead.lead.speed_mps) / ahead.lead.gap_m.max(MIN_GAP_M));
+        if let (Some(ahead), Some(beyond)) = (ahead.as_mut(), beyond.as_ref()) {
+            self.anticipate(ahead, beyond);
         }
         let adjacent = observation.side.zip(observation.adjacent).map(|(side, [lead, alongside, follower])| {
             let lane = PerceivedLane {
@@ -208,7 +202,7 @@ impl Perception {
             };
             (side, lane)
         });
-        PerceivedScene { ahead, adjacent, lane: observation.own_lane }
+        PerceivedScene { ahead, beyond, adjacent, lane: observation.own_lane }
     }
 
     /// Returns the stored observation at `index`, counted from the oldest.
@@ -231,76 +225,47 @@ impl Perception {
         }
     }
 
-    /// Returns the vehicle ahead as a driver perceives it who notices speed differences above the looming threshold.
-    fn ahead_above_threshold(
-        &mut self,
-        observation: &Observation,
-        extrapolation: &Extrapolation,
-        reckoned_mps2: f64,
-    ) -> Option<PerceivedVehicle> {
-        let Some(observed) = observation.ahead else {
-            self.speed_estimate = None;
-            return None;
-        };
-        let speed_mps = self.estimate_speed_mps(&observed, observation.own_speed_mps);
-        let estimated_mps2 = self.acceleration_estimate.acceleration_mps2;
-        let mut ahead = extrapolation.braking_ahead(&observed, speed_mps, estimated_mps2);
-        ahead.lead.acceleration_mps2 = reckoned_mps2;
-        Some(ahead)
-    }
-
-    /// Returns the vehicle ahead as a driver perceives it who accumulates evidence. The brake light of that vehicle counts
-    /// once the driver has noticed that it slows down.
-    fn ahead_as_believed(
-        &mut self,
-        observation: &Observation,
-        extrapolation: &Extrapolation,
-    ) -> Option<PerceivedVehicle> {
-        let evidence = self.settings.evidence?;
-        let Some(observed) = observation.ahead else {
-            self.belief = None;
-            return None;
-        };
-        let step_s = self.accumulated.map_or(0.0, |last| (observation.time - last).s());
-        self.accumulated = Some(observation.time);
-        let seen = Looming {
-            actor: observed.actor,
-            gap_m: observed.gap_m,
-            speed_mps: observed.speed_mps,
-            acceleration_mps2: self.acceleration_estimate.acceleration_mps2,
-            step_s,
-        };
-        let belief = Belief::updated(self.belief, evidence, seen, observation.own_speed_mps);
-        self.belief = Some(belief);
-        let mut ahead = extrapolation.braking_ahead(&observed, belief.speed_mps, belief.acceleration_mps2);
-        ahead.lead.acceleration_mps2 = belief.acceleration_mps2;
-        ahead.brake_light = observed.brake_light && belief.acceleration_mps2 < 0.0;
-        Some(ahead)
-    }
-
-    /// Makes the driver expect that the vehicle ahead brakes if the one beyond shows its brake light.
-    fn anticipate(&mut self, observation: &Observation, now: Time, ahead: Option<&mut PerceivedVehicle>) {
-        let beyond_mps2 = self.beyond_estimate.update_mps2(observation.beyond.as_ref(), now);
-        let Some(ahead) = ahead else { return };
-        if observation.beyond.is_some_and(|beyond| beyond.brake_light) {
-            let lead = &mut ahead.lead;
-            lead.acceleration_mps2 = lead.acceleration_mps2.min(self.settings.anticipation * beyond_mps2.min(0.0));
-            ahead.brake_light = true;
+    /// Returns the vehicle ahead and the second leader of an observation. If the second leader is the vehicle ahead by now, it
+    /// takes that place at once.
+    fn leaders(&self, observation: &Observation) -> [Option<ObservedVehicle>; 2] {
+        if !self.settings.looks_beyond() {
+            return [observation.ahead, None];
+        }
+        let latest = self.observation(self.memory.len() - 1);
+        match (latest.ahead, observation.beyond) {
+            (Some(now), Some(beyond)) if now.actor == beyond.actor => [Some(beyond), None],
+            _ => [observation.ahead, observation.beyond],
         }
     }
 
-    /// Updates and returns the perceived speed of the vehicle ahead (m/s).
-    fn estimate_speed_mps(&mut self, observed: &ObservedVehicle, own_mps: f64) -> f64 {
-        let known = self.speed_estimate.filter(|estimate| estimate.actor == observed.actor);
-        let SpeedEstimate { speed_mps, attended, .. } =
-            known.unwrap_or(SpeedEstimate { actor: observed.actor, speed_mps: own_mps, attended: false });
-        let threshold = if attended { ATTENDED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS };
-        let attended = observed.visual_angle_rate_radps(own_mps) >= threshold;
-        // A driver also notices that the observed speed differs from the one assumed so far.
-        let notices = attended || observed.visual_angle_rate_radps(speed_mps) >= LOOMING_THRESHOLD_RADPS;
-        let speed_mps = if notices { observed.speed_mps } else { speed_mps };
-        self.speed_estimate = Some(SpeedEstimate { actor: observed.actor, speed_mps, attended });
-        speed_mps
+    /// Updates what the driver knows about the `leaders`, and returns them as perceived.
+    fn perceive(
+        &mut self,
+        leaders: [Option<ObservedVehicle>; 2],
+        observation: &Observation,
+        extrapolation: &Extrapolation,
+        now: Time,
+    ) -> [Option<PerceivedVehicle>; 2] {
+        let before = self.known;
+        let known = leaders.map(|leader| {
+            leader.map(|observed| {
+                let same = before.into_iter().flatten().find(|known| known.actor == observed.actor);
+                let mut known = same.unwrap_or_else(|| KnownVehicle::new(&observed, observation, now));
+                let perceived = known.perceive(&observed, observation, self.settings.evidence, now);
+                (known, extrapolation.braking_ahead(&observed, &perceived))
+            })
+        });
+        self.known = known.map(|leader| leader.map(|(known, _)| known));
+        known.map(|leader| leader.map(|(_, perceived)| perceived))
+    }
+
+    /// Makes the driver expect that the vehicle ahead brakes if the second leader shows its brake light.
+    fn anticipate(&self, ahead: &mut PerceivedVehicle, beyond: &PerceivedVehicle) {
+        if beyond.brake_light {
+            let expected_mps2 = self.settings.anticipation * beyond.lead.acceleration_mps2.min(0.0);
+            ahead.lead.acceleration_mps2 = ahead.lead.acceleration_mps2.min(expected_mps2);
+            ahead.brake_light = true;
+        }
     }
 }
 
@@ -333,12 +298,14 @@ impl Extrapolation {
         self.perceived(observed, speed_mps, observed.gap_m + speed_mps * self.elapsed_s - self.own_travel_m)
     }
 
-    /// Returns a vehicle ahead that is perceived at `speed_mps` with `acceleration_mps2`, both extrapolated to now.
-    fn braking_ahead(&self, observed: &ObservedVehicle, speed_mps: f64, acceleration_mps2: f64) -> PerceivedVehicle {
-        let mut ahead = self.ahead(observed, speed_mps);
+    /// Returns a vehicle ahead whose perceived motion is extrapolated to now.
+    fn braking_ahead(&self, observed: &ObservedVehicle, motion: &PerceivedMotion) -> PerceivedVehicle {
+        let mut ahead = self.ahead(observed, motion.speed_mps);
         let lead = &mut ahead.lead;
-        lead.gap_m += accelerated_displacement_m(lead.speed_mps, acceleration_mps2, self.elapsed_s);
-        lead.speed_mps = (lead.speed_mps + acceleration_mps2 * self.elapsed_s).max(0.0);
+        lead.gap_m += accelerated_displacement_m(lead.speed_mps, motion.acceleration_mps2, self.elapsed_s);
+        lead.speed_mps = (lead.speed_mps + motion.acceleration_mps2 * self.elapsed_s).max(0.0);
+        lead.acceleration_mps2 = motion.expected_mps2;
+        ahead.brake_light = motion.brake_light;
         ahead
     }
 

@@ -199,14 +199,15 @@ pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks, 
     }
 }
 
-/// Puts a vehicle into `slot` if it is ahead of the vehicle ahead of `actor`, in its path, and nearer than the one there.
+/// Puts a vehicle into `slot` if it is in the path of `actor`, ahead of the vehicle ahead, and nearer than the one there.
 pub(super) fn keep_beyond(slot: &mut Option<Nearest>, extents: &[Extent], [actor, ahead, other]: [usize; 3]) {
     if other == actor || other == ahead {
         return;
     }
     let from_ahead = Candidate::new(extents, [ahead, other]);
-    if from_ahead.ahead_m > 0.0 && from_ahead.nearest.gap_m >= 0.0 && from_ahead.is_in_path {
-        keep_nearest(slot, Candidate::new(extents, [actor, other]).nearest);
+    let candidate = Candidate::new(extents, [actor, other]);
+    if from_ahead.ahead_m > 0.0 && from_ahead.nearest.gap_m >= 0.0 && candidate.is_in_path {
+        keep_nearest(slot, candidate.nearest);
     }
 }
 

@@ -151,10 +151,10 @@ impl NeighbourSearch {
         }
     }
 
-    /// Fills `slot` with the nearest vehicle in the path of the vehicle ahead of `actor`.
+    /// Fills `slot` with the nearest vehicle in the path of `actor` that is ahead of the vehicle ahead.
     fn fill_beyond(&self, [actor, ahead]: [usize; 2], slot: &mut Option<Nearest>) {
-        for strip in self.touched[ahead].clone() {
-            for entry in self.ahead_in_strip(ahead, strip) {
+        for strip in self.touched[actor].clone() {
+            for entry in self.ahead_in_strip(actor, strip) {
                 if self.is_beyond(actor, entry, slot) {
                     break;
                 }

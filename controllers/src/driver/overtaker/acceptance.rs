@@ -9,9 +9,10 @@ const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 /// Time headway left to a follower in the passing lane (s): an assumption; 0 to 1 are plausible.
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// Speed by which a lead vehicle in the passing lane must exceed the one to overtake to be worth following (m/s): an
-/// assumption; 0 to 3 are plausible.
-const MIN_GAIN_MPS: f64 = 1.0;
+/// Least gain of speed for which a driver overtakes: by which the own desired speed, and the speed of a lead vehicle in the
+/// passing lane, must exceed the speed of the vehicle to overtake (m/s): an assumption; 0.5 to 2.8 are plausible. German law
+/// asks for a speed that is *substantially higher* (StVO § 5 (2)); courts take 10 km/h for trucks (OLG Hamm, 4 Ss OWi 629/08).
+pub(super) const MIN_GAIN_MPS: f64 = 1.0;
 
 /// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far ahead to matter: an
 /// assumption; 0.1 to 0.5 are plausible.

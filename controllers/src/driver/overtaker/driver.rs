@@ -2,13 +2,15 @@
 
 use closecall_traffic::{Indicator, Lane, MINIMUM_JERK_PEAK, Side, Stream, Time};
 
-use super::acceptance::{GapAcceptance, Tolerance};
+use super::acceptance::{GapAcceptance, MIN_GAIN_MPS, Tolerance};
 use super::conflict::Course;
 use super::follow::FollowModel;
 use super::{Overtaker, path};
 use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
-use crate::driver::wiedemann99::{EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light};
+use crate::driver::wiedemann99::{
+    EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light, brake_while_overtaking,
+};
 use crate::driver::{
     BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Looks, check_finite, finite,
 };
@@ -88,6 +90,8 @@ impl Change {
 pub(crate) struct OvertakerDriver {
     pub(super) settings: Overtaker,
     model: FollowModel,
+    /// The model behind the second leader.
+    beyond_model: FollowModel,
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     pub(super) phase: Phase,
@@ -100,6 +104,7 @@ impl OvertakerDriver {
         Self {
             settings,
             model: settings.follow.model(),
+            beyond_model: settings.follow.model(),
             desired_mps: settings.follow.desired_mps(),
             perception: None,
             phase: Phase::Approaching,
@@ -155,11 +160,18 @@ impl Step<'_> {
     }
 
     /// Returns the perceived vehicle ahead, unless it is the overtaken one beside the driver's path: a vehicle observed
-    /// ahead one reaction time ago, in the original lane, may have been passed since. An overtaken vehicle that comes
-    /// into the driver's path is an ordinary lead vehicle.
+    /// ahead one reaction time ago, in the original lane, may have been passed since. The next vehicle in the path then
+    /// takes its place. An overtaken vehicle that comes into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        let ahead = self.scene.ahead.as_ref();
-        ahead.filter(|ahead| Some(ahead.actor) != overtaken || ahead.is_in_path(self.input))
+        let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
+        leaders.find(|leader| Some(leader.actor) != overtaken || leader.is_in_path(self.input))
+    }
+
+    /// Returns the vehicle that is being overtaken: the nearest one ahead in the original lane `origin`. If the first one leaves
+    /// that lane as well, it is the next one.
+    fn overtaken_in(&self, origin: Lane) -> Option<&PerceivedVehicle> {
+        let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
+        leaders.find(|leader| self.input.road.lane_at(leader.d_m) == origin)
     }
 
     /// Returns the present lateral position of the intended path (m).
@@ -225,7 +237,7 @@ impl OvertakerDriver {
             return self.cruise(step, step.scene.ahead.as_ref());
         };
         let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_START);
-        let wants_to_overtake = step.desired_mps > ahead.lead.speed_mps;
+        let wants_to_overtake = step.desired_mps >= ahead.lead.speed_mps + MIN_GAIN_MPS;
         if !wants_to_overtake || !acceptance.accepts(lane) {
             return self.cruise(step, Some(ahead));
         }
@@ -256,8 +268,9 @@ impl OvertakerDriver {
     fn continue_change(&mut self, step: &Step<'_>, mut change: Change) -> DriverAction {
         let own = step.input.own;
         let in_target_lane = step.input.road.lane_at(own.d_m) == change.target;
-        let overtaken = self.overtaken(step, change.overtaken);
+        let overtaken = step.overtaken_in(change.origin);
         if let Some(ahead) = overtaken {
+            change.overtaken = Some(ahead.actor);
             change.clear_at = step.clear_at(&change, ahead);
         }
         let distance_to_clear_m = change.distance_to_clear_m(own.s_m);
@@ -273,7 +286,7 @@ impl OvertakerDriver {
         }
         let following_mps2 = self.follow_in_target(step, &change);
         let requested_mps2 =
-            brake_before_overtaking(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
+            brake_while_overtaking(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
         let mut action =
             DriverAction { acceleration_mps2: requested_mps2, indicator: step.indicator(), ..DriverAction::default() };
         if let Some(ahead) = overtaken {
@@ -321,7 +334,12 @@ impl OvertakerDriver {
     pub(super) fn cruise(&mut self, step: &Step<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
         let lead = ahead.map(|vehicle| &vehicle.lead);
         let requested_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, lead);
-        let acceleration_mps2 = brake_for_brake_light(requested_mps2, step.speed_mps, ahead);
+        let requested_mps2 = brake_for_brake_light(requested_mps2, step.speed_mps, ahead);
+        let nearest = step.scene.ahead.as_ref().zip(ahead).is_some_and(|(nearest, ahead)| nearest.actor == ahead.actor);
+        let beyond = step.scene.beyond.as_ref().filter(|_| nearest);
+        let beyond_mps2 = beyond
+            .map(|beyond| self.beyond_model.acceleration_mps2(step.speed_mps, step.desired_mps, Some(&beyond.lead)));
+        let acceleration_mps2 = self.settings.perception.respond_mps2(requested_mps2, beyond_mps2);
         DriverAction { acceleration_mps2, ..DriverAction::default() }
     }
 
@@ -339,11 +357,6 @@ impl OvertakerDriver {
     fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
         let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
         !self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
-    }
-
-    /// Returns the vehicle that is being overtaken while it is the nearest one ahead.
-    fn overtaken<'a>(&self, step: &Step<'a>, actor: Option<usize>) -> Option<&'a PerceivedVehicle> {
-        step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) == actor)
     }
 
     /// Returns the criterion by which the driver accepts an adjacent lane.
@@ -397,4 +410,51 @@ fn has_passed(step: &Step<'_>, overtaken: Option<usize>) -> bool {
     let adjacent = if step.side == Side::Left { near.right.as_ref() } else { near.left.as_ref() };
     let follower = adjacent.and_then(|lane| lane.follower.as_ref());
     overtaken.is_some() && follower.map(|follower| follower.actor) == overtaken
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, stream};
+
+    use super::*;
+    use crate::driver::testing::{car_ahead, overtaker_config, with_input};
+    use crate::driver::{LaneNeighbours, Lead, Neighbours};
+
+    /// Returns the actions of a driver at 30 m/s in its first seconds, 14 m behind a vehicle at `lead_mps` and with a free
+    /// passing lane. The vehicle shows its brake light, though it keeps its speed, once the driver has pulled out.
+    fn actions(lead_mps: f64) -> Vec<DriverAction> {
+        let mut driver = overtaker_config(0.5, 0.05).check(&Parameters::default()).unwrap().driver();
+        let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+        let mut pulled_out = false;
+        let mut time = Time::ZERO;
+        let mut actions = Vec::new();
+        while time < Time::from_s(2.5) {
+            let gap_m = 14.0 - (30.0 - lead_mps) * time.s();
+            let lead = Lead { gap_m, speed_mps: lead_mps, acceleration_mps2: 0.0 };
+            let own = LaneNeighbours { lead: Some(car_ahead(lead, pulled_out)), ..LaneNeighbours::default() };
+            let left = Some(LaneNeighbours::default());
+            let neighbours = Neighbours { own, left, ..Neighbours::default() };
+            let action = with_input(time, &neighbours, |input| driver.step(input, &mut rng).unwrap());
+            pulled_out |= action.lane_change.is_some();
+            actions.push(action);
+            time += PHYSICS_STEP;
+        }
+        actions
+    }
+
+    #[test]
+    fn a_driver_does_not_pull_out_for_a_gain_of_millimetres_per_second() {
+        let pulls_out = |lead_mps| actions(lead_mps).iter().any(|action| action.lane_change.is_some());
+        assert!(!pulls_out(29.995) && !pulls_out(29.1));
+        assert!(pulls_out(28.9));
+    }
+
+    #[test]
+    fn a_driver_who_is_overtaking_does_not_coast_for_a_brake_light() {
+        let actions = actions(28.9);
+        assert!(actions.iter().any(|action| action.lane_change.is_some()));
+        // The gap closes at 1.1 m/s, and the lane change is done before it is used up.
+        let strongest_mps2 = actions.iter().map(|action| action.acceleration_mps2).fold(0.0, f64::min);
+        assert!(strongest_mps2 > -0.7, "{strongest_mps2}");
+    }
 }

@@ -60,6 +60,14 @@ impl Follow {
         }
     }
 
+    /// Returns the gap at which the driver follows a vehicle at `speed_mps` in equilibrium (m).
+    pub(crate) fn settled_gap_m(&self, speed_mps: f64) -> f64 {
+        match self {
+            Self::Wiedemann99(model) => model.settled_gap_m(speed_mps),
+            Self::Idm(model) => model.safe_gap_m(speed_mps),
+        }
+    }
+
     /// Returns the time headway that the driver keeps: cc1, or T (s).
     pub(crate) fn headway_s(&self) -> f64 {
         match self {

@@ -9,7 +9,7 @@
 //!                  └── back in lane ── returning ◀── gap in the original lane ─────────────────────────┘ scenario asks
 //! ```
 //!
-//! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a
+//! A driver overtakes only for a least gain of speed. In the phase *approaching* with a free passing lane, it keeps its speed: it does not slow down behind a
 //! vehicle that it is about to overtake. It pulls out so that, as far as it can predict, the time headway has the value
 //! given by the scenario when its centre crosses the lane marking, or earlier, so that its gap does not fall below its own
 //! safe gap, cc0 + cc1·v (s₀ + T·v with the Intelligent Driver Model). On a quintic path of duration T, that is T/2 after
@@ -17,7 +17,7 @@
 //! car-following model (Wiedemann 99 or the Intelligent Driver Model). It signals from two
 //! seconds before it pulls out.
 //!
-//! The brake light of the vehicle ahead makes the driver release the accelerator. If the gap closes as fast as drivers
+//! The brake light of the vehicle ahead makes the driver release the accelerator, unless it is already pulling out. If the gap closes as fast as drivers
 //! brake at (a time to collision below 10 s), the driver brakes at least as strongly as that vehicle, one reaction time after
 //! the light.
 //!

@@ -16,10 +16,9 @@ pub(super) const ASSUMED_BRAKING_MPS2: f64 = 2.0;
 /// assumption; 0.5 to 2 are plausible.
 const ASSUMED_BRAKING_DURATION_S: f64 = 1.0;
 
-/// Perceived acceleration of the vehicle ahead.
+/// Perceived acceleration of a vehicle ahead.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AccelerationEstimate {
-    actor: u32,
     pub(super) acceleration_mps2: f64,
     light_on_for_s: f64,
     time: Time,
@@ -27,30 +26,22 @@ pub(super) struct AccelerationEstimate {
 
 impl AccelerationEstimate {
     /// An estimate of zero for a vehicle first observed at `time`.
-    pub(super) fn new(actor: u32, time: Time) -> Self {
-        Self { actor, acceleration_mps2: 0.0, light_on_for_s: 0.0, time }
+    pub(super) fn new(time: Time) -> Self {
+        Self { acceleration_mps2: 0.0, light_on_for_s: 0.0, time }
     }
 
-    /// Updates the perceived acceleration of a vehicle and returns the one that the driver reckons with (m/s²): the
+    /// Updates the perceived acceleration of the vehicle and returns the one that the driver reckons with (m/s²): the
     /// perceived one, or the one that the driver assumes because of the brake light.
-    pub(super) fn update_mps2(&mut self, observed: Option<&ObservedVehicle>, now: Time) -> f64 {
-        let Some(observed) = observed else {
-            self.actor = u32::MAX;
-            return 0.0;
-        };
+    pub(super) fn update_mps2(&mut self, observed: &ObservedVehicle, now: Time) -> f64 {
         let step_s = (now - self.time).s();
         if observed.speed_mps <= 0.0 {
             // A driver sees at once that a vehicle stands: it no longer brakes.
-            *self = Self::new(observed.actor, now);
+            *self = Self::new(now);
             return 0.0;
         }
-        if self.actor == observed.actor {
-            let share = step_s / (ACCELERATION_TIME_CONSTANT_S + step_s);
-            self.acceleration_mps2 += share * (observed.acceleration_mps2 - self.acceleration_mps2);
-            self.light_on_for_s = if observed.brake_light { self.light_on_for_s + step_s } else { 0.0 };
-        } else {
-            *self = Self::new(observed.actor, now);
-        }
+        let share = step_s / (ACCELERATION_TIME_CONSTANT_S + step_s);
+        self.acceleration_mps2 += share * (observed.acceleration_mps2 - self.acceleration_mps2);
+        self.light_on_for_s = if observed.brake_light { self.light_on_for_s + step_s } else { 0.0 };
         self.time = now;
         if observed.brake_light && self.light_on_for_s < ASSUMED_BRAKING_DURATION_S {
             self.acceleration_mps2.min(-ASSUMED_BRAKING_MPS2)

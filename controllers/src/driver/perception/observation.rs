@@ -1,8 +1,11 @@
 //! What a driver observes at one time: the true state of the vehicles around it.
 
-use closecall_traffic::{Lane, Side, Time};
+use closecall_traffic::{Lane, Side, Time, VehicleClass};
 
 use crate::driver::{DriverInput, LaneNeighbours, Neighbour};
+
+/// Distance from a driver's eyes to the front bumper (m): an assumption; 1.5 to 2.5 are plausible.
+const EYES_TO_BUMPER_M: f64 = 2.0;
 
 /// State of another vehicle at the time of an observation.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +28,7 @@ pub(super) struct Observation {
     pub(super) own_speed_mps: f64,
     pub(super) own_lane: Lane,
     pub(super) ahead: Option<ObservedVehicle>,
-    /// The vehicle ahead of that one, in its path.
+    /// The second leader, where the driver sees it: the next vehicle in the path.
     pub(super) beyond: Option<ObservedVehicle>,
     /// The side of the adjacent lane that was observed.
     pub(super) side: Option<Side>,
@@ -54,12 +57,25 @@ impl Observation {
             own_speed_mps: input.own.speed_mps,
             own_lane: input.road.lane_at(own_d_m),
             ahead: nearer.map(observe),
-            beyond: near.beyond.as_ref().map(observe),
+            beyond: near.beyond.as_ref().filter(|beyond| nearer.is_none_or(|ahead| shows(ahead, beyond))).map(observe),
             side,
             adjacent: adjacent
                 .map(|lane| [&lane.lead, &lane.alongside, &lane.follower].map(|n| n.as_ref().map(observe))),
         }
     }
+}
+
+/// Returns true if a driver sees the vehicle `beyond` the one `ahead`: through the windows of a car, past a motorcycle, and
+/// behind a truck only where part of its rear reaches past the truck.
+fn shows(ahead: &Neighbour, beyond: &Neighbour) -> bool {
+    let ends = |vehicle: &Neighbour| {
+        let distance_m = vehicle.gap_m.max(0.0) + EYES_TO_BUMPER_M;
+        let half_width_m = 0.5 * vehicle.width_m;
+        [vehicle.lateral_offset_m - half_width_m, vehicle.lateral_offset_m + half_width_m]
+            .map(|end_m| end_m / distance_m)
+    };
+    let ([ahead_right, ahead_left], [right, left]) = (ends(ahead), ends(beyond));
+    ahead.class != VehicleClass::Truck || right < ahead_right || left > ahead_left
 }
 
 impl ObservedVehicle {

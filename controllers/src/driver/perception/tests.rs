@@ -1,4 +1,4 @@
-use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, stream};
+use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, VehicleClass, stream};
 
 use super::acceleration::ASSUMED_BRAKING_MPS2;
 use super::*;
@@ -186,4 +186,77 @@ fn a_driver_without_a_reaction_time_has_no_perception_to_set() {
     };
     let error = check_perception(Some(&config), true, &none).unwrap_err();
     assert_eq!(error.path.to_string(), "perception.evidence.gating-per-s");
+}
+
+/// Returns what a driver at 30 m/s perceives whose nearest vehicle is 15 m ahead at the same speed until it has left the lane
+/// at 3 s, and whose next one, of the same kind as it, drives 17 m/s slower.
+fn seen_behind_a_leader_that_leaves(perception: &mut Perception, time: Time, class: VehicleClass) -> PerceivedScene {
+    let near = Neighbour { class, ..car_ahead(steady(15.0, 30.0), false) };
+    let next = Neighbour { actor: 2, ..car_ahead(steady(110.0 - 17.0 * time.s(), 13.0), false) };
+    let has_left = time >= Time::from_s(3.0);
+    let own = LaneNeighbours { lead: Some(if has_left { next } else { near }), ..LaneNeighbours::default() };
+    let neighbours = Neighbours { own, beyond: (!has_left).then_some(next), ..Neighbours::default() };
+    let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+    with_input(time, &neighbours, |input| perception.observe(input, &mut rng))
+}
+
+/// Returns the time after which a driver with a reaction time of 0.9 s perceives the next vehicle as the one ahead (s), and the
+/// perceived speed (m/s).
+fn next_vehicle_perceived_after_s(class: VehicleClass) -> (f64, f64) {
+    let mut perception = Perception::new(0.9, None);
+    let mut time = Time::ZERO;
+    loop {
+        let ahead = seen_behind_a_leader_that_leaves(&mut perception, time, class).ahead.unwrap();
+        if ahead.actor == 2 {
+            return ((time - Time::from_s(3.0)).s(), ahead.lead.speed_mps);
+        }
+        time += PHYSICS_STEP;
+    }
+}
+
+#[test]
+fn a_driver_whose_leader_pulls_out_brakes_for_the_next_vehicle_without_a_new_reaction_time() {
+    assert_eq!(next_vehicle_perceived_after_s(VehicleClass::Car), (0.0, 13.0));
+    // What a truck hides is new, and costs the full reaction time.
+    assert!((next_vehicle_perceived_after_s(VehicleClass::Truck).0 - 0.9).abs() < 1e-9);
+}
+
+#[test]
+fn a_driver_sees_position_and_speed_of_the_second_leader_through_a_car_but_not_through_a_truck() {
+    let at = Time::from_s(2.0);
+    let seen = |class| {
+        let mut perception = Perception::new(0.9, None);
+        let mut scene = seen_behind_a_leader_that_leaves(&mut perception, Time::ZERO, class);
+        let mut time = Time::ZERO;
+        while time < at {
+            time += PHYSICS_STEP;
+            scene = seen_behind_a_leader_that_leaves(&mut perception, time, class);
+        }
+        scene.beyond
+    };
+    let beyond = seen(VehicleClass::Car).unwrap();
+    assert!((beyond.lead.gap_m - (110.0 - 17.0 * 2.0)).abs() < 1e-9 && beyond.lead.speed_mps == 13.0, "{beyond:?}");
+    assert_eq!(seen(VehicleClass::Truck), None);
+}
+
+/// Returns the time after which a driver with a reaction time of 1.25 s perceives a brake light that goes on at 3 s (s), 30 m
+/// behind a vehicle that is slower by `closing_mps` at that moment.
+fn light_perceived_after_s(closing_mps: f64) -> f64 {
+    let mut perception = Perception::new(1.25, None);
+    let mut time = Time::ZERO;
+    loop {
+        let on = time >= Time::from_s(3.0);
+        let gap_m = 30.0 - closing_mps * (time.s() - 3.0);
+        if observe(&mut perception, time, steady(gap_m, 30.0 - closing_mps), on).brake_light {
+            return (time - Time::from_s(3.0)).s();
+        }
+        time += PHYSICS_STEP;
+    }
+}
+
+#[test]
+fn a_driver_reacts_faster_where_the_time_to_collision_is_short() {
+    assert!((light_perceived_after_s(0.0) - 1.25).abs() < 1e-9);
+    // At 10 m/s the time to collision is 3 s.
+    assert!((light_perceived_after_s(10.0) - 1.0).abs() < 0.011, "{}", light_perceived_after_s(10.0));
 }

@@ -107,6 +107,11 @@ impl Wiedemann99 {
     pub fn safe_gap_m(&self, speed_mps: f64) -> f64 {
         self.parameters.cc0_m + self.parameters.cc1_s * speed_mps
     }
+
+    /// Returns the gap in the middle of those that the driver keeps behind a vehicle at `speed_mps`, cc0 + cc1·v + cc2/2 (m).
+    pub(crate) fn settled_gap_m(&self, speed_mps: f64) -> f64 {
+        self.safe_gap_m(speed_mps) + 0.5 * self.parameters.cc2_m
+    }
 }
 
 impl Check for Wiedemann99Config {

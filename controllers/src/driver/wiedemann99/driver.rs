@@ -4,7 +4,7 @@ use closecall_traffic::Stream;
 
 use super::{Wiedemann99, Wiedemann99Model};
 use crate::driver::pedals::Pedals;
-use crate::driver::perception::{PerceivedVehicle, Perception};
+use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
 use crate::driver::{
     COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, Lead, Looks, check_finite,
     finite,
@@ -36,6 +36,8 @@ const PULLING_AWAY_MPS: f64 = 2.0;
 pub struct Wiedemann99Driver {
     settings: Wiedemann99,
     model: Wiedemann99Model,
+    /// The model behind the second leader.
+    beyond_model: Wiedemann99Model,
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     emergency: EmergencyBrakingDetector,
@@ -48,6 +50,7 @@ impl Wiedemann99Driver {
         Self {
             settings,
             model: Wiedemann99Model::new(&settings),
+            beyond_model: Wiedemann99Model::new(&settings),
             desired_mps: settings.desired_speed_mps,
             perception: None,
             emergency: EmergencyBrakingDetector::new(settings.hardest_braking_mps2),
@@ -55,14 +58,14 @@ impl Wiedemann99Driver {
         }
     }
 
-    /// Observes the surroundings and returns the perceived vehicle ahead, if any.
-    fn observe_ahead(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<PerceivedVehicle> {
+    /// Observes the surroundings and returns them as perceived, or `None` if the driver knows the truth at once.
+    fn observe(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<PerceivedScene> {
         let reaction = self.settings.reaction?;
         let settings = &self.settings;
         let new = || {
             Perception::new(reaction.draw_s(rng), None).with_lapses(settings.lapse).with_settings(settings.perception)
         };
-        self.perception.get_or_insert_with(new).observe(input, rng).ahead
+        Some(self.perception.get_or_insert_with(new).observe(input, rng))
     }
 }
 
@@ -72,11 +75,13 @@ impl Driver for Wiedemann99Driver {
         let speed_mps = input.own.speed_mps;
         let long_term_mps = *self.desired_mps.get_or_insert_with(|| default_desired_mps(input));
         let desired_mps = input.desired_now_mps(long_term_mps);
-        let mut acceleration_mps2 = if self.settings.reaction.is_some() {
-            let ahead = self.observe_ahead(input, rng);
+        let mut acceleration_mps2 = if let Some(PerceivedScene { ahead, beyond, .. }) = self.observe(input, rng) {
             let requested_mps2 =
                 self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));
             let requested_mps2 = brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref());
+            let beyond_mps2 =
+                beyond.map(|beyond| self.beyond_model.acceleration_mps2(speed_mps, desired_mps, Some(&beyond.lead)));
+            let requested_mps2 = self.settings.perception.respond_mps2(requested_mps2, beyond_mps2);
             self.pedals.apply_mps2(requested_mps2, input.time)
         } else {
             let lead = nearest_lead(input);
@@ -141,19 +146,25 @@ pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
-/// Limits the acceleration as [`coast_for_brake_light`] does, for a driver who is about to overtake the vehicle ahead. If
-/// the gap closes as fast as drivers brake at, the driver brakes at least as strongly as that vehicle, even if steering alone
-/// would avoid it: the brake light says that the prediction may be wrong.
+/// Limits the acceleration as [`coast_for_brake_light`] and [`brake_while_overtaking`] do, for a driver who is about to
+/// overtake the vehicle ahead.
 pub(crate) fn brake_before_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
-    let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
+    brake_while_overtaking(coast_for_brake_light(requested_mps2, speed_mps, ahead), speed_mps, ahead)
+}
+
+/// Returns `requested_mps2`, or at most the acceleration of the vehicle that is being overtaken if that one shows its brake
+/// light and the gap closes as fast as drivers brake at. The driver then brakes even if steering alone would avoid a collision:
+/// the brake light says that the prediction may be wrong. The light alone does not make a driver who is already pulling out
+/// release the accelerator: it leaves the lane of that vehicle.
+pub(crate) fn brake_while_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
         Some(vehicle)
             if vehicle.brake_light
                 && speed_mps - vehicle.lead.speed_mps > BRAKE_ONSET_PER_S * vehicle.lead.gap_m.max(0.0) =>
         {
-            limited_mps2.min(vehicle.lead.acceleration_mps2)
+            requested_mps2.min(vehicle.lead.acceleration_mps2)
         }
-        _ => limited_mps2,
+        _ => requested_mps2,
     }
 }
 

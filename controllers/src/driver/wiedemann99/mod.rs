@@ -13,7 +13,8 @@ pub(crate) use config::Parameters99;
 pub use config::{Wiedemann99, Wiedemann99Config};
 pub use driver::Wiedemann99Driver;
 pub(crate) use driver::{
-    EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light, default_desired_mps, nearest_lead,
+    EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light, brake_while_overtaking,
+    default_desired_mps, nearest_lead,
 };
 pub use model::Wiedemann99Model;
 pub use thresholds::{Regime, Thresholds};
