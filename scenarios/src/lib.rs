@@ -29,6 +29,7 @@ mod intervention;
 pub mod library;
 mod lidar_file;
 mod locate;
+mod logical;
 pub mod member;
 pub mod outcome;
 mod overridden;
@@ -59,6 +60,7 @@ pub use events::{
 pub use file::{ScenarioError, ScenarioFile};
 pub use grip::lateral_grip_mps2;
 pub use intervention::{FaultConfig, IdealConfig, Interventions, MisState};
+pub use logical::{Spreads, logical};
 pub use reenacted::{RearDriver, actor_name, reenact};
 pub use run_key::RunKey;
 pub use sampled::{SampledEncounter, opp2_of, sampled};

@@ -137,7 +137,7 @@ pub struct EmpiricalConfig {
 }
 
 /// The data to which a distribution was fitted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct FittedConfig {
     /// Number of observations.
