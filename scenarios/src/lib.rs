@@ -20,6 +20,7 @@ pub mod criteria;
 mod edit;
 mod events;
 mod file;
+mod fitted_file;
 mod fleet;
 mod grip;
 pub mod harm;
@@ -58,6 +59,7 @@ pub use events::{
     NominalEncounterConfig, ThwBelowConfig, Trigger, TriggerConfig,
 };
 pub use file::{ScenarioError, ScenarioFile};
+pub use fitted_file::FittedFile;
 pub use grip::lateral_grip_mps2;
 pub use intervention::{FaultConfig, IdealConfig, Interventions, MisState};
 pub use logical::{Spreads, logical};

@@ -96,11 +96,7 @@ pub fn logical(
 }
 
 /// Returns the distributions of the parameters.
-fn parameters(
-    approach: &Approach,
-    spreads: &Spreads,
-    headline: &ParametersConfig,
-) -> Result<ParametersConfig, String> {
+fn parameters(approach: &Approach, spreads: &Spreads, headline: &ParametersConfig) -> Result<ParametersConfig, String> {
     let values = &approach.values;
     let taken = |name: &str| {
         let found = headline.0.iter().find(|(known, _)| known.as_str() == name);
@@ -160,7 +156,9 @@ fn around(value: f64, variation: Variation, (bounds, track, source): ([f64; 2], 
     match variation {
         Variation::Fitted { n, .. } => ParameterConfig {
             fitted: Some(FittedConfig { n: n as u64, source: source.to_owned(), ..FittedConfig::default() }),
-            note: Some(format!("the mean is what was recorded of track {track}; sd is the bandwidth of all (Silverman's rule)")),
+            note: Some(format!(
+                "the mean is what was recorded of track {track}; sd is the bandwidth of all (Silverman's rule)"
+            )),
             ..base
         },
         Variation::Assumed { share } => ParameterConfig {

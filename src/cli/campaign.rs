@@ -33,7 +33,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
 
 use super::CliError;
-use super::args::{Format, SensorsChoice, SetArgs};
+use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::{check_backend, check_cameras};
 use super::ending::{EndArgs, Ending};
@@ -109,6 +109,8 @@ pub(super) struct CampaignArgs {
     ensemble: EnsembleArgs,
     #[command(flatten)]
     set: SetArgs,
+    #[command(flatten)]
+    fitted: FittedArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
@@ -173,7 +175,10 @@ impl CampaignArgs {
 
     /// Reads and checks every scenario.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
-        let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
+        let files = expand(&self.scenarios)?
+            .iter()
+            .map(|path| self.fitted.load(path, &self.set))
+            .collect::<Result<Vec<_>, _>>()?;
         let ensemble = self.ensemble.apply(files)?;
         let mut plan = Plan::new(ensemble.entries, self.sampling()?, controllers)?;
         plan.without_effect = ensemble.without_effect;
@@ -284,8 +289,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
         time_budget,
         scenarios: campaign.works.len(),
     };
-    let mut progress =
-        Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
+    let mut progress = Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
     let resumption = campaign.run(results.locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
     resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));

@@ -37,7 +37,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{ScenarioFile, Spreads, logical};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::engagement::engagements;
-use closecall_traffic::atomic::write_file;
+use closecall_traffic::atomic::{WriteError, write_file};
 use serde_json::{Value, json};
 
 use super::CliError;
@@ -56,7 +56,7 @@ use crate::exit_code::ExitCode;
 const SCENARIOS: &str = "scenarios";
 /// Folder of the recorded encounters, in the folder of the campaign.
 const ENCOUNTERS: &str = "encounters";
-/// Number of samples of each encounter of which a recording is kept, the worst ones.
+/// Number of samples of each encounter of which a recording is kept, the worst ones. Those of each kind are kept, too.
 const RECORDED: u64 = 1;
 
 /// Arguments of `closecall traffic chain`.
@@ -92,7 +92,7 @@ pub(super) struct ChainArgs {
     /// Number of worker threads [default: one per processor]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
-    /// Save recordings (Rerun files) of selected samples of each encounter, as `campaign` does [default: worst:1]
+    /// Save recordings (Rerun files) of selected samples of each encounter, as `campaign` does [default: worst:1,each-kind]
     #[arg(long, value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
@@ -130,7 +130,9 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
     protect(&inputs, &[("--out", Some(&args.out))])?;
     let controllers = match args.controller.choice()? {
         ControllerChoice::ACC => {
-            return Err(CliError::usage("every sample also runs with `acc`: name another controller with --controller"));
+            return Err(CliError::usage(
+                "every sample also runs with `acc`: name another controller with --controller",
+            ));
         }
         tested => vec![ControllerChoice::ACC, tested],
     };
@@ -148,14 +150,17 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
     let mut plan = Plan::new(files, sampling, controllers)?;
     plan.use_sensors(Some(args.sensors.mode()))?;
     plan.workers = Workers::with_jobs(args.jobs);
-    let worst = Selection { worst: if is_recording_enabled() { RECORDED } else { 0 }, ..Selection::default() };
+    let recorded = match is_recording_enabled() {
+        true => Selection { worst: RECORDED, each_kind: true, ..Selection::default() },
+        false => Selection::default(),
+    };
     let planned = Planned {
         plan: &plan,
         gates: &gates,
         results: &ResultsArgs::named(&args.out, args.resume),
         artifacts: args.artifacts,
         end: args.end,
-        record: Some(args.record.unwrap_or(worst)),
+        record: Some(args.record.unwrap_or(recorded)),
         format: args.format,
         ray: None,
         stop: (false, None),
@@ -304,10 +309,15 @@ fn origin(name: &str, path: &Path, (approach, chosen): (&Approach, Relevant)) ->
 
 impl Companion for Chain {
     fn begin(&mut self, folder: &Folder) -> Result<(), CliError> {
+        for path in [SCENARIOS, ENCOUNTERS].map(|name| folder.file(name)) {
+            std::fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
+        }
         for ((index, approach, file), origin) in self.encounters.iter().zip(&mut self.origins.encounters) {
             let (recording, name) = (&self.recordings[*index], &file.config().name);
             let text = made_by(&recording.path, file);
-            write_file(&folder.file(&format!("{SCENARIOS}/{name}.toml")), |written| written.write_all(text.as_bytes()))?;
+            write_file(&folder.file(&format!("{SCENARIOS}/{name}.toml")), |written| {
+                written.write_all(text.as_bytes())
+            })?;
             let film = film_lane_change(&recording.data, &approach.change)?;
             let picture = format!("{ENCOUNTERS}/{name}.svg");
             write_file(&folder.file(&picture), |written| written.write_all(still(&film).as_bytes()))?;
@@ -339,8 +349,8 @@ impl Companion for Chain {
 
     /// A system that engages nowhere was not tested.
     fn code(&self, code: ExitCode) -> ExitCode {
-        match self.origins.engaged() {
-            Some((0, _)) => ExitCode::first_of([code, ExitCode::Inconclusive]),
+        match self.origins.engagement() {
+            Some(all) if all.engaged == 0 => ExitCode::first_of([code, ExitCode::Inconclusive]),
             _ => code,
         }
     }

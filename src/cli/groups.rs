@@ -5,8 +5,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, generate, inspect, merge, paper, record, reenact, render, robustness, sample,
-    schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, generate, inspect, merge, paper, record, reenact, render, robustness,
+    sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 

@@ -10,6 +10,7 @@ use closecall_campaign::record::Record;
 use closecall_campaign::runner::{Work, concrete, run_guarded};
 use closecall_campaign::saved::{SavedCampaign, SavedError};
 use closecall_controllers::{EgoState, Reason};
+use closecall_scenarios::outcome::{Moment, Outcome};
 use closecall_simulation::{Observer, RunEvent, RunKey, StepView};
 use closecall_traffic::Time;
 use rayon::prelude::*;
@@ -38,6 +39,9 @@ const CONDITIONS: [Reason; 14] = [
 pub struct Engagement {
     /// Samples in which it engages.
     pub engaged: u64,
+    /// Of these, the samples in which it engages before the lead vehicle brakes, as it is meant to. Braking of the ego alone lets a
+    /// vehicle behind approach.
+    pub before_braking: u64,
     /// The other samples with an outcome, by the condition that was missing when it came closest to engaging.
     pub missing: BTreeMap<String, u64>,
 }
@@ -63,8 +67,13 @@ pub fn engagements(saved: &SavedCampaign) -> Result<BTreeMap<String, Engagement>
         let tested = record.arms.last().and_then(|arm| arm.result.as_ref().ok());
         let Some(mis) = tested.and_then(|outcome| outcome.mis.as_ref().ok()) else { continue };
         let work = works.iter().find(|work| work.file.config().name == record.scenario);
+        let brakes_at_s = tested.and_then(|outcome| time_of(outcome, Moment::FrontBrakes));
         match (mis.engaged_at_s, work) {
-            (Ok(_), _) => all.entry(record.scenario).or_default().engaged += 1,
+            (Ok(at_s), _) => {
+                let engagement = all.entry(record.scenario).or_default();
+                engagement.engaged += 1;
+                engagement.before_braking += u64::from(brakes_at_s.is_none_or(|brakes_at_s| at_s < brakes_at_s));
+            }
             (Err(_), Some(work)) => others.push((work, record.sample, mis.reason)),
             (Err(_), None) => {}
         }
@@ -77,6 +86,11 @@ pub fn engagements(saved: &SavedCampaign) -> Result<BTreeMap<String, Engagement>
         *engagement.missing.entry(reason.text().to_owned()).or_default() += 1;
     }
     Ok(all)
+}
+
+/// Returns the time at which a moment of the encounter is reached (s).
+fn time_of(outcome: &Outcome, moment: Moment) -> Option<f64> {
+    outcome.moments.iter().find(|reached| reached.moment == moment).map(|reached| reached.time.s())
 }
 
 /// Returns the condition that is missing when the system comes closest to engaging in a sample.

@@ -163,7 +163,8 @@ mod tests {
     #[test]
     fn critical_approaches_precede_and_each_further_one_differs_most() {
         // The second and the third are alike; the last one is not critical.
-        let all = [recorded(30.0, 3.0), recorded(45.0, 5.0), recorded(45.2, 5.0), recorded(68.0, 8.0), recorded(120.0, 2.0)];
+        let all =
+            [recorded(30.0, 3.0), recorded(45.0, 5.0), recorded(45.2, 5.0), recorded(68.0, 8.0), recorded(120.0, 2.0)];
         let critical: Vec<bool> = all.iter().map(|one| !one.critical_metrics().is_empty()).collect();
         assert_eq!(critical, [true, true, true, true, false]);
         let chosen = most_relevant(&all, 3);

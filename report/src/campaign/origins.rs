@@ -105,22 +105,18 @@ impl Origins {
         })
     }
 
-    /// Returns the samples of all encounters in which the system engages, and all samples; `None` before the campaign is over.
-    pub fn engaged(&self) -> Option<(u64, u64)> {
-        let all: Option<Vec<&Engagement>> = self.encounters.iter().map(|origin| origin.engagement.as_ref()).collect();
-        let all = all?;
-        Some((all.iter().map(|one| one.engaged).sum(), all.iter().map(|one| one.samples()).sum()))
-    }
-
-    /// Returns the conditions that were missing in all encounters, the most frequent first.
-    fn missing(&self) -> Vec<(String, u64)> {
-        let mut sums: BTreeMap<&str, u64> = BTreeMap::new();
-        for (reason, count) in self.encounters.iter().flat_map(|origin| &origin.engagement).flat_map(|one| &one.missing) {
-            *sums.entry(reason).or_default() += count;
+    /// Returns the engagements of all encounters together; `None` before the campaign is over.
+    pub fn engagement(&self) -> Option<Engagement> {
+        let mut sum = Engagement::default();
+        for origin in &self.encounters {
+            let one = origin.engagement.as_ref()?;
+            sum.engaged += one.engaged;
+            sum.before_braking += one.before_braking;
+            for (reason, count) in &one.missing {
+                *sum.missing.entry(reason.clone()).or_default() += count;
+            }
         }
-        let mut sums: Vec<(String, u64)> = sums.into_iter().map(|(reason, count)| (reason.to_owned(), count)).collect();
-        sums.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-        sums
+        Some(sum)
     }
 }
 
@@ -168,19 +164,25 @@ impl fmt::Display for OriginsText<'_> {
                 origin.reason().map_or("-", |(reason, _)| reason),
             )?;
         }
-        match self.origins.engaged() {
-            Some((engaged, samples)) => writeln!(f, "{}", engaged_sentence(engaged, samples, &self.origins.missing())),
-            None => Ok(()),
-        }
+        self.origins.engagement().map_or(Ok(()), |all| writeln!(f, "{}", engaged_sentence(&all)))
     }
 }
 
 /// Returns in which share the system engages, and what is missing in the rest.
-fn engaged_sentence(engaged: u64, samples: u64, missing: &[(String, u64)]) -> String {
+fn engaged_sentence(all: &Engagement) -> String {
+    let (engaged, samples) = (all.engaged, all.samples());
     let share = 100.0 * engaged as f64 / samples.max(1) as f64;
+    let mut missing: Vec<(&String, u64)> = all.missing.iter().map(|(reason, count)| (reason, *count)).collect();
+    missing.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let rest: Vec<String> = missing.iter().map(|(reason, count)| format!("{reason} ({count})")).collect();
-    let rest = if rest.is_empty() { String::new() } else { format!("; where it comes closest in the rest: {}", rest.join(", ")) };
-    format!("the system engages in {engaged} of {samples} samples ({share:.0} %){rest}")
+    let rest = match rest.is_empty() {
+        true => String::new(),
+        false => format!("; what is missing when it comes closest in the rest: {}", rest.join(", ")),
+    };
+    let before = all.before_braking;
+    format!(
+        "the system engages in {engaged} of {samples} samples ({share:.0} %), in {before} before the lead vehicle brakes{rest}"
+    )
 }
 
 fn counts_of<'a>(summary: &'a Summary, name: &str) -> Option<&'a Counts> {
@@ -200,15 +202,13 @@ pub(super) fn section(findings: &Findings<'_>) -> Markup {
             (changes) " lane changes, of which " (origins.approaches) " overtake a vehicle. "
             (origins.encounters.len()) " of them became scenarios. " (origins.choice)
         }
-        @if let Some((engaged, samples)) = origins.engaged() {
-            p { "Over all encounters " (engaged_sentence(engaged, samples, &origins.missing())) "." }
-        }
+        @if let Some(all) = origins.engagement() { p { "Over all encounters " (engaged_sentence(&all)) "." } }
         (files_table(&origins))
         @if !origins.refused.is_empty() {
             p {
-                "Lane changes that overtake nobody: "
+                "Lane changes that are no encounter: "
                 @for (number, (reason, count)) in origins.refused.iter().enumerate() {
-                    @if number > 0 { "; " } (count) ": " (reason)
+                    @if number > 0 { "; " } (reason) " (" (count) ")"
                 }
                 "."
             }
@@ -239,18 +239,18 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
         @for origin in &origins.encounters {
             @let pairs = counts_of(findings.summary, &origin.scenario).map(|counts| counts.pairs).unwrap_or_default();
             tr {
-                td { a href={ "#origin-" (origin.scenario) } { (origin.scenario) } }
-                td { (format!("{:.1} to {:.1} s", origin.from_s, origin.to_s)) }
+                td.whole { a href={ "#origin-" (origin.scenario) } { (origin.scenario) } }
+                td.whole { (format!("{:.1} to {:.1} s", origin.from_s, origin.to_s)) }
                 (number(format!("{:.1}", origin.ego_mps)))
                 (number(format!("{:.1}", origin.closing_mps)))
                 (number(format!("{:.2}", origin.crossing_thw_s)))
                 (number(origin.front_thw_s.map_or_else(|| "drawn".to_owned(), |thw_s| format!("{thw_s:.2}"))))
                 (number(pairs.prevented)) (number(pairs.induced)) (number(pairs.both)) (number(pairs.neither))
                 @match &origin.engagement {
-                    Some(one) => (number(format!("{} of {}", one.engaged, one.samples()))),
-                    None => (number("-")),
+                    Some(one) => { (number(one.engaged)) (number(one.before_braking)) },
+                    None => { (number("-")) (number("-")) },
                 }
-                td { (origin.reason().map_or_else(|| "-".to_owned(), |(reason, count)| format!("{reason} ({count})"))) }
+                td.whole { (origin.reason().map_or_else(|| "-".to_owned(), |(reason, count)| format!("{reason} ({count})"))) }
             }
         }
     };
@@ -258,9 +258,9 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
         (text_heads(&["encounter", "recorded"]))
         (number_heads(&[
             "ego [m/s]", "closing [m/s]", "headway at the crossing [s]", "front headway [s]", "prevented", "induced", "both", "neither",
-            "engaged",
+            "engaged", "before braking",
         ]))
-        (text_heads(&["mostly missing where not engaged"]))
+        (text_heads(&["mostly missing in the rest"]))
     };
     table(&head, &rows)
 }
