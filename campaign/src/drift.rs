@@ -4,8 +4,9 @@
 //! test ([`two_sample`]). The p-values are corrected for the number of tests ([`holm`]), so that the probability of any false
 //! alarm is at most [`LEVEL`].
 //!
-//! Quantities that repeat another one are not tested: the width of the peak of lateral speed follows from the duration, and
-//! the critical headways are a part of all headways. Values of one recording are treated as independent. Vehicles that drive
+//! A parameter is compared with its *quantity* in the range of its *cut*, on both sides: a scenario's headways from 0.5 to 0.9 s with
+//! the new headways from 0.5 to 0.9 s. Quantities that repeat another one are not tested: the width of the peak of lateral speed
+//! follows from the duration, and the critical headways are a part of all headways, if these are tested. Values of one recording are treated as independent. Vehicles that drive
 //! one behind the other are not quite, so that a platoon can look like drift.
 
 use std::path::Path;
@@ -36,9 +37,49 @@ const TESTED: [Quantity; 6] = [
     Quantity::FollowingSpeed,
 ];
 
-/// The fitted quantities of a file.
+/// The fitted parameters of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fitted(Vec<(Quantity, Summary)>);
+pub struct Fitted(Vec<FittedParameter>);
+
+/// A fitted parameter: the values of a quantity within its cut.
+#[derive(Clone, Debug, PartialEq)]
+struct FittedParameter {
+    name: String,
+    quantity: Quantity,
+    /// The range of values that were fitted: from the first number up to below the second. `None` for all.
+    cut: Option<[f64; 2]>,
+    summary: Summary,
+}
+
+impl FittedParameter {
+    /// Reads a parameter. Returns `None` if it has no quantiles that were fitted, or if its quantity is not tested.
+    ///
+    /// # Errors
+    /// The parameter names a quantity that does not exist.
+    fn of(name: &str, config: &ParameterConfig) -> Result<Option<Self>, String> {
+        let (Some(fitted), Some(empirical)) = (&config.fitted, &config.empirical) else { return Ok(None) };
+        let named = fitted.quantity.as_deref();
+        let Some(found) = Quantity::ALL.into_iter().find(|quantity| quantity.name() == named.unwrap_or(name)) else {
+            let names: Vec<&str> = Quantity::ALL.iter().map(|quantity| quantity.name()).collect();
+            return match named {
+                Some(named) => Err(format!("`{name}.fitted.quantity` is `{named}`: allowed are {}", names.join(", "))),
+                None => Ok(None),
+            };
+        };
+        let (quantity, part) = found.part_of().map_or((found, None), |(whole, cut)| (whole, Some(cut)));
+        if !TESTED.contains(&quantity) {
+            return Ok(None);
+        }
+        let summary = usize::try_from(fitted.n).ok().and_then(|n| Summary::new(n, &empirical.quantiles));
+        let cut = fitted.cut.or(part);
+        Ok(summary.map(|summary| Self { name: name.to_owned(), quantity, cut, summary }))
+    }
+
+    /// Returns whether another parameter repeats this one, or has all values of which this one has a part.
+    fn is_part_of(&self, other: &Self) -> bool {
+        self.quantity == other.quantity && (other.cut.is_none() || self.cut == other.cut)
+    }
+}
 
 impl Fitted {
     /// Reads a file that `closecall traffic fit` wrote, or a scenario whose parameters come from one.
@@ -56,20 +97,24 @@ impl Fitted {
         let parameters = document.remove("parameters").ok_or("there is no table `parameters`")?;
         let parameters: ParametersConfig =
             parameters.try_into().map_err(|error: toml::de::Error| error.message().to_owned())?;
-        let summary = |config: &ParameterConfig| {
-            let n = usize::try_from(config.fitted.as_ref()?.n).ok()?;
-            Summary::new(n, &config.empirical.as_ref()?.quantiles)
-        };
-        let known = |quantity: Quantity| {
-            let found = parameters.0.iter().find(|(name, _)| name.as_str() == quantity.name())?;
-            Some((quantity, summary(found.1)?))
-        };
-        let all: Vec<_> = TESTED.into_iter().filter_map(known).collect();
+        let mut all: Vec<FittedParameter> = Vec::new();
+        for (name, config) in &parameters.0 {
+            all.extend(FittedParameter::of(name.as_str(), config)?);
+        }
+        // In the order of the quantities, those without a cut and those with the name of their quantity first.
+        all.sort_by_key(|one| (one.quantity, one.cut.is_some(), one.name != one.quantity.name()));
+        let mut kept: Vec<FittedParameter> = Vec::new();
+        for one in all {
+            if !kept.iter().any(|other| one.is_part_of(other)) {
+                kept.push(one);
+            }
+        }
+        let all = kept;
         if all.is_empty() {
             let names: Vec<&str> = TESTED.iter().map(|quantity| quantity.name()).collect();
             return Err(format!(
                 "no parameter has quantiles that were fitted: one of {} with `empirical` and `fitted` is needed, as `closecall \
-                 fit` writes them",
+                 traffic fit` writes them",
                 names.join(", ")
             ));
         }
@@ -80,8 +125,14 @@ impl Fitted {
 /// The comparison of one quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QuantityDrift {
+    /// Name of the parameter.
+    pub name: String,
     /// Name of the quantity.
-    pub name: &'static str,
+    pub quantity: &'static str,
+    /// Smallest value of the quantity that is compared; `None` if all values are.
+    pub cut_from: Option<f64>,
+    /// Value of the quantity from which on none is compared; `None` if all values are.
+    pub cut_to: Option<f64>,
     /// Number of fitted values.
     pub fitted_n: usize,
     /// Median of the fitted values, in the unit of the name.
@@ -121,35 +172,40 @@ pub fn drift(fitted: &Fitted, data_sets: &[TrajectoryData], seed: u64) -> Drift 
     for data in data_sets {
         samples.extend(observe(&smooth(data)));
     }
-    let p_value = |quantity: Quantity, summary: &Summary, new: &[f64]| {
-        two_sample::p_value(summary.distance(new), &summary.simulated(new.len(), &mut stream(seed, quantity)))
+    let p_value = |name: &str, summary: &Summary, new: &[f64]| {
+        two_sample::p_value(summary.distance(new), &summary.simulated(new.len(), &mut stream(seed, name)))
     };
     drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &p_value)
 }
 
 /// Returns the probability of a larger distance than that of sorted new values.
-type PValue<'a> = dyn Fn(Quantity, &Summary, &[f64]) -> f64 + 'a;
+type PValue<'a> = dyn Fn(&str, &Summary, &[f64]) -> f64 + 'a;
 
 fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PValue<'_>) -> Drift {
-    let sorted = |quantity| {
-        let mut values = values(quantity);
+    let sorted = |one: &FittedParameter| {
+        let mut values = values(one.quantity);
+        values.retain(|value| one.cut.is_none_or(|[from, to]| (from..to).contains(value)));
         values.sort_by(f64::total_cmp);
         values
     };
-    let new: Vec<Vec<f64>> = fitted.0.iter().map(|(quantity, _)| sorted(*quantity)).collect();
-    let compared = fitted.0.iter().zip(&new).map(|((quantity, summary), new)| {
-        (new.len() >= MIN_VALUES).then(|| (summary.distance(new), p_value(*quantity, summary, new)))
+    let new: Vec<Vec<f64>> = fitted.0.iter().map(sorted).collect();
+    let compared = fitted.0.iter().zip(&new).map(|(one, new)| {
+        (new.len() >= MIN_VALUES).then(|| (one.summary.distance(new), p_value(&one.name, &one.summary, new)))
     });
     let compared: Vec<Option<(f64, f64)>> = compared.collect();
     let p_values: Vec<f64> = compared.iter().flatten().map(|(_, p_value)| *p_value).collect();
     let level = LEVEL / p_values.len().max(1) as f64;
     let mut corrected = holm::corrected(&p_values).into_iter();
     let mut quantities = Vec::new();
-    for (((quantity, summary), new), found) in fitted.0.iter().zip(&new).zip(&compared) {
+    for ((one, new), found) in fitted.0.iter().zip(&new).zip(&compared) {
+        let summary = &one.summary;
         let shift = summary.distance_of_shift(|value| value * (1.0 + STATED_SHIFT));
         let needed = |distance| two_sample::needed(level, summary.n(), distance);
         quantities.push(QuantityDrift {
-            name: quantity.name(),
+            name: one.name.clone(),
+            quantity: one.quantity.name(),
+            cut_from: one.cut.map(|[from, _]| from),
+            cut_to: one.cut.map(|[_, to]| to),
             fitted_n: summary.n(),
             fitted_median: summary.median(),
             n: new.len(),
@@ -166,11 +222,11 @@ fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PV
     Drift { quantities, is_tested: !p_values.is_empty(), has_drifted }
 }
 
-/// Returns the random stream of one quantity, so that a further quantity does not change the others.
-fn stream(seed: u64, quantity: Quantity) -> Stream {
+/// Returns the random stream of one parameter, so that a further one does not change the others.
+fn stream(seed: u64, name: &str) -> Stream {
     let mut hasher = blake3::Hasher::new_derive_key("closecall 2026 simulated distances of drift v1");
     hasher.update(&seed.to_le_bytes());
-    hasher.update(quantity.name().as_bytes());
+    hasher.update(name.as_bytes());
     Stream::from_seed(*hasher.finalize().as_bytes())
 }
 
@@ -212,15 +268,18 @@ mod tests {
         // The simulated distances depend on the numbers of values only.
         let simulated = TRUTH.map(|(quantity, fitted_n, truth)| {
             let any = summary(&drawn(fitted_n, truth, &mut Stream::seed_from_u64(0)));
-            (quantity, any.simulated(n, &mut stream(0, quantity)))
+            (quantity.name(), any.simulated(n, &mut stream(0, quantity.name())))
         });
-        let p_value = |quantity: Quantity, summary: &Summary, new: &[f64]| {
-            let (_, known) = simulated.iter().find(|(known, _)| *known == quantity).unwrap();
+        let p_value = |name: &str, summary: &Summary, new: &[f64]| {
+            let (_, known) = simulated.iter().find(|(known, _)| *known == name).unwrap();
             two_sample::p_value(summary.distance(new), known)
         };
         let is_called = |index: &u64| {
             let mut rng = Stream::seed_from_u64(*index);
-            let mut fit = |(quantity, n, truth)| (quantity, summary(&drawn(n, truth, &mut rng)));
+            let mut fit = |(quantity, n, truth): (Quantity, usize, [f64; 2])| {
+                let (name, summary) = (quantity.name().to_owned(), summary(&drawn(n, truth, &mut rng)));
+                FittedParameter { name, quantity, cut: None, summary }
+            };
             let fitted = Fitted(TRUTH.map(&mut fit).to_vec());
             let new = TRUTH.map(|(quantity, _, truth)| {
                 let values = drawn(n, truth, &mut rng);
@@ -265,5 +324,23 @@ mod tests {
         assert!(Fitted::parse("a = 1").unwrap_err().contains("parameters"));
         assert!(Fitted::parse("[parameters]\nx = { fixed = 1.0 }").unwrap_err().contains("cut-out-thw-s"));
         assert_eq!(Fitted::parse(include_str!("../../scenarios/library/fitted/us101.toml")).unwrap().0.len(), 6);
+        let unknown = "[parameters]\nx = { empirical = { quantiles = [1, 2] }, fitted = { n = 9, source = 's', quantity = 'gap' } }";
+        assert!(
+            Fitted::parse(unknown).unwrap_err().contains("`x.fitted.quantity` is `gap`: allowed are cut-out-thw-s")
+        );
+    }
+
+    #[test]
+    fn a_cut_parameter_is_compared_with_the_values_within_its_cut() {
+        let text = include_str!("../../scenarios/library/rear-vehicle-is-followed.toml");
+        let fitted = Fitted::parse(text).unwrap();
+        // The headway of the follower repeats the front headway; the log-normal headway at the crossing has no quantiles.
+        let names: Vec<&str> = fitted.0.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!(names, ["lane-change-duration-s", "front-thw-s"]);
+        assert_eq!((fitted.0[1].quantity, fitted.0[1].cut), (Quantity::FrontThw, Some([0.5, 0.9])));
+        let headways = || (0..300).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>();
+        let values = |quantity| if quantity == Quantity::FrontThw { headways() } else { Vec::new() };
+        let found = drift_of(&fitted, values, &|_, summary, new| summary.distance(new));
+        assert_eq!(found.quantities[1].n, 40, "of 300 headways, those from 0.5 up to below 0.9 s");
     }
 }

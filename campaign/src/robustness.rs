@@ -50,5 +50,5 @@ fn study_of(path: &Path, options: ReadOptions) -> Result<Study, TrajectoryFileEr
         measured.push((track.trajectory, track.markings));
     }
     measured.sort_by_key(|(track, _)| track.track_id);
-    Ok(Study::new(measured, tracks.markings()))
+    Ok(Study::with_lanes(options.lanes, measured, tracks.markings()))
 }

@@ -20,6 +20,7 @@ pub mod criteria;
 mod edit;
 mod events;
 mod file;
+mod fitted_file;
 mod fleet;
 mod grip;
 pub mod harm;
@@ -29,6 +30,7 @@ mod intervention;
 pub mod library;
 mod lidar_file;
 mod locate;
+mod logical;
 pub mod member;
 pub mod outcome;
 mod overridden;
@@ -57,8 +59,10 @@ pub use events::{
     NominalEncounterConfig, ThwBelowConfig, Trigger, TriggerConfig,
 };
 pub use file::{ScenarioError, ScenarioFile};
+pub use fitted_file::FittedFile;
 pub use grip::lateral_grip_mps2;
 pub use intervention::{FaultConfig, IdealConfig, Interventions, MisState};
+pub use logical::{Spreads, logical};
 pub use reenacted::{RearDriver, actor_name, reenact};
 pub use run_key::RunKey;
 pub use sampled::{SampledEncounter, opp2_of, sampled};

@@ -99,8 +99,11 @@ pub(super) fn written(
 fn scenario_text(config: &ScenarioConfig) -> Result<String, String> {
     let written = toml::to_string(config).map_err(|error| error.to_string())?;
     let mut document: DocumentMut = written.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
-    for default_key in ["requirements", "environment", "parameters", "sensors"] {
+    for default_key in ["requirements", "environment", "sensors"] {
         document.remove(default_key);
+    }
+    if config.parameters.0.is_empty() {
+        document.remove("parameters");
     }
     let actors = document.get_mut("actor").and_then(Item::as_array_of_tables_mut);
     for actor in actors.into_iter().flat_map(ArrayOfTables::iter_mut) {

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_recorded::lane_change::LaneReliability;
 use closecall_recorded::trajectory_data::{
     AxisOptions, BadRows, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, read_with, refuse_duplicates,
 };
-use closecall_scenarios::{ScenarioError, ScenarioFile, Setting, source};
+use closecall_scenarios::{FittedFile, ScenarioError, ScenarioFile, Setting, source};
 use closecall_sensors::SensorMode;
 
 use super::CliError;
@@ -119,6 +120,28 @@ pub(super) struct ReadArgs {
     /// The file counts its lanes from the right
     #[arg(long, help_heading = heading::DATA)]
     lanes_from_right: bool,
+    /// Lanes by which the peak criterion finds lane changes
+    #[arg(long, value_enum, default_value_t, help_heading = heading::DATA)]
+    pub(super) lanes: LanesChoice,
+}
+
+/// The lanes by which lane changes are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum LanesChoice {
+    /// The lanes that the file states for each vehicle
+    #[default]
+    Recorded,
+    /// None: a lateral shift by most of a lane is a lane change. For files whose lanes are missing or unreliable
+    None,
+}
+
+impl LanesChoice {
+    pub(super) const fn reliability(self) -> LaneReliability {
+        match self {
+            Self::Recorded => LaneReliability::Reliable,
+            Self::None => LaneReliability::Unreliable,
+        }
+    }
 }
 
 impl ReadArgs {
@@ -131,7 +154,8 @@ impl ReadArgs {
             Layout::InCar => LayoutChoice::InCar,
         });
         let axes = AxisOptions { mirror_d: self.mirror_d, lanes_from_right: self.lanes_from_right };
-        ReadOptions { layout, bad_rows: if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject }, axes }
+        let bad_rows = if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject };
+        ReadOptions { layout, bad_rows, axes, lanes: self.lanes.reliability() }
     }
 }
 
@@ -150,6 +174,24 @@ impl SetArgs {
         let file = source::load(path, &self.settings)?;
         file.check()?;
         Ok(file)
+    }
+}
+
+/// Fitted distributions in place of those of a scenario.
+#[derive(Clone, Debug, Args)]
+pub(super) struct FittedArgs {
+    /// File with fitted distributions, as `traffic fit` writes it: they replace those of the parameters with the same name, or of those
+    /// that were fitted to the same quantity. --set is applied after it
+    #[arg(long, value_name = "FITTED.toml", help_heading = heading::SCENARIO)]
+    pub(super) fitted: Option<PathBuf>,
+}
+
+impl FittedArgs {
+    /// Reads a scenario, applies the fitted distributions, then the changes of `set`, and checks it.
+    pub(super) fn load(&self, path: &Path, set: &SetArgs) -> Result<ScenarioFile, ScenarioError> {
+        let Some(fitted) = &self.fitted else { return set.load(path) };
+        let fitted = FittedFile::read(fitted)?.settings(&source::load(path, &[])?)?;
+        SetArgs { settings: [fitted, set.settings.clone()].concat() }.load(path)
     }
 }
 

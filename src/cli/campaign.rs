@@ -10,6 +10,7 @@ use clap::Args;
 use closecall_campaign::arguments::positive;
 use closecall_campaign::end_rule::EndMonitor;
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
+use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
@@ -19,6 +20,7 @@ use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
 use closecall_campaign::stop::{StopMonitor, StopRule};
+use closecall_campaign::summary::Summary;
 use closecall_campaign::wall_times::check_share;
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
@@ -28,9 +30,10 @@ use closecall_scenarios::sampling::Design;
 use closecall_scenarios::source::expand;
 use closecall_simulation::controller::ControllerChoice;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::Value;
 
 use super::CliError;
-use super::args::{Format, SensorsChoice, SetArgs};
+use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::{check_backend, check_cameras};
 use super::ending::{EndArgs, Ending};
@@ -106,6 +109,8 @@ pub(super) struct CampaignArgs {
     ensemble: EnsembleArgs,
     #[command(flatten)]
     set: SetArgs,
+    #[command(flatten)]
+    fitted: FittedArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
@@ -170,7 +175,10 @@ impl CampaignArgs {
 
     /// Reads and checks every scenario.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
-        let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
+        let files = expand(&self.scenarios)?
+            .iter()
+            .map(|path| self.fitted.load(path, &self.set))
+            .collect::<Result<Vec<_>, _>>()?;
         let ensemble = self.ensemble.apply(files)?;
         let mut plan = Plan::new(ensemble.entries, self.sampling()?, controllers)?;
         plan.without_effect = ensemble.without_effect;
@@ -184,27 +192,104 @@ impl CampaignArgs {
     }
 }
 
+/// A campaign that is ready to run, with what the command line says of its results.
+pub(super) struct Planned<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) gates: &'a GateSet,
+    pub(super) results: &'a ResultsArgs,
+    pub(super) artifacts: ArtifactArgs,
+    pub(super) end: EndArgs,
+    pub(super) record: Option<Selection>,
+    pub(super) format: Format,
+    /// The cluster that runs the samples, if this machine does not.
+    pub(super) ray: Option<&'a str>,
+    /// Whether the samples stop as soon as they are certain, and after which wall time.
+    pub(super) stop: (bool, Option<Duration>),
+    /// Whether the seed was drawn for this campaign.
+    pub(super) has_drawn_seed: bool,
+}
+
+/// What a command keeps in the folder of a campaign beside the results.
+pub(super) trait Companion {
+    /// Called when the folder is ready, before the first sample runs.
+    fn begin(&mut self, folder: &Folder) -> Result<(), CliError>;
+    /// Called after the last sample, before the reports are written.
+    fn end(&mut self, folder: &Folder) -> Result<(), CliError>;
+    /// Returns what is printed of it.
+    fn text(&self, summary: &Summary) -> String;
+    /// Returns the same for programs, with its key.
+    fn json(&self) -> Option<(&'static str, Value)>;
+    /// Returns the exit code, if `code` is that of the verdict.
+    fn code(&self, code: ExitCode) -> ExitCode;
+}
+
+/// A campaign that keeps nothing beside its results.
+struct Alone;
+
+impl Companion for Alone {
+    fn begin(&mut self, _: &Folder) -> Result<(), CliError> {
+        Ok(())
+    }
+
+    fn end(&mut self, _: &Folder) -> Result<(), CliError> {
+        Ok(())
+    }
+
+    fn text(&self, _: &Summary) -> String {
+        String::new()
+    }
+
+    fn json(&self) -> Option<(&'static str, Value)> {
+        None
+    }
+
+    fn code(&self, code: ExitCode) -> ExitCode {
+        code
+    }
+}
+
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let controllers = args.comparison.controllers(&args.controller, args.plan.wants_pairs())?;
     let is_paired = controllers.len() > 1;
     let mut gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
-    let plan = args.plan(controllers)?;
+    let planned = Planned {
+        plan: &args.plan(controllers)?,
+        gates: &gates,
+        results: &args.results,
+        artifacts: args.artifacts,
+        end: args.end,
+        record: args.record,
+        format: args.format,
+        ray: args.ray.as_deref(),
+        stop: (args.plan.until_certain, args.plan.time_budget),
+        has_drawn_seed: args.draws_seed(),
+    };
+    carry_out(&planned, &mut Alone)
+}
+
+/// Runs a campaign, prints its verdict, and writes its results.
+pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) -> Result<ExitCode, CliError> {
+    let Planned { plan, gates, .. } = planned;
     check_backend(plan.uses_classifier())?;
     check_cameras(plan.mask_rcnn_cameras())?;
-    let replaceable = args.results.place()? == Place::Default;
+    let replaceable = planned.results.place()? == Place::Default;
     let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
-    campaign.remote = connect(args.ray.as_deref(), &manifest).map_err(CampaignError::from)?;
-    let mut results = Results::start(&args.results, &mut campaign, &manifest)?;
-    campaign.retry_errors = args.end.retry_errors;
+    campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;
+    let mut results = Results::start(planned.results, &mut campaign, &manifest)?;
+    if let Some(folder) = results.complete() {
+        companion.begin(folder)?;
+    }
+    campaign.retry_errors = planned.end.retry_errors;
     session::stop_on_request(&mut campaign.stop);
     let started = Instant::now();
+    let (until_certain, time_budget) = planned.stop;
     let stop = StopRule {
-        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.until_certain),
-        time_budget: args.plan.time_budget,
+        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| until_certain),
+        time_budget,
         scenarios: campaign.works.len(),
     };
-    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndMonitor::new(args.end.rule()));
+    let mut progress = Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
     let resumption = campaign.run(results.locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
     resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));
@@ -213,36 +298,46 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         session::received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule))
     {
         let kept = results.locked.as_ref().map(|locked| locked.folder.path());
-        let code = ending.print(args.format, &campaign, &progress.tally.summary, kept);
+        let code = ending.print(planned.format, &campaign, &progress.tally.summary, kept);
         return Ok(results.into_lost().map_or(code, |error| {
             print_error(format_args!("{:?}\n", miette::Report::new(error)));
             ExitCode::first_of([code, ExitCode::Io])
         }));
     }
+    if let Some(folder) = results.complete() {
+        companion.end(folder)?;
+    }
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let judged = tally.judgement();
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
-    match args.format {
-        Format::Json => outln!("{:#}", json::campaign_report(&report, Some(wall_s))),
+    match planned.format {
+        Format::Json => {
+            let mut value = json::campaign_report(&report, Some(wall_s));
+            if let (Some((key, more)), Some(object)) = (companion.json(), value.as_object_mut()) {
+                object.insert(key.to_owned(), more);
+            }
+            outln!("{value:#}");
+        }
         Format::Human => {
             out!("{}", CountsText(&tally.summary));
             let (simulated_s, place) = (tally.summary.total().simulated_s, campaign.place());
             let checks = check_share(progress.spent_s);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
+            out!("{}", companion.text(&tally.summary));
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", VerdictText(&judged));
-            if args.draws_seed() {
+            if planned.has_drawn_seed {
                 outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
             }
         }
     }
     // A report that cannot be written does not cost the verdict.
     let written = match results.complete() {
-        Some(folder) => report.write(folder, selection(args.record)),
+        Some(folder) => report.write(folder, selection(planned.record)),
         None => report.write_without_folder(),
     };
-    let code = args.artifacts.code((&judged).into(), &written);
+    let code = planned.artifacts.code(companion.code((&judged).into()), &written);
     if let Some(folder) = results.complete() {
         print_results(folder, &written.recorded);
     }

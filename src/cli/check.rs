@@ -12,7 +12,7 @@ use closecall_scenarios::{ScenarioError, ScenarioFile};
 use serde_json::{Value, json};
 
 use super::CliError;
-use super::args::{Format, SetArgs};
+use super::args::{FittedArgs, Format, SetArgs};
 use super::help::{examples, heading};
 use super::output::{outln, print_error};
 use super::watching::{WatchingArgs, watch};
@@ -33,6 +33,8 @@ pub(super) struct CheckArgs {
     #[command(flatten)]
     set: SetArgs,
     #[command(flatten)]
+    fitted: FittedArgs,
+    #[command(flatten)]
     watching: WatchingArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -42,7 +44,7 @@ pub(super) struct CheckArgs {
 /// Refuses the options about samples unless a file is watched: a check runs none.
 fn only_with_watch(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
-        "scenarios" | "settings" | "format" | "watch" => arg,
+        "scenarios" | "settings" | "fitted" | "format" | "watch" => arg,
         _ => arg.requires("watch"),
     }
 }
@@ -52,7 +54,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         let [scenario] = &args.scenarios[..] else {
             return Err(CliError::usage("--watch is for one scenario file"));
         };
-        return watch(scenario, &args.set, &args.watching);
+        return watch(scenario, (&args.set, &args.fitted), &args.watching);
     }
     let is_campaign = |path: &&PathBuf| path.join("manifest.json").is_file() || path.join("journal.jsonl").is_file();
     let campaigns: Vec<&PathBuf> = args.scenarios.iter().filter(is_campaign).collect();
@@ -62,7 +64,8 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         }
         return Ok(check_campaigns(&campaigns, args.format));
     }
-    let checked: Vec<_> = expand(&args.scenarios)?.into_iter().map(|path| (args.set.load(&path), path)).collect();
+    let checked: Vec<_> =
+        expand(&args.scenarios)?.into_iter().map(|path| (args.fitted.load(&path, &args.set), path)).collect();
     let codes: Vec<ExitCode> =
         checked.iter().filter_map(|(file, _)| Some(ExitCode::from(file.as_ref().err()?))).collect();
     match args.format {

@@ -90,6 +90,12 @@ impl GateArgs {
         Ok(set)
     }
 
+    /// Returns the same options for a command that measures unless they name a gate.
+    pub(super) fn or_measure(&self) -> Result<Self, CliError> {
+        let is_named = !self.criteria()?.is_empty() || self.max_probability.is_some() || self.max_flaky.is_some();
+        Ok(Self { no_gate: !is_named, ..self.clone() })
+    }
+
     /// Returns the criteria that the options stand for.
     fn criteria(&self) -> Result<Vec<Expression>, CliError> {
         let options = GateOptions {

@@ -5,8 +5,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, drift, generate, inspect, merge, paper, record, reenact, render, robustness, sample,
-    schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, generate, inspect, merge, paper, record, reenact, render, robustness,
+    sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -18,6 +18,8 @@ use crate::exit_code::ExitCode;
     "closecall traffic reenact traffic.csv --record beside.rrd",
 ]))]
 pub(super) enum Traffic {
+    /// Turn recordings into scenarios, run them with the system and without it, and report what becomes of each recorded encounter
+    Chain(chain::ChainArgs),
     /// Report the flaws of a trajectory file: gaps, jumps, overlaps, and rows that cannot be used
     Inspect(inspect::InspectArgs),
     /// Find the lane changes in a trajectory file
@@ -94,6 +96,7 @@ impl Traffic {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<ExitCode, CliError> {
         match self {
+            Self::Chain(args) => chain::chain(args),
             Self::Inspect(args) => inspect::inspect(args),
             Self::LaneChanges(args) => trajectories::lane_changes(args),
             Self::Criticality(args) => trajectories::criticality(args),

@@ -7,6 +7,7 @@ mod baseline;
 mod calibrate;
 mod campaign;
 mod causes;
+mod chain;
 mod check;
 mod command;
 mod compare;

@@ -63,6 +63,11 @@ pub(super) enum Place<'a> {
 }
 
 impl ResultsArgs {
+    /// Returns the arguments of a campaign that keeps its results in a folder.
+    pub(super) fn named(folder: &Path, resume: bool) -> Self {
+        Self { out: Some(folder.to_owned()), no_out: false, resume }
+    }
+
     /// Returns the manifest of the campaign that is to be resumed, if there is one.
     pub(super) fn resumed(&self) -> Option<Manifest> {
         let folder = match self.place().ok().filter(|_| self.resume)? {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::robustness::{RobustnessError, robustness as study};
-use closecall_recorded::robustness::Setup;
+use closecall_recorded::robustness::{FEWEST_LANE_CHANGES, Setup};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, robustness_charts};
 
@@ -56,6 +56,14 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     }
     if found.reference == 0 {
         print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
+        return Ok(ExitCode::Inconclusive);
+    }
+    if found.reference < FEWEST_LANE_CHANGES {
+        print_error(format_args!(
+            "the trajectory files have {} lane changes, and the study needs {FEWEST_LANE_CHANGES}: with fewer, the loss of a single one is \
+             more than the share at which a criterion fails, so that no level can be told\n",
+            found.reference
+        ));
         return Ok(ExitCode::Inconclusive);
     }
     Ok(ExitCode::Pass)

@@ -12,7 +12,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_simulation::RunKey;
 
 use super::CliError;
-use super::args::{Format, SimulationArgs};
+use super::args::{FittedArgs, Format, SimulationArgs};
 use super::arms::ComparisonArgs;
 use super::help::{examples, heading};
 use super::output::{out, outln};
@@ -36,6 +36,8 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     sim: SimulationArgs,
     #[command(flatten)]
+    fitted: FittedArgs,
+    #[command(flatten)]
     comparison: ComparisonArgs,
     #[command(flatten)]
     watch: WatchArgs,
@@ -45,8 +47,9 @@ pub(super) struct RunArgs {
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
-    let file = args.sim.set.load(&args.scenario)?;
-    protect(&[of_scenario(&file), args.comparison.files(&args.sim.arm)].concat(), &args.watch.outputs())?;
+    let file = args.fitted.load(&args.scenario, &args.sim.set)?;
+    let fitted = args.fitted.fitted.iter().cloned().collect();
+    protect(&[of_scenario(&file), args.comparison.files(&args.sim.arm), fitted].concat(), &args.watch.outputs())?;
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
@@ -56,8 +59,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
         isolated.check_variables(&scenario, None)?;
     }
     arms.iter().filter_map(|arm| arm.sensors).try_for_each(|mode| file.check_faults_in(mode))?;
-    let outcomes = run_watched(&scenario, key, &arms, (&args.watch, &args.sim.set.settings))?;
-    print(&outcomes, args.format, Some(&args.sim.set.settings));
+    let outcomes = run_watched(&scenario, key, &arms, (&args.watch, file.settings()))?;
+    print(&outcomes, args.format, Some(file.settings()));
     Ok(ExitCode::Pass)
 }
 

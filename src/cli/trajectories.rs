@@ -7,9 +7,7 @@ use closecall_campaign::arguments::{positive, recording as trajectory_path};
 use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
 use closecall_recorded::filters::smooth;
 use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
-use closecall_recorded::lane_change::{
-    Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
-};
+use closecall_recorded::lane_change::{Criterion, FoundLaneChanges, find, listed_for, read_references, score};
 use closecall_recorded::trajectory_data::{Layout, open};
 use closecall_report::json::{self, stamped};
 use closecall_report::run::film::film_lane_change;
@@ -20,7 +18,7 @@ use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_ch
 use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, ReadArgs, read_noting};
+use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{command_line, out, outln, print_error, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
@@ -48,16 +46,6 @@ impl CriterionChoice {
     }
 }
 
-/// The lanes by which lane changes are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum LanesChoice {
-    /// The lanes that the file states for each vehicle
-    #[default]
-    Recorded,
-    /// None: a lateral shift by most of a lane is a lane change. For files whose lanes are missing or unreliable
-    None,
-}
-
 /// Arguments of `closecall traffic lane-changes`.
 #[derive(Debug, Args)]
 #[command(after_help = examples([
@@ -75,9 +63,6 @@ pub(super) struct LaneChangesArgs {
     /// Criterion by which lane changes are found
     #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     criterion: CriterionChoice,
-    /// Lanes that the peak criterion uses
-    #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
-    lanes: LanesChoice,
     /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with the columns
     /// recording_id, track_id, time_s, direction, clear
     #[arg(long, value_name = "FILE.csv", help_heading = heading::METHOD)]
@@ -162,16 +147,13 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         );
         return Err(CliError::Usage { message });
     }
-    if args.criterion != CriterionChoice::Peak && args.lanes == LanesChoice::None {
+    if args.criterion != CriterionChoice::Peak && args.read.lanes == LanesChoice::None {
         return Err(CliError::usage("`--lanes none` is for `--criterion peak`: other criteria need lanes or markings"));
     }
     let name = tracks.name().to_owned();
     let references = references.map(|all| listed_for(all, &name)).transpose();
     let references = references.map_err(|message| CliError::Usage { message })?;
-    let lanes = match args.lanes {
-        LanesChoice::Recorded => LaneReliability::Reliable,
-        LanesChoice::None => LaneReliability::Unreliable,
-    };
+    let lanes = args.read.lanes.reliability();
     let FoundLaneChanges { lane_changes: changes, spans, tracks: count, basis } =
         find(&mut tracks, args.criterion.criterion(), lanes)?;
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));

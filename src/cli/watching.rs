@@ -12,7 +12,7 @@ use closecall_scenarios::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;
-use super::args::SetArgs;
+use super::args::{FittedArgs, SetArgs};
 use super::arms::{ArmArgs, ComparisonArgs};
 use super::help::heading;
 use super::output::{outln, print_error};
@@ -49,8 +49,12 @@ pub(super) struct WatchingArgs {
     comparison: ComparisonArgs,
 }
 
-/// Checks a scenario file, with the changes of `set`, now and at every change, and runs its first samples.
-pub(super) fn watch(scenario: &Path, set: &SetArgs, args: &WatchingArgs) -> Result<ExitCode, CliError> {
+/// Checks a scenario file, with these changes, now and at every change, and runs its first samples.
+pub(super) fn watch(
+    scenario: &Path,
+    changes: (&SetArgs, &FittedArgs),
+    args: &WatchingArgs,
+) -> Result<ExitCode, CliError> {
     let Some(path) = existing(scenario).filter(|path| path.is_file()) else {
         let message = format!("there is no file {}: `closecall new NAME` writes one", scenario.display());
         return Err(CliError::Usage { message });
@@ -72,7 +76,7 @@ pub(super) fn watch(scenario: &Path, set: &SetArgs, args: &WatchingArgs) -> Resu
             print_error(format_args!("{} is missing\n", path.display()));
             continue;
         }
-        if let Err(error) = round(&path, set, args) {
+        if let Err(error) = round(&path, changes, args) {
             code = ExitCode::from(&error);
             print_error(format_args!("{:?}\n", miette::Report::new(error)));
         }
@@ -90,8 +94,8 @@ fn state(path: &Path) -> Option<(SystemTime, u64)> {
 }
 
 /// Checks the file, and runs its first samples.
-fn round(path: &Path, set: &SetArgs, args: &WatchingArgs) -> Result<(), CliError> {
-    let file = set.load(path)?;
+fn round(path: &Path, (set, fitted): (&SetArgs, &FittedArgs), args: &WatchingArgs) -> Result<(), CliError> {
+    let file = fitted.load(path, set)?;
     let (name, parameters) = (&file.config().name, file.space().iter().len());
     outln!("{}: valid, {name} with {parameters} parameters", path.display());
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };

@@ -6,6 +6,7 @@
 //!                 ─▶ minimize      the smallest failing case near it, and the nearest case that passes
 //!  grid           ─▶ map           the margin that is reached, in theory and in the loop
 //!  campaign       ─▶ cost          what the system costs where nothing happens
+//!                 ─▶ engagement    why the system does not engage
 //!  recordings     ─▶ exposure      how often the encounter happens on a road: the net effect per 10⁶ km
 //!  cases          ─▶ perception    where perception ends, how it errs, and what spoils it
 //! ```
@@ -16,6 +17,7 @@
 pub mod attribution;
 pub mod case;
 pub mod cost;
+pub mod engagement;
 pub mod explain;
 pub mod exposure;
 pub mod failures;

@@ -10,6 +10,7 @@ mod book;
 mod calibrate;
 mod campaign_example;
 mod causes;
+mod chain;
 mod changed_controller;
 mod commands;
 mod comparison;

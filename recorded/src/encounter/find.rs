@@ -59,6 +59,20 @@ fn on_clock(time: Time) -> Time {
     Time::from_ns(time.ns().div_euclid(PERIOD.ns()) * PERIOD.ns())
 }
 
+/// Returns the track that changes lanes, and the first instant of the common clock at which it is recorded in its old lane while
+/// it changes lanes. Returns `None` if `data` does not have the track.
+pub(super) fn begin<'a>(data: &'a SmoothedTrajectoryData, change: &LaneChange) -> Option<(&'a Trajectory, Time)> {
+    let track = &data.tracks[data.track_index(change.track_id)?];
+    let rear = &track.trajectory;
+    let crossing = Time::from_s(change.crossing_s);
+    let stays = track.stays.iter().filter(|stay| stay.lane.0 == change.from_lane && stay.first < crossing);
+    let home_since = stays.map(|stay| stay.first).next_back();
+    let recorded_since = rear.span().map(|(first, _)| first);
+    let begins = [Some(Time::from_s(change.start_s)), home_since, recorded_since].into_iter().flatten().max();
+    // Rounded up to the common clock.
+    Some((rear, on_clock(begins.unwrap_or(crossing) + PERIOD - Time::from_ns(1))))
+}
+
 /// The three vehicles of an encounter, and the time at which their roles are assigned.
 struct Roles<'a> {
     ego: &'a Trajectory,
@@ -72,16 +86,7 @@ impl<'a> Roles<'a> {
     /// Assigns the roles at the start of the lane change `change`.
     fn of(data: &'a SmoothedTrajectoryData, change: &LaneChange) -> Result<Self, NoEncounter> {
         let track_id = change.track_id;
-        let index = data.track_index(track_id).ok_or(NoEncounter::NoTrack { track_id })?;
-        let track = &data.tracks[index];
-        let rear = &track.trajectory;
-        let crossing = Time::from_s(change.crossing_s);
-        let stays = track.stays.iter().filter(|stay| stay.lane.0 == change.from_lane && stay.first < crossing);
-        let home_since = stays.map(|stay| stay.first).next_back();
-        let recorded_since = rear.span().map(|(first, _)| first);
-        let begins = [Some(Time::from_s(change.start_s)), home_since, recorded_since].into_iter().flatten().max();
-        // Rounded up to the common clock.
-        let change_start = on_clock(begins.unwrap_or(crossing) + PERIOD - Time::from_ns(1));
+        let (rear, change_start) = begin(data, change).ok_or(NoEncounter::NoTrack { track_id })?;
         let no_ego = NoEncounter::NoEgo { track_id, lane: change.from_lane };
         let lane = Lane(change.from_lane);
         let ego = next_ahead(data, rear, lane, change_start).ok_or(no_ego)?;
@@ -131,7 +136,7 @@ impl<'a> Roles<'a> {
 }
 
 /// Returns the nearest vehicle ahead of `own` in `lane`, or `None` if there is none or `own` is not in that lane.
-fn next_ahead<'a>(
+pub(super) fn next_ahead<'a>(
     data: &'a SmoothedTrajectoryData,
     own: &Trajectory,
     lane: Lane,

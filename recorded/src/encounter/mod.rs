@@ -22,17 +22,25 @@
 //! consists of the lanes around those of the rear vehicle whose numbers are contiguous, renumbered from lane 1. All its
 //! lanes have the typical width of the trajectory data. The marking that the rear vehicle crosses keeps its recorded
 //! lateral position.
+//!
+//! **Approach.** An [`Approach`] is what a lane change says about a logical scenario: the values of the rear vehicle and of the
+//! vehicle that it overtakes, without their paths. It needs no lead vehicle and no long recording, and [`most_relevant`] chooses
+//! among approaches.
 
+mod approach;
 mod choose;
 mod find;
 mod frame;
 mod recorded;
+mod relevance;
 #[cfg(test)]
 mod tests;
 
+pub use approach::{Approach, ApproachValues, NoApproach, Party, approach};
 pub use choose::{ChoiceError, choose, track_suggestion};
 pub use find::encounter;
 pub use recorded::{
     EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, REAR_INDEX,
     RecordedEncounter, SHORTEST_APPROACH,
 };
+pub use relevance::{Relevant, Variation, most_relevant};

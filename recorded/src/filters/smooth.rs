@@ -5,6 +5,7 @@ use closecall_traffic::{Time, Trajectory, TrajectoryPoint};
 use super::butterworth::LowPass;
 use super::resample::resample;
 use super::stays::{Stay, period_of, stays_of};
+use crate::lane_change::LaneReliability;
 use crate::trajectory_data::{LaneMarkings, TrajectoryData};
 
 /// Period of the common clock, which runs at 5 Hz.
@@ -32,6 +33,8 @@ pub struct SmoothedTrajectoryData {
     pub name: String,
     /// Lateral positions of the lane markings.
     pub markings: LaneMarkings,
+    /// Whether lane changes are found by the recorded lanes.
+    pub lanes: LaneReliability,
     /// The tracks in order of their track ids, without those that cover no instant of the common clock.
     pub tracks: Vec<SmoothedTrack>,
     first_tick: i64,
@@ -51,7 +54,8 @@ pub struct Presence {
 pub fn smooth(data: &TrajectoryData) -> SmoothedTrajectoryData {
     let tracks: Vec<_> = data.trajectories.iter().filter_map(smooth_track).collect();
     let (first_tick, present) = presence_by_tick(&tracks);
-    SmoothedTrajectoryData { name: data.name.clone(), markings: data.markings.clone(), tracks, first_tick, present }
+    let (name, markings) = (data.name.clone(), data.markings.clone());
+    SmoothedTrajectoryData { name, markings, lanes: data.lanes, tracks, first_tick, present }
 }
 
 /// Smooths one track and resamples it to the common clock.

@@ -70,6 +70,16 @@ impl Quantity {
         }
     }
 
+    /// Returns the quantity of which this one is a part, and the range of its values (in its unit): from the first number up to
+    /// below the second. `None` if it is no part of another one.
+    pub const fn part_of(self) -> Option<(Self, [f64; 2])> {
+        match self {
+            Self::CriticalCutOutThw => Some((Self::CutOutThw, [0.0, CRITICAL_THW_S])),
+            Self::ShortFrontThw => Some((Self::FrontThw, [SHORTEST_ACC_S, CRITICAL_THW_S])),
+            _ => None,
+        }
+    }
+
     /// Returns a description of the values, for the comments of the output file.
     pub const fn meaning(self) -> &'static str {
         match self {
@@ -127,11 +137,12 @@ impl Samples {
         self.values.entry(quantity).or_default().push(value);
     }
 
-    /// Adds a headway to quantity `all`, and also to `critical` if it is critical and at least `from_s`.
-    fn push_headway(&mut self, all: Quantity, critical: Quantity, from_s: f64, thw_s: f64) {
-        self.push(all, thw_s);
-        if (from_s..CRITICAL_THW_S).contains(&thw_s) {
-            self.push(critical, thw_s);
+    /// Adds a headway to a quantity, and to the quantity that is a part of it if it is in its range.
+    fn push_headway(&mut self, part: Quantity, thw_s: f64) {
+        let Some((whole, [from_s, to_s])) = part.part_of() else { return };
+        self.push(whole, thw_s);
+        if (from_s..to_s).contains(&thw_s) {
+            self.push(part, thw_s);
         }
     }
 }
@@ -162,7 +173,7 @@ fn observe_lane_change(data: &SmoothedTrajectoryData, change: &LaneChange, sampl
     if thw_s > FOLLOWING_THW_S {
         return;
     }
-    samples.push_headway(Quantity::CutOutThw, Quantity::CriticalCutOutThw, 0.0, thw_s);
+    samples.push_headway(Quantity::CriticalCutOutThw, thw_s);
     // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are first recorded.
     let own = &data.tracks[lead.own_index].trajectory;
     let other = &data.tracks[lead.lead_index].trajectory;
@@ -222,7 +233,7 @@ fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
         }
         samples.begin();
         let (headways, speeds): (Vec<f64>, Vec<f64>) = instants.into_iter().unzip();
-        samples.push_headway(Quantity::FrontThw, Quantity::ShortFrontThw, SHORTEST_ACC_S, median(headways));
+        samples.push_headway(Quantity::ShortFrontThw, median(headways));
         samples.push(Quantity::FollowingSpeed, median(speeds));
     }
 }

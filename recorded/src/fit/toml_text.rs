@@ -87,7 +87,11 @@ fn push_heading(text: &mut String, result: &FittedDistributions, heading: &Headi
 fn push_entry(text: &mut String, fitted: &FittedQuantity, distribution: &str, source: &str) {
     let [low, high] = fitted.interval_95.map(number);
     let (name, n, source) = (fitted.quantity.name(), fitted.n, quoted(source));
-    let provenance = format!("fitted = {{ n = {n}, source = {source}, interval-95 = [{low}, {high}] }}");
+    let of = fitted.quantity.part_of().map_or_else(String::new, |(whole, cut)| {
+        let [from, to] = cut.map(number);
+        format!(", quantity = \"{}\", cut = [{from}, {to}]", whole.name())
+    });
+    let provenance = format!("fitted = {{ n = {n}, source = {source}, interval-95 = [{low}, {high}]{of} }}");
     // Writing to a string cannot fail.
     let _infallible = writeln!(text, "{name} = {{ {distribution}, {provenance} }}");
 }

@@ -44,9 +44,10 @@ impl Criterion {
 }
 
 /// Whether the recorded lane of a vehicle is reliable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LaneReliability {
     /// Reliable: the peak criterion requires a change of the recorded lane.
+    #[default]
     Reliable,
     /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the recorded lane.
     Unreliable,
@@ -72,8 +73,8 @@ struct TrackData<'a> {
 
 /// Detects the lane changes of all tracks by the peak criterion, in order of track id and time.
 pub fn detect(data: &SmoothedTrajectoryData) -> Vec<LaneChange> {
-    let detector = LaneChangeDetector::new(LaneReliability::Reliable, &data.markings);
-    data.tracks.iter().flat_map(|track| detector.by_recorded_lane(track)).collect()
+    let detector = LaneChangeDetector::new(data.lanes, &data.markings);
+    data.tracks.iter().flat_map(|track| detector.by_peak(track)).collect()
 }
 
 impl LaneChangeDetector {
@@ -114,8 +115,11 @@ impl LaneChangeDetector {
         criteria.iter().map(|criterion| self.detect_smoothed(*criterion, data)).collect()
     }
 
-    fn by_recorded_lane(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
-        let mut found = by_crossings(&track.trajectory, &crossings(&track.stays), self.lane_width_m);
+    fn by_peak(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
+        let mut found = match self.lanes {
+            LaneReliability::Reliable => by_crossings(&track.trajectory, &crossings(&track.stays), self.lane_width_m),
+            LaneReliability::Unreliable => by_shift(&track.trajectory, self.lane_width_m),
+        };
         mark_doubles(&mut found, &self.road);
         found
     }

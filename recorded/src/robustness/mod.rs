@@ -32,4 +32,6 @@ mod matching;
 mod study;
 
 pub use disturb::Disturbance;
-pub use study::{CriterionCounts, Experiment, FAILING_SHARE, Measured, ReferenceKind, Robustness, Setup, Study};
+pub use study::{
+    CriterionCounts, Experiment, FAILING_SHARE, FEWEST_LANE_CHANGES, Measured, ReferenceKind, Robustness, Setup, Study,
+};

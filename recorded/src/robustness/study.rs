@@ -11,6 +11,8 @@ use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 /// Share of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
 /// detects undisturbed.
 pub const FAILING_SHARE: f64 = 0.05;
+/// Fewest lane changes that a study needs: with fewer, the loss of a single one exceeds [`FAILING_SHARE`].
+pub const FEWEST_LANE_CHANGES: usize = 20;
 
 /// A track, and the distances to the markings for each of its points; these are empty if they were not measured.
 pub type Measured = (Trajectory, Vec<MarkingDistances>);
@@ -51,6 +53,8 @@ pub enum ReferenceKind {
     Gradient,
     /// Lane changes by the peak criterion: changes of the recorded lane at peaks of the lateral speed.
     RecordedLanes,
+    /// Lane changes by the peak criterion: lateral shifts by most of a lane.
+    LateralShift,
 }
 
 /// A robustness study of one trajectory data set, with its reference lane changes.
@@ -88,13 +92,22 @@ pub struct CriterionCounts {
 impl Study {
     /// Detects the reference lane changes in `tracks` on the road with these `markings`.
     pub fn new(tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
+        Self::with_lanes(LaneReliability::Reliable, tracks, markings)
+    }
+
+    /// Works like [`Self::new`]. The peak criterion finds the reference by the recorded lanes only if they are reliable.
+    pub fn with_lanes(lanes: LaneReliability, tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
         let has_distances = tracks.iter().any(|(_, distances)| !distances.is_empty());
         let (kind, reference_criterion, criteria) = if has_distances {
             (ReferenceKind::Gradient, Criterion::Gradient, Criterion::ALL.to_vec())
         } else {
-            (ReferenceKind::RecordedLanes, Criterion::Peak, vec![Criterion::Peak, Criterion::Distance])
+            let kind = match lanes {
+                LaneReliability::Reliable => ReferenceKind::RecordedLanes,
+                LaneReliability::Unreliable => ReferenceKind::LateralShift,
+            };
+            (kind, Criterion::Peak, vec![Criterion::Peak, Criterion::Distance])
         };
-        let reference_detector = LaneChangeDetector::new(LaneReliability::Reliable, markings);
+        let reference_detector = LaneChangeDetector::new(lanes, markings);
         let reference: Vec<_> = tracks
             .iter()
             .map(|(track, distances)| reference_detector.detect(reference_criterion, track, distances))

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::class_names::UnknownClass;
 use super::continuity::Continuity;
 use super::markings::LaneMarkings;
+use crate::lane_change::LaneReliability;
 
 /// The layout of a trajectory file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -84,6 +85,8 @@ pub struct TrajectoryData {
     pub period: Time,
     /// Positions of the lane markings, as far as they are known.
     pub markings: LaneMarkings,
+    /// Whether lane changes are found by the recorded lanes.
+    pub lanes: LaneReliability,
     /// The tracks, sorted by track number.
     pub trajectories: Vec<Trajectory>,
     /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from a file.
@@ -119,6 +122,7 @@ impl TrajectoryData {
             layout: Layout::Plain,
             period,
             markings,
+            lanes: LaneReliability::default(),
             trajectories,
             hash: String::new(),
             unknown_classes: Vec::new(),

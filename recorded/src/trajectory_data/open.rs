@@ -58,7 +58,8 @@ pub fn read(path: &Path) -> Result<TrajectoryData, TrajectoryFileError> {
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
 pub fn read_with(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
-    open_window(path, options, usize::MAX)?.collect_all()
+    let data = open_window(path, options, usize::MAX)?.collect_all()?;
+    Ok(TrajectoryData { lanes: options.lanes, ..data })
 }
 
 /// Reads trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the

@@ -18,6 +18,7 @@ use super::order::{WINDOW_ROWS, order_of};
 use super::plausible;
 use super::skipped_rows::SkippedRows;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
+use crate::lane_change::LaneReliability;
 
 /// Minimum time that counts from 1970 instead of from the start of the file: one day.
 const MIN_EPOCH_TIME: Time = Time::from_ms(86_400_000);
@@ -42,6 +43,8 @@ pub struct ReadOptions {
     pub bad_rows: BadRows,
     /// Directions of the file that differ from the documented ones.
     pub axes: AxisOptions,
+    /// Whether lane changes are found by the recorded lanes.
+    pub lanes: LaneReliability,
 }
 
 /// A layout that a caller can require by name.

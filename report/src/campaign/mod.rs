@@ -15,6 +15,7 @@ pub mod findings;
 pub(crate) mod html;
 pub mod junit;
 pub mod markdown;
+pub mod origins;
 pub mod outcomes;
 pub mod overview;
 mod pareto;

@@ -7,11 +7,12 @@ use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::ScenarioFile;
-use closecall_traffic::atomic::WriteError;
+use closecall_traffic::atomic::{WriteError, write_file};
 
 use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
+use super::origins::ORIGINS;
 use crate::run::figure::{scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording_of;
@@ -63,6 +64,13 @@ pub(super) fn record(
                 continue;
             }
         };
+        // A report that shows recorded traffic shows the simulated sample beside it.
+        if folder.file(ORIGINS).exists() {
+            let picture = path.join(format!("{name}-{}.svg", chosen.sample));
+            if let Err(error) = write_file(&picture, |file| file.write_all(entry.still.as_bytes())) {
+                recorded.failures.push((format!("the picture of sample {} of {name}", chosen.sample), error.into()));
+            }
+        }
         for outcome in &entry.outcomes {
             let key = (name.to_owned(), chosen.sample, outcome.controller.clone());
             recorded.paths.insert(key, format!("{RECORDINGS}/{}", entry.file));

@@ -21,10 +21,12 @@ impl fmt::Display for DriftText<'_> {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
         let count = |value: Option<u64>| value.map_or("-".to_owned(), |value| value.to_string());
         for one in &self.0.quantities {
+            let cut = one.cut_from.zip(one.cut_to);
+            let cut = cut.map_or_else(String::new, |(from, to)| format!("  {} from {from} to {to}", one.quantity));
             let mark = if one.corrected_p_value.is_some_and(|p_value| p_value < LEVEL) { "  DRIFTED" } else { "" };
             writeln!(
                 f,
-                "{:<22} {:>4} {:>8.3} {:>6} {:>8} {:>13} {:>7} {:>13} {:>9} {:>6}{mark}",
+                "{:<22} {:>4} {:>8.3} {:>6} {:>8} {:>13} {:>7} {:>13} {:>9} {:>6}{cut}{mark}",
                 one.name,
                 one.fitted_n,
                 one.fitted_median,

@@ -1,6 +1,8 @@
 //! Charts of criticality: how often each value of a metric occurs, with its threshold, and the shares of critical lane
 //! changes to the left and to the right.
 
+use std::collections::BTreeMap;
+
 use closecall_recorded::criticality::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
     CRITICAL_TTCE_S, Counted, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, shares,
@@ -13,6 +15,8 @@ use super::trajectory_charts::{ChartError, file, number_axis, range};
 use crate::charts::style::{Canvas, ChartAxis, Drawn, axes, legend_text, series_colour};
 use crate::units::labelled;
 
+/// Largest number of labels on an axis of counts.
+const COUNT_LABELS: usize = 6;
 /// Number of bars of a histogram.
 const BARS: usize = 20;
 /// Half of the width of a bar of shares, as a share of the distance between two metrics (-).
@@ -75,6 +79,24 @@ pub(super) fn histogram(
     file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), (&values, limit), is_above(metric)))
 }
 
+/// Returns the number of values in each bar. Bar 0 begins at the threshold, so that no bar holds critical and other values.
+fn bars(values: &[f64], limit: f64, width: f64) -> BTreeMap<i32, u32> {
+    let mut bars = BTreeMap::new();
+    for value in values {
+        #[expect(clippy::cast_possible_truncation, reason = "a small whole number")]
+        let bar = ((value - limit) / width).floor() as i32;
+        *bars.entry(bar).or_default() += 1;
+    }
+    bars
+}
+
+/// Returns a vertical axis from zero that counts in whole numbers.
+fn whole_number_axis(name: &str, end: f64) -> ChartAxis<'_> {
+    // A label between two counts stays empty.
+    let text = |count: &f64| if count.fract() == 0.0 { format!("{count:.0}") } else { String::new() };
+    ChartAxis { name, range: 0.0..end, labels: COUNT_LABELS, text: Box::new(text), has_grid: true }
+}
+
 fn draw_histogram(
     canvas: &Canvas<'_>,
     title: &str,
@@ -85,18 +107,14 @@ fn draw_histogram(
     let side = if is_above { "above" } else { "below" };
     let x = number_axis(name, range(values.iter().copied().chain([limit]), Some(0.0)));
     let (start, width) = (x.range.start, (x.range.end - x.range.start) / BARS as f64);
-    let mut counts = [0_u32; BARS];
-    for value in values {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
-        let bar = (((value - start) / width) as usize).min(BARS - 1);
-        counts[bar] += 1;
-    }
-    let largest = f64::from(counts.iter().copied().max().unwrap_or(0));
-    let y = number_axis("lane changes", 0.0..(1.1 * largest).max(1.0));
+    let bars = bars(values, limit, width);
+    let largest = bars.values().copied().max().unwrap_or(0);
+    let y = whole_number_axis("lane changes", (1.1 * f64::from(largest)).max(1.0));
     let mut plot = axes(canvas, Some(title), &x, &y)?;
-    plot.draw_series(counts.iter().enumerate().map(|(bar, count)| {
-        let left = start + bar as f64 * width;
-        Rectangle::new([(left, 0.0), (left + width, f64::from(*count))], series_colour(0).mix(0.6).filled())
+    plot.draw_series(bars.iter().map(|(bar, count)| {
+        let left = limit + f64::from(*bar) * width;
+        let corners = [(left.max(start), 0.0), (left + width, f64::from(*count))];
+        Rectangle::new(corners, series_colour(0).mix(0.6).filled())
     }))?;
     let line = [(limit, 0.0), (limit, y.range.end)];
     plot.draw_series(DashedLineSeries::new(line, 6, 4, series_colour(1).stroke_width(2)))?
@@ -163,4 +181,23 @@ fn name_at(x: f64) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
     let name = is_middle.then(|| METRICS.get(nearest as usize)).flatten();
     name.map_or(String::new(), |name| name.rsplit_once('_').map_or(*name, |(name, _unit)| name).to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_bar_of_a_histogram_holds_critical_and_other_values() {
+        // Bars from 0.7 to 0.9 and from 0.9 to 1.1.
+        let found = bars(&[0.05, 0.71, 0.899, 0.9, 1.0, 1.75], 0.9, 0.2);
+        assert_eq!(found, BTreeMap::from([(-5, 1), (-1, 2), (0, 2), (4, 1)]));
+    }
+
+    #[test]
+    fn the_axis_of_counts_has_whole_numbers_only() {
+        let axis = whole_number_axis("lane changes", 2.2);
+        let texts: Vec<String> = [0.0, 0.5, 1.0, 1.5, 2.0].iter().map(|count| (axis.text)(count)).collect();
+        assert_eq!(texts, ["0", "", "1", "", "2"]);
+    }
 }

@@ -19,6 +19,7 @@ impl fmt::Display for RobustnessText<'_> {
         let reference = match found.reference_kind {
             ReferenceKind::Gradient => "jumps of the distances to the markings",
             ReferenceKind::RecordedLanes => "recorded lanes",
+            ReferenceKind::LateralShift => "lateral shift",
         };
         let Setup { repetitions, seed, .. } = found.setup;
         writeln!(f, "{} lane changes, by {reference}; each criterion without noise and offset:", found.reference)?;

@@ -137,7 +137,7 @@ pub struct EmpiricalConfig {
 }
 
 /// The data to which a distribution was fitted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct FittedConfig {
     /// Number of observations.
@@ -152,6 +152,13 @@ pub struct FittedConfig {
         deserialize_with = "finite::pair"
     )]
     pub interval_95: Option<[f64; 2]>,
+    /// The quantity of `closecall traffic fit` to which the distribution was fitted, such as `front-thw-s`. Default: the one with
+    /// the name of the parameter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantity: Option<String>,
+    /// The range of values of the quantity that were fitted: from the first number up to below the second. Default: all.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::pair")]
+    pub cut: Option<[f64; 2]>,
 }
 
 impl ParameterConfig {
@@ -228,6 +235,10 @@ impl FittedConfig {
         }
         if self.source.trim().is_empty() {
             return Err(ConfigError::new("source", Problem::Missing { needed: "what it was fitted to" }));
+        }
+        if let Some([low, high]) = self.cut.filter(|[low, high]| !(low < high)) {
+            let rule = format!("{low} is not below {high}");
+            return Err(ConfigError::new("cut[0]", Problem::Contradiction { other: "cut[1]", rule }));
         }
         if let Some([low, high]) = self.interval_95 {
             for (index, value, allowed) in [(0, low, FINITE), (1, high, at_least(low))] {

@@ -67,7 +67,12 @@ fn every_kind_is_parsed_and_has_its_nominal_value() {
 fn a_distribution_states_its_provenance() {
     let space = space(ALL_KINDS);
     let provenance = |name| space.get(&ParameterName::new(name).unwrap()).unwrap().provenance.clone();
-    let fitted = FittedConfig { n: 214, source: "US-101".to_owned(), interval_95: Some([0.21, 0.27]) };
+    let fitted = FittedConfig {
+        n: 214,
+        source: "US-101".to_owned(),
+        interval_95: Some([0.21, 0.27]),
+        ..FittedConfig::default()
+    };
     assert_eq!(provenance("cut-out-thw-s"), Provenance::Fitted(fitted));
     assert_eq!(provenance("cruise-mps"), Provenance::Assumed("speeds of motorways".to_owned()));
     assert_eq!(provenance("rear-class"), Provenance::Unstated);

@@ -251,14 +251,18 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     hold("sample", [&sampled]);
     let fit = |file: &str| program(&["traffic", "fit", file, "--correlations"], 0);
     hold("fit", [&fit(&csv), &fit(&few)]);
-    let fitted = at("fitted.toml");
+    let (fitted, headline) = (at("fitted.toml"), library("low-thw-overtake").display().to_string());
     stdout(&closecall(["traffic", "fit", &csv, "-o", &fitted]), 0);
     hold(
         "drift",
-        [&program(&["traffic", "drift", &fitted, &csv], 0), &program(&["traffic", "drift", &fitted, &few], 4)],
+        [
+            &program(&["traffic", "drift", &fitted, &csv], 0),
+            &program(&["traffic", "drift", &fitted, &few], 4),
+            &program(&["traffic", "drift", &headline, &csv], 1),
+        ],
     );
     hold("statistics", [&program(&["traffic", "statistics", &csv], 0)]);
-    hold("robustness", [&program(&["traffic", "robustness", &few, "--repetitions", "1"], 0)]);
+    hold("robustness", [&program(&["traffic", "robustness", &few, "--repetitions", "1"], 4)]);
     let broken = at("broken.csv");
     std::fs::write(&broken, BROKEN).unwrap();
     let dropped = program(&["traffic", "inspect", &broken, "--drop-bad-rows"], 0);

@@ -10,6 +10,7 @@ use super::{ledger, provenance, samples, scenario, verdict};
 use crate::campaign::causes;
 use crate::campaign::ensemble::ensemble_html;
 use crate::campaign::findings::Findings;
+use crate::campaign::origins;
 use closecall_traffic::atomic::{WriteError, write_file};
 
 /// The style sheet of all pages.
@@ -28,6 +29,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
     let title = format!("{}: {}", findings.judged.word(), findings.scenario_names());
     let body = html! {
         (ledger::collisions(findings)?)
+        (origins::section(findings))
         (ensemble_html(findings.summary, findings.manifest))
         (verdict::gates(findings))
         (verdict::requirements(findings))

@@ -1,0 +1,186 @@
+//! Fitted distributions in place of those of a scenario: a file that `closecall traffic fit` wrote, or one of the same form.
+//!
+//! A parameter takes the distribution of the entry that was fitted to the same values: to the same quantity in the same range. Without
+//! one, it takes the entry of its name. A log-normal distribution that the scenario cuts takes the log-normal form of the file, and
+//! keeps its cut. The replacement is a [`Setting`], so that manifests, recordings and JSON state it, with the hash of the file.
+
+use std::path::{Path, PathBuf};
+
+use closecall_recorded::fit::Quantity;
+
+use super::parameters::{ParameterConfig, ParametersConfig};
+use super::{ScenarioError, ScenarioFile, Setting};
+
+/// A file of fitted distributions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedFile {
+    path: PathBuf,
+    /// Its provenance in words, with the hash of its content.
+    source: String,
+    parameters: ParametersConfig,
+    /// The parametric forms, if the file has any.
+    parametric: ParametersConfig,
+}
+
+/// The values to which a distribution was fitted: a quantity, and the range of its values.
+#[derive(Clone, Debug, PartialEq)]
+struct FittedTo<'a> {
+    quantity: &'a str,
+    cut: Option<[f64; 2]>,
+}
+
+impl<'a> FittedTo<'a> {
+    fn of(name: &'a str, config: &'a ParameterConfig) -> Self {
+        let fitted = config.fitted.as_ref();
+        Self {
+            quantity: fitted.and_then(|fitted| fitted.quantity.as_deref()).unwrap_or(name),
+            cut: fitted.and_then(|fitted| fitted.cut),
+        }
+    }
+}
+
+impl FittedFile {
+    /// Reads a file of fitted distributions.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if the file cannot be read, or a distribution is not valid.
+    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
+        let read = |source| ScenarioError::Read { path: path.to_owned(), source };
+        let text = std::fs::read_to_string(path).map_err(read)?;
+        let hash = blake3::hash(text.as_bytes()).to_hex();
+        let source = format!("from {} (blake3 {})", path.display(), hash.get(..16).unwrap_or_default());
+        let wrong = |message: String| ScenarioError::Syntax { path: path.to_owned(), line: 1, message };
+        let mut document: toml::Table =
+            text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_owned()))?;
+        let mut table = |name: &str| match document.remove(name) {
+            Some(value) => {
+                value.try_into::<ParametersConfig>().map_err(|error| wrong(format!("[{name}]: {}", error.message())))
+            }
+            None => Ok(ParametersConfig::default()),
+        };
+        let (parameters, parametric) = (table("parameters")?, table("parametric")?);
+        if parameters.0.is_empty() {
+            return Err(wrong("there is no table `parameters` with fitted distributions".to_owned()));
+        }
+        parameters.check().map_err(|error| wrong(error.within("parameters").to_string()))?;
+        Ok(Self { path: path.to_owned(), source, parameters, parametric })
+    }
+
+    /// Returns the settings that give the parameters of a scenario the distributions of this file.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if an entry of the file is neither a parameter of the scenario nor a quantity of `traffic fit`, or if no
+    /// parameter takes a distribution.
+    pub fn settings(&self, scenario: &ScenarioFile) -> Result<Vec<Setting>, ScenarioError> {
+        let own = &scenario.config().parameters.0;
+        let allowed = || own.keys().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        let name = &scenario.config().name;
+        let refuse = |message: String| ScenarioError::Syntax { path: self.path.clone(), line: 1, message };
+        let is_known = |entry: &str| {
+            own.keys().any(|known| known.as_str() == entry) || Quantity::ALL.iter().any(|known| known.name() == entry)
+        };
+        if let Some(unknown) = self.parameters.0.keys().find(|entry| !is_known(entry.as_str())) {
+            return Err(refuse(format!("`{unknown}` is no parameter of {name}: allowed are {}", allowed())));
+        }
+        let mut settings = Vec::new();
+        for (parameter, config) in own {
+            if let Some(replacement) = self.replacement(parameter.as_str(), config) {
+                let value = toml::Value::try_from(&replacement).map_err(|error| refuse(error.to_string()))?;
+                let setting = format!("parameters.{parameter}={value}").parse::<Setting>();
+                settings.push(setting.map_err(|source| ScenarioError::Set { path: self.path.clone(), source })?);
+            }
+        }
+        if settings.is_empty() {
+            return Err(refuse(format!("no entry replaces a parameter of {name}: allowed are {}", allowed())));
+        }
+        Ok(settings)
+    }
+
+    /// Returns the distribution of this file that replaces one of a scenario.
+    fn replacement(&self, name: &str, config: &ParameterConfig) -> Option<ParameterConfig> {
+        let wanted = FittedTo::of(name, config);
+        let same = |(entry, other): &(&_, &ParameterConfig)| FittedTo::of(as_str(entry), other) == wanted;
+        let (entry, found) = self
+            .parameters
+            .0
+            .iter()
+            .filter(|_| config.fitted.is_some())
+            .find(same)
+            .or_else(|| self.parameters.0.iter().find(|(entry, _)| entry.as_str() == name))?;
+        let is_cut = config.log_normal.as_ref().filter(|form| form.min.is_some() || form.max.is_some());
+        let form = self.parametric.0.get(entry);
+        let (mut taken, note) = match (is_cut, form.and_then(|form| Some((form, form.log_normal?)))) {
+            (Some(cut), Some((form, log_normal))) => {
+                let log_normal = super::parameters::LogNormalConfig { min: cut.min, max: cut.max, ..log_normal };
+                (ParameterConfig { log_normal: Some(log_normal), ..form.clone() }, ", with the cut of the scenario")
+            }
+            _ => (found.clone(), ""),
+        };
+        if let Some(fitted) = &mut taken.fitted {
+            let FittedTo { quantity, cut } = FittedTo::of(entry.as_str(), found);
+            (fitted.quantity, fitted.cut) = (Some(quantity.to_owned()), cut);
+        }
+        // The correlations of the file are with its other entries, which the scenario may not have.
+        taken.spearman = config.spearman.clone();
+        taken.note = Some(format!("{}{note}", self.source));
+        Some(taken)
+    }
+}
+
+fn as_str(name: &closecall_traffic::ParameterName) -> &str {
+    name.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::library;
+    use super::*;
+
+    fn headline() -> ScenarioFile {
+        ScenarioFile::parse(Path::new("a.toml"), library::text("low-thw-overtake").unwrap(), &[]).unwrap()
+    }
+
+    fn fitted(text: &str) -> FittedFile {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fitted.toml");
+        std::fs::write(&path, text).unwrap();
+        FittedFile::read(&path).unwrap()
+    }
+
+    #[test]
+    fn a_parameter_takes_the_entry_that_was_fitted_to_the_same_values() {
+        let us101 = fitted(include_str!("../library/fitted/us101.toml"));
+        let settings = us101.settings(&headline()).unwrap();
+        let text = library::text("low-thw-overtake").unwrap();
+        let file = ScenarioFile::parse(Path::new("a.toml"), text, &settings).unwrap();
+        let config =
+            |name: &str| file.config().parameters.0.iter().find(|(known, _)| known.as_str() == name).unwrap().1;
+        let [before, after] = [headline().config().clone(), file.config().clone()].map(|config| config.parameters);
+        for name in ["front-thw-s", "lane-change-duration-s"] {
+            let of = |all: &ParametersConfig| {
+                all.0.iter().find(|(known, _)| known.as_str() == name).unwrap().1.empirical.clone().unwrap()
+            };
+            assert_eq!(of(&before), of(&after), "{name}: the library was fitted to the same file");
+        }
+        // The cut of the headway at the crossing is a choice of the scenario.
+        let cut_out = config("cut-out-thw-s");
+        let form = cut_out.log_normal.unwrap();
+        assert_eq!((form.median, form.min, form.max), (0.758, Some(0.15), Some(0.4)));
+        // `closing-mps` is assumed in the scenario, and has an entry of its name.
+        assert_eq!(config("closing-mps").fitted.as_ref().unwrap().n, 13);
+        assert!(config("front-thw-s").note.as_ref().unwrap().contains("blake3"));
+    }
+
+    #[test]
+    fn an_unknown_name_is_refused_with_the_allowed_ones() {
+        let entry = |name: &str| format!("[parameters]\n{name} = {{ uniform = {{ min = 1, max = 2 }} }}\n");
+        let message = fitted(&entry("front-thw")).settings(&headline()).unwrap_err().to_string();
+        assert!(
+            message.contains("`front-thw` is no parameter of low-thw-overtake: allowed are brake-mps2"),
+            "{message}"
+        );
+        let message = fitted(&entry("crossing-mps")).settings(&headline()).unwrap_err().to_string();
+        assert!(message.contains("no entry replaces a parameter of low-thw-overtake"), "{message}");
+        assert_eq!(fitted(&entry("brake-mps2")).settings(&headline()).unwrap().len(), 1);
+    }
+}
