@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use closecall_scenarios::promise::{Goal, Hindrance};
 use closecall_simulation::Arm;
 
 use super::arm_pairs::ArmPair;
-use super::ledger::{ArmCounts, Inference, Pairs};
+use super::ledger::{ArmCounts, Inference, PairFate, Pairs, Tally};
 use super::record::Record;
 use super::repeats::Repeats;
 use super::runner::Work;
@@ -18,6 +19,10 @@ pub struct Counts {
     pub arms: Vec<ArmCounts>,
     /// Pairs of baseline and tested arm: the first and the last one.
     pub pairs: Pairs,
+    /// Why the tested arm did not prevent the collision in the samples of [`Pairs::both`], the most frequent reason first.
+    pub not_prevented: Vec<(Hindrance, u64)>,
+    /// What became of the goal in the tested arm, the most frequent case first.
+    pub goals: Vec<(Goal, u64)>,
     /// All pairs of arms.
     pub arm_pairs: Vec<ArmPair>,
     /// Samples that were run.
@@ -49,6 +54,7 @@ impl Counts {
                 self.pairs.push(baseline, tested);
             }
             self.arm_pairs.iter_mut().for_each(|pair| pair.push(&tallies));
+            self.push_reasons(record, &tallies);
             self.samples += 1;
         }
         for arm in &record.arms {
@@ -61,7 +67,24 @@ impl Counts {
         self.invalid += u64::from(record.is_invalid());
     }
 
+    fn push_reasons(&mut self, record: &Record, tallies: &[Tally]) {
+        let Some(Ok(outcome)) = record.arms.last().map(|arm| arm.result.as_ref()) else { return };
+        if outcome.mis.is_ok()
+            && let Some(goal) = Goal::of(outcome)
+        {
+            count(&mut self.goals, goal, 1);
+        }
+        if let [baseline, .., tested] = tallies
+            && PairFate::of(baseline, tested) == Some(PairFate::Both)
+            && let Some(hindrance) = Hindrance::of(outcome)
+        {
+            count(&mut self.not_prevented, hindrance, 1);
+        }
+    }
+
     fn add(&mut self, other: &Self) {
+        other.not_prevented.iter().for_each(|(hindrance, times)| count(&mut self.not_prevented, *hindrance, *times));
+        other.goals.iter().for_each(|(goal, times)| count(&mut self.goals, *goal, *times));
         for (sum, counts) in self.arms.iter_mut().zip(&other.arms) {
             sum.add(counts);
         }
@@ -85,6 +108,15 @@ impl Counts {
     pub fn errors(&self) -> u64 {
         self.arms.iter().map(|arm| arm.errors).sum()
     }
+}
+
+/// Adds to a tally, whose most frequent entry stays the first. Equally frequent ones are in the order in which they came.
+fn count<T: PartialEq>(tally: &mut Vec<(T, u64)>, of: T, times: u64) {
+    match tally.iter_mut().find(|(other, _)| *other == of) {
+        Some((_, sum)) => *sum += times,
+        None => tally.push((of, times)),
+    }
+    tally.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
 }
 
 /// The counts of a campaign.

@@ -87,10 +87,29 @@ class MisSummary:
     mean_deceleration_mps2: float | None
     #: Whether the goal was in reach.
     goal_in_reach: bool | None
-    #: Why the system did what it did.
+    #: Why the system engaged or, if it never did, the reason that held longest while it could have.
     reason: str
+    #: All reasons in order of time: ``reason``, ``from_s``, ``until_s``.
+    reasons: tuple[Mapping[str, Any], ...] = ()
+    #: From when to when the reason of a system that never engaged was sought (s).
+    decided_s: tuple[float, float] | None = None
     #: When and why the system was not available: ``from_s``, ``lasted_s``, ``reason``.
     unavailable: Mapping[str, Any] | None = None
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What became of the method's promise, from the true states. An absent value is ``None``, and ``absent`` names the reason."""
+
+    #: What became of the gain of 2 s of front time headway, in words; ``None`` if nothing was promised.
+    goal: str | None
+    #: Whether the gain was in reach when a vehicle behind was near for the first time.
+    in_reach: bool | None
+    #: Front time headway at the critical distance, minus the smallest one until the vehicle behind was near (s).
+    thw_raised_s: float | None
+    #: Hardest braking of the ego within 2 s of the crossing of the vehicle behind (m/s²).
+    crossing_braking_mps2: float | None
     absent: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -112,6 +131,7 @@ class Outcome:
     moments: tuple[Moment, ...]
     margins: Margins
     mis: MisSummary
+    promise: Promise | None = None
     _json: str = field(repr=False, compare=False, default="")
     _run: _native.Run | None = field(repr=False, compare=False, default=None)
 
@@ -124,7 +144,8 @@ class Outcome:
             collisions=tuple(_collision(one) for one in keys["collisions"]),
             moments=tuple(Moment(**one) for one in keys["moments"]),
             margins=Margins(**_split(keys["margins"])),
-            mis=MisSummary(**_split(keys["mis"])),
+            mis=MisSummary(**_tuples(_split(keys["mis"]))),
+            promise=None if keys["promise"] is None else Promise(**_split(keys["promise"])),
             _json=text,
             _run=run,
         )
@@ -192,6 +213,11 @@ class Outcome:
 def _collision(keys: dict[str, Any]) -> Collision:
     between, struck = tuple(keys["between"]), tuple(keys["struck_side"])
     return Collision(**{**keys, "between": between, "struck_side": struck})
+
+
+def _tuples(keys: dict[str, Any]) -> dict[str, Any]:
+    """Makes tuples of lists."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in keys.items()}
 
 
 def _split(keys: dict[str, Any]) -> dict[str, Any]:

@@ -36,6 +36,7 @@ pub mod outcome;
 mod overridden;
 pub mod parameters;
 mod placement;
+pub mod promise;
 mod recorded;
 mod recorded_values;
 mod reenacted;

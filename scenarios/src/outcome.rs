@@ -198,8 +198,43 @@ pub struct Cost {
     pub imposed_braking_mps2: f64,
 }
 
-/// What the margin increase system (MIS) did in a run.
+/// An interval in which the system gave one reason.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReasonSpan {
+    /// The reason.
+    pub reason: Reason,
+    /// Time of the first control step with this reason (s).
+    pub from_s: f64,
+    /// Time of the first control step with another reason, or of the last one of all (s).
+    pub until_s: f64,
+}
+
+/// Returns the reason that held longest in the interval, in sum. Of reasons that held equally long it is the earliest.
+///
+/// Emergency braking hides the condition that is missing beneath it, and therefore counts only if there is no other
+/// reason. In an interval without duration it is the last reason until then. `None` if there is no reason until its end.
+pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Option<Reason> {
+    let is_braking = |span: &ReasonSpan| matches!(span.reason, Reason::BrakingRequired | Reason::BrakingDone);
+    let mut held: Vec<(Reason, f64)> = Vec::new();
+    for span in spans.iter().filter(|span| !is_braking(span)) {
+        let lasted_s = span.until_s.min(until_s) - span.from_s.max(from_s);
+        if lasted_s > 0.0 {
+            match held.iter_mut().find(|(reason, _)| *reason == span.reason) {
+                Some((_, sum_s)) => *sum_s += lasted_s,
+                None => held.push((span.reason, lasted_s)),
+            }
+        }
+    }
+    let longest = held.into_iter().reduce(|longest, other| if other.1 > longest.1 { other } else { longest });
+    let before = || spans.iter().filter(|span| span.from_s <= until_s);
+    longest
+        .map(|(reason, _)| reason)
+        .or_else(|| before().rfind(|span| !is_braking(span)).map(|span| span.reason))
+        .or_else(|| before().next_back().map(|span| span.reason))
+}
+
+/// What the margin increase system (MIS) did in a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
     /// Time of its first engagement (s).
     pub engaged_at_s: Measured,
@@ -214,11 +249,33 @@ pub struct MisSummary {
     pub mean_deceleration_mps2: Measured,
     /// Whether the planned headway was within reach at the engagement. `None` if it never engaged or stated no plan.
     pub goal_in_reach: Option<bool>,
-    /// The reason for the engagement or, if it never engaged, the reason given at the last control step.
+    /// The reason for the engagement or, if it never engaged, the reason that held longest in `decided_s`.
     pub reason: Reason,
+    /// All reasons that it gave, in order of time.
+    #[serde(default)]
+    pub reasons: Vec<ReasonSpan>,
+    /// From the time at which the vehicle behind met the conditions on distance and speed until the hazard, or until it had
+    /// left the lane, or until the end (s). `None` if no vehicle behind met them.
+    #[serde(default)]
+    pub decided_s: Option<[f64; 2]>,
     /// When and why it was not available. `None` if it was available all the time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unavailable: Option<Unavailability>,
+}
+
+/// What the method promises, from the true states, in every arm.
+///
+/// The promise: when the vehicle behind is at the critical distance, the front time headway has grown by 2 s, and the ego
+/// does not brake hard while that vehicle leaves the lane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Promise {
+    /// Whether the ego could reach the goal when a vehicle behind was near for the first time: braking within its limit, with
+    /// everybody else at constant speed. `None` if no vehicle behind was near, or none was ahead.
+    pub in_reach: Option<bool>,
+    /// Front time headway when the vehicle behind is at the critical distance, minus the smallest one until it was near (s).
+    pub thw_raised_s: Measured,
+    /// Hardest braking of the ego from 2 s before until 2 s after the vehicle behind crosses the marking (m/s²).
+    pub crossing_braking_mps2: Measured,
 }
 
 /// When the margin increase system was not available, because the ego knew that sensors had failed.
@@ -264,6 +321,9 @@ pub struct Outcome {
     /// What the ego cost itself and the vehicle behind it. `None` in a journal that was written without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
+    /// What became of the method's promise. `None` in a journal that was written without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub promise: Option<Promise>,
 }
 
 impl Outcome {
@@ -296,5 +356,45 @@ impl Outcome {
     /// Returns whether the ego was part of a collision. Gates count samples for which this holds.
     pub fn ego_collided(&self) -> bool {
         self.ego_collisions().next().is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn span(reason: Reason, from_s: f64, until_s: f64) -> ReasonSpan {
+        ReasonSpan { reason, from_s, until_s }
+    }
+
+    #[test]
+    fn the_reason_is_the_one_that_held_longest_and_not_the_last_one() {
+        let spans = [
+            span(Reason::RearFar, 0.0, 3.6),
+            span(Reason::PassingLaneOccupied, 3.6, 9.6),
+            span(Reason::BrakingRequired, 9.6, 30.0),
+        ];
+        assert_eq!(longest_reason(&spans, [3.6, 9.6]), Some(Reason::PassingLaneOccupied));
+        assert_eq!(longest_reason(&spans, [3.6, 30.0]), Some(Reason::PassingLaneOccupied), "braking hides the reason");
+        assert_eq!(longest_reason(&spans, [0.0, 5.0]), Some(Reason::RearFar));
+    }
+
+    #[test]
+    fn intervals_of_one_reason_add_up() {
+        let spans = [
+            span(Reason::RearUnconfirmed, 0.0, 1.0),
+            span(Reason::RearNotApproaching, 1.0, 2.5),
+            span(Reason::RearUnconfirmed, 2.5, 3.5),
+        ];
+        assert_eq!(longest_reason(&spans, [0.0, 3.5]), Some(Reason::RearUnconfirmed));
+        assert_eq!(longest_reason(&spans, [0.5, 3.0]), Some(Reason::RearNotApproaching), "only the interval counts");
+    }
+
+    #[test]
+    fn without_an_interval_the_reason_is_the_last_condition_that_was_missing() {
+        let spans = [span(Reason::RearFar, 0.0, 3.6), span(Reason::BrakingRequired, 3.6, 9.0)];
+        assert_eq!(longest_reason(&spans, [5.0, 5.0]), Some(Reason::RearFar));
+        assert_eq!(longest_reason(&spans[1..], [3.6, 9.0]), Some(Reason::BrakingRequired), "nothing else is known");
+        assert_eq!(longest_reason(&[], [0.0, 9.0]), None);
     }
 }

@@ -46,6 +46,7 @@ mod paper;
 mod paper_figure;
 mod perception;
 mod readme;
+mod reasons;
 mod reenact;
 mod reference_models;
 mod references;

@@ -70,7 +70,7 @@ pub(crate) fn records(out: &Path) -> Vec<Record> {
 /// Returns an outcome under the name of another, and with its summary of the margin increase system: what the reference says of
 /// neither is not compared.
 fn named_as(outcome: &Outcome, reference: &Outcome) -> Outcome {
-    Outcome { controller: reference.controller.clone(), mis: reference.mis, ..outcome.clone() }
+    Outcome { controller: reference.controller.clone(), mis: reference.mis.clone(), ..outcome.clone() }
 }
 
 /// Returns true if the controller of a record has had the outcome of the baseline, to the last bit.

@@ -44,6 +44,16 @@ fn a_deceleration_of_one_metre_per_second_squared_gains_two_seconds_of_headway()
     assert!((1.9..=2.1).contains(&gained_s), "{gained_s}");
 }
 
+#[test]
+fn a_plan_for_the_time_to_closest_encounter_brakes_too_gently_for_the_figure() {
+    let gained_s = |controller| {
+        let mis = run(controller).0.mis.unwrap();
+        mis.thw_front_at_critical_s.unwrap() - mis.thw_front_at_engagement_s.unwrap()
+    };
+    let [critical_gap, ttce] = [BuiltIn::Mis, BuiltIn::MisTtce].map(gained_s);
+    assert!(ttce < 1.8 && critical_gap >= 1.9, "{ttce} {critical_gap}");
+}
+
 /// Returns the letters of the moments of a run, in their order.
 fn letters(outcome: &Outcome) -> String {
     outcome.moments.iter().filter_map(|noted| noted.moment.letter()).collect()

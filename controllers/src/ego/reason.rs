@@ -41,6 +41,8 @@ pub enum Reason {
     PassingLaneOccupied,
     /// It is not known whether the passing lane is free.
     PassingLaneUnknown,
+    /// Another vehicle follows the rear vehicle closely.
+    RearFollowed,
     /// All conditions for engaging hold, and the goal is in reach.
     Engaged,
     /// All conditions for engaging hold, but the goal is out of reach; the comfort limit is used in full.
@@ -94,6 +96,7 @@ impl Reason {
             Self::NoPassingLane => "no lane to overtake in",
             Self::PassingLaneOccupied => "passing lane occupied",
             Self::PassingLaneUnknown => "passing lane not known to be free",
+            Self::RearFollowed => "vehicle behind is followed closely",
             Self::Engaged => "engaged, goal in reach",
             Self::EngagedGoalOutOfReach => "engaged, goal out of reach",
             Self::RearCrosses => "vehicle behind crosses the marking",

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::acc::GapPolicy;
-use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoStack, MisConfig, MisSettings};
+use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoStack, Horizon, MisConfig, MisSettings};
 
 /// The ego stack as a scenario file describes it. An absent function is not part of the stack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -68,6 +68,13 @@ impl EgoSettings {
     #[must_use]
     pub fn with_extended_mis(self) -> Self {
         Self { mis: self.mis.map(MisSettings::extended), ..self }
+    }
+
+    /// Returns the same stack with a margin increase system that plans for the time to closest encounter, if it has one at all: the
+    /// controller `mis-ttce`.
+    #[must_use]
+    pub fn with_ttce_mis(self) -> Self {
+        Self { mis: self.mis.map(|mis| MisSettings { horizon: Horizon::Ttce, ..mis }), ..self }
     }
 
     /// Returns the gap that the adaptive cruise control keeps at `speed_mps` (m).

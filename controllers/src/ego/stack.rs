@@ -54,6 +54,7 @@ impl EgoStack {
             self.last_comfort.map_or((0.0, 0.0), |(time, last_mps2)| (last_mps2, (input.time - time).s()));
         let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);
         let acc_mps2 = Acc::limit_jerk_mps2(acc_mps2, last_mps2, speed_mps, step_s);
+        let early_mps2 = self.early_braking_mps2(speed_mps, lead);
         let Some(mis) = &mut self.mis else {
             return EgoCommand {
                 acceleration_mps2: acc_mps2,
@@ -79,7 +80,24 @@ impl EgoStack {
             Request::Hold => 0.0_f64.max(lowest).min(highest),
             Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest),
         };
+        let acceleration_mps2 = acceleration_mps2.min(early_mps2.max(lowest));
         EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }
+    }
+}
+
+/// Braking of the lead vehicle from which on it counts as braking (m/s²): an assumption, above the ripple of traffic; 1 to 3 are plausible.
+const LEAD_BRAKES_MPS2: f64 = 1.5;
+
+impl EgoStack {
+    /// Returns the acceleration that a cautious system does not exceed behind a braking lead vehicle (m/s²).
+    fn early_braking_mps2(&self, speed_mps: f64, lead: Option<&Front>) -> f64 {
+        let is_cautious = self.settings.mis.is_some_and(|mis| mis.caution.brakes_early);
+        match lead {
+            Some(lead) if is_cautious && lead.acceleration_mps2 < -LEAD_BRAKES_MPS2 => {
+                -lead.required_braking_mps2(speed_mps, 2.0)
+            }
+            _ => f64::INFINITY,
+        }
     }
 }
 

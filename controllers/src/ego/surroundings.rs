@@ -298,6 +298,19 @@ pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> 
     Some(rear_vehicle_from(best, input))
 }
 
+/// Returns true if an established track follows `rear` in the lane of the ego at a time headway below `headway_s` (s).
+pub(crate) fn is_followed(input: &EgoInput<'_>, rear: &RearVehicle, headway_s: f64) -> bool {
+    input.tracks.iter().any(|track| {
+        let gap_m = rear.x_m - track.x_m() - touching_distance_m(track.length_m, rear.length_m);
+        track.x_m() < rear.x_m
+            && !rear.matches(track)
+            && is_established(track)
+            && exists(track)
+            && in_own_lane(track)
+            && gap_m < headway_s * track.vx_mps()
+    })
+}
+
 /// Determines whether the passing lane is free for `rear` to overtake the ego, with all vehicles at constant speed. A
 /// vehicle behind `rear` must keep at least `follower_headway_s` (s) to it.
 pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle, follower_headway_s: f64) -> PassingLane {

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
+use super::text::{goals, not_prevented};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
@@ -75,6 +76,9 @@ fn counts(summary: &Summary) -> String {
     if summary.is_paired() {
         for (name, counts) in &summary.scenarios {
             text.push_str(&format!("{}: {}", cell(name), pairs(counts, summary.inference)));
+            for sentence in [not_prevented(counts), goals(counts)].into_iter().flatten() {
+                text.push_str(&format!("{}: {sentence}.\n\n", cell(name)));
+            }
         }
     }
     if summary.has_references() {

@@ -23,7 +23,8 @@ use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::SampleFailure;
 use closecall_scenarios::criteria::Measure;
 use closecall_scenarios::harm::harm;
-use closecall_scenarios::outcome::{Collision, MisSummary, Outcome};
+use closecall_scenarios::outcome::{Collision, MisSummary, Outcome, ReasonSpan};
+use closecall_scenarios::promise::Goal;
 use closecall_traffic::atomic::{WriteError, write_file};
 
 /// One sample in one arm.
@@ -313,17 +314,27 @@ fn margin_columns(columns: &mut Columns) {
     }
 }
 
+/// Returns all reasons of the system with their intervals, in order of time.
+fn reasons_text(reasons: &[ReasonSpan]) -> String {
+    let text = |span: &ReasonSpan| format!("{} {:.2} to {:.2} s", span.reason, span.from_s, span.until_s);
+    reasons.iter().map(text).collect::<Vec<_>>().join("; ")
+}
+
 fn mis_columns(columns: &mut Columns) {
     columns.mis("mis_engaged_at_s", "s", |mis| mis.engaged_at_s);
     columns.mis("mis_released_at_s", "s", |mis| mis.released_at_s);
     columns.mis("mis_thw_front_at_engagement_s", "s", |mis| mis.thw_front_at_engagement_s);
     columns.mis("mis_thw_front_at_critical_s", "s", |mis| mis.thw_front_at_critical_s);
     columns.mis("mis_mean_deceleration_mps2", "m/s²", |mis| mis.mean_deceleration_mps2);
-    let mis = |row: &OutcomeRow| row.outcome()?.mis.ok();
-    columns.flag("mis_goal_in_reach", move |row| mis(row)?.goal_in_reach);
+    columns.flag("mis_goal_in_reach", move |row| row.outcome()?.mis.as_ref().ok()?.goal_in_reach);
     columns.text("mis_reason", move |row| {
-        Some(row.outcome()?.mis.map_or_else(|absent| absent.to_string(), |mis| mis.reason.to_string()))
+        Some(row.outcome()?.mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string()))
     });
+    columns.text("mis_reasons", move |row| Some(reasons_text(&row.outcome()?.mis.as_ref().ok()?.reasons)));
+    columns.text("mis_goal", move |row| Some(Goal::of(row.outcome()?)?.text().to_owned()));
+    for (name, unit) in [("thw_raised_s", "s"), ("crossing_braking_mps2", "m/s²")] {
+        columns.number(name, unit, move |row| Measure::named(name)?.of(row.outcome()?));
+    }
 }
 
 /// Returns the name of an enum's variant, as JSON writes it too.

@@ -84,6 +84,9 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
             write!(f, "  (any vehicle: {without} to {with}, McNemar mid-p {p:.2e})")?;
         }
         writeln!(f)?;
+        if let Some(sentence) = not_prevented(counts) {
+            writeln!(f, "  {sentence}")?;
+        }
         let of_others = pairs.induced_of_others + pairs.both_of_others;
         if of_others > 0 {
             let tested = summary.controllers.last().map_or("", String::as_str);
@@ -101,6 +104,9 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
                 harm::WEIGHT
             )?;
         }
+    }
+    if let Some(sentence) = goals(counts) {
+        writeln!(f, "  {sentence}")?;
     }
     if summary.has_references() {
         write_arm_pairs(f, summary, counts)?;
@@ -122,6 +128,23 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
         )?;
     }
     Ok(())
+}
+
+/// Returns why the system under test did not prevent the collisions that it did not, the most frequent reason first; `None` if there
+/// are none.
+pub(super) fn not_prevented(counts: &Counts) -> Option<String> {
+    let of = |(hindrance, times): &(_, u64)| format!("{hindrance} in {times}");
+    let texts: Vec<String> = counts.not_prevented.iter().map(of).collect();
+    let all = counts.pairs.prevented + counts.pairs.both;
+    (!texts.is_empty())
+        .then(|| format!("prevented {} of {all}; of the others: {}", counts.pairs.prevented, texts.join(", ")))
+}
+
+/// Returns what became of the method's goal, the most frequent case first; `None` if there was none.
+pub(super) fn goals(counts: &Counts) -> Option<String> {
+    let all: u64 = counts.goals.iter().map(|(_, times)| times).sum();
+    let texts: Vec<String> = counts.goals.iter().map(|(goal, times)| format!("{} in {times}", goal.text())).collect();
+    (all > 0).then(|| format!("goal (2 s of headway) in {all} encounters: {}", texts.join(", ")))
 }
 
 /// Writes all pairs of arms.

@@ -7,6 +7,7 @@ use closecall_campaign::ledger::{Inference, Pairs};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
+use closecall_scenarios::promise::{Goal, Hindrance};
 use serde_json::{Map, Value, json};
 
 use super::influence::influence;
@@ -166,9 +167,13 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
     object.insert("controllers".to_owned(), Value::Object(controllers));
     if summary.is_paired() {
         object.insert("paired".to_owned(), paired(&counts.pairs, summary.inference));
+        let why = |(why, times): &(Hindrance, u64)| json!({ "reason": why.to_string(), "samples": times });
+        object.insert("not_prevented".to_owned(), counts.not_prevented.iter().map(why).collect());
         let results = pair_results(summary, counts);
         object.insert("arm_pairs".to_owned(), json!(results.iter().map(arm_pair).collect::<Vec<_>>()));
     }
+    let goal = |(goal, times): &(Goal, u64)| json!({ "goal": goal.text(), "samples": times });
+    object.insert("goals".to_owned(), counts.goals.iter().map(goal).collect());
     object.insert("checks".to_owned(), checks(&counts.checks));
     object
 }

@@ -1,6 +1,9 @@
 //! The outcome of a run as JSON.
 
-use closecall_scenarios::outcome::{Collision, Margins, MisSummary, Outcome, ReachedMoment, Unavailability};
+use closecall_scenarios::outcome::{
+    Collision, Margins, MisSummary, Outcome, Promise, ReachedMoment, ReasonSpan, Unavailability,
+};
+use closecall_scenarios::promise::Goal;
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
@@ -33,6 +36,7 @@ pub fn outcome(outcome: &Outcome) -> Value {
         "moments": outcome.moments.iter().map(moment).collect::<Vec<_>>(),
         "margins": margins(&outcome.margins),
         "mis": mis(&outcome.mis),
+        "promise": outcome.promise.as_ref().map(|kept| promise(kept, outcome)),
     })
 }
 
@@ -86,6 +90,15 @@ fn margins(margins: &Margins) -> Value {
     Value::Object(object)
 }
 
+fn promise(promise: &Promise, outcome: &Outcome) -> Value {
+    let mut object = Map::new();
+    object.insert("goal".to_owned(), json!(Goal::of(outcome).map(Goal::text)));
+    object.insert("in_reach".to_owned(), json!(promise.in_reach));
+    insert(&mut object, "thw_raised_s", promise.thw_raised_s);
+    insert(&mut object, "crossing_braking_mps2", promise.crossing_braking_mps2);
+    Value::Object(object)
+}
+
 fn mis(mis: &Result<MisSummary, Absent>) -> Value {
     let mut object = Map::new();
     let of = |value: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(value);
@@ -95,10 +108,15 @@ fn mis(mis: &Result<MisSummary, Absent>) -> Value {
     insert(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
     insert(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
     object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
-    if let Some(unavailable) = mis.as_ref().ok().and_then(|mis| mis.unavailable) {
+    if let Some(unavailable) = mis.as_ref().ok().and_then(|mis| mis.unavailable.as_ref()) {
         let Unavailability { from_s, lasted_s, reason } = unavailable;
         let value = json!({ "from_s": from_s, "lasted_s": lasted_s, "reason": reason.to_string() });
         object.insert("unavailable".to_owned(), value);
+    }
+    if let Ok(mis) = mis {
+        let span = |span: &ReasonSpan| json!({ "reason": span.reason.to_string(), "from_s": span.from_s, "until_s": span.until_s });
+        object.insert("reasons".to_owned(), mis.reasons.iter().map(span).collect());
+        object.insert("decided_s".to_owned(), json!(mis.decided_s));
     }
     let reason = mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string());
     object.insert("reason".to_owned(), json!(reason));

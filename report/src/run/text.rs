@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::outcome::{MisSummary, Outcome, ReasonSpan};
 use closecall_traffic::Measured;
 
 /// Returns an outcome in one line.
@@ -15,6 +15,24 @@ pub fn outcome_line(outcome: &Outcome) -> String {
     };
     let (sample, controller) = (outcome.sample, &outcome.controller);
     format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}")
+}
+
+/// Returns the reason of the system, with the time in which it could have engaged if it never did.
+pub(super) fn reason_text(mis: &MisSummary) -> String {
+    match (mis.engaged_at_s, mis.decided_s) {
+        (Err(_), Some([from_s, until_s])) => {
+            let held =
+                |span: &&ReasonSpan| span.reason == mis.reason && span.until_s > from_s && span.from_s <= until_s;
+            let (first, last) = (mis.reasons.iter().find(held), mis.reasons.iter().rfind(held));
+            match first.zip(last) {
+                Some((first, last)) => {
+                    format!("{}, {:.1} to {:.1} s", mis.reason, first.from_s.max(from_s), last.until_s.min(until_s))
+                }
+                None => mis.reason.to_string(),
+            }
+        }
+        _ => mis.reason.to_string(),
+    }
 }
 
 /// The outcome of a run as text for human readers, over several lines.
@@ -66,7 +84,7 @@ impl fmt::Display for OutcomeText<'_> {
                 f.write_str(&line("MIS engaged at", mis.engaged_at_s, "s"))?;
                 f.write_str(&line("  front time headway then", mis.thw_front_at_engagement_s, "s"))?;
                 f.write_str(&line("  front time headway at the critical moment", mis.thw_front_at_critical_s, "s"))?;
-                writeln!(f, "  MIS: {}", mis.reason)
+                writeln!(f, "  MIS: {}", reason_text(mis))
             }
             Err(absent) => writeln!(f, "  MIS: {absent}"),
         }

@@ -4,7 +4,8 @@
 //! of `outcomes.parquet` where there is one.
 
 use crate::harm::harm;
-use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome};
+use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome, Promise};
+use crate::promise::{Goal, HARD_BRAKING_MPS2, is_due};
 use closecall_traffic::Measured;
 
 /// Whether a measure counts or quantifies.
@@ -129,6 +130,10 @@ fn cost(outcome: &Outcome, of: fn(&Cost) -> f64) -> Option<f64> {
     outcome.cost.as_ref().map(of)
 }
 
+fn promise(outcome: &Outcome, of: fn(&Promise) -> Measured) -> Option<f64> {
+    of(outcome.promise.as_ref()?).ok()
+}
+
 /// Front time headway that the ego gained from the engagement to the critical distance (s).
 fn thw_gain_s(outcome: &Outcome) -> Option<f64> {
     let at_engagement_s = mis(outcome, |mis| mis.thw_front_at_engagement_s)?;
@@ -167,6 +172,27 @@ pub const MEASURES: &[Measure] = &[
         SLOWED_FOR_REAR,
         "the ego is slower than the lead vehicle by more than 0.5 m/s after a vehicle behind is within 100 m and approaches at 10 km/h or more",
         |outcome| cost(outcome, |cost| if cost.prompted_deficit_mps > SLOWED_MPS { 1.0 } else { 0.0 }),
+    ),
+    flag(
+        "goal_due",
+        "a gain of 2 s of front time headway is in reach when the rear vehicle is near, and the lead vehicle does not brake before the rear vehicle is at the critical distance",
+        |outcome| is(is_due(outcome)?),
+    ),
+    flag(
+        "goal_reached",
+        "the front time headway has grown by 1.9 s when the rear vehicle is at the critical distance",
+        |outcome| {
+            outcome.promise?;
+            is(Goal::of(outcome) == Some(Goal::Reached))
+        },
+    ),
+    flag(
+        "braked_at_crossing",
+        "the ego brakes harder than 1.5 m/s² within 2 s of the crossing of the rear vehicle",
+        |outcome| {
+            outcome.promise?;
+            is(promise(outcome, |promise| promise.crossing_braking_mps2).is_some_and(|mps2| mps2 > HARD_BRAKING_MPS2))
+        },
     ),
     flag("ended_in_standstill", "the ego and the vehicles near it come to a stop", |outcome| {
         is(outcome.end == EndReason::Standstill)
@@ -231,4 +257,14 @@ pub const MEASURES: &[Measure] = &[
     number("harm", "driver deaths expected from all collisions of the sample", |outcome| Some(harm(outcome))),
     number("duration_s", "duration of the run", |outcome| Some(outcome.duration.s())),
     number("thw_gain_s", "front time headway gained from the engagement to the critical distance", thw_gain_s),
+    number(
+        "thw_raised_s",
+        "front time headway at the critical distance, minus the smallest one until the rear vehicle was near",
+        |outcome| promise(outcome, |promise| promise.thw_raised_s),
+    ),
+    number(
+        "crossing_braking_mps2",
+        "hardest braking of the ego within 2 s of the crossing of the rear vehicle",
+        |outcome| promise(outcome, |promise| promise.crossing_braking_mps2),
+    ),
 ];

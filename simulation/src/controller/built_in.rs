@@ -15,6 +15,8 @@ pub enum BuiltIn {
     Acc,
     /// The scenario's complete ego stack.
     Mis,
+    /// The scenario's complete ego stack, whose margin increase system plans for the time to closest encounter.
+    MisTtce,
     /// The scenario's complete ego stack, with a margin increase system that engages earlier and may brake harder.
     MisExtended,
     /// As [`BuiltIn::Acc`], but slowing down gently from the first second on, without looking back.
@@ -37,6 +39,7 @@ impl fmt::Display for BuiltIn {
         match self {
             Self::Acc => f.write_str("acc"),
             Self::Mis => f.write_str("mis"),
+            Self::MisTtce => f.write_str("mis-ttce"),
             Self::MisExtended => f.write_str("mis-extended"),
             Self::Blind => f.write_str("blind"),
             Self::Crawl => f.write_str("crawl"),
@@ -50,9 +53,10 @@ impl fmt::Display for BuiltIn {
 
 impl BuiltIn {
     /// The controllers whose name has no number.
-    pub(super) const FIXED: [Self; 8] = [
+    pub(super) const FIXED: [Self; 9] = [
         Self::Acc,
         Self::Mis,
+        Self::MisTtce,
         Self::MisExtended,
         Self::Blind,
         Self::Crawl,
@@ -63,7 +67,7 @@ impl BuiltIn {
 
     /// Returns true if the controller is a margin increase system, so that it needs a stack that has one.
     pub const fn needs_mis(self) -> bool {
-        matches!(self, Self::Mis | Self::MisExtended)
+        matches!(self, Self::Mis | Self::MisTtce | Self::MisExtended)
     }
 
     /// Returns a factory of this controller.
@@ -91,6 +95,7 @@ impl ControllerFactory for BuiltInFactory {
         match self.built_in {
             BuiltIn::Acc | BuiltIn::Blind | BuiltIn::Crawl => settings.without_mis(),
             BuiltIn::Mis => *settings,
+            BuiltIn::MisTtce => settings.with_ttce_mis(),
             BuiltIn::MisExtended => settings.with_extended_mis(),
             BuiltIn::Gap(gap) => settings.with_time_gap(gap.s()),
             BuiltIn::R157Gap => settings.with_r157_gap(),

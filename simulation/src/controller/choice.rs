@@ -30,9 +30,9 @@ pub enum ControllerChoice {
 }
 
 /// The names and forms of the controllers, as messages list them.
-const KNOWN: &str = "`acc`, `mis`, `mis-extended`, `blind`, `crawl`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
+const KNOWN: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `blind`, `crawl`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
 /// The words that are suggested for a misspelt one.
-const WORDS: &str = "`acc`, `mis`, `mis-extended`, `blind`, `crawl`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
+const WORDS: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `blind`, `crawl`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
 /// The beginning of the name of a controller with another constant time gap.
 const GAP: &str = "gap-";
 

@@ -25,6 +25,7 @@ mod mis_log;
 mod moments;
 mod observer;
 mod phase;
+mod promise;
 mod settling;
 mod start;
 mod state;

@@ -17,9 +17,10 @@ use super::equipment::perception;
 use super::events::Events;
 use super::humans::{Human, human_drivers, looks, weave};
 use super::margins::{MarginMeter, Widths};
-use super::mis_log::{MisLog, MisObservation};
+use super::mis_log::{MisLog, MisObservation, RearObservation};
 use super::moments::Moments;
 use super::phase::{Encounter, Follower};
+use super::promise::{EgoMotion, PromiseMeter};
 use super::settling::settle_sensors;
 use super::start::start_of_ego;
 use super::{Arm, CurrentMargins, Observer, RunEvent, RunKey, SampleError, StepView};
@@ -62,8 +63,10 @@ pub(super) struct Run<'a> {
     meter: MarginMeter,
     cost: CostMeter,
     mis: MisLog,
+    promise: PromiseMeter,
     moments: Moments,
-    critical_gap_m: f64,
+    /// The margin increase system of the arm; of the scenario or the method, if the arm has none.
+    mis_settings: MisSettings,
     /// The last command of the ego controller.
     command: Option<EgoCommand>,
     /// How far the driver of each vehicle looks. The ego perceives with its sensors; its margins need the lane and the path.
@@ -95,6 +98,7 @@ impl<'a> Run<'a> {
     ) -> Result<Self, SampleError> {
         let settings = *settings_of(&scenario);
         let looks_back = arm.controller.looks_back(&settings);
+        let mis_settings = *arm.controller.settings(&settings).mis().or(settings.mis()).unwrap_or(&MisSettings::PAPER);
         let own = key;
         // Noise and drivers draw from these random numbers; the outcome names the run itself.
         let key = scenario.random_numbers.map_or(own, |of| RunKey { seed: of.seed, sample: of.sample });
@@ -128,8 +132,9 @@ impl<'a> Run<'a> {
             meter: MarginMeter::new(scenario.physics_step.s()),
             cost: CostMeter::new(scenario.physics_step.s()),
             mis: MisLog::default(),
+            promise: PromiseMeter::new(),
             moments: Moments::default(),
-            critical_gap_m: settings.mis().unwrap_or(&MisSettings::PAPER).critical_gap_m,
+            mis_settings,
             command: None,
             neighbours: vec![Neighbours::default(); world.len()],
             // One track of each of the three object-level sensors.
@@ -238,6 +243,11 @@ impl<'a> Run<'a> {
             return;
         }
         let reference_mps = self.meter.observe(own, &self.margins);
+        self.promise.observe(&EgoMotion {
+            time: self.world.time(),
+            braking_mps2: -own.acceleration_mps2,
+            thw_front_s: self.margins.thw_front_s,
+        });
         let rear = self.margins.follower.zip(self.margins.gap_rear_m.ok()).map(|(actor, gap_m)| {
             let state = self.world.state(actor);
             Rear { gap_m, speed_mps: state.speed_mps, acceleration_mps2: state.acceleration_mps2 }
@@ -287,40 +297,80 @@ impl<'a> Run<'a> {
         }
         self.command = Some(command);
         let ego = self.scenario.ego;
-        let is_critical = self.encounter.reaches_critical_gap(&self.world, ego, self.critical_gap_m);
-        self.note_moments(is_critical);
+        let rear = self.observe_rear();
+        self.note_moments(rear);
+        self.note_promise(rear);
         self.mis.observe(&MisObservation {
             time,
             command: &command,
             speed_mps: self.world.state(ego).speed_mps,
             thw_front_s: self.margins.thw_front_s,
-            is_critical,
+            rear,
             failed,
         });
     }
 
-    /// Notes the moments of the encounter that are reached now.
-    fn note_moments(&mut self, is_critical: bool) {
-        let time = self.world.time();
-        let own_mps = self.world.state(self.scenario.ego).speed_mps;
-        let is_near = self.margins.follower.is_some_and(|rear| {
-            let closing_mps = self.world.state(rear).speed_mps - own_mps;
+    /// Observes where the vehicle behind is.
+    fn observe_rear(&mut self) -> RearObservation {
+        let ego = self.scenario.ego;
+        let own = self.world.state(ego);
+        let near = self.margins.follower.filter(|rear| {
+            let closing_mps = self.world.state(*rear).speed_mps - own.speed_mps;
             self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= ENGAGEMENT_GAP_M)
                 && closing_mps >= ENGAGEMENT_CLOSING_MPS
         });
-        let lead_brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
-        let brakes_hard = self.world.state(self.scenario.ego).acceleration_mps2 < -HAZARD_BRAKING_MPS2;
+        let brakes_hard = own.acceleration_mps2 < -HAZARD_BRAKING_MPS2;
+        RearObservation {
+            near,
+            is_hazard: near.is_some() && self.lead_brakes() && brakes_hard,
+            has_crossed: matches!(self.encounter.phase(), Phase::Overtaking | Phase::After),
+            is_critical: self.encounter.reaches_critical_gap(&self.world, ego, self.mis_settings.critical_gap_m),
+        }
+    }
+
+    fn lead_brakes(&self) -> bool {
+        self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light)
+    }
+
+    /// Notes the moments of the encounter that are reached now.
+    fn note_moments(&mut self, rear: RearObservation) {
+        let time = self.world.time();
         for (moment, is_now) in [
-            (Moment::Hazard, is_near && lead_brakes && brakes_hard),
-            (Moment::RearNear, is_near),
-            (Moment::CriticalDistance, is_critical),
-            (Moment::FrontBrakes, lead_brakes),
-            (Moment::Crossed, matches!(self.encounter.phase(), Phase::Overtaking | Phase::After)),
+            (Moment::Hazard, rear.is_hazard),
+            (Moment::RearNear, rear.near.is_some()),
+            (Moment::CriticalDistance, rear.is_critical),
+            (Moment::FrontBrakes, self.lead_brakes()),
+            (Moment::Crossed, rear.has_crossed),
             (Moment::Concluded, self.encounter.phase() == Phase::After),
         ] {
             if is_now {
                 self.moments.note(moment, time);
             }
+        }
+    }
+
+    /// Notes what becomes of the method's promise now.
+    fn note_promise(&mut self, rear: RearObservation) {
+        if let (Some(actor), Ok(rear_gap_m)) = (rear.near, self.margins.gap_rear_m) {
+            let ego_mps = self.world.state(self.scenario.ego).speed_mps;
+            let settings = self.mis_settings;
+            let encounter = self.margins.gap_front_m.ok().zip(self.margins.lead.ok()).map(|(front_gap_m, lead)| {
+                closecall_controllers::Encounter {
+                    ego_mps,
+                    front_gap_m,
+                    lead_mps: lead.speed_mps,
+                    rear_gap_m,
+                    closing_mps: self.world.state(actor).speed_mps - ego_mps,
+                    critical_gap_m: settings.critical_gap_m,
+                }
+            });
+            self.promise.note_near(encounter, &settings);
+        }
+        if rear.is_critical {
+            self.promise.note_critical(self.margins.thw_front_s);
+        }
+        if rear.has_crossed {
+            self.promise.note_crossed(self.world.time());
         }
     }
 
@@ -385,6 +435,7 @@ impl<'a> Run<'a> {
             margins: self.meter.finish(),
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
             cost: Some(self.cost.finish()),
+            promise: Some(self.promise.finish()),
         }
     }
 }

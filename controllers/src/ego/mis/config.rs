@@ -33,6 +33,32 @@ pub struct MisConfig {
     pub follower_headway_s: Option<Num>,
 }
 
+/// The time for which the braking is planned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Horizon {
+    /// Until the rear vehicle is at the critical gap, with the ego braking as planned: what the paper's figure shows.
+    #[default]
+    CriticalGap,
+    /// The time to closest encounter at present speeds: what the paper's text says.
+    Ttce,
+}
+
+/// What the extended system heeds besides the paper's conditions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Caution {
+    /// Whether the ego brakes for a braking lead vehicle at once, as little as it needs, instead of using up the margin first.
+    pub brakes_early: bool,
+    /// Time headway of a vehicle behind the rear vehicle in the lane of the ego below which the system stays off (s).
+    pub second_headway_s: f64,
+    /// Largest speed deficit to the lead vehicle (m/s).
+    pub max_deficit_mps: f64,
+}
+
+impl Caution {
+    /// The paper's system heeds none of it.
+    pub const NONE: Self = Self { brakes_early: false, second_headway_s: 0.0, max_deficit_mps: f64::INFINITY };
+}
+
 /// The checked parameters of the margin increase system.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MisSettings {
@@ -57,6 +83,12 @@ pub struct MisSettings {
     /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with which that lane counts
     /// as free (s).
     pub follower_headway_s: f64,
+    /// The time for which the braking is planned.
+    #[serde(skip)]
+    pub horizon: Horizon,
+    /// What the extended system heeds besides.
+    #[serde(skip)]
+    pub caution: Caution,
 }
 
 impl MisSettings {
@@ -73,6 +105,8 @@ impl MisSettings {
         hold_s: 2.0,
         worst_front_braking_mps2: 8.0,
         follower_headway_s: 0.0,
+        horizon: Horizon::CriticalGap,
+        caution: Caution::NONE,
     };
 
     /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors to the rear confirm and
@@ -144,6 +178,7 @@ impl Check for MisConfig {
                 Range::closed(0.0, 5.0),
                 paper.follower_headway_s,
             )?,
+            ..paper
         })
     }
 }

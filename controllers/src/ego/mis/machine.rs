@@ -5,8 +5,8 @@ use closecall_traffic::{Absent, Time};
 
 use super::room::has_room;
 use super::target::Target;
-use super::{ArrivalPrediction, BrakingResponse, Encounter, MisPlan, MisSettings};
-use crate::ego::surroundings::{Front, PassingLane, RearVehicle, nearest_rear_vehicle, passing_lane};
+use super::{ArrivalPrediction, BrakingResponse, Encounter, Horizon, MisPlan, MisSettings};
+use crate::ego::surroundings::{Front, PassingLane, RearVehicle, is_followed, nearest_rear_vehicle, passing_lane};
 use crate::ego::{EgoInput, EgoState, Reason};
 
 /// Multiple of the engaging gap beyond which the rear vehicle has fallen back: an assumption; 1.1 to 1.5 are plausible.
@@ -207,6 +207,9 @@ impl Mis {
         if !(least_speed_mps - situation.speed_mps() >= settings.engage_closing_mps) {
             return Err(Reason::RearNotApproaching);
         }
+        if is_followed(situation.input, &rear, settings.caution.second_headway_s) {
+            return Err(Reason::RearFollowed);
+        }
         match passing_lane(situation.input, &rear, settings.follower_headway_s) {
             PassingLane::Free => {}
             PassingLane::None => return Err(Reason::NoPassingLane),
@@ -252,6 +255,8 @@ impl Mis {
             release(Reason::RearFellBack)
         } else if now - target.last_approached > FOLLOWING_DELAY {
             release(Reason::RearFollows)
+        } else if is_followed(situation.input, rear, settings.caution.second_headway_s) {
+            release(Reason::RearFollowed)
         } else if lane == PassingLane::Occupied {
             release(Reason::PassingLaneOccupied)
         } else if now - target.last_lane_free > LOSS_TIMEOUT {
@@ -323,11 +328,15 @@ impl Mis {
         };
         let prediction = ArrivalPrediction { encounter, response: self.response(situation) };
         let bound = self.settings.max_deceleration_mps2;
-        let solution = situation
-            .lead
-            .filter(|lead| target.may_cost_speed(lead, ego_mps))
-            .and_then(|_| prediction.solve(target.goal_thw_s, bound));
+        let solution = situation.lead.filter(|lead| target.may_cost_speed(lead, ego_mps)).and_then(|_| {
+            match self.settings.horizon {
+                Horizon::CriticalGap => prediction.solve(target.goal_thw_s, bound),
+                Horizon::Ttce => encounter.solve_by_ttce(target.goal_thw_s, bound),
+            }
+        });
+        let deficit_mps = lead_mps - ego_mps;
         let braking = solution.map_or(0.0, |solution| solution.deceleration_mps2);
+        let braking = if deficit_mps > self.settings.caution.max_deficit_mps { 0.0 } else { braking };
         let touching = Encounter { critical_gap_m: 0.0, ..encounter };
         let ttce_s = if rear.gap_m <= 0.0 {
             Err(Absent::Touching)

@@ -147,7 +147,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use config::{MisConfig, MisSettings};
+pub use config::{Caution, Horizon, MisConfig, MisSettings};
 pub use machine::{ACTUATOR_LAG_S, BRAKE_RELEASE_JERK_MPS3, GOAL_TOLERANCE_S};
 pub(crate) use machine::{Mis, Request, Situation};
 pub use plan::MisPlan;

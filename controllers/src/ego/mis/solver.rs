@@ -84,6 +84,21 @@ impl Encounter {
         Some((self.front_gap_m + opening_m) / speed_mps)
     }
 
+    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is `goal_s` at the time to closest
+    /// encounter, which both vehicles' present speeds determine: the time until the rear vehicle touches the ego if neither
+    /// brakes.
+    ///
+    /// With the time t, THW = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t) = H gives a = (H·v_E − g_F − (v_F − v_E)·t)/(½·t² + H·t).
+    /// Returns `None` if the rear vehicle does not approach.
+    pub fn solve_by_ttce(&self, goal_s: f64, bound_mps2: f64) -> Option<Solution> {
+        let time_s = Self { critical_gap_m: 0.0, ..*self }.arrival_s(0.0)?;
+        let missing_m = goal_s * self.ego_mps - self.front_gap_m - (self.lead_mps - self.ego_mps) * time_s;
+        let needed = missing_m / (0.5 * time_s * time_s + goal_s * time_s);
+        // NaN and infinity occur if the rear vehicle touches the ego. NaN is written to be out of reach.
+        let in_reach = needed <= bound_mps2;
+        Some(Solution { deceleration_mps2: if in_reach { needed.max(0.0) } else { bound_mps2 }, in_reach })
+    }
+
     /// Returns the smallest braking up to `bound_mps2` with which the front time headway is `goal_s` when the rear
     /// vehicle arrives.
     ///
@@ -123,6 +138,15 @@ mod tests {
         assert!((0.9..=1.1).contains(&solution.deceleration_mps2), "{solution:?}");
         let gained = REFERENCE.headway_at_arrival_s(1.0).unwrap() - 0.7;
         assert!((1.9..=2.1).contains(&gained), "{gained}");
+    }
+
+    #[test]
+    fn the_ttce_plan_starts_gently_and_misses_the_reference_point() {
+        let solution = REFERENCE.solve_by_ttce(2.7, 9.0).unwrap();
+        // TTCE = 100/6.67 = 15 s: (2.7·30 − 21)/(112.5 + 40.5).
+        assert!((solution.deceleration_mps2 - 60.0 / 153.0).abs() < 1e-9, "{solution:?}");
+        let gained = REFERENCE.headway_at_arrival_s(solution.deceleration_mps2).unwrap() - 0.7;
+        assert!(gained < 1.5, "the ego's own braking brings the rear vehicle earlier: {gained}");
     }
 
     #[test]

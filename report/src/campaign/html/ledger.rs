@@ -1,5 +1,6 @@
 //! The counts: how often the ego collides in each arm, how sure that is, and what the system under test changes.
 
+use super::super::text::{goals, not_prevented};
 use std::io;
 
 use maud::{Markup, html};
@@ -100,6 +101,11 @@ fn pairs(scenarios: &[(String, Counts)], inference: Inference) -> io::Result<Mar
     Ok(html! {
         h2 { "What the controller under test changes" }
         (table(&head, &rows))
+        @for (name, counts) in scenarios {
+            @for sentence in [not_prevented(counts), goals(counts)].into_iter().flatten() {
+                p { (name) ": " (sentence) "." }
+            }
+        }
         p.note {
             "McNemar p (mid-p, two-sided), of the samples in which some vehicle collides in one arm alone: the probability of "
             "a split at least this uneven if both arms are alike. It is valid only if the number of samples was fixed in "

@@ -46,6 +46,8 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
         mean_deceleration_mps2: Ok(0.75),
         goal_in_reach: Some(true),
         reason: Reason::Engaged,
+        reasons: vec![ReasonSpan { reason: Reason::Engaged, from_s: 4.52, until_s: 16.52 }],
+        decided_s: Some([4.52, 9.0]),
         unavailable: None,
     };
     Outcome {

@@ -26,7 +26,7 @@ const GOAL_GAIN_S: f64 = 2.0;
 
 /// Returns the front headway gained from the engagement of the MIS until the vehicle behind is at the critical distance (s).
 fn gained_s(outcome: &Outcome) -> Measured {
-    let mis = outcome.mis?;
+    let mis = outcome.mis.as_ref().map_err(|absent| *absent)?;
     Ok((mis.thw_front_at_critical_s? - mis.thw_front_at_engagement_s?).max(0.0))
 }
 

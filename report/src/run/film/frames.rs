@@ -85,8 +85,8 @@ pub struct Frame {
     pub(in crate::run) margins: CurrentMargins,
     /// Tracks that the ego's sensors report; empty below [`Level::Objects`].
     pub(in crate::run) tracks: Vec<Track>,
-    /// The vehicle behind the ego, as its rear sensors know it.
-    pub(in crate::run) rear_seen: Option<RearSeen>,
+    /// The vehicles behind the ego, as its rear sensors know them.
+    pub(in crate::run) rear_seen: Vec<RearSeen>,
     /// Command of the ego's controller; `None` for recorded traffic.
     pub(in crate::run) command: Option<EgoCommand>,
     /// Phase of the encounter; `None` for recorded traffic.

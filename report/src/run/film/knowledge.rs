@@ -1,12 +1,19 @@
 //! What the ego knew of the vehicle behind it: since when it was tracked, how far away it was then, when it was lost.
 
+use closecall_sensors::SceneVehicle;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
 
 use super::{Film, Frame};
 
-/// The vehicle behind the ego, as the rear sensors know it.
+/// Largest distance along the road between a track and the vehicle that it belongs to (m): an assumption; 3 to 10 are
+/// plausible.
+const SAME_VEHICLE_M: f64 = 5.0;
+
+/// A vehicle behind the ego, as the rear sensors know it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::run) struct RearSeen {
+    /// Index of the vehicle among the actors; `None` for a track that belongs to no vehicle.
+    pub(in crate::run) actor: Option<usize>,
     /// Distance from its front to the rear of the ego (m).
     pub(in crate::run) gap_m: f64,
 }
@@ -40,15 +47,23 @@ impl KnownSpan {
     }
 }
 
-/// Returns the nearest confirmed track of a vehicle behind the ego, or `None` if there is none. A track that has passed
-/// the rear bumper is no longer behind.
-pub(super) fn rear_seen(tracks: &[Track], ego_length_m: f64) -> Option<RearSeen> {
+/// Returns the confirmed tracks of vehicles behind the ego. A track that has passed the rear bumper is no longer behind.
+pub(super) fn rear_seen(tracks: &[Track], vehicles: &[SceneVehicle], ego: usize) -> Vec<RearSeen> {
+    let own = &vehicles[ego];
     let is_known = |track: &&Track| {
         track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
     };
-    let gap_m = |track: &Track| -track.x_m() - 0.5 * (track.length_m + ego_length_m);
-    let gaps = tracks.iter().filter(is_known).map(gap_m).filter(|&gap_m| gap_m > 0.0);
-    gaps.min_by(f64::total_cmp).map(|gap_m| RearSeen { gap_m })
+    let belongs = |track: &Track| {
+        let lateral_m = |index: &usize| (vehicles[*index].state.d_m - own.state.d_m - track.y_m()).abs();
+        let is_near = |index: &usize| {
+            (vehicles[*index].state.s_m - own.state.s_m - track.x_m()).abs() < SAME_VEHICLE_M && *index != ego
+        };
+        (0..vehicles.len()).filter(is_near).min_by(|a, b| lateral_m(a).total_cmp(&lateral_m(b)))
+    };
+    let ego_length_m = own.vehicle.dimensions.length_m;
+    let seen =
+        |track: &Track| RearSeen { actor: belongs(track), gap_m: -track.x_m() - 0.5 * (track.length_m + ego_length_m) };
+    tracks.iter().filter(is_known).map(seen).filter(|seen| seen.gap_m > 0.0).collect()
 }
 
 impl Film {
@@ -59,8 +74,9 @@ impl Film {
         if self.outcome.is_none() {
             return spans;
         }
+        let relevant = self.relevant_rear();
         for (first_frame, frame) in self.frames.iter().enumerate() {
-            let seen = known(frame);
+            let seen = known(frame, relevant);
             if spans.last().is_none_or(|span| span.from_m.is_some() != seen.is_some()) {
                 let is_later = spans.iter().any(|span| span.from_m.is_some());
                 spans.push(KnownSpan { first_frame, time: frame.time, from_m: seen, is_later });
@@ -80,15 +96,33 @@ impl Film {
         let lost = self.lost(&spans);
         Some(match first {
             Some((time, from_m)) if time > self.frames[0].time => {
-                format!("No vehicle was seen behind until {:.2} s ({from_m:.0} m{weather}).{lost}", time.s())
+                format!("The vehicle behind was not seen until {:.2} s ({from_m:.0} m{weather}).{lost}", time.s())
             }
-            Some((_, from_m)) => format!("A vehicle behind was seen from the start ({from_m:.0} m{weather}).{lost}"),
+            Some((_, from_m)) => format!("The vehicle behind was seen from the start ({from_m:.0} m{weather}).{lost}"),
             None => format!("No vehicle was seen behind{}.", weather.replacen("; ", " (", 1) + closing(&weather)),
         })
     }
 }
 
 impl Film {
+    /// Returns the vehicle behind that matters: the one that collides with the ego, else the last one behind it in its lane at
+    /// the critical moment. `None` if there is none.
+    fn relevant_rear(&self) -> Option<usize> {
+        let critical = self.critical_moment();
+        let until = self.frames.partition_point(|frame| frame.time <= critical);
+        let follower = self.frames[..until].iter().rev().find_map(|frame| frame.margins.follower);
+        let ego = self.actors[self.ego].name.as_str();
+        let partner = self.worst_collision().filter(|collision| collision.between.iter().any(|id| id.as_str() == ego));
+        let struck = partner.and_then(|collision| {
+            let other = collision.between.iter().find(|id| id.as_str() != ego)?;
+            self.actors.iter().position(|actor| actor.name == other.as_str())
+        });
+        // The ego may have run into a vehicle ahead, which was never behind.
+        let was_behind =
+            |actor: &usize| self.frames[..until].iter().any(|frame| frame.margins.follower == Some(*actor));
+        struck.filter(was_behind).or(follower)
+    }
+
     /// Returns a sentence on the spans before the critical moment in which a vehicle that was known is out of sight.
     fn lost(&self, spans: &[KnownSpan]) -> String {
         let critical = self.critical_moment();
@@ -109,6 +143,8 @@ fn closing(weather: &str) -> &'static str {
     if weather.is_empty() { "" } else { ")" }
 }
 
-fn known(frame: &Frame) -> Option<f64> {
-    frame.rear_seen.map(|seen| seen.gap_m)
+/// Returns the distance of the nearest vehicle that is known, or of the vehicle `relevant` alone (m).
+fn known(frame: &Frame, relevant: Option<usize>) -> Option<f64> {
+    let seen = frame.rear_seen.iter().filter(|seen| relevant.is_none() || seen.actor == relevant);
+    seen.map(|seen| seen.gap_m).min_by(f64::total_cmp)
 }

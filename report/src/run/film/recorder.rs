@@ -192,14 +192,13 @@ impl Observer for FilmRecorder {
         let keeps_objects = self.film.level >= Level::Objects;
         let keeps_images = self.film.level >= Level::Full;
         let (scan, other_scans) = self.scans(view);
-        let ego_length_m = self.film.actors[self.film.ego].vehicle.dimensions.length_m;
         self.film.frames.push(Frame {
             time: view.time,
             states: view.vehicles.iter().map(|vehicle| vehicle.state).collect(),
             pitches_rad: view.vehicles.iter().map(|vehicle| vehicle.pitch_rad).collect(),
             margins: *view.margins,
             tracks: if keeps_objects { view.tracks.to_vec() } else { Vec::new() },
-            rear_seen: rear_seen(view.tracks, ego_length_m),
+            rear_seen: rear_seen(view.tracks, view.vehicles, self.film.ego),
             command: Some(*view.command),
             phase: Some(view.phase),
             rear_fields: if keeps_objects { view.perception.rear_fields() } else { Vec::new() },

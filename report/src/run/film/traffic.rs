@@ -176,7 +176,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         margins: margins(tracks, &present),
         states,
         tracks: Vec::new(),
-        rear_seen: None,
+        rear_seen: Vec::new(),
         command: None,
         phase: None,
         rear_fields: Vec::new(),

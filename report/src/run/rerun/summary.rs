@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use closecall_traffic::{Measured, Time};
 
 use crate::run::film::{Film, fate_word, headway_text};
+use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
 
 /// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
@@ -136,7 +137,7 @@ fn push_table(page: &mut String, film: &Film) {
             row("front headway then", &WithUnit(mis.thw_front_at_engagement_s, "s"));
             row("front headway at the critical distance", &WithUnit(mis.thw_front_at_critical_s, "s"));
             row("mean braking", &WithUnit(mis.mean_deceleration_mps2, "m/s²"));
-            row("reason", &mis.reason);
+            row("reason", &reason_text(mis));
         }
         Err(absent) => row("MIS", absent),
     }
