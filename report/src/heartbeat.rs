@@ -45,12 +45,24 @@ impl Drop for Heartbeat {
     }
 }
 
+/// Returns a rate with two digits.
+pub fn rate_text(rate: f64) -> String {
+    match rate {
+        rate if rate >= 9.95 => format!("{rate:.0}"),
+        rate if rate >= 0.995 => format!("{rate:.1}"),
+        _ => format!("{rate:.2}"),
+    }
+}
+
 fn line(done: u64, all: u64, elapsed: Duration) -> String {
     let elapsed_s = elapsed.as_secs_f64();
     let per_second = done as f64 / elapsed_s;
     let left = match done {
         0 => String::new(),
-        _ => format!(", {:.0} s left", (all.saturating_sub(done)) as f64 / per_second),
+        _ => {
+            let left_s = (all.saturating_sub(done)) as f64 / per_second;
+            format!(", {} samples/s, {left_s:.0} s left", rate_text(per_second))
+        }
     };
     format!("{done} of {all} samples after {elapsed_s:.0} s{left}")
 }
@@ -63,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_line_states_the_progress() {
-        assert_eq!(line(50, 200, Duration::from_secs(10)), "50 of 200 samples after 10 s, 30 s left");
+        assert_eq!(line(50, 200, Duration::from_secs(10)), "50 of 200 samples after 10 s, 5.0 samples/s, 30 s left");
         assert_eq!(line(0, 200, Duration::from_secs(30)), "0 of 200 samples after 30 s");
     }
 

@@ -10,10 +10,11 @@
 //!
 //! * [`parameters`], [`sampling`]: the distributions of the parameters, and the designs that draw from them
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall
-//! * [`outcome`], [`harm`]: what a run leaves behind
+//! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
 //! * [`criteria`]: what a file asks of the outcomes
 
 mod base;
+pub mod causal;
 mod checked;
 mod config;
 pub mod criteria;

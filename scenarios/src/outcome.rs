@@ -63,6 +63,17 @@ impl Collision {
         self.between.contains(actor)
     }
 
+    /// Returns the indices of the striking and of the struck vehicle in `between`. If both moved towards each other, the vehicle
+    /// whose front was struck is the striking one.
+    pub fn roles(&self) -> [usize; 2] {
+        match self.closed_by {
+            ClosedBy::First => [0, 1],
+            ClosedBy::Second => [1, 0],
+            ClosedBy::Both if self.struck_side[0] != BoxSide::Front && self.struck_side[1] == BoxSide::Front => [1, 0],
+            ClosedBy::Both => [0, 1],
+        }
+    }
+
     /// Returns the change of velocity of `actor` (m/s), or `None` if it is not one of the two vehicles.
     pub fn delta_v_of(&self, actor: &ActorId) -> Option<f64> {
         let index = self.between.iter().position(|id| id == actor)?;

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
-use crate::faults::{Faults, OdometryErrors};
+use crate::faults::{ActingSensors, Faults, OdometryErrors, StatedFault};
 use crate::image_detector::ImageDetector;
 use crate::lidar::{ClusteringCheck, ClusteringMethod, FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
 use crate::worker_classifier::WorkerClassifier;
@@ -248,6 +248,15 @@ impl Sensors {
     /// Returns the injected faults.
     pub fn faults(&self) -> &Faults {
         &self.altered.faults
+    }
+
+    /// Returns the injected faults of those sensors that exist in the mode, in words.
+    pub fn stated_faults(&self) -> Vec<StatedFault> {
+        self.faults().stated(ActingSensors {
+            is_full: self.mode == SensorMode::Full,
+            has_front_lidar: self.mode == SensorMode::Full && self.full.front_lidar.is_some(),
+            has_models: self.mode != SensorMode::GroundTruth,
+        })
     }
 
     /// Returns the same sensors with these faults in place of their own.

@@ -24,12 +24,12 @@ use closecall_campaign::summary::Summary;
 use closecall_campaign::wall_times::check_share;
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
-use closecall_report::heartbeat::Heartbeat;
+use closecall_report::heartbeat::{Heartbeat, rate_text};
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::source::expand;
 use closecall_simulation::controller::ControllerChoice;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::Value;
 
 use super::CliError;
@@ -43,6 +43,7 @@ use super::help::{examples, heading};
 use super::output::{heartbeat, out, outln, print_error};
 use super::plan::PlanArgs;
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
+use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -319,14 +320,14 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
             outln!("{value:#}");
         }
         Format::Human => {
-            out!("{}", CountsText(&tally.summary));
+            out!("{}", for_terminal(&CountsText(&tally.summary)));
             let (simulated_s, place) = (tally.summary.total().simulated_s, campaign.place());
             let checks = check_share(progress.spent_s);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
             out!("{}", companion.text(&tally.summary));
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", FlakyText(&tally.overview));
-            out!("{}", VerdictText(&judged));
+            out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: campaign.works.len() }));
             if planned.has_drawn_seed {
                 outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
             }
@@ -391,8 +392,9 @@ pub(super) fn progress_bar(samples: u64) -> ProgressBar {
     if session::is_active() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {per_sec}, {eta} left") {
-        bar.set_style(style);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {rate} samples/s, {eta} left") {
+        let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| drop(text.write_str(&rate_text(state.per_sec())));
+        bar.set_style(style.with_key("rate", rate));
     }
     bar
 }

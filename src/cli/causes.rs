@@ -26,6 +26,7 @@ use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
 use super::protect::{of_campaign, protect};
+use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall explain`.
@@ -60,7 +61,9 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         (Format::Json, ..) => outln!("{:#}", stamped(json!(found), None, None)),
         (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
-            found.iter().for_each(|explanation| outln!("{}", ExplanationText { explanation, folder: &args.dir }));
+            for explanation in &found {
+                outln!("{}", for_terminal(&ExplanationText { explanation, folder: &args.dir }));
+            }
         }
     }
     Ok(ExitCode::Pass)

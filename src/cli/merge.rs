@@ -16,6 +16,7 @@ use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{out, outln};
 use super::results::{ArtifactArgs, print_results, selection};
+use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall tool merge`.
@@ -60,10 +61,10 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
-            out!("{}", CountsText(&tally.summary));
+            out!("{}", for_terminal(&CountsText(&tally.summary)));
             out!("{}", ensemble_text(&tally.summary, saved.manifest()));
             out!("{}", FlakyText(&tally.overview));
-            out!("{}", VerdictText(&judged));
+            out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: works.len() }));
         }
     }
     let written = report.write(saved.folder(), selection(args.record));

@@ -40,6 +40,7 @@ mod schema;
 mod sensors;
 mod statistics;
 mod study;
+mod terminal;
 mod trajectories;
 mod view;
 mod viewer;

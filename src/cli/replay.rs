@@ -54,7 +54,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     }
     let settings = [saved.manifest().settings(), args.set.settings.clone()].concat();
     let outcomes = run_watched(&scenario, key, &arms, (&args.watch, &settings))?;
-    print(&outcomes, args.format, Some(&settings));
+    print((&scenario, &arms), &outcomes, args.format, &settings);
     if !args.set.settings.is_empty() {
         return Ok(ExitCode::Pass);
     }

@@ -6,10 +6,11 @@ use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::json;
 use closecall_report::run::text::OutcomeText;
-use closecall_scenarios::Setting;
+use closecall_scenarios::causal::causal_sentence;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::RunKey;
+use closecall_scenarios::{Scenario, Setting};
+use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
 use super::args::{FittedArgs, Format, SimulationArgs};
@@ -17,6 +18,7 @@ use super::arms::ComparisonArgs;
 use super::help::{examples, heading};
 use super::output::{out, outln};
 use super::protect::{of_scenario, protect};
+use super::terminal::for_terminal;
 use super::watch::{WatchArgs, run_watched};
 use crate::exit_code::ExitCode;
 
@@ -60,13 +62,19 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     }
     arms.iter().filter_map(|arm| arm.sensors).try_for_each(|mode| file.check_faults_in(mode))?;
     let outcomes = run_watched(&scenario, key, &arms, (&args.watch, file.settings()))?;
-    print(&outcomes, args.format, Some(file.settings()));
+    print((&scenario, &arms), &outcomes, args.format, file.settings());
     Ok(ExitCode::Pass)
 }
 
 /// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first. `settings` are those of the
-/// command line, if it can have any.
-pub(super) fn print(outcomes: &[Outcome], format: Format, settings: Option<&[Setting]>) {
+/// command line.
+pub(super) fn print(
+    (scenario, arms): (&Scenario, &[Arm]),
+    outcomes: &[Outcome],
+    format: Format,
+    settings: &[Setting],
+) {
+    let settings = Some(settings);
     match (format, outcomes) {
         (Format::Json, [outcome]) => outln!("{:#}", json::stamped(json::outcome(outcome), None, settings)),
         (Format::Json, outcomes) => {
@@ -74,8 +82,9 @@ pub(super) fn print(outcomes: &[Outcome], format: Format, settings: Option<&[Set
             outln!("{:#}", json::stamped(serde_json::Value::Array(both), None, settings));
         }
         (Format::Human, outcomes) => {
-            for outcome in outcomes {
-                out!("{}", OutcomeText(outcome));
+            for (outcome, arm) in outcomes.iter().zip(arms) {
+                let sentence = causal_sentence(scenario, arm.sensors, outcome);
+                out!("{}", for_terminal(&OutcomeText { outcome, sentence: &sentence }));
             }
         }
     }

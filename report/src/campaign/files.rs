@@ -32,7 +32,7 @@ use super::junit::write_junit;
 use super::markdown::{markdown, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
-use super::recordings::{Recorded, RecordedSample, record};
+use super::recordings::{Recorded, RecordedSample, Still, record};
 use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
@@ -126,7 +126,7 @@ impl CampaignReport<'_> {
         let mut written = Written::default();
         let (files, none) = (self.scenario_files(), Recordings::new());
         let (slowest, wall_s) = written.note("the wall times", self.wall_times(folder, &files)).unwrap_or_default();
-        let junit = self.with_findings(&files, Some(folder), &none, &slowest, |findings| {
+        let junit = self.with_findings((&files, Some(folder)), (&none, &[]), &slowest, |findings| {
             write_junit(&folder.file("junit.xml"), findings, &wall_s)
         });
         written.note("junit.xml", junit);
@@ -144,8 +144,8 @@ impl CampaignReport<'_> {
         if self.tally.summary.is_paired() {
             written.note("arm_pairs.parquet", write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary));
         }
-        self.write_pages(folder, (&none, &slowest), &mut written);
-        let Recorded { paths, samples, failures } = match record(folder, &files, selection) {
+        self.write_pages(folder, (&none, &[], &slowest), &mut written);
+        let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection) {
             Ok(recorded) => recorded,
             Err(error) => {
                 written.note::<(), _>("the recordings", Err(error));
@@ -158,15 +158,24 @@ impl CampaignReport<'_> {
         }
         if !paths.is_empty() {
             // Once more, with links to the recordings.
-            self.write_pages(folder, (&paths, &slowest), &mut written);
+            self.write_pages(folder, (&paths, &stills, &slowest), &mut written);
+            let junit = self.with_findings((&files, Some(folder)), (&paths, &stills), &slowest, |findings| {
+                write_junit(&folder.file("junit.xml"), findings, &wall_s)
+            });
+            written.note("junit.xml", junit);
         }
         written.note("samples.xml", self.write_samples(folder, &paths));
         written
     }
 
     /// Writes the reports for human readers, with links to the recordings.
-    fn write_pages(&self, folder: &Folder, (recordings, slowest): (&Recordings, &[Timing]), written: &mut Written) {
-        self.with_findings(&self.scenario_files(), Some(folder), recordings, slowest, |findings| {
+    fn write_pages(
+        &self,
+        folder: &Folder,
+        (recordings, stills, slowest): (&Recordings, &[Still], &[Timing]),
+        written: &mut Written,
+    ) {
+        self.with_findings((&self.scenario_files(), Some(folder)), (recordings, stills), slowest, |findings| {
             written.note(REPORT, write_html(&folder.file(REPORT), findings));
             written.note("summary.md", write_markdown(&folder.file("summary.md"), findings));
         });
@@ -219,9 +228,8 @@ impl CampaignReport<'_> {
 
     fn with_findings<T>(
         &self,
-        files: &[&ScenarioFile],
-        folder: Option<&Folder>,
-        recordings: &Recordings,
+        (files, folder): (&[&ScenarioFile], Option<&Folder>),
+        (recordings, stills): (&Recordings, &[Still]),
         slowest: &[Timing],
         write: impl FnOnce(&Findings<'_>) -> T,
     ) -> T {
@@ -235,6 +243,7 @@ impl CampaignReport<'_> {
             judged: self.judged,
             overview: &self.tally.overview,
             recordings,
+            stills,
             gallery: has_gallery.then_some(gallery.as_str()),
             folder,
             slowest,
@@ -246,7 +255,7 @@ impl CampaignReport<'_> {
         let Some(path) = std::env::var_os(STEP_SUMMARY).filter(|path| !path.is_empty()).map(PathBuf::from) else {
             return Ok(());
         };
-        let text = self.with_findings(&self.scenario_files(), folder, &Recordings::new(), &[], markdown);
+        let text = self.with_findings((&self.scenario_files(), folder), (&Recordings::new(), &[]), &[], markdown);
         let opened = OpenOptions::new().create(true).append(true).open(&path);
         let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::overview::Overview;
+use super::recordings::Still;
 use super::timings::Timing;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::Manifest;
@@ -29,6 +30,8 @@ pub struct Findings<'a> {
     pub overview: &'a Overview,
     /// The recorded samples.
     pub recordings: &'a Recordings,
+    /// Pictures of the recorded samples: the worst of each kind first.
+    pub stills: &'a [Still],
     /// The page of the recordings, relative to the campaign's folder, if there is one.
     pub gallery: Option<&'a str>,
     /// The campaign's folder, if there is one.
@@ -37,17 +40,28 @@ pub struct Findings<'a> {
     pub slowest: &'a [Timing],
 }
 
-impl Findings<'_> {
+/// Largest number of pictures in a report.
+const STILLS: usize = 3;
+
+impl<'a> Findings<'a> {
     /// Returns the names of the scenarios, as a title.
     pub(super) fn scenario_names(&self) -> String {
         self.files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     /// Returns the recording of a sample, in any arm. If arms have recordings of their own, the last one is returned.
-    pub(super) fn recording(&self, scenario: &str, sample: u64) -> Option<&str> {
+    pub(super) fn recording(&self, scenario: &str, sample: u64) -> Option<&'a str> {
         let from = (scenario.to_owned(), sample, String::new());
         let of_sample = |key: &(String, u64, String)| key.0 == scenario && key.1 == sample;
         self.recordings.range(from..).take_while(|(key, _)| of_sample(key)).last().map(|(_, path)| path.as_str())
+    }
+
+    /// Returns the pictures of the worst samples, failures first, each with the path of its recording.
+    pub(super) fn worst_stills(&self) -> Vec<(&'a Still, &'a str)> {
+        let mut stills: Vec<&Still> = self.stills.iter().collect();
+        stills.sort_by_key(|still| !still.is_failure());
+        let with_path = |still: &'a Still| Some((still, self.recording(&still.scenario, still.sample)?));
+        stills.into_iter().filter_map(with_path).take(STILLS).collect()
     }
 
     /// Returns the command that runs a sample again, from within the campaign's folder.

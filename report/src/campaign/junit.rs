@@ -24,6 +24,7 @@ use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
 use super::findings::Findings;
 use super::overview::ErrorGroup;
+use super::recordings::card_beside;
 use super::samples_xml::legal_xml;
 
 /// The answer of one case.
@@ -164,6 +165,8 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
             };
             properties.extend(scenario.flaky.iter().map(first));
         }
+        let of_suite = findings.worst_stills().into_iter().filter(|(still, _)| still.scenario == suite);
+        properties.extend(of_suite.map(|(_, recording)| ("incident card".to_owned(), card_beside(recording))));
         if findings.summary.has_references() {
             properties.extend(arm_pair_properties(findings, counts));
         }

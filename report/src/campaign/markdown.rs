@@ -5,6 +5,8 @@ use std::path::Path;
 use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
+use super::recordings::card_beside;
+use super::words::{reasons, sentence};
 use super::text::{goals, not_prevented};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
@@ -27,9 +29,14 @@ pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteE
 
 /// Returns the summary.
 pub fn markdown(findings: &Findings<'_>) -> String {
-    let mut text = format!("## Closecall: {}\n\n", findings.judged.word());
-    for reason in &findings.judged.reasons {
+    let mut text = format!("## Closecall: {}\n\n", sentence(findings.judged, findings.files.len()));
+    for reason in &reasons(findings.judged) {
         text.push_str(&format!("- {reason}\n"));
+    }
+    for (still, recording) in findings.worst_stills() {
+        let (verdict, scenario, sample) = (still.verdict, cell(&still.scenario), still.sample);
+        let card = card_beside(recording);
+        text.push_str(&format!("- {verdict}: {scenario}, sample {sample}: {} ([incident card]({card}))\n", cell(&still.sentence)));
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));

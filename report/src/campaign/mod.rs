@@ -24,11 +24,12 @@ pub mod samples_xml;
 mod tally;
 mod text;
 pub mod timings;
+mod words;
 
 pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};
 pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{ArtifactError, CampaignReport, ReportError, Written, check_folder};
-pub use recordings::RecordedSample;
+pub use recordings::{RecordedSample, Still};
 pub use tally::Tally;
 pub use text::{CountsText, FlakyText, VerdictText};

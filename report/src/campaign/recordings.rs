@@ -13,7 +13,7 @@ use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
 use super::origins::ORIGINS;
-use crate::run::figure::{scrubber, still};
+use crate::run::figure::{card, scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording_of;
 
@@ -30,6 +30,39 @@ pub struct RecordedSample {
     pub path: PathBuf,
 }
 
+/// A picture of a recorded sample at its critical moment.
+#[derive(Clone, Debug)]
+pub struct Still {
+    /// The scenario's name.
+    pub scenario: String,
+    /// The sample's number.
+    pub sample: u64,
+    /// The verdict on the pair, or on the only run.
+    pub verdict: &'static str,
+    /// What happened in the arm under test and why, in one sentence.
+    pub sentence: String,
+    /// The picture, as SVG.
+    pub svg: String,
+}
+
+impl Still {
+    fn of(entry: &IndexEntry) -> Self {
+        let IndexEntry { scenario, sample, verdict, sentence, still, .. } = entry;
+        let (scenario, sentence, svg) = (scenario.clone(), sentence.clone(), still.clone());
+        Self { scenario, sample: *sample, verdict, sentence, svg }
+    }
+
+    /// Returns whether a vehicle collides in the arm under test.
+    pub(super) fn is_failure(&self) -> bool {
+        matches!(self.verdict, "INDUCED" | "BOTH COLLIDE" | "COLLISION")
+    }
+}
+
+/// Returns the path of the incident card beside a recording.
+pub(super) fn card_beside(recording: &str) -> String {
+    recording.strip_suffix(".rrd").map_or_else(String::new, |stem| format!("{stem}.html"))
+}
+
 /// What has been recorded.
 #[derive(Default)]
 pub(super) struct Recorded {
@@ -37,6 +70,8 @@ pub(super) struct Recorded {
     pub(super) paths: Recordings,
     /// The recordings in the order of the page.
     pub(super) samples: Vec<RecordedSample>,
+    /// Pictures of the recorded samples, in the same order.
+    pub(super) stills: Vec<Still>,
     /// What could not be recorded, in words, and why.
     pub(super) failures: Vec<(String, ReportError)>,
 }
@@ -75,6 +110,7 @@ pub(super) fn record(
             let key = (name.to_owned(), chosen.sample, outcome.controller.clone());
             recorded.paths.insert(key, format!("{RECORDINGS}/{}", entry.file));
         }
+        recorded.stills.push(Still::of(&entry));
         let (scenario, path) = (name.to_owned(), path.join(&entry.file));
         recorded.samples.push(RecordedSample { scenario, sample: chosen.sample, reasons: chosen.reasons, path });
         entries.push(entry);
@@ -148,8 +184,12 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
         still: films.last().map_or(String::new(), still),
         scrubber: scrubber(&films),
         verdict: Film::verdict_word(&films),
+        sentence: films.last().and_then(Film::sentence_text).unwrap_or_default(),
         outcomes: films.iter().filter_map(|film| film.outcome().cloned()).collect(),
     };
+    let in_folder = format!("closecall replay . {sample} --scenario {scenario}{paired} --record {file}");
+    let card_path = saved.folder().file(&card_beside(&format!("{RECORDINGS}/{file}")));
+    write_file(&card_path, |card_file| card_file.write_all(card(&films, &in_folder).as_bytes()))?;
     write_recording_of(&saved.folder().file(&format!("{RECORDINGS}/{file}")), films)?;
     Ok(entry)
 }

@@ -12,6 +12,7 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
 use super::outcomes::OutcomeRow;
+use super::recordings::card_beside;
 use closecall_scenarios::outcome::Collision;
 use closecall_traffic::atomic::{WriteError, write_file};
 
@@ -113,7 +114,7 @@ fn case<W: Write>(xml: &mut Writer<W>, row: &OutcomeRow, recording: Option<&str>
     }
     if let Some(recording) = recording {
         // JUnit has no attachments. CI servers read this line instead.
-        let text = legal_xml(&format!("[[ATTACHMENT|{recording}]]"));
+        let text = legal_xml(&format!("[[ATTACHMENT|{recording}]]\n[[ATTACHMENT|{}]]", card_beside(recording)));
         xml.create_element("system-out").write_text_content(BytesText::new(&text))?;
     }
     xml.write_event(Event::End(BytesEnd::new("testcase")))

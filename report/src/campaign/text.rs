@@ -11,6 +11,7 @@ use closecall_campaign::verdict::Judgement;
 
 use super::overview::{ErrorGroup, Overview};
 use super::pareto::ParetoText;
+use super::words::{reasons, sentence};
 
 /// Width of the names of the arms in the output, at least.
 const NAME_WIDTH: usize = 5;
@@ -59,14 +60,19 @@ impl fmt::Display for FlakyText<'_> {
     }
 }
 
-/// The verdict with its reasons.
+/// The verdict in one sentence, with its reasons: what is not met first, in plain words.
 #[derive(Clone, Copy, Debug)]
-pub struct VerdictText<'a>(pub &'a Judgement);
+pub struct VerdictText<'a> {
+    /// The verdict.
+    pub judged: &'a Judgement,
+    /// The number of scenarios.
+    pub scenarios: usize,
+}
 
 impl fmt::Display for VerdictText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.0.word())?;
-        self.0.reasons.iter().try_for_each(|reason| writeln!(f, "  {reason}"))
+        writeln!(f, "{}", sentence(self.judged, self.scenarios))?;
+        reasons(self.judged).iter().try_for_each(|reason| writeln!(f, "  {reason}"))
     }
 }
 

@@ -37,11 +37,16 @@ pub(super) fn reason_text(mis: &MisSummary) -> String {
 
 /// The outcome of a run as text for human readers, over several lines.
 #[derive(Clone, Copy, Debug)]
-pub struct OutcomeText<'a>(pub &'a Outcome);
+pub struct OutcomeText<'a> {
+    /// The outcome.
+    pub outcome: &'a Outcome,
+    /// What happened and why, in one sentence.
+    pub sentence: &'a str,
+}
 
 impl fmt::Display for OutcomeText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let outcome = self.0;
+        let Self { outcome, sentence } = self;
         writeln!(
             f,
             "{} · {} · seed {} · sample {} · ended at {} ({})",
@@ -52,6 +57,7 @@ impl fmt::Display for OutcomeText<'_> {
             outcome.duration,
             serde_json::to_string(&outcome.end).unwrap_or_default().trim_matches('"'),
         )?;
+        writeln!(f, "  {sentence}")?;
         for (name, value) in outcome.parameters.iter() {
             writeln!(f, "  {name} = {value}")?;
         }

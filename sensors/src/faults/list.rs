@@ -83,6 +83,11 @@ impl<T: Combine> FaultList<T> {
         Self { entries: self.entries.map(|entry| entry.map(always)) }
     }
 
+    /// Returns the effect of each entry with its begin and its end (s).
+    pub(crate) fn spans(&self) -> impl Iterator<Item = (T, [f64; 2])> + '_ {
+        self.entries.iter().flatten().map(|entry| (entry.effect, [entry.from_s, entry.until_s]))
+    }
+
     /// Returns everything that holds together at some time, each with the index of the entry that begins or ends then.
     pub(crate) fn combinations(&self) -> impl Iterator<Item = (usize, T)> {
         let entries = self.entries.iter().enumerate().filter_map(|(index, entry)| entry.as_ref().map(|of| (index, of)));

@@ -23,12 +23,15 @@ mod odometry;
 mod sector;
 #[cfg(test)]
 mod tests;
+mod words;
 
 pub use config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
 pub(crate) use list::FaultList;
 pub use list::Faults;
 pub(crate) use odometry::Belief;
 pub use odometry::{OdometryErrorConfig, OdometryErrors};
+pub(crate) use words::ActingSensors;
+pub use words::{SensorGroup, StatedFault};
 
 pub(crate) use config::LidarFault;
 pub(crate) use object::ObjectFault;

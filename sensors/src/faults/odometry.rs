@@ -113,6 +113,11 @@ impl OdometryErrors {
         *self == Self::default()
     }
 
+    /// Returns begin and end of the errors (s).
+    pub(super) fn span_s(&self) -> [f64; 2] {
+        self.span_s
+    }
+
     /// Returns the errors that hold at `time`.
     #[must_use]
     pub fn at(&self, time: Time) -> Self {

@@ -115,19 +115,6 @@ pub fn state_word(state: EgoState) -> &'static str {
     }
 }
 
-/// Returns the indices of the striking and of the struck vehicle in `collision.between`. If both moved towards each other, the
-/// vehicle whose front was struck is the striking one.
-pub(crate) fn roles(collision: &Collision) -> [usize; 2] {
-    match collision.closed_by {
-        ClosedBy::First => [0, 1],
-        ClosedBy::Second => [1, 0],
-        ClosedBy::Both if collision.struck_side[0] != BoxSide::Front && collision.struck_side[1] == BoxSide::Front => {
-            [1, 0]
-        }
-        ClosedBy::Both => [0, 1],
-    }
-}
-
 /// Runs a case with further settings, and attributes its first collision. Returns the outcome, and `None` if no vehicle
 /// collides.
 ///
@@ -151,7 +138,7 @@ fn of_collision(
     trace: &Trace,
     careful_as_ego: Option<bool>,
 ) -> Option<Attribution> {
-    let roles = roles(collision);
+    let roles = collision.roles();
     let party = |role: usize| Party { actor: collision.between[role].clone(), side: collision.struck_side[role] };
     let index = |role: usize| scenario.actors.iter().position(|actor| actor.id == collision.between[role]);
     let indices = [index(roles[0])?, index(roles[1])?];

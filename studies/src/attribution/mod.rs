@@ -17,6 +17,5 @@ mod collision;
 mod counterfactual;
 mod trace;
 
-pub(crate) use collision::roles;
 pub use collision::{Attribution, Avoidable, Party, attribute, braking_words, phase_word, state_word};
 pub use trace::Trace;

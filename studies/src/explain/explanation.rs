@@ -109,6 +109,8 @@ pub struct Explanation {
     pub controller: String,
     /// Depth of the sensor simulation: `full`, `object` or `ground-truth`.
     pub sensors: String,
+    /// What happened: who struck whom, after what, what the system did and why, and which faults held.
+    pub happened: String,
     /// The collision.
     pub collision: Attribution,
     /// The runs with one stage replaced, in the order of the chain.

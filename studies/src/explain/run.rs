@@ -1,6 +1,7 @@
 //! The runs of an explanation.
 
 use closecall_controllers::CheckedDriver;
+use closecall_scenarios::causal::causal_sentence;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{MisState, Setting, SettingError};
 use closecall_simulation::controller::ControllerChoice;
@@ -61,6 +62,7 @@ pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
         sample: case.sample,
         controller: case.arm.controller.name().to_owned(),
         sensors: sensors.name().to_owned(),
+        happened: causal_sentence(&scenario, case.arm.sensors, &outcome),
         collision,
         stages,
         missing,

@@ -7,7 +7,6 @@ use closecall_campaign::resume_command::quoted;
 use closecall_scenarios::MisState;
 
 use super::{Cause, Explanation, MisEffect, StageRun};
-use crate::attribution::phase_word;
 
 /// An explanation as text for readers.
 #[derive(Clone, Copy, Debug)]
@@ -80,18 +79,10 @@ impl fmt::Display for ExplanationText<'_> {
         let collision = &explanation.collision;
         writeln!(
             f,
-            "{} sample {} ({}, {} sensors): {} strikes {} at {:.2} s with {:.1} m/s, phase {}",
-            explanation.scenario,
-            explanation.sample,
-            explanation.controller,
-            explanation.sensors,
-            collision.striking.actor,
-            collision.struck.actor,
-            collision.time_s,
-            collision.relative_speed_mps,
-            phase_word(collision.phase),
+            "{} sample {} ({}, {} sensors): {}",
+            explanation.scenario, explanation.sample, explanation.controller, explanation.sensors, explanation.happened,
         )?;
-        writeln!(f, "  {}; avoidable by: {}", collision.phase_words(), collision.avoidable.words())?;
+        writeln!(f, "  phase {}; avoidable by: {}", collision.phase_words(), collision.avoidable.words())?;
         writeln!(f, "{}", explanation.sentence())?;
         writeln!(f)?;
         for run in &explanation.stages {

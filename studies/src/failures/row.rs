@@ -8,7 +8,7 @@ use closecall_scenarios::harm::harm;
 use closecall_scenarios::outcome::{Moment, Outcome, Phase};
 use serde::{Deserialize, Serialize};
 
-use crate::attribution::{Attribution, roles};
+use crate::attribution::Attribution;
 use crate::case::fails;
 use crate::explain::{Cause, Explanation};
 
@@ -59,7 +59,7 @@ impl FailureRow {
             is_induced: fate.map(|fate| fate == PairFate::Induced),
             harm: harm(outcome),
             time_s: first.time.s(),
-            vehicles: roles(first).map(|role| first.between[role].to_string()),
+            vehicles: first.roles().map(|role| first.between[role].to_string()),
             phase: first.phase,
             is_after_lead_braking: outcome.moment(Moment::FrontBrakes).is_some_and(|time| time <= first.time),
             attribution: None,

@@ -2,10 +2,12 @@
 //!
 //! ```text
 //!  report.html
-//!    verdict with its reasons          what decides the exit code
-//!    collisions, pairs, requirements   counts with their intervals
-//!    each scenario                     errors, worst samples, outcome map, what moves the result, margins, coverage
-//!    slowest samples, provenance       what a repetition needs
+//!    verdict in a sentence, signature  what decides the exit code
+//!    gates in plain words              the worst first; those that are met are folded
+//!    collisions, pairs                 counts with their intervals
+//!    worst samples                     pictures with links to their recordings and incident cards, outcome map
+//!    causes, each scenario             folded: worst samples, what moves the result, margins, coverage
+//!    provenance                        what a repetition needs
 //!  recordings/index.html
 //!    each recorded sample              a picture, its numbers, how to open it
 //! ```

@@ -28,15 +28,18 @@ pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> R
 pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
     let title = format!("{}: {}", findings.judged.word(), findings.scenario_names());
     let body = html! {
-        (ledger::collisions(findings)?)
         (origins::section(findings))
-        (ensemble_html(findings.summary, findings.manifest))
         (verdict::gates(findings))
+        (ledger::collisions(findings)?)
+        (scenario::evidence(findings)?)
+        (ensemble_html(findings.summary, findings.manifest))
         (verdict::requirements(findings))
         (ledger::validity(findings))
-        (findings.folder.map_or_else(Markup::default, causes::table))
+        @if let Some(folder) = findings.folder {
+            details { summary { "Causes of the failures" } (causes::table(folder)) }
+        }
         @for overview in &findings.overview.scenarios { (scenario::section(findings, overview)?) }
-        (samples::slowest(findings))
+        details { summary { "Slowest samples" } (samples::slowest(findings)) }
         (provenance::provenance(findings))
     };
     let (contents, body) = with_contents(&body.into_string());
@@ -77,16 +80,48 @@ pub fn document(title: &str, body: &Markup) -> Markup {
     }
 }
 
-/// Returns a table that scrolls sideways if the page is too narrow; `head` holds cells, `rows` holds rows.
+/// Returns a table; `head` holds cells, `rows` holds rows. On a narrow page each row becomes a list in which every cell has the name
+/// of its column, and on a page that is wider but not wide enough the table scrolls sideways.
 pub fn table(head: &Markup, rows: &Markup) -> Markup {
     html! {
         div.wide tabindex="0" {
             table {
                 thead { tr { (head) } }
-                tbody { (rows) }
+                tbody { (PreEscaped(with_names(&column_names(&head.0), &rows.0))) }
             }
         }
     }
+}
+
+/// Returns the texts of the cells of a head.
+fn column_names(head: &str) -> Vec<String> {
+    let cells = head.split("<t").filter(|part| part.starts_with(['h', 'd']));
+    let text = |cell: &str| {
+        let inside = cell.split_once('>').map_or("", |(_, inside)| inside);
+        inside.split('<').next().unwrap_or_default().replace('"', "&quot;")
+    };
+    cells.map(text).collect()
+}
+
+/// Adds the name of its column to each cell of the rows.
+fn with_names(names: &[String], rows: &str) -> String {
+    let mut named = String::with_capacity(rows.len());
+    let mut column = 0;
+    for (index, part) in rows.split_inclusive("<t").enumerate() {
+        // Each part but the first follows the begin of an element.
+        let is_element = |name: char| index > 0 && part.starts_with(name) && part[1..].starts_with([' ', '>']);
+        if is_element('r') {
+            column = 0;
+        }
+        if is_element('d') {
+            let name = names.get(column).map_or("", String::as_str);
+            named.push_str(&format!("d data-name=\"{name}\"{}", &part[1..]));
+            column += 1;
+        } else {
+            named.push_str(part);
+        }
+    }
+    named
 }
 
 /// Returns the heads of columns of text.
@@ -119,6 +154,15 @@ mod tests {
         assert_eq!(page.0, "<p>0</p><h2 id=\"part-0\">One</h2><p>1</p><h2 id=\"part-1\">a &lt; b</h2>");
         let contents = contents.into_string();
         assert!(contents.contains("<a href=\"#part-0\">One</a><a href=\"#part-1\">a &lt; b</a>"), "{contents}");
+    }
+
+    #[test]
+    fn every_cell_has_the_name_of_its_column() {
+        let head = html! { th { "sample" } th.number { "ΔV \"max\"" } td {} };
+        let rows = html! { tr { td { "1" } td.number { "2" } td { "3" } } tr.collided { td { "4" } } };
+        let table = table(&head, &rows).into_string();
+        let body = table.split_once("<tbody>").unwrap().1;
+        assert_eq!(body.matches("data-name=\"sample\"").count(), 2, "{body}");
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
     html! {
         h2 { "How it was made" }
         (table(&text_heads(&["", ""]), &rows))
-        p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
+        details { summary { "Where the sampled values come from" }
         @for file in findings.files {
             @if file.space().iter().len() > 0 {
                 h3 { "Where the values of " (file.config().name) " come from" }
@@ -29,7 +29,7 @@ pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
                 };
                 (table(&text_heads(&["parameter", "", "from"]), &rows))
             }
-        }
+        } }
     }
 }
 

@@ -8,6 +8,7 @@ use closecall_traffic::Measured;
 use maud::{Markup, PreEscaped, html};
 
 use super::page::{document, table};
+use crate::campaign::recordings::card_beside;
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, write_file};
 
@@ -32,6 +33,8 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) scrubber: Markup,
     /// The verdict on the pair, or on the only run.
     pub(in crate::campaign) verdict: &'static str,
+    /// What happened in the arm under test and why, in one sentence.
+    pub(in crate::campaign) sentence: String,
     /// The outcome of each arm, the baseline first.
     pub(in crate::campaign) outcomes: Vec<Outcome>,
 }
@@ -104,6 +107,7 @@ fn section(entry: &IndexEntry) -> Markup {
                 p { "Recorded as " (entry.reasons.join(", ")) "." }
                 @for line in &entry.story { p.failure[line.contains("COLLISION")] { (line) } }
                 (numbers(&entry.outcomes))
+                p { a href=(card_beside(&entry.file)) { "Incident card" } ", one page for a ticket." }
                 p { "Open it, from this page's folder:" }
                 pre.command tabindex="0" { "rerun " (entry.file) }
                 p { "Run it again, from this page's folder:" }

@@ -2,11 +2,14 @@
 
 use std::io;
 
-use maud::{Markup, html};
+use closecall_scenarios::ScenarioFile;
+use maud::{Markup, PreEscaped, html};
 
 use super::page::legend_key;
 use super::{influence, samples};
 use crate::campaign::findings::Findings;
+use crate::campaign::recordings::card_beside;
+use crate::campaign::words::worst_first;
 use crate::campaign::overview::{Fate, MARGINS, MarginBins, ScenarioOverview};
 use crate::charts;
 use crate::charts::style::{arm_colour, css, fate_colour};
@@ -16,18 +19,60 @@ use closecall_traffic::statistics::format::percent;
 /// Returns the section of one scenario.
 pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> io::Result<Markup> {
     let file = findings.files.iter().find(|file| file.config().name == scenario.name);
+    // The map of the only scenario, and of the worst, stands above.
+    let is_above = worst_scenario(findings).is_some_and(|worst| worst.name == scenario.name);
     Ok(html! {
         section {
             h2 { (scenario.name) }
-            @if let Some(file) = file { p.what { (file.config().description) } }
+            @if let Some(file) = file { p.what { (file.config().description) } (faults(file)) }
             (samples::errors(scenario))
             (samples::flaky(scenario))
-            (samples::worst(findings, scenario))
-            (map(scenario)?)
-            (influence::section(findings, scenario)?)
-            (margins(scenario)?)
-            (coverage(scenario)?)
+            details {
+                summary { "Samples, margins and coverage" }
+                (samples::worst(findings, scenario))
+                @if !is_above { (map(scenario)?) }
+                (influence::section(findings, scenario)?)
+                (margins(scenario)?)
+                (coverage(scenario)?)
+            }
         }
+    })
+}
+
+/// Returns the faults that a scenario injects; nothing if it injects none.
+fn faults(file: &ScenarioFile) -> Markup {
+    let stated = file.concrete(&file.space().nominal()).map_or_else(|_| Vec::new(), |concrete| concrete.sensors.stated_faults());
+    let texts: Vec<String> = stated.iter().map(ToString::to_string).collect();
+    html! { @if !texts.is_empty() { p { strong { "Injected faults: " } (texts.join("; ")) "." } } }
+}
+
+/// Returns the scenario with the gate that misses its bound by most, else the first.
+fn worst_scenario<'a>(findings: &Findings<'a>) -> Option<&'a ScenarioOverview> {
+    let scenarios = &findings.overview.scenarios;
+    let named = |name: &str| scenarios.iter().find(|scenario| scenario.name == name);
+    worst_first(findings.judged).first().and_then(|gate| named(&gate.scenario)).or(scenarios.first())
+}
+
+/// Returns the evidence that is looked at first: the outcome map of the worst scenario, and pictures of the worst samples.
+pub(super) fn evidence(findings: &Findings<'_>) -> io::Result<Markup> {
+    let stills = findings.worst_stills();
+    let worst = worst_scenario(findings);
+    Ok(html! {
+        h2 { "Worst samples" @if let Some(worst) = worst { ", and the map of " (worst.name) } }
+        @if !stills.is_empty() {
+            div.stills {
+                @for (still, recording) in stills {
+                    figure {
+                        a href=(recording) { (PreEscaped(&still.svg)) }
+                        figcaption {
+                            strong { (still.verdict) } " " (still.scenario) ", sample " (still.sample) ": " (still.sentence) ". "
+                            a href=(recording) { "Recording" } ", " a href=(card_beside(recording)) { "incident card" }
+                        }
+                    }
+                }
+            }
+        }
+        @if let Some(worst) = worst { (map(worst)?) }
     })
 }
 

@@ -13,7 +13,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 
 use super::page::campaign;
-use crate::campaign::Tally;
+use crate::campaign::{Still, Tally};
 use crate::campaign::findings::{Findings, Recordings};
 use crate::campaign::timings::Timing;
 
@@ -47,6 +47,13 @@ fn page() -> String {
         judged: &judged,
         overview: &tally.overview,
         recordings: &recordings,
+        stills: &[Still {
+            scenario: scenario.clone(),
+            sample: worst,
+            verdict: "BOTH COLLIDE",
+            sentence: "R struck E from behind".to_owned(),
+            svg: "<svg></svg>".to_owned(),
+        }],
         gallery: Some("recordings/index.html"),
         folder: None,
         slowest: &[Timing { scenario, sample: 1, controller, wall_s: 0.25 }],
@@ -69,7 +76,11 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
         "Slowest samples",
         "How it was made",
         "closing [m/s]",
-        "<a href=\"#part-0\">Collisions of the ego</a>",
+        "<a href=\"#part-0\">Gates</a>",
+        "FAIL: 1 of 1 scenarios misses a ",
+        "R struck E from behind",
+        "recordings/low-thw-overtake-1.html",
+        "Signature",
         "page written on",
         "prefers-color-scheme: dark",
     ] {

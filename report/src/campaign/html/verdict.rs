@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use super::page::{number, number_heads, table, text_heads};
+use super::page::{table, text_heads};
 use crate::campaign::findings::Findings;
-use closecall_campaign::gate::{Evaluation, Standing};
+use crate::campaign::words::{gate_words, sentence, worst_first};
+use closecall_campaign::gate::{GateResult, Standing};
 use closecall_campaign::verdict::Verdict;
-use closecall_traffic::statistics::format::percent;
 
 const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     match verdict {
@@ -18,23 +18,25 @@ const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     }
 }
 
-/// Returns the head of the page: the verdict, what was run, and the reasons.
+/// Returns the head of the page: the verdict in one sentence, what was run, what else is to be said, and the fields for a signature.
 pub(super) fn header(findings: &Findings<'_>) -> Markup {
     let (judged, sampling) = (findings.judged, findings.manifest.sampling);
     let samples = findings.summary.total().samples;
+    let gates: Vec<String> = judged.gates.iter().map(ToString::to_string).collect();
     html! {
         header.(verdict_class(judged.verdict())) {
             p.verdict { (judged.word()) }
             div {
-                h1 { (findings.scenario_names()) }
+                h1 { (sentence(judged, findings.files.len())) }
                 @if let Some(line) = headline(findings) { p.headline { (line) } }
                 p.what {
-                    (findings.summary.controllers.join(" against ")) ": "
+                    (findings.scenario_names()) ": " (findings.summary.controllers.join(" against ")) ", "
                     (samples) @if samples == 1 { " sample, " } @else { " samples, " }
                     (sampling.design.to_string()) " design, seed " (sampling.seed)
                     @if let Some(part) = findings.manifest.partition { ", part " (part.to_string()) }
                 }
-                ul { @for reason in &judged.reasons { li { (reason) } } }
+                ul { @for reason in judged.reasons.iter().filter(|reason| !gates.contains(reason)) { li { (reason) } } }
+                p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
             }
         }
     }
@@ -66,32 +68,36 @@ fn badge(standing: Standing) -> Markup {
     html! { span.badge.(standing_class(standing)) { (standing.word()) } }
 }
 
-/// Returns the table of gates and requirement checks; empty if there is none.
+/// Returns the gates and requirement checks in plain words, the worst first; those that are met are folded. Empty if there is none.
 pub(super) fn gates(findings: &Findings<'_>) -> Markup {
-    let gates = &findings.judged.gates;
-    if gates.is_empty() {
+    if findings.judged.gates.is_empty() {
         return Markup::default();
     }
-    let head = html! {
-        (text_heads(&["scenario", "gate", "result"]))
-        (number_heads(&["value", "share, 95 %", "samples"]))
-        (text_heads(&["from"]))
-    };
+    let is_met = |gate: &&GateResult| gate.standing() <= Standing::NotChecked;
+    let (met, unmet): (Vec<&GateResult>, Vec<&GateResult>) = worst_first(findings.judged).into_iter().partition(is_met);
+    html! {
+        h2 { "Gates" }
+        @if unmet.is_empty() { p { "All " (met.len()) " gates are met or not checked." } } @else { (gate_table(&unmet)) }
+        @if !met.is_empty() {
+            details { summary { (met.len()) " gates that are met or not checked" } (gate_table(&met)) }
+        }
+    }
+}
+
+fn gate_table(gates: &[&GateResult]) -> Markup {
+    let head = text_heads(&["result", "scenario", "from", "what is required, and what was found", "criterion"]);
     let rows = html! {
         @for gate in gates {
-            @let Evaluation { value, interval_95, samples, .. } = gate.evaluation;
             tr {
-                td { (gate.scenario) }
-                td { code { (gate.expression.to_string()) } }
                 td { (badge(gate.standing())) }
-                (number(value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"))))
-                (number(interval_95.map_or_else(String::new, |[low, high]| format!("{} to {}", percent(low), percent(high)))))
-                (number(samples))
+                td { (gate.scenario) }
                 td { (gate.source.to_string()) }
+                td { (gate_words(gate)) }
+                td { code { (gate.expression.to_string()) } }
             }
         }
     };
-    html! { h2 { "Gates" } (table(&head, &rows)) }
+    table(&head, &rows)
 }
 
 /// Returns the table of requirements; empty if the scenarios name none.
@@ -110,5 +116,5 @@ pub(super) fn requirements(findings: &Findings<'_>) -> Markup {
             }
         }
     };
-    html! { h2 { "Requirements" } (table(&head, &rows)) }
+    html! { details { summary { "Requirements" } h2 { "Requirements" } (table(&head, &rows)) } }
 }

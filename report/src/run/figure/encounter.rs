@@ -8,7 +8,7 @@ use closecall_recorded::criticality::CRITICAL_TTCE_S;
 use closecall_traffic::Time;
 
 use super::chart::{Chart, Curve, Range, range_of};
-use super::colours::{EGO, FRONT, REAR, colour};
+use super::colours::{EGO, FRONT, REAR, colour, legend_name};
 use super::strip;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame, ego_state_name};
@@ -259,8 +259,8 @@ fn motion(films: &[Film], of: fn(&closecall_traffic::VehicleState) -> f64) -> Ve
         let film = &films[film_index];
         let is_named = film_index + 1 == films.len();
         Curve {
-            name: if is_named { film.actors[actor].name.clone() } else { String::new() },
-            stroke: stroke(films, film_index, colour(actor, film.ego)),
+            name: if is_named { legend_name(film, actor) } else { String::new() },
+            stroke: stroke(films, film_index, colour(film, actor)),
             points: (0..film.frames.len())
                 .map(|index| {
                     let frame = &film.frames[index];
@@ -277,15 +277,15 @@ fn motion(films: &[Film], of: fn(&closecall_traffic::VehicleState) -> f64) -> Ve
 fn trajectories(films: &[Film]) -> Chart<'static> {
     let mut curves = Vec::new();
     for (film_index, film) in films.iter().enumerate() {
-        for (actor, member) in film.actors.iter().enumerate() {
+        for actor in 0..film.actors.len() {
             let points = frames_shown(films, film).map(|index| {
                 let state = &film.frames[index].states[actor];
                 (state.s_m, film.is_present(actor, index).then_some(state.d_m))
             });
             let is_named = film_index + 1 == films.len();
             curves.push(Curve {
-                name: if is_named { member.name.clone() } else { String::new() },
-                stroke: stroke(films, film_index, colour(actor, film.ego)),
+                name: if is_named { legend_name(film, actor) } else { String::new() },
+                stroke: stroke(films, film_index, colour(film, actor)),
                 points: points.collect(),
             });
         }

@@ -1,5 +1,5 @@
-//! Static figures of an encounter, which need no viewer: for a report, and for the index page of a campaign's
-//! recordings.
+//! Figures of an encounter, which need no viewer: for a report, for the index page of a campaign's recordings, and on incident
+//! cards.
 //!
 //! ```text
 //!   Film ─▶ road strips at (a) … (e) ─┐
@@ -9,6 +9,7 @@
 //! The same film gives the same bytes on every machine: this module writes the SVG itself, and renders its text with
 //! the bundled font (a subset of DejaVu Sans; see `font/`), never with the fonts of the machine.
 
+mod card;
 mod chart;
 mod colours;
 mod encounter;
@@ -19,6 +20,7 @@ mod still;
 mod strip;
 mod svg;
 
+pub(crate) use card::card;
 pub use encounter::encounter;
 pub use picture::{PictureError, PictureFile, parse_width_mm};
 pub(crate) use scrubber::scrubber;

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::colours::colour;
+use super::colours::{colour, legend_name};
 use crate::run::film::Film;
 
 /// Number of frames between two positions of the slider.
@@ -35,8 +35,9 @@ pub(crate) fn scrubber(films: &[Film]) -> Markup {
                 "Time " input type="range" min="0" max=(films.iter().map(last).max().unwrap_or(0)) value=(start);
             }
             p.legend {
-                @for (index, actor) in tested.actors.iter().enumerate() {
-                    span.key style={ "--key:" (colour(index, tested.ego)) } { (actor.name) }
+                @for actor in 0..tested.actors.len() {
+                    @let name = legend_name(tested, actor);
+                    @if !name.is_empty() { span.key style={ "--key:" (colour(tested, actor)) } { (name) } }
                 }
             }
             script type="application/json" { (PreEscaped(format!("[{}]", rows.join(",")))) }
@@ -61,7 +62,7 @@ fn road(film: &Film) -> Markup {
                 @let size = &actor.vehicle.dimensions;
                 @let [length_m, width_m] = [size.length_m, size.width_m * STRETCH];
                 rect x=(format!("{:.1}", -0.5 * length_m)) y=(format!("{:.1}", -0.5 * width_m))
-                    width=(format!("{length_m:.1}")) height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(index, film.ego)) {
+                    width=(format!("{length_m:.1}")) height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(film, index)) {
                     title { (actor.name) }
                 }
             }

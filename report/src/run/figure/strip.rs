@@ -127,7 +127,7 @@ impl Strip<'_> {
         let Some(frame) = other.frames.get(index) else { return };
         for actor in (0..other.actors.len()).filter(|&actor| other.is_present(actor, index)) {
             let shape = self.shape(other, actor, &frame.states[actor]);
-            svg.polygon(&shape, "none", Stroke::solid(colour(actor, other.ego), 1.0));
+            svg.polygon(&shape, "none", Stroke::solid(colour(other, actor), 1.0));
         }
     }
 
@@ -138,7 +138,7 @@ impl Strip<'_> {
             (0.5 * film_actor.vehicle.dimensions.length_m, 0.5 * film_actor.vehicle.dimensions.width_m);
         let corner = |[along, across]: [f64; 2]| self.at(state.s_m + along * half_m, state.d_m + across * side_m);
         let shape = self.shape(self.film, actor, state);
-        let paint = colour(actor, self.film.ego);
+        let paint = colour(self.film, actor);
         svg.polygon(&shape, paint, Stroke::solid("#ffffff", 0.6));
         if state.brake_light {
             svg.line(corner([-1.0, -0.9]), corner([-1.0, 0.9]), Stroke::solid(BRAKE, 4.0));
@@ -151,9 +151,12 @@ impl Strip<'_> {
         if let Some(side) = side {
             svg.circle(corner([-1.0, side]), 3.0, INDICATOR);
         }
+        if !self.film.is_main(actor) {
+            return;
+        }
         // The name of the ego is below its body, those of the others are above: a vehicle beside the ego covers
         // neither. The others' names extend away from the ego, so that the headway has room.
-        let text = format!("{} {:.1} m/s", film_actor.name, state.speed_mps);
+        let text = format!("{} {:.1} m/s", self.film.vehicle_label(actor), state.speed_mps);
         let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
         let own_m = self.frame.states[self.film.ego].s_m;
         let (along, anchor) = match state.s_m - own_m {

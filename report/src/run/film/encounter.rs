@@ -10,6 +10,7 @@ use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 use super::traffic::{frame_at, present_frames, straight_road};
 use super::{Film, FilmActor, Level, Part, TrafficFilmError};
 use closecall_scenarios::actor_name;
+use closecall_scenarios::causal::VehicleLetters;
 use closecall_simulation::CONTROL_STEP;
 
 /// Returns the film of a recorded encounter, with one frame per control step.
@@ -43,6 +44,8 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         acceleration_limits: Vec::new(),
         camera: None,
         outcome: None,
+        letters: VehicleLetters::default(),
+        faults: Vec::new(),
         highlight: Some(encounter.crossing),
         foreword: String::new(),
         settings: Vec::new(),

@@ -4,11 +4,13 @@ use std::ops::Range;
 
 use closecall_controllers::EgoCommand;
 use closecall_sensors::camera::Camera;
-use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle};
+use closecall_sensors::faults::StatedFault;
+use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle, SensorHealth};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState, maths};
 
+use closecall_scenarios::causal::VehicleLetters;
 use closecall_scenarios::outcome::{Collision, Outcome, Phase};
 use closecall_simulation::{CurrentMargins, RunEvent};
 
@@ -91,6 +93,8 @@ pub struct Frame {
     pub(in crate::run) command: Option<EgoCommand>,
     /// Phase of the encounter; `None` for recorded traffic.
     pub(in crate::run) phase: Option<Phase>,
+    /// Health of the sensors as the ego knows it; `None` for recorded traffic.
+    pub(in crate::run) health: Option<SensorHealth>,
     /// Fields of view of the rear sensors; none if they are not simulated or below [`Level::Objects`].
     pub(in crate::run) rear_fields: Vec<FieldOfView>,
     /// Scan of the rear LiDAR, the first one if there are several, in the frames whose scan is kept.
@@ -134,6 +138,10 @@ pub struct Film {
     pub(in crate::run) camera: Option<(Camera, NoiseKey)>,
     /// The outcome; `None` for recorded traffic.
     pub(in crate::run) outcome: Option<Outcome>,
+    /// The letters of the vehicles in texts.
+    pub(in crate::run) letters: VehicleLetters,
+    /// The faults that were injected.
+    pub(in crate::run) faults: Vec<StatedFault>,
     /// The critical moment, if it follows from something other than collisions and headways.
     pub(in crate::run) highlight: Option<Time>,
     /// Text that precedes the story, in Markdown.
@@ -170,6 +178,28 @@ impl Film {
             actor.part = Part::Background;
         }
         self
+    }
+
+    /// Makes all vehicles traffic around that are neither ego, lead vehicle nor rear vehicle, and neither collide nor are ever the
+    /// vehicle ahead of or behind the ego. Those that are relevant are named, but not plotted.
+    pub(super) fn mark_relevant(&mut self) {
+        let collides = |name: &str| {
+            let mut vehicles = self.collisions().iter().flat_map(|collision| &collision.between);
+            vehicles.any(|id| id.as_str() == name)
+        };
+        let is_near = |actor: usize| {
+            let mut margins = self.frames.iter().map(|frame| &frame.margins);
+            margins.any(|near| near.follower == Some(actor) || near.lead.is_ok_and(|lead| lead.actor == actor))
+        };
+        let is_relevant: Vec<bool> = (0..self.actors.len())
+            .map(|actor| collides(&self.actors[actor].name) || is_near(actor))
+            .collect();
+        for (actor, is_relevant) in self.actors.iter_mut().zip(is_relevant) {
+            if let Part::Other(_) = actor.part {
+                actor.is_plotted = false;
+                actor.part = if is_relevant { actor.part } else { Part::Background };
+            }
+        }
     }
 
     /// Returns true if a vehicle is named and coloured.

@@ -12,6 +12,7 @@
 //! Films of simulated and of recorded traffic have the same type, so that the same views show both.
 
 mod arms;
+mod cause;
 mod comparison;
 mod encounter;
 mod frames;
@@ -31,6 +32,6 @@ pub use frames::{Film, FilmActor, Frame, Level, Part};
 pub(super) use knowledge::KnownSpan;
 pub use recorder::FilmRecorder;
 pub(super) use scan::{NO_CLUSTER, Scan};
-pub(super) use story::{collision_text, driver_note_text, ego_state_name};
+pub(super) use story::{driver_note_text, ego_state_name};
 pub use traffic::{TrafficFilmError, film_lane_change};
-pub(super) use verdict::{fate_word, headway_text};
+pub(super) use verdict::{fate_word, headway_text, headways};

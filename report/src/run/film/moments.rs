@@ -37,6 +37,13 @@ impl Film {
         self.frames.get(at).map_or_else(|| self.end(), |frame| frame.time)
     }
 
+    /// Returns the moment at which a recording of these films opens, the same in all of them: the collision of the last film that has
+    /// one, else the critical moment of the last film.
+    pub(in crate::run) fn shown_moment(films: &[Self]) -> Time {
+        let collided = films.iter().rev().find(|film| film.worst_collision().is_some());
+        collided.or(films.last()).map_or(Time::ZERO, Self::critical_frame_time)
+    }
+
     /// Returns the time of the last frame.
     pub(crate) fn end(&self) -> Time {
         self.frames.last().map_or(Time::ZERO, |frame| frame.time)

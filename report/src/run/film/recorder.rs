@@ -9,6 +9,7 @@ use closecall_traffic::Time;
 use super::knowledge::rear_seen;
 use super::{Film, FilmActor, Frame, Level, Limit, Part, Scan};
 use closecall_scenarios::Scenario;
+use closecall_scenarios::causal::VehicleLetters;
 use closecall_scenarios::outcome::{Outcome, Phase};
 use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView};
 
@@ -86,6 +87,8 @@ impl FilmRecorder {
                 (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego, actors })
             }),
             outcome: None,
+            letters: VehicleLetters::of(scenario),
+            faults: sensors.stated_faults(),
             highlight: None,
             foreword: String::new(),
             settings: Vec::new(),
@@ -102,6 +105,7 @@ impl FilmRecorder {
             actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
+        film.mark_relevant();
         if let Some((index, lidars)) = self.closest
             && let Some(frame) = film.frames.get_mut(index)
         {
@@ -201,6 +205,7 @@ impl Observer for FilmRecorder {
             rear_seen: rear_seen(view.tracks, view.vehicles, self.film.ego),
             command: Some(*view.command),
             phase: Some(view.phase),
+            health: Some(view.perception.health()),
             rear_fields: if keeps_objects { view.perception.rear_fields() } else { Vec::new() },
             scan,
             other_scans,

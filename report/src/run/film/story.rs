@@ -29,7 +29,7 @@ impl Film {
                     1 => String::new(),
                     count => format!(" It was one of {count} collisions."),
                 };
-                format!("COLLISION at {:.2} s: {}.{more}", collision.time.s(), collision_text(collision))
+                format!("COLLISION at {:.2} s: {}.{more}", collision.time.s(), self.collision_text(collision))
             }
             None => {
                 let margin = |name: &str, value: closecall_traffic::Measured| match value {
@@ -95,7 +95,7 @@ impl Film {
             }
             RunEvent::PhaseChanged { .. } => None,
             RunEvent::Collision(reported) => {
-                let text = format!("COLLISION: {}", collision_text(self.collision_in_outcome(reported)));
+                let text = format!("COLLISION: {}", self.collision_text(self.collision_in_outcome(reported)));
                 Some(StoryLine { time, text, is_severe: true })
             }
         }
@@ -129,13 +129,4 @@ pub(crate) const fn ego_state_name(state: EgoState) -> &'static str {
         EgoState::Releasing => "releasing",
         EgoState::EmergencyBraking => "emergency braking",
     }
-}
-
-/// Returns the vehicles of a collision, their relative speed, and the change of velocity of each.
-pub(crate) fn collision_text(collision: &Collision) -> String {
-    let [first, second] = &collision.between;
-    format!(
-        "{first} and {second} at {:.1} m/s (ΔV {first} {:.1} m/s, {second} {:.1} m/s)",
-        collision.relative_speed_mps, collision.delta_v_mps[0], collision.delta_v_mps[1]
-    )
 }

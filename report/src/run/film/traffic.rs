@@ -18,6 +18,7 @@ use closecall_traffic::{
 
 use super::{Film, FilmActor, Frame, Level, Part};
 use crate::units::labelled;
+use closecall_scenarios::causal::VehicleLetters;
 use closecall_simulation::{CurrentMargins, Lead};
 
 /// Time shown before the start and after the end of the lane change.
@@ -89,6 +90,8 @@ pub fn film_lane_change(
         acceleration_limits: Vec::new(),
         camera: None,
         outcome: None,
+        letters: VehicleLetters::default(),
+        faults: Vec::new(),
         highlight: critical_time(change),
         foreword: String::new(),
         settings: Vec::new(),
@@ -179,6 +182,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         rear_seen: Vec::new(),
         command: None,
         phase: None,
+        health: None,
         rear_fields: Vec::new(),
         other_scans: Vec::new(),
         rear_image: None,

@@ -1,7 +1,7 @@
 //! The verdict on a run or on a pair, in words: which vehicles collided, whether the system prevented it, how close it was.
 
 use closecall_campaign::ledger::{PairFate, Tally};
-use closecall_scenarios::outcome::{Collision, Outcome};
+use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::Light;
 
 use super::Film;
@@ -61,15 +61,16 @@ impl Film {
     pub fn result(&self) -> Option<String> {
         let outcome = self.outcome.as_ref()?;
         let collision = match self.worst_collision() {
-            Some(collision) => collided(collision),
+            Some(collision) => format!("{} ({:.2} s)", self.struck_text(collision), collision.time.s()),
             None => "no collision".to_owned(),
         };
-        let margins = &outcome.margins;
-        let headways = [("front", margins.min_thw_front_s), ("rear", margins.min_thw_rear_s)];
-        let texts = headways.iter().filter_map(|(name, thw_s)| Some(format!("{name} {}", headway_text(thw_s.ok()?))));
-        let texts: Vec<String> = texts.collect();
-        let headways = if texts.is_empty() { "no vehicle near".to_owned() } else { texts.join(", ") };
-        Some(format!("{collision}; smallest headway: {headways}"))
+        Some(format!("{collision}; smallest headway: {}", headways(outcome)))
+    }
+
+    /// Returns the smallest headways, and since when the ego saw the vehicle behind.
+    pub(in crate::run) fn headways_and_sight(&self) -> Option<String> {
+        let sight = self.sight().map_or(String::new(), |sight| format!(" {sight}"));
+        Some(format!("Smallest headway: {}.{sight}", headways(self.outcome.as_ref()?)))
     }
 
     /// Returns what the system did, and since when it saw the vehicle behind, as a line of a list.
@@ -100,14 +101,13 @@ impl Film {
     }
 }
 
-/// Returns the vehicles of a collision and their relative speed.
-fn collided(collision: &Collision) -> String {
-    let [first, second] = &collision.between;
-    format!(
-        "collision of {first} and {second} at {:.1} m/s ({:.2} s)",
-        collision.relative_speed_mps,
-        collision.time.s()
-    )
+/// Returns the smallest headways of a run.
+pub(in crate::run) fn headways(outcome: &Outcome) -> String {
+    let margins = &outcome.margins;
+    let headways = [("front", margins.min_thw_front_s), ("rear", margins.min_thw_rear_s)];
+    let texts = headways.iter().filter_map(|(name, thw_s)| Some(format!("{name} {}", headway_text(thw_s.ok()?))));
+    let texts: Vec<String> = texts.collect();
+    if texts.is_empty() { "no vehicle near".to_owned() } else { texts.join(", ") }
 }
 
 /// Largest headway that is written in full (s). Beyond it the vehicles do not influence each other.

@@ -23,7 +23,7 @@ use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::{Film, Frame};
-use closecall_scenarios::outcome::CRITICAL_THW_S;
+use closecall_scenarios::outcome::{CRITICAL_THW_S, Collision};
 
 /// Factor by which the picture is stretched across the road.
 const STRETCH: f64 = 1.0;
@@ -153,6 +153,20 @@ fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingE
 /// Returns the room that the clock takes (m in the picture).
 fn clock_m(canvas: &Canvas<'_>) -> f64 {
     LETTER_M * (canvas.film.arm_label().chars().count() + CLOCK_LETTERS) as f64 + BETWEEN_LABELS_M
+}
+
+/// Returns the text at the end of the row above the road from a collision on.
+fn collision_mark(film: &Film, collision: &Collision) -> String {
+    format!("COLLISION: {}", film.struck_text(collision))
+}
+
+/// Returns the room that the text about the collision takes in a frame (m in the picture).
+fn collision_m(canvas: &Canvas<'_>, row: usize) -> f64 {
+    let film = canvas.film;
+    let happened = |collision: &&Collision| film.frames[row].time >= collision.time;
+    film.worst_collision().filter(happened).map_or(0.0, |collision| {
+        LETTER_M * collision_mark(film, collision).chars().count() as f64 + BETWEEN_LABELS_M
+    })
 }
 
 /// Writes the name of the arm with the time of the frame. A label is centred at its point.
@@ -328,7 +342,7 @@ fn write_collisions(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
     let frames = &film.frames[row..];
     let times: Vec<Time> = frames.iter().map(|frame| frame.time).collect();
     let entity = "bird/collision";
-    let text = format!("COLLISION {:.1} m/s", collision.relative_speed_mps);
+    let text = collision_mark(film, collision);
     let half_m = 0.5 * LETTER_M * text.chars().count() as f64;
     let text_at = [(X_RANGE_M[1] - half_m) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
     let fixed = Points2D::update_fields()

@@ -7,9 +7,8 @@
 //!  │ from above            ├─────────────────────┤      │ from above: both arms ├─────────────────────┤
 //!  ├───────────────────────┤ acceleration │ …    │      │ on one metre axis     │ acceleration │ …    │
 //!  │ scene                 ├─────────────────────┤      ├───────────┬───────────┼─────────────────────┤
-//!  │ (and rear camera)     │ states              │      │ scene:    │ scene:    │ states: with MIS    │
-//!  │                       ├─────────────────────┤      │ without   │ with MIS  ├─────────────────────┤
-//!  │                       │ log │ story         │      │ MIS       │           │ states: without │ … │
+//!  ├───────────────────────┤ states │ log │ story│      │ scenes │ rear cameras │ states │ log │ story│
+//!  │ rear camera           │                     │      │           │           │ of both arms        │
 //!  └───────────────────────┴─────────────────────┘      └───────────┴───────────┴─────────────────────┘
 //!           one run                                              a pair
 //! ```
@@ -24,7 +23,7 @@ use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::components::Range1D;
 use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 
-use self::nodes::{Node, View, below, beside, tabs};
+use self::nodes::{Node, View, below, beside, named, tabs};
 use super::RecordingError;
 use super::palette;
 use super::parts::{
@@ -69,26 +68,26 @@ pub(super) struct FilmContents {
 
 /// Writes the layout for these films.
 pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(), RecordingError> {
+    let has_camera = films.iter().any(|film| film.has_camera);
     let left = below(
         [Some((verdict_share(films), verdict())), bird(films).map(|view| (bird_share(films), view))]
             .into_iter()
             .flatten()
-            .chain(scenes(films).map(|view| (if films.len() > 1 || is_traffic(films) { 3.4 } else { 5.0 }, view)))
+            .chain(scenes(films).map(|view| (scenes_share(films, has_camera), view)))
             .collect(),
     );
-    let mut states: Vec<Node> = films.iter().filter(|film| film.has_states).rev().map(states).collect();
     let mut right = Vec::new();
     let mut plots = films_plots(films);
     if !plots.is_empty() {
         right.push((2.5, plots.remove(0)));
     }
     right.extend(tabs(plots).map(|node| (2.4, node)));
-    if !states.is_empty() {
-        right.push((3.2, states.remove(0)));
-    }
-    states.extend([log(films), View::new("TextDocument", "Story", "summary").into()]);
-    right.extend(tabs(states).map(|node| (1.9, node)));
-    let columns = [left.map(|node| (11.0, node)), below(right).map(|node| (9.0, node))];
+    let story = View::new("TextDocument", "Story", "summary").into();
+    let told = films.iter().any(|film| film.has_states).then(|| states(films)).into_iter().chain([log(films), story]);
+    right.extend(tabs(told.collect()).map(|node| (5.1, node)));
+    // Camera and point cloud need the room.
+    let left_share = if has_camera { 13.0 } else { 11.0 };
+    let columns = [left.map(|node| (left_share, node)), below(right).map(|node| (9.0, node))];
     let root = beside(columns.into_iter().flatten().collect());
     nodes::write(recording, root.unwrap_or_else(verdict), OPENING_TIMELINE)
 }
@@ -97,8 +96,18 @@ pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(),
 fn bird_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 2.5,
-        _ => 4.2,
+        [_] => 2.2,
+        _ => 3.9,
+    }
+}
+
+/// Returns the room for the scenes. With images of the camera they take a third of the window.
+fn scenes_share(films: &[FilmContents], has_camera: bool) -> f32 {
+    match has_camera {
+        true if films.len() > 1 => 5.2,
+        true => 6.6,
+        false if films.len() > 1 || is_traffic(films) => 3.8,
+        false => 5.4,
     }
 }
 
@@ -106,8 +115,8 @@ fn bird_share(films: &[FilmContents]) -> f32 {
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 2.6,
-        _ => 2.9,
+        [_] => 1.8,
+        _ => 2.2,
     }
 }
 
@@ -115,19 +124,22 @@ fn verdict() -> Node {
     View::new("TextDocument", "Verdict", "verdict").into()
 }
 
-/// Returns the 3D views of the films, each with the rear camera if there is one.
+/// Returns the 3D views of the films with the images of the rear cameras: those of one film below each other, those of a pair as tabs.
 fn scenes(films: &[FilmContents]) -> Option<Node> {
-    let mut nodes = Vec::new();
-    for film in films.iter().filter(|film| film.has_scene) {
-        let mut own = vec![(3.0, scene(film))];
-        if film.has_camera {
-            let camera =
-                View::new("2D", titled("Rear camera", films, film), format!("{}{}", film.root, super::camera::ENTITY));
-            own.push((1.6, camera.into()));
+    let scenes: Vec<(f32, Node)> = films.iter().filter(|film| film.has_scene).map(|film| (1.0, scene(film))).collect();
+    let camera = |film: &FilmContents| {
+        let entity = format!("{}{}", film.root, super::camera::ENTITY);
+        (1.0, View::new("2D", titled("Rear camera", films, film), entity).into())
+    };
+    let cameras: Vec<(f32, Node)> = films.iter().filter(|film| film.has_camera).map(camera).collect();
+    match (scenes.len(), cameras.is_empty()) {
+        (_, true) => beside(scenes),
+        (1, false) => below(scenes.into_iter().chain(cameras).collect()),
+        _ => {
+            let [scenes, cameras] = [beside(scenes).map(|node| named("Scenes", node)), below(cameras).map(|node| named("Rear cameras", node))];
+            tabs(scenes.into_iter().chain(cameras).collect())
         }
-        nodes.extend(below(own).map(|node| (1.0, node)));
     }
-    beside(nodes)
 }
 
 /// Returns the 3D view of a film, which moves along the road with the ego.
@@ -161,7 +173,8 @@ fn bird(films: &[FilmContents]) -> Option<Node> {
     let low = shown.iter().map(|film| film.bird_range[0]).min_by(f64::total_cmp)?;
     let high = shown.iter().map(|film| film.bird_range[1]).max_by(f64::total_cmp)?;
     let subject = if is_traffic(films) { "vehicle that changes lanes" } else { "ego" };
-    let view = View::new("2D", format!("From above · distance from the {subject} [m]"), "/")
+    let outlines = if shown.len() > 1 { " · outlines: the other arm" } else { "" };
+    let view = View::new("2D", format!("From above · distance from the {subject} [m]{outlines}"), "/")
         .with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
     let bounds = Range2D { x_range: super::bird::X_RANGE_M.into(), y_range: [low, high].into() };
     let road = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
@@ -216,9 +229,11 @@ fn log(films: &[FilmContents]) -> Node {
         .into()
 }
 
-/// Returns the view of the bands of states of a film.
-fn states(film: &FilmContents) -> Node {
-    View::new("StateTimeline", format!("States: {}", film.name), format!("{}states", film.root)).into()
+/// Returns the view of the bands of states of all films. The moments have the colours of their lines in the plots.
+fn states(films: &[FilmContents]) -> Node {
+    let arms = if films.len() > 1 { " of both arms" } else { "" };
+    let title = format!("States{arms} · colours of the moments: lines in the plots");
+    View::new("StateTimeline", title, super::plots::STATES_ENTITY).into()
 }
 
 /// Returns the title of a view, followed by the name of its arm if there are several films.

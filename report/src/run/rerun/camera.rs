@@ -153,11 +153,50 @@ fn in_picture([left, top, right, bottom]: [f32; 4]) -> ([f32; 2], [f32; 2]) {
     (low, [0, 1].map(|axis| high[axis] - low[axis]))
 }
 
+/// Width of a letter and height of a label in the picture, where the camera has the room of a window of 1280 px (px).
+const LETTER_PX: f32 = 3.4;
+const LABEL_PX: f32 = 9.0;
+
+/// Clears each label that would lie on one of a larger box. A label is centred below its box.
+fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String]) {
+    let area = |index: usize| boxes[index].1[0] * boxes[index].1[1];
+    let mut order: Vec<usize> = (0..boxes.len().min(labels.len())).collect();
+    order.sort_by(|&one, &other| area(other).total_cmp(&area(one)));
+    let mut taken: Vec<[f32; 4]> = Vec::new();
+    for index in order {
+        let ([left, top], [width, height]) = boxes[index];
+        let half = 0.5 * LETTER_PX * labels[index].chars().count() as f32;
+        let (middle, below) = (left + 0.5 * width, top + height);
+        let place = [middle - half, below, middle + half, below + LABEL_PX];
+        let covers = |[left, top, right, bottom]: &[f32; 4]| {
+            place[0] < *right && *left < place[2] && place[1] < *bottom && *top < place[3]
+        };
+        if labels[index].is_empty() || taken.iter().any(covers) {
+            labels[index].clear();
+        } else {
+            taken.push(place);
+        }
+    }
+}
+
 /// Returns the colour of what the camera takes for a vehicle of this class.
 fn class_colour(class: VehicleClass) -> Rgba {
     match class {
         VehicleClass::Car => palette::TRACK,
         VehicleClass::Truck => palette::WARNING,
         VehicleClass::Motorcycle => palette::SAFE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_label_lies_on_that_of_a_larger_box() {
+        let boxes = [([100.0, 10.0], [8.0, 20.0]), ([98.0, 10.0], [30.0, 22.0]), ([200.0, 10.0], [8.0, 8.0])];
+        let mut labels = ["motorcycle 0.83", "car 1.00", "truck 0.70"].map(str::to_owned);
+        clear_covered(&boxes, &mut labels);
+        assert_eq!(labels, ["", "car 1.00", "truck 0.70"]);
     }
 }

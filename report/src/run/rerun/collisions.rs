@@ -9,11 +9,13 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Float64Array, StringArray};
 use closecall_scenarios::outcome::Collision;
 use closecall_traffic::Time;
+use closecall_traffic::geometry::BoxSide;
 use rerun::{
     ComponentDescriptor, ComponentIdentifier, SerializationResult, SerializedComponentBatch, SerializedComponentColumn,
 };
 
 use super::RecordingError;
+use super::plots::phase_name;
 use super::stream::Writer;
 use crate::run::film::Film;
 use crate::units::unit_of;
@@ -30,12 +32,26 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         Ok([
             texts("between_first", collisions, |collision| collision.between[0].as_str())?,
             texts("between_second", collisions, |collision| collision.between[1].as_str())?,
+            texts("struck_side_first", collisions, |collision| side_word(collision.struck_side[0]))?,
+            texts("struck_side_second", collisions, |collision| side_word(collision.struck_side[1]))?,
+            texts("striking", collisions, |collision| collision.between[collision.roles()[0]].as_str())?,
+            texts("phase", collisions, |collision| phase_name(collision.phase))?,
             numbers("relative_speed_mps", collisions, |collision| collision.relative_speed_mps)?,
             numbers("delta_v_first_mps", collisions, |collision| collision.delta_v_mps[0])?,
             numbers("delta_v_second_mps", collisions, |collision| collision.delta_v_mps[1])?,
         ]
         .into_iter())
     })
+}
+
+/// Returns the name of a side, as the table of outcomes has it.
+pub(super) const fn side_word(side: BoxSide) -> &'static str {
+    match side {
+        BoxSide::Front => "front",
+        BoxSide::Rear => "rear",
+        BoxSide::Left => "left",
+        BoxSide::Right => "right",
+    }
 }
 
 fn texts(

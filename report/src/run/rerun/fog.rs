@@ -41,7 +41,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     }
     let step_m = (FARTHEST * visibility_m).min(MAX_DISTANCE_M) / f64::from(CURTAINS);
     let opacity = 1.0 - maths::exp(-KOSCHMIEDER * step_m / visibility_m);
-    let colour = palette::with_opacity(palette::through_fog(palette::SKY, 0.0), (255.0 * opacity) as u8);
+    let light = film.environment.light;
+    let colour = palette::with_opacity(palette::through_fog(palette::sky(light), 0.0, light), (255.0 * opacity) as u8);
     for curtain in 1..=CURTAINS {
         let x_m = step_m * f64::from(curtain);
         let corner = |across: f64, up: f64| {

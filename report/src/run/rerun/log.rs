@@ -1,4 +1,4 @@
-//! The text log: every event at the time at which it happened.
+//! The text log: every event at the time at which it happened. Its lines have the colour of the viewer's theme.
 
 use std::collections::BTreeMap;
 
@@ -6,10 +6,9 @@ use closecall_traffic::Time;
 use rerun::{TextLog, TextLogLevel};
 
 use super::RecordingError;
-use super::palette::{self, Rgba};
 use super::plots::phase_name;
 use super::stream::Writer;
-use crate::run::film::{Film, KnownSpan, collision_text, driver_note_text, ego_state_name};
+use crate::run::film::{Film, KnownSpan, driver_note_text, ego_state_name};
 use closecall_simulation::RunEvent;
 
 /// One line of the log.
@@ -17,7 +16,6 @@ struct Line {
     time: Time,
     entity: &'static str,
     level: &'static str,
-    colour: Rgba,
     text: String,
 }
 
@@ -25,16 +23,17 @@ struct Line {
 /// arm.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordingError> {
     let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
-    let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, colour: palette::NEUTRAL, text };
+    let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, text };
     let mut lines = vec![plain("log/run", start, film.title.clone())];
     lines.extend(film.happenings.iter().map(|(time, what)| line(film, *time, what)));
     lines.extend(film.moments().iter().map(|noted| {
         let text = noted.moment.label();
-        Line { colour: palette::MOMENT, ..plain("log/moment", noted.time, text) }
+        plain("log/moment", noted.time, text)
     }));
     lines.extend(known(film));
     lines.extend(reasons(film));
     lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
+    lines.push(plain("log/critical", film.critical_frame_time(), "the critical moment".to_owned()));
     lines.push(plain("log/run", film.end(), "the run ends here".to_owned()));
     // The lines of an entity make up one chunk.
     let mut of_entity: BTreeMap<&str, Vec<Line>> = BTreeMap::new();
@@ -48,7 +47,6 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
             TextLog::update_fields()
                 .with_many_text(lines.iter().map(|line| format!("{arm}{}", line.text)))
                 .with_many_level(lines.iter().map(|line| line.level))
-                .with_many_color(lines.iter().map(|line| line.colour))
                 .columns_of_unit_batches()
         })?;
     }
@@ -61,7 +59,6 @@ fn known(film: &Film) -> Vec<Line> {
         time: span.time,
         entity: "log/sight",
         level: TextLogLevel::INFO,
-        colour: palette::SIGHT,
         text: format!("vehicle behind the ego: {}", span.words()),
     };
     film.known_spans().into_iter().map(line).collect()
@@ -79,7 +76,6 @@ fn reasons(film: &Film) -> Vec<Line> {
             time: pair[1].time,
             entity: "log/reason",
             level: TextLogLevel::INFO,
-            colour: palette::NEUTRAL,
             text: format!("ego: {}, since {}", ego_state_name(now.state), now.reason),
         });
     }
@@ -88,23 +84,22 @@ fn reasons(film: &Film) -> Vec<Line> {
 
 /// Returns the log line of an event.
 fn line(film: &Film, time: Time, what: &RunEvent) -> Line {
-    let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
-    let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
+    let info = |entity, text| Line { time, entity, level: TextLogLevel::INFO, text };
+    let warn = |entity, text| Line { time, entity, level: TextLogLevel::WARN, text };
     match what {
-        RunEvent::EventTriggered { event } => warn("log/event", palette::EVENT, format!("event `{event}` sets in")),
+        RunEvent::EventTriggered { event } => warn("log/event", format!("event `{event}` sets in")),
         RunEvent::DriverNote { actor, note } => {
             let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());
-            let colour = film.actors.get(*actor).map_or(palette::NEUTRAL, |actor| palette::part(actor.part));
-            info("log/driver", colour, format!("{name} {}", driver_note_text(*note)))
+            info("log/driver", format!("{name} {}", driver_note_text(*note)))
         }
         RunEvent::EgoStateChanged { from, to, reason } => {
             let text = format!("ego: {} -> {} ({reason})", ego_state_name(*from), ego_state_name(*to));
-            info("log/ego", palette::EGO, text)
+            info("log/ego", text)
         }
-        RunEvent::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_name(*to))),
+        RunEvent::PhaseChanged { to } => info("log/phase", format!("phase: {}", phase_name(*to))),
         RunEvent::Collision(reported) => {
-            let text = format!("COLLISION: {}", collision_text(film.collision_in_outcome(reported)));
-            Line { time, entity: "log/collision", level: TextLogLevel::ERROR, colour: palette::CRITICAL, text }
+            let text = format!("COLLISION: {}", film.collision_text(film.collision_in_outcome(reported)));
+            Line { time, entity: "log/collision", level: TextLogLevel::ERROR, text }
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its
-//! curves in the plots can be matched.
+//! curves in the plots can be matched. Curves are legible on the viewer's dark and on its light background.
 
 use closecall_scenarios::outcome::Moment;
+use closecall_traffic::Light;
 
 use crate::run::film::Part;
 
@@ -9,31 +10,25 @@ use crate::run::film::Part;
 pub(super) type Rgba = [u8; 4];
 
 /// The ego.
-pub(super) const EGO: Rgba = [64, 156, 255, 255];
+pub(super) const EGO: Rgba = [38, 116, 222, 255];
 /// The first of the other actors, by convention the lead vehicle.
-pub(super) const FRONT: Rgba = [255, 176, 59, 255];
+pub(super) const FRONT: Rgba = [190, 98, 0, 255];
 /// The second of the other actors, by convention the rear vehicle.
-pub(super) const REAR: Rgba = [244, 92, 160, 255];
-/// Colours of further actors, in their order. They repeat if there are more actors.
-const OTHERS: [Rgba; 4] = [[130, 208, 96, 255], [176, 132, 255, 255], [64, 190, 180, 255], [200, 170, 90, 255]];
+pub(super) const REAR: Rgba = [214, 40, 118, 255];
+/// A further vehicle that is relevant: it is grey, too, but paler, and has a name.
+const OTHER: Rgba = [176, 180, 186, 255];
 /// A vehicle of the traffic around.
-const BACKGROUND: Rgba = [128, 132, 138, 255];
+const BACKGROUND: Rgba = [118, 122, 128, 255];
 /// Colours of the moments of the encounter, in the views that mark them.
 const MOMENTS: [Rgba; 7] = [
     [214, 69, 65, 255],
-    [120, 144, 200, 255],
-    [176, 132, 255, 255],
-    [214, 140, 40, 255],
-    [64, 170, 160, 255],
-    [112, 150, 80, 255],
-    [140, 140, 150, 255],
+    [98, 124, 186, 255],
+    [150, 100, 230, 255],
+    [190, 110, 10, 255],
+    [20, 140, 130, 255],
+    [104, 142, 72, 255],
+    [130, 130, 140, 255],
 ];
-/// A line of text about a moment.
-pub(super) const MOMENT: Rgba = [140, 150, 190, 255];
-/// A line of text about what the ego sees.
-pub(super) const SIGHT: Rgba = [40, 160, 190, 255];
-/// A line of text about an event of the scenario.
-pub(super) const EVENT: Rgba = [214, 150, 30, 255];
 /// The ground beside the road in the view from above. It is dark in both themes of the viewer, so that labels are legible.
 pub(super) const GROUND: Rgba = [24, 27, 31, 255];
 /// Fog, as the scene shows it. It is darker than by day, so that labels are legible.
@@ -50,17 +45,20 @@ pub(super) const MARKING: Rgba = [226, 226, 222, 255];
 pub(super) const RAIL: Rgba = [150, 156, 162, 255];
 pub(super) const BRAKE_LIGHT: Rgba = [255, 32, 24, 255];
 pub(super) const INDICATOR: Rgba = [255, 170, 0, 255];
-pub(super) const SKY: Rgba = [112, 130, 150, 255];
+/// The sky by day, at dusk and at night.
+const SKY: [Rgba; 3] = [[112, 130, 150, 255], [62, 58, 84, 255], [9, 12, 22, 255]];
+/// Share of the light of the day that lies on the ground at dusk and at night, so that vehicles stay legible.
+const GROUND_LIGHT: [f64; 3] = [1.0, 0.7, 0.45];
 pub(super) const BOX_FIT: Rgba = [255, 255, 255, 255];
 pub(super) const TRUTH: Rgba = [110, 214, 120, 255];
 pub(super) const MISSED: Rgba = [255, 120, 0, 255];
 pub(super) const FALSE_TRACK: Rgba = [255, 0, 200, 255];
 pub(super) const FIELD_OF_VIEW: Rgba = [150, 220, 255, 255];
 pub(super) const TRACK: Rgba = [96, 230, 255, 255];
-pub(super) const SAFE: Rgba = [110, 214, 120, 255];
-pub(super) const CRITICAL: Rgba = [255, 64, 64, 255];
-pub(super) const WARNING: Rgba = [255, 196, 64, 255];
-pub(super) const NEUTRAL: Rgba = [138, 142, 148, 255];
+pub(super) const SAFE: Rgba = [26, 134, 70, 255];
+pub(super) const CRITICAL: Rgba = [220, 38, 38, 255];
+pub(super) const WARNING: Rgba = [166, 110, 0, 255];
+pub(super) const NEUTRAL: Rgba = [118, 122, 128, 255];
 pub(super) const QUIET: Rgba = [96, 100, 108, 255];
 
 /// Returns the colour of a part.
@@ -69,15 +67,37 @@ pub(super) fn part(part: Part) -> Rgba {
         Part::Ego => EGO,
         Part::Lead => FRONT,
         Part::Rear => REAR,
-        Part::Other(number) => OTHERS[number % OTHERS.len()],
+        Part::Other(_) => OTHER,
         Part::Background => BACKGROUND,
     }
 }
 
+/// Returns the colour of the sky.
+pub(super) const fn sky(light: Light) -> Rgba {
+    SKY[light_index(light)]
+}
+
+/// Returns the colour of something on the ground in this light.
+pub(super) fn lit(colour: Rgba, light: Light) -> Rgba {
+    let share = GROUND_LIGHT[light_index(light)];
+    let [red, green, blue, opacity] = colour;
+    let darker = |channel: u8| (f64::from(channel) * share).round() as u8;
+    [darker(red), darker(green), darker(blue), opacity]
+}
+
+const fn light_index(light: Light) -> usize {
+    match light {
+        Light::Day => 0,
+        Light::Dusk => 1,
+        Light::Night => 2,
+    }
+}
+
 /// Returns a colour as it looks through fog that lets this share of the light pass.
-pub(super) fn through_fog(colour: Rgba, share: f64) -> Rgba {
+pub(super) fn through_fog(colour: Rgba, share: f64, light: Light) -> Rgba {
+    let fog = lit(FOG, light);
     std::array::from_fn(|channel| {
-        (f64::from(colour[channel]) * share + f64::from(FOG[channel]) * (1.0 - share)).round() as u8
+        (f64::from(colour[channel]) * share + f64::from(fog[channel]) * (1.0 - share)).round() as u8
     })
 }
 
@@ -93,10 +113,13 @@ pub(super) fn text([red, green, blue, opacity]: Rgba) -> Rgba {
     [paler(red), paler(green), paler(blue), opacity]
 }
 
-/// Returns a darker shade of a colour, for the curves of the baseline.
-pub(super) fn darker([red, green, blue, opacity]: Rgba) -> Rgba {
-    let scaled = |channel: u8| (u16::from(channel) * 11 / 20) as u8;
-    [scaled(red), scaled(green), scaled(blue), opacity]
+/// Share of white in a curve of the baseline.
+const BASELINE_WHITE: f64 = 0.20;
+
+/// Returns a lighter shade of a colour, for the curves of the baseline.
+pub(super) fn lighter([red, green, blue, opacity]: Rgba) -> Rgba {
+    let mixed = |channel: u8| (f64::from(channel) * (1.0 - BASELINE_WHITE) + 255.0 * BASELINE_WHITE).round() as u8;
+    [mixed(red), mixed(green), mixed(blue), opacity]
 }
 
 /// Returns the colour of a moment of the encounter.
@@ -128,4 +151,55 @@ pub(super) fn intensity(intensity: u8) -> Rgba {
     // Most returns are weak, so that the scale follows the square root.
     let root = f32::from(intensity).sqrt() / f32::from(u8::MAX).sqrt();
     SHADES[((root * 8.0) as usize).min(7)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Backgrounds of the plots in the viewer's dark and in its light theme (Rerun 0.36).
+    const DARK: Rgba = [13, 16, 17, 255];
+    const LIGHT: Rgba = [255, 255, 255, 255];
+    /// Least contrast of a graphical object (WCAG 2.2, 1.4.11) and of text (1.4.3).
+    const LEAST_OF_CURVES: f64 = 3.0;
+    const LEAST_OF_TEXT: f64 = 4.5;
+
+    /// Returns the relative luminance after WCAG 2.2.
+    fn luminance([red, green, blue, _]: Rgba) -> f64 {
+        let linear = |channel: u8| match f64::from(channel) / 255.0 {
+            low if low <= 0.040_45 => low / 12.92,
+            high => closecall_traffic::maths::powf((high + 0.055) / 1.055, 2.4),
+        };
+        0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
+    }
+
+    fn contrast(one: Rgba, other: Rgba) -> f64 {
+        let [one, other] = [one, other].map(luminance);
+        (one.max(other) + 0.05) / (one.min(other) + 0.05)
+    }
+
+    #[test]
+    fn curves_are_legible_in_both_themes_and_those_of_the_baseline_are_lighter() {
+        let curves = [EGO, FRONT, REAR, CRITICAL, SAFE, WARNING, NEUTRAL];
+        for colour in curves.into_iter().chain(curves.map(lighter)).chain(MOMENTS) {
+            for background in [DARK, LIGHT] {
+                let contrast = contrast(colour, background);
+                assert!(contrast >= LEAST_OF_CURVES, "{colour:?} on {background:?}: {contrast:.2}");
+            }
+        }
+        assert!(curves.iter().all(|&colour| luminance(lighter(colour)) > luminance(colour)));
+        // The colours of other traffic are greys.
+        let greys = [OTHER, BACKGROUND].map(|[red, green, blue, _]| [red, green, blue]);
+        assert!(greys.iter().all(|grey| grey.iter().max().unwrap() - grey.iter().min().unwrap() <= 12));
+        assert!(contrast([255, 176, 59, 255], LIGHT) < LEAST_OF_CURVES, "a curve that does not pass");
+    }
+
+    #[test]
+    fn labels_are_legible_on_the_ground_of_the_view_from_above() {
+        for part in [Part::Ego, Part::Lead, Part::Rear, Part::Other(0), Part::Background] {
+            let contrast = contrast(text(super::part(part)), GROUND);
+            assert!(contrast >= LEAST_OF_TEXT, "{part:?}: {contrast:.2}");
+        }
+        assert!(contrast(NOTE, GROUND) >= LEAST_OF_TEXT);
+    }
 }

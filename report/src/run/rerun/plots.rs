@@ -2,7 +2,7 @@
 
 mod bands;
 
-pub(super) use self::bands::phase_name;
+pub(super) use self::bands::{ENTITY as STATES_ENTITY, phase_name};
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ const THIN_LINE_WIDTH: f32 = 1.0;
 pub(super) enum Role {
     /// The only film.
     Alone,
-    /// The film to compare with. Its curves are darker.
+    /// The film to compare with. Its curves are thin and lighter.
     Baseline,
     /// The film that is compared with the baseline.
     Tested,
@@ -44,13 +44,14 @@ pub(super) enum Kind {
     Acceleration,
     Speed,
     Gap,
+    Ttc,
     Encounter,
     Margin,
 }
 
 /// All plots, in their order in the layout.
-pub(super) const KINDS: [Kind; 6] =
-    [Kind::Headway, Kind::Acceleration, Kind::Speed, Kind::Gap, Kind::Margin, Kind::Encounter];
+pub(super) const KINDS: [Kind; 7] =
+    [Kind::Headway, Kind::Acceleration, Kind::Speed, Kind::Gap, Kind::Ttc, Kind::Margin, Kind::Encounter];
 
 impl Kind {
     /// Returns the name of its entities.
@@ -60,6 +61,7 @@ impl Kind {
             Self::Acceleration => "acceleration",
             Self::Speed => "speed",
             Self::Gap => "gap",
+            Self::Ttc => "ttc",
             Self::Encounter => "encounter",
             Self::Margin => "margin",
         }
@@ -74,6 +76,7 @@ impl Kind {
             Self::Acceleration => "Acceleration [m/s²] · E blue · F orange · R pink",
             Self::Speed => "Speed [m/s]",
             Self::Gap => "Gap [m] · seen grey",
+            Self::Ttc => "Rear TTC [s]",
             Self::Encounter => "TTCE [s] · DCE [m]",
             Self::Margin => "Headway gained [s]",
         }
@@ -86,7 +89,7 @@ impl Kind {
             Self::Speed => "m/s",
             Self::Gap => "m",
             Self::Encounter if curve.contains("dce") => "m",
-            Self::Headway | Self::Encounter | Self::Margin => "s",
+            Self::Headway | Self::Ttc | Self::Encounter | Self::Margin => "s",
         }
     }
 
@@ -102,7 +105,7 @@ impl Kind {
             Self::Acceleration => [-6.0, 2.0],
             Self::Speed => [f64::INFINITY, f64::NEG_INFINITY],
             Self::Gap => [0.0, 60.0],
-            Self::Encounter => [0.0, 10.0],
+            Self::Ttc | Self::Encounter => [0.0, 10.0],
             Self::Margin => [-0.5, 2.5],
         }
     }
@@ -114,7 +117,7 @@ impl Kind {
             Self::Acceleration => [-11.0, 5.0],
             Self::Speed => [0.0, f64::INFINITY],
             Self::Gap => [0.0, 130.0],
-            Self::Encounter => [0.0, 10.0],
+            Self::Ttc | Self::Encounter => [0.0, 10.0],
             Self::Margin => [-1.5, 4.5],
         }
     }
@@ -139,6 +142,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<Vec<
     let mut note = |kind: Kind, has_curve: bool| found.extend(has_curve.then_some(kind));
     note(Kind::Headway, plots.headways()?);
     note(Kind::Gap, plots.gaps()?);
+    note(Kind::Ttc, plots.time_to_collision()?);
     note(Kind::Encounter, plots.encounter()?);
     plots.motion()?;
     note(Kind::Speed, true);
@@ -147,6 +151,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<Vec<
     let ranges: Vec<Plot> = found.into_iter().map(|kind| Plot { kind, range: plots.range(kind) }).collect();
     for plot in &ranges {
         plots.moment_lines(plot)?;
+        plots.collision_lines(plot)?;
     }
     plots.bands()?;
     Ok(ranges)
@@ -209,7 +214,36 @@ impl Plots<'_> {
         let lacking = if kind == Kind::Speed { (LEAST_SPEED_SPAN_MPS - (high - low)).max(0.0) } else { 0.0 };
         let room = AXIS_ROOM * (high - low) + 0.5 * lacking;
         let largest = kind.largest_range();
-        [(low - room).max(largest[0]), (high + room).min(largest[1])]
+        with_two_ticks([(low - room).max(largest[0]), (high + room).min(largest[1])])
+    }
+
+    /// Writes a red vertical line at each collision. That of the baseline is thin.
+    fn collision_lines(&self, plot: &Plot) -> Result<(), RecordingError> {
+        let width = if self.role == Role::Baseline { THIN_LINE_WIDTH } else { LINE_WIDTH };
+        for (number, collision) in self.film.collisions().iter().enumerate() {
+            let entity = format!("plots/{}/collisions/{}", plot.kind.name(), number + 1);
+            let style = SeriesLines::new()
+                .with_names([self.named(&self.film.struck_text(collision))])
+                .with_colors([palette::CRITICAL])
+                .with_widths([width]);
+            self.writer.write_static(&entity, &style)?;
+            self.writer.write_series(&entity, &[collision.time; 2], &self.ends(plot).map(Some))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the ends of a vertical line. The view of a pair can show more than the range of this film.
+    fn ends(&self, plot: &Plot) -> [f64; 2] {
+        let largest = plot.kind.largest_range();
+        [0, 1].map(|end| if largest[end].is_finite() { largest[end] } else { plot.range[end] })
+    }
+
+    /// Returns the name of a curve, followed by that of the arm if there are several.
+    fn named(&self, name: &str) -> String {
+        match self.role {
+            Role::Alone => name.to_owned(),
+            Role::Baseline | Role::Tested => format!("{name} {}", self.film.arm_label()),
+        }
     }
 
     /// Writes a vertical line at each moment of the encounter. The baseline of a pair writes none.
@@ -218,9 +252,7 @@ impl Plots<'_> {
             return Ok(());
         }
         let moments = self.film.moments();
-        // The view of a pair can show more than the range of this film.
-        let largest = plot.kind.largest_range();
-        let ends = [0, 1].map(|end| if largest[end].is_finite() { largest[end] } else { plot.range[end] });
+        let ends = self.ends(plot);
         for (number, noted) in moments.iter().enumerate() {
             let entity = format!("plots/{}/moments/{}", plot.kind.name(), number + 1);
             let style = SeriesLines::new()
@@ -235,12 +267,9 @@ impl Plots<'_> {
 
     /// Writes name and style of a curve.
     fn write_style(&self, entity: &str, curve: &CurveStyle<'_>) -> Result<(), RecordingError> {
-        let name = match self.role {
-            Role::Alone => curve.name.to_owned(),
-            Role::Baseline | Role::Tested => format!("{} {}", curve.name, self.film.arm_label()),
-        };
+        let name = self.named(curve.name);
         let (colour, width) = match self.role {
-            Role::Baseline => (palette::darker(curve.colour), THIN_LINE_WIDTH),
+            Role::Baseline => (palette::lighter(curve.colour), THIN_LINE_WIDTH),
             Role::Alone | Role::Tested => (curve.colour, curve.width),
         };
         self.write_line(entity, SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]))
@@ -286,6 +315,12 @@ impl Plots<'_> {
         let seen = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         let seen = self.curve("plots/gap/rear_seen", &seen, |frame| Some(plan(frame)?.rear_gap_m))?;
         Ok(front || rear || seen)
+    }
+
+    /// Writes the time to collision of the vehicle behind the ego.
+    fn time_to_collision(&self) -> Result<bool, RecordingError> {
+        let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
+        self.curve("plots/ttc/rear", &rear, |frame| frame.margins.ttc_rear_s.ok())
     }
 
     /// Writes the next closest encounter at the present velocities, in the ground truth and as the MIS estimates it.
@@ -350,6 +385,28 @@ impl Plots<'_> {
     }
 }
 
+/// Least share of a plot's height between two ticks of the value axis that have a number: 22 of the 85 px of the lowest plot.
+const LEAST_TICK_SHARE: f64 = 0.26;
+
+/// Steps between the ticks of a value axis: the viewer puts them at multiples of a power of ten.
+const STEPS: [f64; 8] = [0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1_000.0, 10_000.0];
+/// Room beyond a tick to which an axis is extended, as a share of the step.
+const TICK_ROOM: f64 = 0.05;
+
+/// Extends a range of a value axis until two of its ticks have a number.
+fn with_two_ticks([mut low, mut high]: [f64; 2]) -> [f64; 2] {
+    // Each extension makes the range longer, and with it perhaps the step.
+    while let Some(step) = STEPS.into_iter().find(|step| *step >= LEAST_TICK_SHARE * (high - low)) {
+        let [first, last] = [(low / step).ceil() * step, (high / step).floor() * step];
+        if last > first {
+            break;
+        }
+        let [below, above] = [first - step, last + step];
+        if low - below <= above - high { low = below - TICK_ROOM * step } else { high = above + TICK_ROOM * step }
+    }
+    [low, high]
+}
+
 /// A curve's style, and the unit of its values, in the component `unit`.
 struct WithUnit {
     style: SeriesLines,
@@ -368,4 +425,30 @@ impl AsComponents for WithUnit {
 /// Returns the plan of the MIS in a frame, if there is one.
 fn plan(frame: &Frame) -> Option<MisPlan> {
     frame.command?.plan
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the number of ticks that have a number in a plot of the least height.
+    fn ticks([low, high]: [f64; 2]) -> usize {
+        let step = STEPS.into_iter().find(|step| *step >= LEAST_TICK_SHARE * (high - low)).unwrap();
+        let count = (high / step).floor() - (low / step).ceil() + 1.0;
+        if count > 0.0 { count as usize } else { 0 }
+    }
+
+    #[test]
+    fn every_value_axis_has_two_ticks() {
+        assert_eq!(with_two_ticks([0.0, 3.0]), [0.0, 3.0]);
+        assert_eq!(ticks([-7.0, 2.0]), 1);
+        for range in [[-7.0, 2.0], [-6.3, 2.1], [22.0, 36.0], [31.0, 38.0], [0.0, 60.0], [0.0, 130.0], [-0.5, 2.5], [0.0, 10.0], [28.5, 28.6]] {
+            let [low, high] = with_two_ticks(range);
+            assert!(low <= range[0] && high >= range[1] && ticks([low, high]) >= 2, "{range:?}: {low} to {high}");
+        }
+        for kind in KINDS {
+            let range = kind.least_range();
+            assert!(range[0] > range[1] || ticks(with_two_ticks(range)) >= 2, "{kind:?}");
+        }
+    }
 }

@@ -4,7 +4,8 @@
 //!  __properties                   name of the recording
 //!  __properties/run               scenario, seed, sample, verdict, settings
 //!  __properties/parameters        one value per sampled parameter
-//!  __properties/arms/ARM          collided, smallest headways, when the MIS engaged, and so on
+//!  __properties/arms/ARM          collided, smallest headways, when the MIS engaged, what happened in words, and so on
+//!  __properties/arms/ARM/collision_N   each collision: who struck whom, struck sides, ΔV, phase
 //! ```
 //!
 //! The unit is in the name of each property, and in the metadata of its column, as the type of the component.
@@ -12,11 +13,13 @@
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
-use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::outcome::{Collision, Outcome};
 use closecall_traffic::{Measured, Value};
 use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 
 use super::RecordingError;
+use super::collisions::side_word;
+use super::plots::phase_name;
 use super::recording::Recording;
 use crate::run::film::Film;
 use crate::units::unit_of;
@@ -46,6 +49,10 @@ pub(super) fn write(recording: &Recording, films: &[Film]) -> Result<(), Recordi
     parameters.push(recording, "parameters")?;
     for (film, outcome) in films.iter().filter_map(|film| Some((film, film.outcome.as_ref()?))) {
         of_arm(film, outcome)?.push(recording, &format!("arms/{}", film.arm))?;
+        for (number, collision) in outcome.collisions.iter().enumerate() {
+            let entity = format!("arms/{}/collision_{}", film.arm, number + 1);
+            of_collision(collision)?.push(recording, &entity)?;
+        }
     }
     Ok(())
 }
@@ -53,8 +60,12 @@ pub(super) fn write(recording: &Recording, films: &[Film]) -> Result<(), Recordi
 /// Returns the properties of one arm.
 fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> {
     let margins = &outcome.margins;
+    let happened = film.sentence().map_or_else(String::new, |sentence| sentence.to_string());
+    let faults: Vec<String> = film.faults.iter().map(ToString::to_string).collect();
     let mut properties = Properties::default()
         .text("controller", &outcome.controller)?
+        .text("happened", &happened)?
+        .text("faults", &faults.join("; "))?
         .flag("ego_collided", outcome.ego_collided())?
         .count("collisions", outcome.collisions.len() as u64)?
         .number("duration_s", Ok(outcome.duration.s()))?
@@ -63,6 +74,7 @@ fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> 
         .number("min_thw_rear_s", margins.min_thw_rear_s)?
         .number("min_gap_front_m", margins.min_gap_front_m)?
         .number("min_gap_rear_m", margins.min_gap_rear_m)?
+        .number("min_ttc_rear_s", margins.min_ttc_rear_s)?
         .number("max_deceleration_mps2", Ok(margins.max_deceleration_mps2))?;
     if let Some(collision) = film.worst_collision() {
         properties = properties
@@ -76,6 +88,21 @@ fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> 
             .text("mis_reason", &mis.reason.to_string())?;
     }
     Ok(properties)
+}
+
+/// Returns the properties of one collision.
+fn of_collision(collision: &Collision) -> Result<Properties, RecordingError> {
+    let [striking, struck] = collision.roles();
+    Properties::default()
+        .number("time_s", Ok(collision.time.s()))?
+        .text("striking", collision.between[striking].as_str())?
+        .text("striking_side", side_word(collision.struck_side[striking]))?
+        .text("struck", collision.between[struck].as_str())?
+        .text("struck_side", side_word(collision.struck_side[struck]))?
+        .text("phase", phase_name(collision.phase))?
+        .number("relative_speed_mps", Ok(collision.relative_speed_mps))?
+        .number("delta_v_striking_mps", Ok(collision.delta_v_mps[striking]))?
+        .number("delta_v_struck_mps", Ok(collision.delta_v_mps[struck]))
 }
 
 /// Values of one entity. A value that does not exist has no column.

@@ -48,7 +48,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let right_m = road.right_edge_m() - SHOULDER_M;
 
     // Half of the fog's colour lies on the ground, so that near things stay legible.
-    let tint = |colour| palette::through_fog(colour, 0.5 + 0.5 * fog::clear_share(film));
+    let light = film.environment.light;
+    let tint = |colour| palette::through_fog(palette::lit(colour, light), 0.5 + 0.5 * fog::clear_share(film), light);
     let mut verge = Ribbons::new(road, VERGE_Z_M);
     verge.add([from_m, to_m], [right_m - VERGE_M, left_m + VERGE_M]);
     writer.write_static("world/road/verge", &verge.mesh(tint(palette::VERGE)))?;
@@ -57,7 +58,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     surface.add([from_m, to_m], [right_m, left_m]);
     writer.write_static("world/road/surface", &surface.mesh(tint(palette::ROAD)))?;
 
-    writer.write_static("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::MARKING))?;
+    writer.write_static("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::lit(palette::MARKING, light)))?;
     if road.has_guard_rails() {
         writer.write_static("world/road/guard_rails", &guard_rails(road, [from_m, to_m]))?;
     }

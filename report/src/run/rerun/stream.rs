@@ -60,9 +60,13 @@ pub(super) struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// Creates the writer of one film whose entity paths begin with `root`. `span` holds the first and the last moment of any
-    /// film.
-    pub(super) fn new(recording: &'a Recording, film: &Film, (root, is_alone): (&str, bool), span: [Time; 2]) -> Self {
-        let critical = film.critical_frame_time();
+    /// film, `critical` the moment at which the recording opens.
+    pub(super) fn new(
+        recording: &'a Recording,
+        film: &Film,
+        (root, is_alone): (&str, bool),
+        (span, critical): ([Time; 2], Time),
+    ) -> Self {
         Self { recording, critical, root: root.to_owned(), is_alone, period: film.period, span }
     }
 
@@ -79,6 +83,25 @@ impl<'a> Writer<'a> {
     /// Writes components that hold for the whole run.
     pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
         self.recording.log_static(self.path(entity), what)
+    }
+
+    /// Writes components that hold for the whole run, of an entity beside those of the films.
+    pub(super) fn write_static_of_all(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
+        self.recording.log_static(entity.into(), what)
+    }
+
+    /// Writes rows like [`Self::write_curve`], of an entity beside those of the films.
+    pub(super) fn write_curve_of_all(
+        &self,
+        entity: &str,
+        times: &[Time],
+        build: impl BuildColumns,
+    ) -> Result<(), RecordingError> {
+        if times.is_empty() {
+            return Ok(());
+        }
+        let columns = build(0..times.len()).map_err(RecordingStreamError::from)?;
+        self.recording.send_columns(entity.into(), self.timelines(times), columns)
     }
 
     /// Writes one row of components for each of `times`, which must ascend, and a copy of the row that holds at the

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use closecall_traffic::{Measured, Time};
 
-use crate::run::film::{Film, fate_word, headway_text};
+use crate::run::film::{Film, fate_word, headway_text, headways};
 use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
 
@@ -39,20 +39,26 @@ pub(super) fn story(films: &[Film]) -> String {
 
 /// Appends the verdict on a pair.
 fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
+    let [baseline, tested] = films;
+    push_head(page, fate_word(fate), tested);
     // Writing to a string cannot fail.
-    let _ = write!(page, "### {}\n\n", fate_word(fate));
     for film in films {
-        if let Some(result) = film.result() {
-            let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
-        }
+        let sentence = film.sentence().map_or_else(String::new, |sentence| sentence.to_string());
+        let _ = writeln!(page, "- **{}:** {sentence}", film.arm_label());
     }
-    let [_, tested] = films;
-    page.extend(tested.system_line());
-    let conditions = conditions(tested);
-    if let Some(outcome) = &tested.outcome {
-        let _ =
-            writeln!(page, "- {} · seed {} · sample {}{conditions}", outcome.scenario, outcome.seed, outcome.sample);
+    let without = baseline.outcome.as_ref().map_or_else(String::new, headways);
+    if let Some(line) = tested.headways_and_sight() {
+        let _ = writeln!(page, "- {line} Without it: {without}.");
     }
+}
+
+/// Appends the verdict in one word, with the sample.
+fn push_head(page: &mut String, word: &str, film: &Film) {
+    let sample = film.outcome.as_ref().map_or_else(String::new, |outcome| {
+        format!(" · {} · seed {} · sample {}{}", outcome.scenario, outcome.seed, outcome.sample, conditions(film))
+    });
+    // Writing to a string cannot fail.
+    let _ = write!(page, "**{word}**{sample}\n\n");
 }
 
 /// Appends the verdict on one film. That of a re-enactment stands below the comparison with the recorded encounter.
@@ -66,13 +72,18 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         (Some(_), None) => "NO COLLISION",
     };
     if film.foreword.is_empty() && !is_reenactment {
-        let _ = write!(page, "### {word}\n\n");
+        push_head(page, word, film);
     }
-    match film.result() {
+    match film.sentence() {
         // The comparison has it, and what the system did.
-        Some(_) if is_reenactment => {}
-        Some(result) => {
-            let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
+        Some(_) if is_reenactment => {
+            push_head(page, "Simulated", film);
+        }
+        Some(sentence) => {
+            let _ = writeln!(page, "- **{}:** {sentence}", film.arm_label());
+            if let Some(line) = film.headways_and_sight() {
+                let _ = writeln!(page, "- {line}");
+            }
         }
         None => {
             let _ = write!(page, "**{}**\n\n", film.title);
@@ -81,13 +92,6 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
                 let _ = writeln!(page, "- {:.2} s: {note}", time.s());
             }
         }
-    }
-    if !is_reenactment {
-        page.extend(film.system_line());
-    }
-    if let Some(outcome) = &film.outcome {
-        let (seed, sample, conditions) = (outcome.seed, outcome.sample, conditions(film));
-        let _ = writeln!(page, "- {} · seed {seed} · sample {sample}{conditions}", outcome.scenario);
     }
 }
 

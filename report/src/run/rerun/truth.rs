@@ -20,6 +20,9 @@ const CLEARANCE_M: f64 = 0.05;
 /// Height of the boxes of false tracks (m), since tracks have no height.
 const FALSE_HEIGHT_M: f64 = 1.5;
 
+/// The label of a track to which no vehicle belongs.
+const NO_VEHICLE: &str = "does not exist";
+
 /// A box in the ego frame.
 #[derive(Clone, Copy)]
 struct Shape {
@@ -53,20 +56,25 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     ];
     for (name, colour, of) in layers {
         let shapes: Vec<&Vec<Shape>> = comparisons.iter().map(of).collect();
-        write_layer(writer, (&format!("world/ego/truth/{name}"), colour), &times, &shapes)?;
+        let label = (name == "false_tracks").then_some(NO_VEHICLE);
+        write_layer(writer, (&format!("world/ego/truth/{name}"), colour, label), &times, &shapes)?;
     }
     Ok(vec!["world/ego/truth/known".to_owned()])
 }
 
 fn write_layer(
     writer: &Writer<'_>,
-    (entity, colour): (&str, Rgba),
+    (entity, colour, label): (&str, Rgba, Option<&str>),
     times: &[Time],
     shapes: &[&Vec<Shape>],
 ) -> Result<(), RecordingError> {
     let fixed =
         Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.05_f32]).with_colors([colour]);
-    writer.write_static(entity, &fixed)?;
+    // One label stands for every box.
+    match label {
+        Some(label) => writer.write_static(entity, &fixed.with_labels([label]).with_show_labels(true))?,
+        None => writer.write_static(entity, &fixed)?,
+    }
     // Rows are written for the frames with shapes and for the frame after them, which clears the shapes.
     let rows: Vec<usize> =
         (0..shapes.len()).filter(|&row| row == 0 || !shapes[row].is_empty() || !shapes[row - 1].is_empty()).collect();

@@ -9,7 +9,7 @@ use super::bodies;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use crate::run::film::{Film, Frame, Part, headway_text};
-use closecall_scenarios::outcome::{CRITICAL_THW_S, Collision};
+use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 /// An arrow shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.25;
@@ -163,7 +163,7 @@ fn write_velocity(
 /// Returns the name of a vehicle, with its rounded speed if there is room, for each frame in which it is present. A vehicle that
 /// touches the ego has none: the names would lie on each other, and the collision's text has both.
 fn names(film: &Film, actor: usize, has_room: bool) -> Vec<String> {
-    let name = film.actors[actor].name.as_str();
+    let name = film.vehicle_label(actor);
     let text = |frame: &Frame| {
         let distance_m = || film.moving_box(frame, actor).shape.distance_m(&film.moving_box(frame, film.ego).shape);
         if actor != film.ego && film.outcome.is_some() && distance_m() < TOUCHING_M {
@@ -171,7 +171,7 @@ fn names(film: &Film, actor: usize, has_room: bool) -> Vec<String> {
         }
         match has_room {
             true => format!("{name} {:.0} m/s", frame.states[actor].speed_mps),
-            false => name.to_owned(),
+            false => name.clone(),
         }
     };
     film.frames[film.actors[actor].present_frames.clone()].iter().map(text).collect()
@@ -342,12 +342,6 @@ impl Gap {
     }
 }
 
-/// Returns the text about a collision, with the change of velocity of each vehicle.
-fn mark_text(collision: &Collision) -> String {
-    let ([first, second], [first_mps, second_mps]) = (&collision.between, collision.delta_v_mps);
-    format!("COLLISION: ΔV {first} {first_mps:.1}, {second} {second_mps:.1} m/s")
-}
-
 /// Writes a mark on the struck side of the first vehicle of each collision, and the changes of velocity as a text on
 /// the road behind it. Both move with the vehicle.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
@@ -367,7 +361,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         let mark = Points3D::new([[x, y, 0.6], [text_x_m, 0.0, 0.0]])
             .with_colors([palette::CRITICAL, palette::text(palette::CRITICAL)])
             .with_radii([0.45_f32, 0.05])
-            .with_labels([String::new(), mark_text(collision)])
+            .with_labels([String::new(), film.collision_text(collision)])
             .with_show_labels(true);
         // The mark appears at the first frame at or after the contact: in earlier frames the vehicles are still apart.
         let appears_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);

@@ -106,6 +106,7 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
     let end = films.iter().map(Film::end).max();
     let span = [start, end].map(|time| time.unwrap_or(Time::ZERO));
     let canvases = bird::Canvas::of_films(films);
+    let shown = Film::shown_moment(films);
     let mut contents = Vec::new();
     for (index, film) in films.iter().enumerate() {
         let role = match (films.len(), index) {
@@ -114,7 +115,7 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
             _ => Role::Tested,
         };
         let root = format!("{}/", film.arm);
-        let writer = Writer::new(&recording, film, (&root, films.len() == 1), span);
+        let writer = Writer::new(&recording, film, (&root, films.len() == 1), (span, shown));
         contents.push(write_film(&writer, &canvases[index], (root, role))?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, &canvases[index], ghosts)?;
@@ -155,12 +156,13 @@ fn write_film(
     (root, role): (String, Role),
 ) -> Result<FilmContents, RecordingError> {
     let film = canvas.film;
+    let light = film.environment.light;
     let mut contents = FilmContents {
         name: film.arm_label().to_owned(),
         root,
         bird_range: canvas.range_m(),
         weather: film.weather(),
-        sky: palette::through_fog(palette::SKY, fog::clear_share(film)),
+        sky: palette::through_fog(palette::sky(light), fog::clear_share(film), light),
         span: [film.frames.first().map_or(Time::ZERO, |frame| frame.time), film.end()],
         ..FilmContents::default()
     };

@@ -22,11 +22,25 @@ pub const REPLICATES: usize = 32;
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// The 95 % interval. It may reach beyond the range of the quantity, such as below 0 for a share.
+    /// The 95 % interval. Unless it is [bounded](Self::within), it may reach beyond the range of the quantity, such as below 0 for a
+    /// share.
     pub interval_95: [f64; 2],
 }
 
 impl Estimate {
+    /// Returns the estimate in `interval_95`, which is found in another way: the value is moved to its nearer end if it lies outside.
+    #[must_use]
+    pub fn with_interval(self, interval_95: [f64; 2]) -> Self {
+        let [low, high] = interval_95;
+        Self { value: self.value.max(low).min(high), interval_95 }
+    }
+
+    /// Returns the estimate of a quantity that has no value outside `range`.
+    #[must_use]
+    pub fn within(self, range: [f64; 2]) -> Self {
+        self.with_interval(self.interval_95.map(|bound| bound.max(range[0]).min(range[1])))
+    }
+
     /// Returns true if the interval contains `truth`.
     pub fn covers(&self, truth: f64) -> bool {
         self.interval_95[0] <= truth && truth <= self.interval_95[1]
@@ -89,6 +103,17 @@ mod tests {
         assert_eq!(estimate.value, 3.0);
         assert!((estimate.interval_95[1] - 3.0 - 2.776 * 1.5811 / 5.0_f64.sqrt()).abs() < 1e-3);
         assert_eq!(student(&[1.0]), None);
+    }
+
+    #[test]
+    fn an_estimate_never_lies_outside_its_interval_nor_a_rate_below_zero() {
+        let below = Estimate { value: -0.004, interval_95: [-0.01, 0.002] };
+        let moved = below.with_interval([0.0, 0.811]);
+        assert_eq!((moved.value, moved.interval_95), (0.0, [0.0, 0.811]));
+        let rate = Estimate { value: 0.01, interval_95: [-0.02, 0.04] }.within([0.0, 1.0]);
+        assert_eq!((rate.value, rate.interval_95), (0.01, [0.0, 0.04]));
+        let certain = Estimate { value: 1.0, interval_95: [1.0, 1.0] }.within([0.0, 1.0]);
+        assert_eq!((certain.value, certain.interval_95), (1.0, [1.0, 1.0]));
     }
 
     #[test]

@@ -178,7 +178,9 @@ impl Design {
                 (count > 0.0).then(|| sums[3 * quarter + 1] / count)
             })
         };
-        let means = [mean(0)?, mean(1)?, mean(2)?, mean(3)?];
+        let is_event = outputs.iter().flatten().all(|output| *output == 0.0 || (output - 1.0).abs() <= f64::EPSILON);
+        let bounded = |quarter: usize| mean(quarter).map(|mean| if is_event { mean.within([0.0, 1.0]) } else { mean });
+        let means = [bounded(0)?, bounded(1)?, bounded(2)?, bounded(3)?];
         Some(MainEffect { index: jackknife(&replicates, share_between)?, means })
     }
 }
@@ -215,7 +217,7 @@ impl GroupSums {
             Some(bounds) if changes < MIN_CHANGES => (with(first, [0.0, bounds[1]]), with(total, bounds)),
             // The first-order index is no larger than the total index.
             _ if is_event && self.changes.iter().any(|side| *side < MIN_ON_EACH_SIDE) => (
-                first.zip(total).map(|(first, total)| Estimate { interval_95: [0.0, total.interval_95[1]], ..first }),
+                first.zip(total).map(|(first, total)| first.with_interval([0.0, total.interval_95[1]])),
                 total,
             ),
             _ => (first, total),
@@ -237,7 +239,7 @@ impl GroupSums {
 }
 
 fn with(estimate: Option<Estimate>, interval_95: [f64; 2]) -> Option<Estimate> {
-    estimate.map(|estimate| Estimate { interval_95, ..estimate })
+    estimate.map(|estimate| estimate.with_interval(interval_95))
 }
 
 /// Returns the variance of the outputs of A and B; `None` if they do not vary.

@@ -6,7 +6,9 @@ use rerun::Points2D;
 use super::super::RecordingError;
 use super::super::palette::{self, Rgba};
 use super::super::stream::Writer;
-use super::{BETWEEN_LABELS_M, Canvas, LETTER_M, MARK_ORDER, NAMES_ABOVE_M, NAMES_BELOW_M, X_RANGE_M, clock_m};
+use super::{
+    BETWEEN_LABELS_M, Canvas, LETTER_M, MARK_ORDER, NAMES_ABOVE_M, NAMES_BELOW_M, X_RANGE_M, clock_m, collision_m,
+};
 use crate::run::film::{Frame, Part, headway_text};
 
 /// Number of vehicles that are named, by their order among the actors.
@@ -46,16 +48,25 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let film = canvas.film;
     let frame = &film.frames[row];
     let own = &frame.states[film.ego];
-    let named = (0..film.actors.len()).filter(|&actor| film.is_main(actor) && film.is_present(actor, row)).take(NAMED);
+    let mut named: Vec<usize> =
+        (0..film.actors.len()).filter(|&actor| film.is_main(actor) && film.is_present(actor, row)).collect();
+    // Ego, lead vehicle and rear vehicle first, then the nearest others.
+    let rank = |actor: &usize| match film.actors[*actor].part {
+        Part::Other(_) | Part::Background => (frame.states[*actor].s_m - own.s_m).abs(),
+        Part::Ego | Part::Lead | Part::Rear => 0.0,
+    };
+    named.sort_by(|one, other| rank(one).total_cmp(&rank(other)));
+    named.truncate(NAMED);
     let mut names: Vec<Name> = named
+        .into_iter()
         .filter_map(|actor| {
-            let (state, actor_name) = (&frame.states[actor], &film.actors[actor].name);
+            let (state, label) = (&frame.states[actor], film.vehicle_label(actor));
             let x_m = state.s_m - own.s_m;
             let is_shown = x_m > X_RANGE_M[0] && x_m < X_RANGE_M[1];
             let is_above =
                 film.actors[actor].part == Part::Rear || state.d_m - own.d_m > 0.5 * film.road.lane_width_m();
             let headway = headway_of(frame, actor);
-            let text = format!("{actor_name} {:.1} m/s{headway}", state.speed_mps);
+            let text = format!("{label} {:.1} m/s{headway}", state.speed_mps);
             is_shown.then(|| Name {
                 x_m,
                 is_above,
@@ -64,12 +75,21 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
             })
         })
         .collect();
-    names.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+    let mut placed = Vec::new();
     for is_above in [true, false] {
-        let free_from_m = X_RANGE_M[0] + if is_above { clock_m(canvas) } else { 0.0 };
-        keep_apart(free_from_m, names.iter_mut().filter(|name| name.is_above == is_above));
+        let (clock_m, mark_m) = if is_above { (clock_m(canvas), collision_m(canvas, row)) } else { (0.0, 0.0) };
+        let room_m = [X_RANGE_M[0] + clock_m, X_RANGE_M[1] - mark_m];
+        let (mut of_row, rest): (Vec<Name>, Vec<Name>) = names.into_iter().partition(|name| name.is_above == is_above);
+        names = rest;
+        // The names are in the order of their rank. What has no room is left out.
+        while of_row.len() > 1 && of_row.iter().map(Name::width_m).sum::<f64>() > room_m[1] - room_m[0] {
+            of_row.pop();
+        }
+        of_row.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        keep_apart(room_m, &mut of_row);
+        placed.extend(of_row);
     }
-    names
+    placed
 }
 
 /// Returns the headway that belongs to a vehicle, as it follows its speed.
@@ -86,12 +106,42 @@ fn headway_of(frame: &Frame, actor: usize) -> String {
     }
 }
 
-/// Moves names to the right so that the first begins at `free_from_m` or later and none covers the one before.
-fn keep_apart<'n>(mut free_from_m: f64, names: impl Iterator<Item = &'n mut Name>) {
-    for name in names {
-        let half_m = 0.5 * LETTER_M * name.text.chars().count() as f64;
-        let farthest_m = (X_RANGE_M[1] - half_m).max(free_from_m + half_m);
-        name.x_m = name.x_m.max(free_from_m + half_m).min(farthest_m);
-        free_from_m = name.x_m + half_m + BETWEEN_LABELS_M;
+/// Moves names along the row so that all lie in its room and none covers another. They are in the order of the row.
+fn keep_apart([from_m, to_m]: [f64; 2], names: &mut [Name]) {
+    let mut free_from_m = from_m;
+    for name in names.iter_mut() {
+        let half_m = 0.5 * name.width_m();
+        name.x_m = name.x_m.max(free_from_m + half_m);
+        free_from_m = name.x_m + half_m;
+    }
+    let mut free_to_m = to_m;
+    for name in names.iter_mut().rev() {
+        let half_m = 0.5 * name.width_m();
+        name.x_m = name.x_m.min(free_to_m - half_m);
+        free_to_m = name.x_m - half_m;
+    }
+}
+
+impl Name {
+    /// Returns the room that the name takes, with the distance to the next (m in the picture).
+    fn width_m(&self) -> f64 {
+        LETTER_M * self.text.chars().count() as f64 + BETWEEN_LABELS_M
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_name_covers_another_and_none_leaves_its_room() {
+        let name = |x_m, text: &str| Name { x_m, is_above: true, text: text.to_owned(), colour: palette::NOTE };
+        for at_m in [[-34.0, -33.0, -30.0], [70.0, 72.0, 74.0], [0.0, 1.0, 74.0]] {
+            let mut names: Vec<Name> = at_m.into_iter().zip(["R rear 30.0 m/s", "left-2", "E ego"]).map(|(x_m, text)| name(x_m, text)).collect();
+            keep_apart([-20.0, 60.0], &mut names);
+            let ends: Vec<[f64; 2]> = names.iter().map(|name| [-0.5, 0.5].map(|side| name.x_m + side * name.width_m())).collect();
+            assert!(ends[0][0] >= -20.0 - 1e-9 && ends[2][1] <= 60.0 + 1e-9, "{ends:?}");
+            assert!(ends.windows(2).all(|pair| pair[0][1] <= pair[1][0] + 1e-9), "{ends:?}");
+        }
     }
 }

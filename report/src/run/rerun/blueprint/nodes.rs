@@ -50,11 +50,21 @@ pub(super) enum Node {
     View(View),
     /// Nodes beside, below or behind each other, each with its share of the room.
     Container(ContainerKind, Vec<(f32, Node)>),
+    /// A container with the name that its tab has.
+    Named(&'static str, Box<Node>),
 }
 
 impl From<View> for Node {
     fn from(view: View) -> Self {
         Self::View(view)
+    }
+}
+
+/// Returns a node that has a name as a tab. A view has a title of its own.
+pub(super) fn named(name: &'static str, node: Node) -> Node {
+    match node {
+        Node::View(_) => node,
+        container => Node::Named(name, Box::new(container)),
     }
 }
 
@@ -88,7 +98,7 @@ pub(super) fn write(recording: &Recording, root: Node, timeline: &str) -> Result
     // The root of a layout must be a container.
     let root = match root {
         Node::View(view) => Node::Container(ContainerKind::Tabs, vec![(1.0, view.into())]),
-        container @ Node::Container(..) => container,
+        container @ (Node::Container(..) | Node::Named(..)) => container,
     };
     let root = writer.write(root)?;
     let viewport = ViewportBlueprint::new().with_root_container(uuid(root)).with_auto_layout(false);
@@ -116,7 +126,12 @@ impl NodeWriter<'_> {
         let number = self.count;
         match node {
             Node::View(view) => self.write_view(number, view)?,
-            Node::Container(kind, nodes) => self.write_container(number, kind, nodes)?,
+            Node::Container(kind, nodes) => self.write_container(number, (kind, None), nodes)?,
+            Node::Named(name, node) => match *node {
+                Node::Container(kind, nodes) => self.write_container(number, (kind, Some(name)), nodes)?,
+                // Only containers are named.
+                other => return self.write(other),
+            },
         }
         Ok(number)
     }
@@ -135,7 +150,7 @@ impl NodeWriter<'_> {
     fn write_container(
         &mut self,
         number: u64,
-        kind: ContainerKind,
+        (kind, name): (ContainerKind, Option<&str>),
         nodes: Vec<(f32, Node)>,
     ) -> Result<(), RecordingError> {
         let shares: Vec<f32> = nodes.iter().map(|(share, _)| *share).collect();
@@ -147,6 +162,10 @@ impl NodeWriter<'_> {
         }
         let first = paths.first().cloned().unwrap_or_default();
         let blueprint = ContainerBlueprint::new(kind).with_contents(paths);
+        let blueprint = match name {
+            Some(name) => blueprint.with_display_name(name),
+            None => blueprint,
+        };
         let blueprint = match kind {
             ContainerKind::Horizontal => blueprint.with_col_shares(shares.into_iter().map(ColumnShare::from)),
             ContainerKind::Vertical => blueprint.with_row_shares(shares.into_iter().map(RowShare::from)),

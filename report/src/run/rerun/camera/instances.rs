@@ -3,7 +3,7 @@
 use closecall_sensors::camera::{Instance, MASK_THRESHOLD, PixelRect};
 use closecall_traffic::{Time, VehicleClass};
 
-use super::{ENTITY, PIXEL_ROWS, PIXEL_STEP, class_colour, fixed_marks, in_picture};
+use super::{ENTITY, PIXEL_ROWS, PIXEL_STEP, class_colour, clear_covered, fixed_marks, in_picture};
 use crate::run::film::Frame;
 use crate::run::rerun::RecordingError;
 use crate::run::rerun::palette::{self, Rgba};
@@ -58,12 +58,12 @@ fn boxes(found: &[Instance]) -> Boxes2D {
         true => class_colour(instance.class),
         false => palette::QUIET,
     };
-    Boxes2D::from_mins_and_sizes(
-        shown.iter().map(|instance| ends(instance).0),
-        shown.iter().map(|instance| ends(instance).1),
-    )
+    let places: Vec<([f32; 2], [f32; 2])> = shown.iter().map(|instance| ends(instance)).collect();
+    let mut labels: Vec<String> = shown.iter().map(|instance| label(instance)).collect();
+    clear_covered(&places, &mut labels);
+    Boxes2D::from_mins_and_sizes(places.iter().map(|place| place.0), places.iter().map(|place| place.1))
     .with_colors(shown.iter().map(colour))
-    .with_labels(shown.iter().map(|instance| label(instance)))
+    .with_labels(labels)
     .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))))
 }
 

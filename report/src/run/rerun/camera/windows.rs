@@ -3,7 +3,7 @@
 use closecall_sensors::Detection;
 use closecall_sensors::camera::{PixelRect, RearCamera};
 
-use super::{class_colour, in_picture};
+use super::{class_colour, clear_covered, in_picture};
 use crate::run::film::{Film, Frame};
 use crate::run::rerun::palette::{self, Rgba};
 use rerun::Boxes2D;
@@ -18,12 +18,12 @@ pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2
         let [left, top] = [window.left, window.top].map(|start| start as f32);
         in_picture([left, top, left + window.width as f32, top + window.height as f32])
     };
-    Boxes2D::from_mins_and_sizes(
-        in_image.iter().map(|(_, window)| ends(window).0),
-        in_image.iter().map(|(_, window)| ends(window).1),
-    )
-    .with_colors(in_image.iter().map(|(found, _)| colour(found)))
-    .with_labels(in_image.iter().map(|(found, _)| label(found)))
+    let shown: Vec<([f32; 2], [f32; 2])> = in_image.iter().map(|(_, window)| ends(window)).collect();
+    let mut labels: Vec<String> = in_image.iter().map(|(found, _)| label(found)).collect();
+    clear_covered(&shown, &mut labels);
+    Boxes2D::from_mins_and_sizes(shown.iter().map(|ends| ends.0), shown.iter().map(|ends| ends.1))
+        .with_colors(in_image.iter().map(|(found, _)| colour(found)))
+        .with_labels(labels)
 }
 
 fn colour(found: &Detection) -> Rgba {

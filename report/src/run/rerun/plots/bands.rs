@@ -1,18 +1,30 @@
-//! Bands of states over time: the ego stack, what the ego knew, the phase, the moments, the brake lights.
+//! Bands of states over time, in one view: the ego stack with its reasons, the moments, the collisions, what the ego knew, the
+//! health of the sensors, the phase, the brake lights.
+//!
+//! ```text
+//!  states/1_ego_stack/mis   states/2_reason/mis   states/3_moments/mis …
+//! ```
+//!
+//! The viewer shows the path of an entity as the name of its row, and orders the rows by it. The rows of the arms of a pair
+//! therefore lie below each other.
 
 use std::collections::BTreeMap;
 
 use closecall_controllers::EgoState;
 use closecall_scenarios::outcome::{Phase, ReachedMoment};
+use closecall_sensors::faults::SensorGroup;
+use closecall_sensors::{Health, SensorHealth};
 use closecall_traffic::Time;
 use rerun::{StateChange, StateConfiguration};
 
 use super::super::RecordingError;
 use super::super::palette::{self, Rgba};
 use super::super::stream::changes;
-use super::Plots;
+use super::{Plots, Role};
 use crate::run::film::{Frame, KnownSpan, ego_state_name};
 
+/// Entity of all bands. It lies beside the entities of the arms.
+pub(in super::super) const ENTITY: &str = "states";
 const BEFORE: &str = "-";
 const NO_REAR: &str = "no vehicle behind";
 const BRAKES: &str = "on";
@@ -50,6 +62,19 @@ impl<'a> Word<'a> {
 /// The label of a bar that is too short for any letter. In place of an empty one the viewer shows the state.
 const NO_LABEL: &str = " ";
 
+const HEALTHY: &str = "healthy";
+const DEGRADED: &str = "degraded";
+const FAILED: &str = "failed";
+
+/// A group of sensors: its row, its health, and the group of the faults that concern it.
+type HealthRow = (&'static str, fn(&SensorHealth) -> Health, SensorGroup);
+
+const HEALTH_ROWS: [HealthRow; 3] = [
+    ("5_front_sensor", |health| health.front, SensorGroup::Front),
+    ("5_rear_sensors", |health| health.rear, SensorGroup::Rear),
+    ("5_side_sensors", |health| health.surround, SensorGroup::Surround),
+];
+
 const BRAKING: [Word<'static>; 2] =
     [Word::new(BRAKES, BRAKES, palette::BRAKE_LIGHT), Word::new(DRIVES, DRIVES, palette::QUIET)];
 
@@ -79,29 +104,100 @@ pub(in super::super) const fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
+/// Returns what a short bar shows of a text: its first word.
+fn first_word(text: &str) -> &str {
+    text.split([' ', ':', ',']).next().unwrap_or(text)
+}
+
 impl Plots<'_> {
-    /// Writes the bands: the state of the ego stack, what the ego knew of the vehicle behind, the phase, the moments, and
-    /// the brake lights. A band ends with the run.
+    /// Writes the bands. A band ends with the run.
     pub(super) fn bands(&self) -> Result<(), RecordingError> {
         let frames = &self.film.frames;
         if frames.iter().all(|frame| frame.command.is_some()) {
             let state = |frame: &Frame| frame.command.map_or("", |command| ego_state_name(command.state));
-            self.band("states/1_ego", &frames.iter().map(state).collect::<Vec<_>>(), &STATES)?;
+            self.band("1_ego_stack", &frames.iter().map(state).collect::<Vec<_>>(), &STATES)?;
+            self.reasons()?;
             self.sight()?;
+            self.health()?;
             // Without a vehicle behind there is no encounter that could have a phase.
             let phase = |frame: &Frame| match frame.phase {
                 Some(Phase::Approach) if frame.margins.follower.is_none() => NO_REAR,
                 phase => phase.map_or("", phase_name),
             };
-            self.band("states/4_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASES)?;
+            self.band("7_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASES)?;
         }
         self.moments()?;
+        self.collisions()?;
         for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
             let braking = frames.iter().map(|frame| frame.states[index].brake_light);
             let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
             if words.contains(&BRAKES) {
-                self.band(&format!("states/5_brake_light_{}", actor.name), &words, &BRAKING)?;
+                self.band(&format!("8_brake_light_{}", actor.name), &words, &BRAKING)?;
             }
+        }
+        Ok(())
+    }
+
+    /// Writes a band that shows the reason for the state of the ego stack. A controller that never changes its reason has none.
+    fn reasons(&self) -> Result<(), RecordingError> {
+        let reason = |frame: &Frame| frame.command.map_or("", |command| command.reason.text());
+        let words: Vec<&str> = self.film.frames.iter().map(reason).collect();
+        if changes(&words).len() < 2 {
+            return Ok(());
+        }
+        let colour = |frame: &Frame| match frame.command.map(|command| command.state) {
+            Some(EgoState::Following) | None => palette::QUIET,
+            Some(state) => STATES.iter().find(|word| word.text == ego_state_name(state)).map_or(palette::QUIET, |it| it.colour),
+        };
+        let frames = self.film.frames.iter().zip(&words);
+        let states: Vec<Word<'_>> = frames.map(|(frame, text)| Word::new(text, first_word(text), colour(frame))).collect();
+        self.band("2_reason", &words, &states)
+    }
+
+    /// Writes a band that shows from when on vehicles have collided, and which.
+    fn collisions(&self) -> Result<(), RecordingError> {
+        let collisions = self.film.collisions();
+        let texts: Vec<String> = collisions.iter().map(|collision| self.film.struck_text(collision)).collect();
+        if texts.is_empty() {
+            return Ok(());
+        }
+        let latest = |time: Time| collisions.iter().rposition(|collision| collision.time <= time);
+        let words: Vec<&str> =
+            self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
+        let states = texts.iter().map(|text| Word::new(text, text.split(' ').next().unwrap_or(text), palette::CRITICAL));
+        self.band("4_collisions", &words, &states.chain([Word::new(BEFORE, BEFORE, palette::QUIET)]).collect::<Vec<_>>())
+    }
+
+    /// Writes a band for each group of sensors: its health as the ego knows it, and injected faults that the ego has not noticed. The
+    /// arms of a pair have the same sensors, so that the baseline writes none.
+    fn health(&self) -> Result<(), RecordingError> {
+        if self.role == Role::Baseline {
+            return Ok(());
+        }
+        for (row, of, group) in HEALTH_ROWS {
+            let text = |frame: &Frame| {
+                let held = self.film.faults.iter().filter(|fault| fault.group == group && fault.holds_at(frame.time));
+                let effects: Vec<String> = held.map(|fault| format!("{} {}", fault.sensor, fault.effects)).collect();
+                let what = if effects.is_empty() { String::new() } else { format!(": {}", effects.join("; ")) };
+                match frame.health.as_ref().map(of) {
+                    Some(Health::Failed) => format!("{FAILED}{what}"),
+                    Some(Health::Degraded) => format!("{DEGRADED}{what}"),
+                    Some(Health::Ok) | None if effects.is_empty() => HEALTHY.to_owned(),
+                    Some(Health::Ok) | None => format!("faulty, not noticed{what}"),
+                }
+            };
+            let texts: Vec<String> = self.film.frames.iter().map(text).collect();
+            let words: Vec<&str> = texts.iter().map(String::as_str).collect();
+            let colour = |word: &str| match word {
+                HEALTHY => palette::SAFE,
+                word if word.starts_with(FAILED) => palette::CRITICAL,
+                _ => palette::WARNING,
+            };
+            let states: Vec<Word<'_>> = changes(&words)
+                .into_iter()
+                .map(|row| Word::new(words[row], first_word(words[row]), colour(words[row])))
+                .collect();
+            self.band(row, &words, &states)?;
         }
         Ok(())
     }
@@ -117,7 +213,7 @@ impl Plots<'_> {
         let colour = |span: &KnownSpan| if span.from_m.is_some() { palette::SAFE } else { palette::QUIET };
         let states: Vec<Word<'_>> =
             (0..spans.len()).map(|index| Word::new(&texts[index], &shorts[index], colour(&spans[index]))).collect();
-        self.band("states/2_rear_seen", &words, &states)
+        self.band("6_vehicle_behind", &words, &states)
     }
 
     /// Writes a band that shows the latest of the moments of the encounter at each time.
@@ -136,12 +232,13 @@ impl Plots<'_> {
         let states = (0..moments.len())
             .map(|index| Word::new(&texts[index], &short[index], palette::moment(moments[index].moment)))
             .chain([Word::new(BEFORE, BEFORE, palette::QUIET)]);
-        self.band("states/3_moments", &words, &states.collect::<Vec<_>>())
+        self.band("3_moments", &words, &states.collect::<Vec<_>>())
     }
 
     /// Writes a band with one state per frame, and its end after the last frame. A bar shows as much of the state's name
     /// as it has room for.
-    fn band(&self, entity: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
+    fn band(&self, row: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
+        let entity = format!("{ENTITY}/{row}/{}", self.film.arm_label().replace(' ', "_"));
         let rows = changes(words);
         let end = self.film.end() + self.film.period;
         let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).chain([end]).collect();
@@ -159,8 +256,8 @@ impl Plots<'_> {
             .with_values(known.keys().map(String::as_str))
             .with_labels(known.values().map(|(label, _)| *label))
             .with_colors(known.values().map(|(_, colour)| *colour));
-        self.writer.write_static(entity, &configuration)?;
-        self.writer.write_curve(entity, &times, |range| {
+        self.writer.write_static_of_all(&entity, &configuration)?;
+        self.writer.write_curve_of_all(&entity, &times, |range| {
             StateChange::new().with_state(shown[range].iter().map(String::as_str)).columns_of_unit_batches()
         })
     }

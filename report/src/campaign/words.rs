@@ -1,0 +1,241 @@
+//! The verdict in words that a release manager can sign, and the gates in plain words, the worst first.
+//!
+//! ```text
+//!  FAIL: 2 of 14 scenarios miss a requirement: cut-in-into-margin (MIS-6), busy-overtake (MIS-1)
+//!    NOT MET: cut-in-into-margin: MIS-6: …
+//! ```
+//!
+//! The page, the summary and the terminal have the same words in the same order.
+
+use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource, Standing};
+use closecall_campaign::verdict::{Decision, Judgement};
+use closecall_scenarios::criteria::{Aggregate, Operator, Quantity};
+use closecall_traffic::statistics::format::percent;
+
+use crate::units::unit_of;
+
+/// Returns the verdict in one sentence. `scenarios` is the number of scenarios of the campaign.
+pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
+    let word = judged.word();
+    let because = |decided: Standing, verb: &str| {
+        let names = scenarios_of(judged, decided);
+        let listed: Vec<String> = names.iter().map(|(name, marks)| named(name, marks)).collect();
+        let what = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
+        let count = names.iter().filter(|(name, _)| name != ALL).count();
+        (!listed.is_empty()).then(|| match count {
+            0 => format!("{word}: the scenarios together {verb} {what}: {}", listed.join(", ")),
+            1 => format!("{word}: 1 of {scenarios} scenarios {} {what}: {}", singular(verb), listed.join(", ")),
+            count => format!("{word}: {count} of {scenarios} scenarios {verb} {what}: {}", listed.join(", ")),
+        })
+    };
+    let first_reason = || {
+        let is_of_gate = |reason: &&String| judged.gates.iter().any(|gate| gate.to_string() == **reason);
+        judged.reasons.iter().find(|reason| !is_of_gate(reason)).map(|reason| format!("{word}: {reason}"))
+    };
+    let told = match judged.decision {
+        Decision::Fail => because(Standing::Fail, "miss").or_else(first_reason),
+        Decision::Inconclusive => because(Standing::Inconclusive, "do not decide").or_else(first_reason),
+        Decision::Pass => {
+            let met = judged.gates.iter().filter(|gate| gate.standing() == Standing::Pass).count();
+            let all = if scenarios == 1 { "the scenario meets".to_owned() } else { format!("all {scenarios} scenarios meet") };
+            Some(format!("{word}: {all} what is required, {met} of {} gates", judged.gates.len()))
+        }
+        Decision::NotJudged | Decision::Overridden | Decision::SampleError | Decision::Invalid => first_reason(),
+        Decision::Measured => None,
+    };
+    told.unwrap_or_else(|| word.to_owned())
+}
+
+/// Returns a verb as one scenario has it.
+fn singular(verb: &str) -> String {
+    if verb == "miss" { "misses".to_owned() } else { verb.replacen("do not", "does not", 1) }
+}
+
+/// What stands in the place of a scenario for a gate on all of them together.
+const ALL: &str = "all scenarios";
+
+/// Returns the scenarios with a gate of this standing, in the order of the gates, each with the marks of its requirements.
+fn scenarios_of(judged: &Judgement, standing: Standing) -> Vec<(String, Vec<String>)> {
+    let mut names: Vec<(String, Vec<String>)> = Vec::new();
+    for gate in worst_first(judged).into_iter().filter(|gate| gate.standing() == standing) {
+        let name = gate.scenario.clone();
+        let index = names.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
+            names.push((name, Vec::new()));
+            names.len() - 1
+        });
+        if let GateSource::Requirement(mark) = &gate.source
+            && !names[index].1.contains(mark)
+        {
+            names[index].1.push(mark.clone());
+        }
+    }
+    names
+}
+
+fn named(name: &str, marks: &[String]) -> String {
+    if marks.is_empty() { name.to_owned() } else { format!("{name} ({})", marks.join(", ")) }
+}
+
+/// Returns the gates: those that are not met first, and of these the one first that misses its bound by the largest share.
+pub(crate) fn worst_first(judged: &Judgement) -> Vec<&GateResult> {
+    let mut gates: Vec<&GateResult> = judged.gates.iter().collect();
+    gates.sort_by(|one, other| {
+        other.standing().cmp(&one.standing()).then_with(|| missed_by(other).total_cmp(&missed_by(one)))
+    });
+    gates
+}
+
+/// Smallest magnitude of a bound to which a distance is related.
+const LEAST_BOUND: f64 = 0.001;
+
+/// Returns the distance of the value from the bound, as a share of the bound; 0 if the bound is met or there is no value.
+fn missed_by(gate: &GateResult) -> f64 {
+    let (Some(value), Answer::Missed) = (gate.evaluation.value, gate.evaluation.answer) else { return 0.0 };
+    let bound = gate.expression.bound;
+    (value - bound).abs() / bound.abs().max(LEAST_BOUND)
+}
+
+/// Returns a gate in one line, as terminal and summary have it: standing, scenario, requirement, what was found and what is
+/// required, and the criterion.
+pub(crate) fn gate_line(gate: &GateResult) -> String {
+    let scenario = &gate.scenario;
+    let mark = match &gate.source {
+        GateSource::Requirement(mark) => format!("{mark}: "),
+        _ => String::new(),
+    };
+    let source = match &gate.source {
+        GateSource::Requirement(_) => String::new(),
+        source => format!("; from {source}"),
+    };
+    format!("{}: {scenario}: {mark}{} [{}{source}]", gate.standing().word(), gate_words(gate), gate.expression)
+}
+
+/// Returns what a gate found and what it requires, in plain words.
+pub(crate) fn gate_words(gate: &GateResult) -> String {
+    let expression = &gate.expression;
+    let Evaluation { value, interval_95, samples, answer } = gate.evaluation;
+    let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
+    let of = expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
+    let unit = match (&expression.quantity, is_share) {
+        (Quantity::Tested(measure) | Quantity::Baseline(measure), false) if !expression.aggregate.is_of_flag() => unit_of(measure.name),
+        _ => None,
+    };
+    let shown = |value: f64| match (is_share, unit) {
+        (true, _) => percent(value),
+        (false, Some(unit)) => format!("{} {unit}", number(value)),
+        (false, None) => number(value),
+    };
+    let sides = match expression.operator {
+        Operator::AtLeast => "at least",
+        Operator::AtMost => "at most",
+    };
+    let bounded = if matches!(expression.aggregate, Aggregate::Lower | Aggregate::Upper) { format!("{sides} ") } else { String::new() };
+    let is = value.map_or_else(|| "has no value".to_owned(), |value| format!("{bounded}{}", shown(value)));
+    let interval = interval_95
+        .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
+    let open = match answer {
+        Answer::Open(reason) => format!("; {}", reason.text()),
+        Answer::Met | Answer::Missed => String::new(),
+    };
+    format!("{subject}{of}: {is} ({samples} samples{interval}{open}); required: {sides} {}", shown(expression.bound))
+}
+
+/// Returns what is judged in words, and whether it is a share.
+fn subject(aggregate: Aggregate, quantity: &Quantity) -> (String, bool) {
+    let words = flag_words(quantity);
+    match aggregate {
+        Aggregate::Count => (format!("number of samples in which {words}"), false),
+        Aggregate::Share | Aggregate::Lower | Aggregate::Upper => (format!("share of the samples in which {words}"), true),
+        Aggregate::Min => (format!("smallest value of: {words}"), false),
+        Aggregate::Max => (format!("largest value of: {words}"), false),
+        Aggregate::Mean => (format!("mean of: {words}"), false),
+        Aggregate::Sum => (format!("sum of: {words}"), false),
+        Aggregate::Percentile(percent) => (format!("{percent} % percentile of: {words}"), false),
+    }
+}
+
+fn flag_words(quantity: &Quantity) -> String {
+    match quantity {
+        Quantity::Tested(measure) => measure.meaning.to_owned(),
+        Quantity::Baseline(measure) => format!("{} in the baseline", measure.meaning),
+        Quantity::Pair(flag) => format!("a collision is {}", flag.name()),
+    }
+}
+
+/// Returns a number with as many digits as tell it apart, and no more than four.
+fn number(value: f64) -> String {
+    let text = format!("{value:.4}");
+    let short = text.trim_end_matches('0').trim_end_matches('.');
+    if short.is_empty() || short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
+/// Returns the reasons of a verdict in the order in which they are read: what is not met or open, what else there is to say, what is
+/// met. Gates are in plain words.
+pub(crate) fn reasons(judged: &Judgement) -> Vec<String> {
+    let texts: Vec<String> = judged.gates.iter().map(ToString::to_string).collect();
+    let others = judged.reasons.iter().filter(|reason| !texts.contains(reason)).cloned();
+    let lines = |is_met: bool| {
+        let gates = worst_first(judged).into_iter();
+        gates.filter(move |gate| (gate.standing() <= Standing::NotChecked) == is_met).map(gate_line)
+    };
+    lines(false).chain(others).chain(lines(true)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_campaign::gate::OpenReason;
+
+    use super::*;
+
+    fn gate(scenario: &str, text: &str, mark: Option<&str>, value: f64, answer: Answer) -> GateResult {
+        GateResult {
+            scenario: Some(scenario.to_owned()),
+            expression: text.parse().unwrap(),
+            source: mark.map_or(GateSource::CommandLine, |mark| GateSource::Requirement(mark.to_owned())),
+            evaluation: Evaluation { value: Some(value), interval_95: Some([0.2, 0.4]), samples: 60, answer },
+        }
+    }
+
+    fn judged(decision: Decision, gates: Vec<GateResult>) -> Judgement {
+        Judgement {
+            decision,
+            reasons: gates.iter().map(ToString::to_string).chain(["a note".to_owned()]).collect(),
+            gates,
+            requirements: Vec::new(),
+            expectations: Vec::new(),
+            probabilities: Vec::new(),
+            flaky: None,
+        }
+    }
+
+    #[test]
+    fn the_sentence_names_the_scenarios_that_miss_a_requirement_the_worst_first() {
+        let gates = vec![
+            gate("a", "lower(prevented | baseline.ego_collided) >= 0.5", Some("MIS-1"), 0.45, Answer::Missed),
+            gate("b", "upper(induced) <= 0.03", Some("MIS-2"), 0.02, Answer::Met),
+            gate("c", "lower(prevented | baseline.ego_collided) >= 0.5", Some("MIS-1"), 0.05, Answer::Missed),
+        ];
+        let found = judged(Decision::Fail, gates);
+        assert_eq!(sentence(&found, 14), "FAIL: 2 of 14 scenarios miss a requirement: c (MIS-1), a (MIS-1)");
+        let lines = reasons(&found);
+        assert!(lines[0].starts_with("NOT MET: c: MIS-1: share of the samples in which a collision is prevented, where the ego collides in the baseline: at least 5"), "{lines:?}");
+        assert!(lines[0].contains("required: at least 50") && lines[0].ends_with("[lower(prevented | baseline.ego_collided) >= 0.5]"), "{lines:?}");
+        assert_eq!(lines[2], "a note");
+        assert!(lines[3].starts_with("met: b: MIS-2: share of the samples in which a collision is induced: at most 2"), "{lines:?}");
+    }
+
+    #[test]
+    fn what_is_open_or_met_is_said_so() {
+        let open = Answer::Open(OpenReason::TooFewSamples);
+        let found = judged(Decision::Inconclusive, vec![gate("a", "p1(min_ttc_rear_s) >= 1", None, 0.9, open)]);
+        assert_eq!(sentence(&found, 1), "INCONCLUSIVE: 1 of 1 scenarios does not decide a gate: a");
+        let words = gate_words(&found.gates[0]);
+        assert_eq!(
+            words,
+            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20.0 % to 40.0 %; too few \
+             samples to decide); required: at least 1 s"
+        );
+        let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);
+        assert_eq!(sentence(&met, 1), "PASS: the scenario meets what is required, 1 of 1 gates");
+    }
+}

@@ -1,0 +1,187 @@
+//! The incident card of a sample: one page for a ticket, which loads nothing. It has what happened and why in one sentence for each arm,
+//! both arms from above in real time, the headways, and the command that runs the sample again.
+//!
+//! The animation is SMIL, part of SVG, and needs no script.
+
+use std::fmt::Write as _;
+
+use closecall_traffic::{Measured, Time};
+use maud::{Markup, html};
+
+use super::colours::{FRONT, REAR, colour};
+use crate::campaign::html::page::document;
+use crate::run::film::{Film, Frame, Part};
+use closecall_scenarios::outcome::CRITICAL_THW_S;
+
+/// Time shown before and after the moment at which the recording opens.
+const BEFORE: Time = Time::from_ms(12_000);
+const AFTER: Time = Time::from_ms(3_000);
+/// Time between two positions of a vehicle. The browser moves it evenly in between.
+const STEP: Time = Time::from_ms(200);
+/// Rear and front end of the visible road, relative to the ego (m).
+const REACH_M: [f64; 2] = [-65.0, 75.0];
+/// Distance at which a vehicle is out of sight (m).
+const AWAY_M: f64 = 400.0;
+/// The road is drawn wider than it is by this factor.
+const STRETCH: f64 = 2.0;
+/// Room above and below the road (m in the picture).
+const ROOM_M: f64 = 1.5;
+/// Size of a plot of headways, and its margin (px).
+const PLOT_PX: [f64; 2] = [700.0, 130.0];
+const MARGIN_PX: f64 = 26.0;
+/// Upper end of the axis of headways (s).
+const MOST_THW_S: f64 = 4.0;
+const CRITICAL: &str = "#c40018";
+
+/// Returns the card as a page. `replay` is the command that runs the sample again.
+pub(crate) fn card(films: &[Film], replay: &str) -> String {
+    let Some(tested) = films.last() else { return String::new() };
+    let shown = Film::shown_moment(films);
+    let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min().unwrap_or(Time::ZERO);
+    let end = films.iter().map(Film::end).max().unwrap_or(Time::ZERO);
+    let window = Window { from: (shown - BEFORE).max(start), to: (shown + AFTER).min(end) };
+    let sample = tested.outcome().map_or_else(String::new, |outcome| {
+        format!("{} · seed {} · sample {}", outcome.scenario, outcome.seed, outcome.sample)
+    });
+    let verdict = Film::verdict_word(films);
+    let body = html! {
+        h1 { (verdict) ": " (sample) }
+        @for film in films {
+            section.incident {
+                h2 { (film.arm_label()) }
+                @if let Some(sentence) = film.sentence() {
+                    p.failure[film.worst_collision().is_some()] { (sentence.to_string()) }
+                }
+                figure { (road(film, window)) (headways(film, window)) }
+            }
+        }
+        p.note {
+            "From above, in real time, from " (format!("{:.1}", window.from.s())) " to " (format!("{:.1}", window.to.s()))
+            " s: E is the ego, F the lead vehicle, R the rear vehicle; other traffic is grey. The road is drawn twice as wide as it is. "
+            "Below: time headway in front (orange) and behind (pink), with the threshold of 0.9 s."
+        }
+        p { "Run it again, in the campaign's folder:" }
+        pre.command tabindex="0" { (replay) }
+    };
+    document(&format!("{verdict}: {sample}"), &body).into_string()
+}
+
+/// The time that a card shows.
+#[derive(Clone, Copy)]
+struct Window {
+    from: Time,
+    to: Time,
+}
+
+impl Window {
+    /// Returns the times of the positions.
+    fn times(self) -> impl Iterator<Item = Time> {
+        let steps = (self.to - self.from).ns() / STEP.ns();
+        (0..=steps).map(move |step| self.from + STEP * step)
+    }
+
+    /// Returns the duration of the animation as SVG writes it.
+    fn duration(self) -> String {
+        format!("{:.1}s", (self.to - self.from).s().max(STEP.s()))
+    }
+}
+
+/// Returns the index of the frame at a time: the first or the last one outside of the film.
+fn frame_index(film: &Film, time: Time) -> usize {
+    film.frames.partition_point(|frame| frame.time <= time).saturating_sub(1)
+}
+
+/// Returns the road with its moving vehicles.
+fn road(film: &Film, window: Window) -> Markup {
+    let right_m = -film.road.right_edge_m() * STRETCH;
+    let [rear_m, front_m] = REACH_M;
+    let view = format!("{rear_m} {:.1} {} {:.1}", -ROOM_M, front_m - rear_m, right_m + 2.0 * ROOM_M);
+    let lanes = f64::from(film.road.lanes());
+    let lines = (1..film.road.lanes()).map(|line| right_m * f64::from(line) / lanes);
+    html! {
+        svg viewBox=(view) role="img" aria-label={ "The road from above, " (film.arm_label()) } {
+            rect x=(rear_m) y="0" width=(front_m - rear_m) height=(format!("{right_m:.1}")) fill="#e9eaec" {}
+            @for y_m in lines {
+                line x1=(rear_m) x2=(front_m) y1=(format!("{y_m:.1}")) y2=(format!("{y_m:.1}")) stroke="#9aa0a6" stroke-width="0.2" {}
+            }
+            @for actor in 0..film.actors.len() { (vehicle(film, actor, window)) }
+        }
+    }
+}
+
+/// Returns a vehicle that moves. One that never comes into view has no place on the card.
+fn vehicle(film: &Film, actor: usize, window: Window) -> Markup {
+    let size = &film.actors[actor].vehicle.dimensions;
+    let [length_m, width_m] = [size.length_m, size.width_m * STRETCH];
+    let mut is_seen = false;
+    let mut positions = String::new();
+    for time in window.times() {
+        let index = frame_index(film, time);
+        let Some(frame) = film.frames.get(index) else { continue };
+        let ahead_m = frame.states[actor].s_m - frame.states[film.ego].s_m;
+        let is_there = film.is_present(actor, index) && ahead_m.abs() < AWAY_M;
+        is_seen |= is_there && ahead_m > REACH_M[0] - length_m && ahead_m < REACH_M[1] + length_m;
+        let x_m = if is_there { ahead_m } else { AWAY_M };
+        let separator = if positions.is_empty() { "" } else { ";" };
+        // Writing to a string cannot fail.
+        let _ = write!(positions, "{separator}{x_m:.1} {:.1}", -frame.states[actor].d_m * STRETCH);
+    }
+    if !is_seen {
+        return Markup::default();
+    }
+    let letter = match film.actors[actor].part {
+        Part::Ego => "E",
+        Part::Lead => "F",
+        Part::Rear => "R",
+        Part::Other(_) | Part::Background => "",
+    };
+    html! {
+        g {
+            animateTransform attributeName="transform" type="translate" dur=(window.duration()) repeatCount="indefinite" values=(positions) {}
+            rect x=(format!("{:.1}", -0.5 * length_m)) y=(format!("{:.1}", -0.5 * width_m)) width=(format!("{length_m:.1}"))
+                height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(film, actor)) { title { (film.actors[actor].name) } }
+            text y="1" font-size="2.8" text-anchor="middle" fill="#ffffff" { (letter) }
+        }
+    }
+}
+
+/// Returns the headways over time, with a line that moves along.
+fn headways(film: &Film, window: Window) -> Markup {
+    let [width, height] = PLOT_PX;
+    let span_s = (window.to - window.from).s().max(STEP.s());
+    let x = |time: Time| MARGIN_PX + (time - window.from).s() / span_s * (width - 2.0 * MARGIN_PX);
+    let y = |thw_s: f64| height - MARGIN_PX - (thw_s.min(MOST_THW_S) / MOST_THW_S) * (height - 1.5 * MARGIN_PX);
+    let curve = |of: fn(&Frame) -> Measured| {
+        let mut points = String::new();
+        for time in window.times() {
+            if let Some(Ok(thw_s)) = film.frames.get(frame_index(film, time)).map(of) {
+                let _ = write!(points, "{:.0},{:.1} ", x(time), y(thw_s));
+            }
+        }
+        points
+    };
+    let (left, right) = (format!("{:.0}", x(window.from)), format!("{:.0}", x(window.to)));
+    let collisions = film.collisions().iter().map(|collision| collision.time);
+    let shown = collisions.filter(|time| *time >= window.from && *time <= window.to);
+    html! {
+        svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label={ "Time headways, " (film.arm_label()) } {
+            @for thw_s in [0.0, 1.0, 2.0, 3.0, 4.0] {
+                line x1=(left) x2=(right) y1=(format!("{:.1}", y(thw_s))) y2=(format!("{:.1}", y(thw_s))) stroke="#dfe4ea" {}
+                text x="20" y=(format!("{:.1}", y(thw_s) + 4.0)) font-size="11" text-anchor="end" fill="#55606d" { (format!("{thw_s:.0}")) }
+            }
+            line x1=(left) x2=(right) y1=(format!("{:.1}", y(CRITICAL_THW_S))) y2=(format!("{:.1}", y(CRITICAL_THW_S))) stroke=(CRITICAL) stroke-dasharray="4 3" {}
+            polyline fill="none" stroke=(FRONT) stroke-width="2" points=(curve(|frame| frame.margins.thw_front_s)) {}
+            polyline fill="none" stroke=(REAR) stroke-width="2" points=(curve(|frame| frame.margins.thw_rear_s)) {}
+            @for time in shown {
+                line x1=(format!("{:.0}", x(time))) x2=(format!("{:.0}", x(time))) y1="8" y2=(height - MARGIN_PX) stroke=(CRITICAL) stroke-width="2" {}
+            }
+            line x1=(left) x2=(left) y1="8" y2=(height - MARGIN_PX) stroke="#1d242c" {
+                @for end in ["x1", "x2"] {
+                    animate attributeName=(end) from=(left) to=(right) dur=(window.duration()) repeatCount="indefinite" {}
+                }
+            }
+            text x=(left) y=(height - 8.0) font-size="11" fill="#55606d" { (format!("{:.1} s", window.from.s())) }
+            text x=(right) y=(height - 8.0) font-size="11" text-anchor="end" fill="#55606d" { (format!("{:.1} s", window.to.s())) }
+        }
+    }
+}

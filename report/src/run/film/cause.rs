@@ -1,0 +1,65 @@
+//! Why a run ended as it did: the sentence about it, the letters of its vehicles, and how long the reason of the system held.
+
+use closecall_scenarios::causal::CausalSentence;
+use closecall_scenarios::outcome::{Collision, Outcome};
+use closecall_traffic::Time;
+
+use super::{Film, Part};
+
+impl Film {
+    /// Returns the sentence about the run: who struck whom, after what, what the system did and why, which faults held. `None` for
+    /// recorded traffic.
+    pub(in crate::run) fn sentence(&self) -> Option<CausalSentence<'_>> {
+        let outcome = self.outcome.as_ref()?;
+        let reason_span_s = self.reason_span_s(outcome);
+        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, reason_span_s })
+    }
+
+    /// Returns the sentence about the run as text.
+    pub(crate) fn sentence_text(&self) -> Option<String> {
+        self.sentence().map(|sentence| sentence.to_string())
+    }
+
+    /// Returns who struck whom, and how fast.
+    pub(in crate::run) fn struck_text(&self, collision: &Collision) -> String {
+        self.sentence().map_or_else(String::new, |sentence| sentence.struck(collision))
+    }
+
+    /// Returns who struck whom, how fast, and the change of velocity of each.
+    pub(in crate::run) fn collision_text(&self, collision: &Collision) -> String {
+        let sentence = self.sentence();
+        sentence.map_or_else(String::new, |told| format!("{} ({})", told.struck(collision), told.delta_v(collision)))
+    }
+
+    /// Returns the name of a vehicle after its letter: E is the ego, F the lead vehicle, R the rear vehicle of an encounter.
+    pub(in crate::run) fn vehicle_label(&self, actor: usize) -> String {
+        let name = &self.actors[actor].name;
+        let letter = match self.actors[actor].part {
+            // In the film of a lane change, the numbers of the tracks are what a reader looks up.
+            _ if name.starts_with("track-") => return name.clone(),
+            Part::Ego => "E",
+            Part::Lead => "F",
+            Part::Rear => "R",
+            Part::Other(_) | Part::Background => return name.clone(),
+        };
+        format!("{letter} {name}")
+    }
+
+    /// Returns the longest time over which the controller gave the reason of the outcome (s).
+    fn reason_span_s(&self, outcome: &Outcome) -> Option<[f64; 2]> {
+        let reason = outcome.mis.as_ref().ok()?.reason;
+        let mut spans: Vec<[Time; 2]> = Vec::new();
+        let mut is_open = false;
+        for frame in &self.frames {
+            let holds = frame.command.is_some_and(|command| command.reason == reason);
+            match (holds, spans.last_mut().filter(|_| is_open)) {
+                (true, Some(span)) => span[1] = frame.time,
+                (true, None) => spans.push([frame.time; 2]),
+                (false, _) => {}
+            }
+            is_open = holds;
+        }
+        let longest = spans.into_iter().max_by_key(|span| span[1] - span[0])?;
+        Some(longest.map(Time::s))
+    }
+}

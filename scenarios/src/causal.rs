@@ -1,0 +1,300 @@
+//! What happened in a run, in one sentence: who struck whom, how long after which cause, what the margin increase system (MIS) did
+//! and why, and which faults held.
+//!
+//! ```text
+//!  R struck E from behind at 9.2 m/s (ΔV R 5.1, E 5.1 m/s) at 13.50 s, 4.5 s after F braked; the MIS stayed off: passing lane
+//!  occupied, 3.6 to 9.6 s; faults: none
+//! ```
+
+use std::fmt;
+
+use closecall_controllers::Reason;
+use closecall_sensors::SensorMode;
+use closecall_sensors::faults::StatedFault;
+use closecall_traffic::geometry::BoxSide;
+use closecall_traffic::{ActorId, Time};
+
+use super::Scenario;
+use crate::outcome::{Collision, MisSummary, Moment, Outcome};
+
+/// The letters of the vehicles of an encounter: E is the ego, F the lead vehicle, R the rear vehicle. Any other vehicle has its name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VehicleLetters {
+    lead: Option<ActorId>,
+    rear: Option<ActorId>,
+}
+
+impl VehicleLetters {
+    /// Returns the letters of a scenario: by convention the first vehicle besides the ego is the lead vehicle, and the second the
+    /// rear vehicle.
+    pub fn of(scenario: &Scenario) -> Self {
+        let mut others = scenario.actors.iter().enumerate().filter(|(index, _)| *index != scenario.ego);
+        let mut next = || others.next().map(|(_, actor)| actor.id.clone());
+        Self { lead: next(), rear: next() }
+    }
+
+    /// Returns the letter of a vehicle, or its name if it has none. `ego` is the name of the ego.
+    pub fn of_vehicle<'a>(&self, ego: &ActorId, vehicle: &'a ActorId) -> &'a str {
+        match vehicle {
+            _ if vehicle == ego => "E",
+            _ if self.lead.as_ref() == Some(vehicle) => "F",
+            _ if self.rear.as_ref() == Some(vehicle) => "R",
+            _ => vehicle.as_str(),
+        }
+    }
+}
+
+/// The sentence about a run.
+#[derive(Clone, Copy, Debug)]
+pub struct CausalSentence<'a> {
+    /// What the run left behind.
+    pub outcome: &'a Outcome,
+    /// The letters of its vehicles.
+    pub letters: &'a VehicleLetters,
+    /// The faults that were injected.
+    pub faults: &'a [StatedFault],
+    /// The time over which the reason of the MIS held (s), if that is known.
+    pub reason_span_s: Option<[f64; 2]>,
+}
+
+impl CausalSentence<'_> {
+    fn letter<'a>(&self, vehicle: &'a ActorId) -> &'a str {
+        self.letters.of_vehicle(&self.outcome.ego, vehicle)
+    }
+
+    /// Returns the ego's first collision or, if there is none, the first of any vehicles.
+    fn first(&self) -> Option<&Collision> {
+        self.outcome.ego_collisions().next().or(self.outcome.collisions.first())
+    }
+
+    /// Returns who struck whom on which side, and how fast: *R struck E from behind at 9.2 m/s*.
+    pub fn struck(&self, collision: &Collision) -> String {
+        let [striking, struck] = collision.roles();
+        let [own_side, side] = [striking, struck].map(|role| collision.struck_side[role]);
+        let [one, other] = [striking, struck].map(|role| self.letter(&collision.between[role]));
+        let how = match (own_side, side) {
+            (BoxSide::Front, BoxSide::Rear) => format!("struck {other} from behind"),
+            (BoxSide::Front, BoxSide::Front) => format!("struck {other} head-on"),
+            (BoxSide::Rear, BoxSide::Front) => format!("rolled back into the front of {other}"),
+            (_, BoxSide::Left) => format!("struck {other} on its left side"),
+            (_, BoxSide::Right) => format!("struck {other} on its right side"),
+            (_, BoxSide::Front) => format!("struck the front of {other}"),
+            (_, BoxSide::Rear) => format!("struck the rear of {other}"),
+        };
+        format!("{one} {how} at {:.1} m/s", collision.relative_speed_mps)
+    }
+
+    /// Returns the change of velocity of each vehicle: *ΔV R 5.1, E 5.1 m/s*.
+    pub fn delta_v(&self, collision: &Collision) -> String {
+        let texts =
+            collision.roles().map(|role| (self.letter(&collision.between[role]), collision.delta_v_mps[role]));
+        let [(one, one_mps), (other, other_mps)] = texts;
+        format!("ΔV {one} {one_mps:.1}, {other} {other_mps:.1} m/s")
+    }
+
+    /// Returns how long before the collision the lead vehicle began to brake.
+    fn after_braking(&self, collision: &Collision) -> String {
+        match self.outcome.moment(Moment::FrontBrakes) {
+            Some(time) if time <= collision.time => {
+                format!(", {:.1} s after F braked", (collision.time - time).s())
+            }
+            _ => ", F had not braked".to_owned(),
+        }
+    }
+
+    /// Returns what the MIS did and why; nothing if the controller has none.
+    fn mis(&self) -> Option<String> {
+        let mis = self.outcome.mis.as_ref().ok()?;
+        let gone = mis.unavailable.map_or_else(String::new, |gone| {
+            format!(", without its sensors for {:.1} s from {:.1} s on", gone.lasted_s, gone.from_s)
+        });
+        let did = match mis.engaged_at_s {
+            Ok(engaged_at_s) => format!("the MIS engaged at {engaged_at_s:.1} s{}", self.engaged(mis, engaged_at_s)),
+            Err(_) => format!("the MIS stayed off: {}{}", mis.reason, self.reason_span()),
+        };
+        Some(format!("{did}{gone}"))
+    }
+
+    /// Returns how long before or after the braking the MIS engaged, and what it could do.
+    fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
+        let when = self.outcome.moment(Moment::FrontBrakes).map_or_else(String::new, |time| {
+            let before_s = time.s() - engaged_at_s;
+            let side = if before_s >= 0.0 { "before" } else { "after" };
+            format!(", {:.1} s {side} F braked", before_s.abs())
+        });
+        let gained = match (mis.thw_front_at_engagement_s, mis.thw_front_at_critical_s) {
+            (Ok(before_s), Ok(after_s)) => format!(", front headway {before_s:.2} to {after_s:.2} s"),
+            _ => String::new(),
+        };
+        let goal = if mis.reason == Reason::EngagedGoalOutOfReach { ", its goal out of reach" } else { "" };
+        format!("{when}{gained}{goal}")
+    }
+
+    fn reason_span(&self) -> String {
+        self.reason_span_s.map_or_else(String::new, |[from_s, until_s]| format!(", {from_s:.1} to {until_s:.1} s"))
+    }
+
+    /// Returns the faults that began before the first collision, or in the run.
+    fn faults(&self) -> String {
+        let end = self.first().map_or(self.outcome.duration, |collision| collision.time);
+        let has_begun = |fault: &&StatedFault| fault.from_s <= end.s();
+        let texts: Vec<String> = self.faults.iter().filter(has_begun).map(ToString::to_string).collect();
+        if texts.is_empty() { "none".to_owned() } else { texts.join("; ") }
+    }
+}
+
+/// Returns the sentence about a run of a scenario, in which the command line may have set the mode of the sensors.
+pub fn causal_sentence(scenario: &Scenario, sensors: Option<SensorMode>, outcome: &Outcome) -> String {
+    let faults = sensors.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode)).stated_faults();
+    let letters = VehicleLetters::of(scenario);
+    CausalSentence { outcome, letters: &letters, faults: &faults, reason_span_s: None }.to_string()
+}
+
+impl fmt::Display for CausalSentence<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.first() {
+            Some(first) => {
+                write!(f, "{} ({}) at {}", self.struck(first), self.delta_v(first), seconds(first.time))?;
+                f.write_str(&self.after_braking(first))?;
+                let others = self.outcome.collisions.iter().filter(|other| *other != first);
+                for other in others {
+                    let when = if other.time < first.time { "before it" } else { "then" };
+                    write!(f, "; {when} {} at {}", self.struck(other), seconds(other.time))?;
+                }
+            }
+            None => {
+                f.write_str("no vehicle collided")?;
+                if let Some(time) = self.outcome.moment(Moment::FrontBrakes) {
+                    write!(f, "; F braked at {}", seconds(time))?;
+                }
+            }
+        }
+        if let Some(mis) = self.mis() {
+            write!(f, "; {mis}")?;
+        }
+        write!(f, "; faults: {}", self.faults())
+    }
+}
+
+fn seconds(time: Time) -> String {
+    format!("{:.2} s", time.s())
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_sensors::faults::SensorGroup;
+    use closecall_traffic::{Absent, Parameters};
+
+    use super::*;
+    use crate::outcome::{ClosedBy, EndReason, Margins, Phase, ReachedMoment};
+
+    fn id(name: &str) -> ActorId {
+        name.parse().unwrap()
+    }
+
+    fn letters() -> VehicleLetters {
+        VehicleLetters { lead: Some(id("front")), rear: Some(id("rear")) }
+    }
+
+    fn collision(between: [&str; 2], sides: [BoxSide; 2], closed_by: ClosedBy) -> Collision {
+        Collision {
+            time: Time::from_ms(13_500),
+            between: between.map(id),
+            struck_side: sides,
+            closed_by,
+            phase: Phase::Critical,
+            relative_speed_mps: 9.2,
+            delta_v_mps: [5.1, 5.2],
+        }
+    }
+
+    fn outcome(collisions: Vec<Collision>, reason: Reason) -> Outcome {
+        let none = Err(Absent::NoFollower);
+        Outcome {
+            scenario: "s".to_owned(),
+            seed: 1,
+            sample: 0,
+            controller: "mis".to_owned(),
+            ego: id("ego"),
+            parameters: Parameters::default(),
+            end: EndReason::Collision,
+            duration: Time::from_ms(15_500),
+            collisions,
+            moments: vec![ReachedMoment { moment: Moment::FrontBrakes, time: Time::from_ms(9_000) }],
+            margins: Margins {
+                min_thw_front_s: none,
+                min_thw_rear_s: none,
+                min_gap_front_m: none,
+                min_gap_rear_m: none,
+                min_ttc_rear_s: none,
+                max_deceleration_mps2: 0.0,
+                max_jerk_mps3: 0.0,
+                max_speed_deficit_mps: 0.0,
+            },
+            mis: Ok(MisSummary {
+                engaged_at_s: Err(Absent::NeverEngaged),
+                released_at_s: Err(Absent::NeverEngaged),
+                thw_front_at_engagement_s: Err(Absent::NeverEngaged),
+                thw_front_at_critical_s: Err(Absent::NeverEngaged),
+                mean_deceleration_mps2: Err(Absent::NeverEngaged),
+                goal_in_reach: None,
+                reason,
+                unavailable: None,
+            }),
+            cost: None,
+        }
+    }
+
+    fn sentence(outcome: &Outcome, faults: &[StatedFault], reason_span_s: Option<[f64; 2]>) -> String {
+        CausalSentence { outcome, letters: &letters(), faults, reason_span_s }.to_string()
+    }
+
+    #[test]
+    fn the_sentence_says_who_struck_whom_after_what_and_why_the_system_did_not_act() {
+        let rear_end = collision(["ego", "rear"], [BoxSide::Rear, BoxSide::Front], ClosedBy::Second);
+        let run = outcome(vec![rear_end], Reason::PassingLaneOccupied);
+        assert_eq!(
+            sentence(&run, &[], Some([3.6, 9.6])),
+            "R struck E from behind at 9.2 m/s (ΔV R 5.2, E 5.1 m/s) at 13.50 s, 4.5 s after F braked; the MIS stayed off: passing \
+             lane occupied, 3.6 to 9.6 s; faults: none"
+        );
+    }
+
+    #[test]
+    fn sides_and_other_vehicles_have_words() {
+        let struck = |between, sides, closed_by| {
+            let run = outcome(vec![collision(between, sides, closed_by)], Reason::NoRear);
+            sentence(&run, &[], None).split(" at ").next().unwrap().to_owned()
+        };
+        use BoxSide::{Front, Left, Rear, Right};
+        use ClosedBy::{Both, First, Second};
+        assert_eq!(struck(["ego", "front"], [Front, Rear], First), "E struck F from behind");
+        assert_eq!(struck(["ego", "left-2"], [Left, Front], Second), "left-2 struck E on its left side");
+        assert_eq!(struck(["left-2", "rear"], [Right, Left], Second), "R struck left-2 on its right side");
+        assert_eq!(struck(["ego", "rear"], [Front, Front], Both), "E struck R head-on");
+    }
+
+    #[test]
+    fn a_fault_that_begins_after_the_collision_is_not_named() {
+        let fault = |from_s| StatedFault {
+            group: SensorGroup::Rear,
+            sensor: "rear LiDAR".to_owned(),
+            effects: "dead".to_owned(),
+            has_ghost: false,
+            from_s,
+            until_s: f64::INFINITY,
+        };
+        let rear_end = collision(["ego", "rear"], [BoxSide::Rear, BoxSide::Front], ClosedBy::Second);
+        let run = outcome(vec![rear_end], Reason::RearSensorsFailed);
+        let end = |faults: &[StatedFault]| sentence(&run, faults, None).split("; faults: ").nth(1).unwrap().to_owned();
+        assert_eq!(end(&[fault(2.0)]), "rear LiDAR dead from 2.0 s on");
+        assert_eq!(end(&[fault(14.0)]), "none");
+        assert_eq!(end(&[fault(f64::NEG_INFINITY), fault(14.0)]), "rear LiDAR dead");
+        let harmless = outcome(vec![], Reason::RearSensorsFailed);
+        assert_eq!(
+            sentence(&harmless, &[fault(14.0)], None),
+            "no vehicle collided; F braked at 9.00 s; the MIS stayed off: not available: rear sensors failed; faults: rear LiDAR \
+             dead from 14.0 s on"
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! Texts for people at a terminal: wrapped at words to its width, with verdicts in colour. A pipe receives the text as it is.
+//!
+//! `NO_COLOR` and `CLICOLOR` are respected (crate `console`).
+
+use std::fmt::Display;
+use std::io::{IsTerminal, stdout};
+
+use closecall_campaign::session;
+use console::{Style, Term};
+use textwrap::{Options, WordSplitter, wrap};
+
+/// Further indentation of a line that goes on in the next (columns).
+const HANGING: usize = 2;
+/// Narrowest terminal to which texts are wrapped (columns).
+const LEAST_WIDTH: usize = 20;
+
+/// Returns a text for standard output.
+pub(super) fn for_terminal(text: &impl Display) -> String {
+    let text = text.to_string();
+    if session::is_active() || !stdout().is_terminal() {
+        return text;
+    }
+    let width = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    let wrapped = width.map_or(text.clone(), |width| wrapped(&text, width));
+    if console::colors_enabled() { coloured(&wrapped) } else { wrapped }
+}
+
+/// Wraps each line at words. A line that goes on is indented further than its begin.
+fn wrapped(text: &str, width: usize) -> String {
+    let width = width.max(LEAST_WIDTH);
+    let mut lines = Vec::new();
+    for line in text.split('\n') {
+        let indent = line.len() - line.trim_start().len();
+        let hanging = " ".repeat((indent + HANGING).min(width / 2));
+        let options = Options::new(width).subsequent_indent(&hanging).word_splitter(WordSplitter::NoHyphenation);
+        let begin = " ".repeat(indent);
+        lines.extend(wrap(line.trim_start(), options.initial_indent(&begin)).into_iter().map(|line| line.into_owned()));
+    }
+    lines.join("\n")
+}
+
+/// The words at the begin of a line that have a colour.
+const WORDS: [(&str, fn() -> Style); 11] = [
+    ("PASS", good),
+    ("FAIL", bad),
+    ("INVALID", bad),
+    ("ERROR", bad),
+    ("INCONCLUSIVE", undecided),
+    ("NOT JUDGED", undecided),
+    ("OVERRIDDEN", undecided),
+    ("NOT MET", bad),
+    ("met", good),
+    ("open", undecided),
+    ("COLLISION", bad),
+];
+
+fn good() -> Style {
+    Style::new().green().bold()
+}
+
+fn bad() -> Style {
+    Style::new().red().bold()
+}
+
+fn undecided() -> Style {
+    Style::new().yellow().bold()
+}
+
+/// Colours the word at the begin of each line that has one.
+fn coloured(text: &str) -> String {
+    let colour = |line: &str| {
+        let start = line.trim_start();
+        let is_word = |word: &str| {
+            start.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with([':', ' ']))
+        };
+        match WORDS.iter().find(|(word, _)| is_word(word)) {
+            Some((word, style)) => {
+                let (indent, rest) = (&line[..line.len() - start.len()], &start[word.len()..]);
+                format!("{indent}{}{rest}", style().apply_to(word))
+            }
+            None => line.to_owned(),
+        }
+    };
+    text.split('\n').map(colour).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_line_is_wider_than_the_terminal_and_no_word_is_lost() {
+        let text = "FAIL\n  NOT MET: low-thw-overtake: MIS-1: prevents at least 50 % of the collisions\n\n  one two\n";
+        for width in [20, 34, 80] {
+            let lines = wrapped(text, width);
+            assert!(lines.split('\n').all(|line| line.chars().count() <= width), "{width}: {lines}");
+            let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+            if width > 20 {
+                assert_eq!(words(&lines), words(text), "{width}");
+            }
+        }
+        assert_eq!(wrapped(text, 200), text);
+        assert_eq!(wrapped("  aa bb cc dd ee ff gg hh", 20), "  aa bb cc dd ee ff\n    gg hh");
+    }
+
+    #[test]
+    fn only_a_word_of_the_verdict_has_a_colour() {
+        console::set_colors_enabled(true);
+        let coloured_text = coloured("FAIL: 1 of 2\n  FAILURES\n  met: x");
+        console::set_colors_enabled(false);
+        let lines: Vec<&str> = coloured_text.split('\n').collect();
+        assert!(lines[0].starts_with("\u{1b}[") && lines[0].ends_with(": 1 of 2"), "{lines:?}");
+        assert_eq!(lines[1], "  FAILURES");
+        assert!(lines[2].starts_with("  \u{1b}["), "{lines:?}");
+    }
+}
