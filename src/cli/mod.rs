@@ -35,6 +35,7 @@ mod results;
 mod robustness;
 mod run;
 mod sample;
+mod saved;
 mod schema;
 mod sensors;
 mod statistics;

@@ -10,6 +10,7 @@ use maud::{Markup, PreEscaped, html};
 use super::page::{document, table};
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::shown::shown;
 
 /// One recorded sample.
 #[derive(Clone, Debug)]
@@ -42,7 +43,7 @@ pub(in crate::campaign) struct IndexEntry {
 /// [`WriteError`] if the page cannot be written.
 pub(in crate::campaign) fn write_index(path: &Path, entries: &[IndexEntry]) -> Result<(), WriteError> {
     let page = page(entries).into_string();
-    write_file(path, |file| file.write_all(page.as_bytes()))
+    write_file(path, |file| file.write_all(shown(&page).as_bytes()))
 }
 
 fn page(entries: &[IndexEntry]) -> Markup {

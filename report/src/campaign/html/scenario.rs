@@ -20,7 +20,7 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
         section {
             h2 { (scenario.name) }
             @if let Some(file) = file { p.what { (file.config().description) } }
-            (samples::errors(scenario))
+            (samples::errors(findings, scenario))
             (samples::flaky(scenario))
             (samples::worst(findings, scenario))
             (map(scenario)?)
