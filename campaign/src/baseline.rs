@@ -15,6 +15,7 @@ use std::path::Path;
 
 use closecall_scenarios::sampling::Design;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input::read_text;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -115,8 +116,7 @@ impl Baseline {
     /// # Errors
     /// [`FolderError`] if the file cannot be read, is not a baseline of version [`BASELINE_VERSION`], or was edited.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
+        let text = read_text(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
         let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };
         // The version comes first: another layout has other keys.
         let value: Value = serde_json::from_str(&text).map_err(|error| content(error.line(), error.to_string()))?;

@@ -17,6 +17,7 @@ use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_scenarios::ScenarioError;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
 use closecall_traffic::Stream;
+use closecall_traffic::input::read_text;
 use closecall_traffic::statistics::holm;
 use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::statistics::two_sample::{self, Summary};
@@ -88,7 +89,7 @@ impl Fitted {
     /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let read = |source| ScenarioError::Read { path: path.to_owned(), source };
-        let text = std::fs::read_to_string(path).map_err(read)?;
+        let text = read_text(path).map_err(read)?;
         Self::parse(&text).map_err(|message| ScenarioError::Syntax { path: path.to_owned(), line: 1, message })
     }
 

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use crate::execution::End;
 use crate::record::Record;
 use crate::resume_command::{quoted, resume_command};
+use crate::summary::Summary;
 
 /// When a campaign ends before its last sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,6 +67,8 @@ pub struct EndedEarly<'a> {
     pub samples: [u64; 2],
     /// Samples that ended in an error.
     pub errors: u64,
+    /// Why they did: the counts with their failures.
+    pub summary: &'a Summary,
     /// The campaign's folder, and the command line that started it.
     pub kept: Option<(&'a Path, Vec<String>)>,
 }
@@ -84,6 +87,7 @@ impl EndedEarly<'_> {
             "samples": done,
             "of": of,
             "errors": self.errors,
+            "failures": self.summary.failures_json(),
             "resume": self.resume(),
         })
     }
@@ -93,6 +97,9 @@ impl fmt::Display for EndedEarly<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [done, of] = self.samples;
         writeln!(f, "ENDED EARLY, without a verdict: {}; {done} of {of} samples are done", self.message)?;
+        for (scenario, failure) in self.summary.failures() {
+            writeln!(f, "  {scenario}: {failure}")?;
+        }
         let (Some(resume), Some((out, _))) = (self.resume(), &self.kept) else {
             return writeln!(f, "nothing was kept: a campaign with --out can be resumed");
         };
@@ -116,6 +123,11 @@ impl EndMonitor {
     /// Returns a monitor that has seen no record.
     pub const fn new(rule: EndRule) -> Self {
         Self { rule, errors: 0, ending: None }
+    }
+
+    /// Counts a record after which the campaign has gone on.
+    pub fn count(&mut self, record: &Record) {
+        self.errors += u64::from(record.arms.iter().any(|arm| arm.result.is_err()));
     }
 
     /// Counts a record. Returns `Break` if the campaign ends after it.

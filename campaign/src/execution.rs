@@ -54,6 +54,8 @@ pub struct ResumeReport {
     pub retried: u64,
     /// Number of lines that repeated the line before them, and were removed.
     pub doubled: u64,
+    /// Number of samples that were added to a scenario before the next one, because the campaign has grown.
+    pub added: u64,
     /// Why the last records are not in the folder, if the campaign went on without it.
     pub lost: Option<WriteError>,
 }
@@ -71,7 +73,8 @@ impl ResumeReport {
         });
         let doubled = (self.doubled > 0)
             .then(|| format!("{} lines of the journal that repeated the line before were removed", self.doubled));
-        damaged.chain(retried).chain(doubled).chain(torn).collect()
+        let added = (self.added > 0).then(|| format!("{} samples were added to earlier scenarios", self.added));
+        damaged.chain(retried).chain(doubled).chain(added).chain(torn).collect()
     }
 }
 
@@ -200,9 +203,9 @@ impl Campaign {
         folder: Option<&LockedFolder>,
         mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<ResumeReport, CampaignError> {
-        let Repair { damaged, retried, doubled } =
+        let Repair { damaged, retried, doubled, added } =
             folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
-        let mut report = ResumeReport { torn: None, damaged, retried, doubled, lost: None };
+        let mut report = ResumeReport { torn: None, damaged, retried, doubled, added, lost: None };
         if let Some(folder) = folder.filter(|folder| self.stop.is_set() && folder.journal_path().exists()) {
             // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {

@@ -18,6 +18,8 @@ pub enum FailureKind {
     InvalidInput,
     /// A sample has no outcome.
     Sample,
+    /// What runs is not what the campaign began with.
+    Validity,
     /// A file or folder cannot be read or written.
     Io,
 }
@@ -70,7 +72,8 @@ impl From<&SavedError> for FailureKind {
             SavedError::ScenarioNotNamed { .. }
             | SavedError::UnknownScenario { .. }
             | SavedError::UnknownSample { .. }
-            | SavedError::UnknownArm { .. } => Self::Usage,
+            | SavedError::UnknownArm { .. }
+            | SavedError::NotTrusted { .. } => Self::Usage,
         }
     }
 }
@@ -79,7 +82,7 @@ impl From<&CampaignError> for FailureKind {
     fn from(error: &CampaignError) -> Self {
         match error {
             CampaignError::Folder(error) => Self::from(error),
-            CampaignError::Refused { .. } => Self::InvalidInput,
+            CampaignError::Refused { .. } => Self::Validity,
             CampaignError::Remote(error) if error.is_input() => Self::InvalidInput,
             CampaignError::Write(_) | CampaignError::Workers(_) | CampaignError::Remote(_) => Self::Io,
         }

@@ -36,6 +36,9 @@ pub struct Fingerprint {
     pub files: Vec<FileHash>,
     /// What the process states about itself in its first answer.
     pub identity: Identity,
+    /// The files that the process has mapped or opened after its greeting. They differ from machine to machine.
+    #[serde(skip)]
+    open_files: Vec<PathBuf>,
 }
 
 impl Fingerprint {
@@ -51,11 +54,18 @@ impl Fingerprint {
             CheckedDriver::Ego(ego) => identify(settings, folder, ego, &scenario.road).ok(),
             CheckedDriver::Human(_) => None,
         });
+        let (identity, open_files) = greeted.unwrap_or_default();
         Self {
             command: settings.command.clone(),
             files: named_files(settings, folder).into_iter().map(hash).collect(),
-            identity: greeted.unwrap_or_default(),
+            identity,
+            open_files,
         }
+    }
+
+    /// Returns the files that the process has mapped or opened after its greeting.
+    pub(crate) fn open_files(&self) -> &[PathBuf] {
+        &self.open_files
     }
 
     /// Returns the fingerprint of a controller that runs in a process; `None` for all others.
@@ -76,6 +86,7 @@ impl Fingerprint {
             command: settings.text(),
             files: vec![FileHash { name: settings.path.clone(), blake3 }],
             identity: Identity { name: stated.name, version: stated.version },
+            open_files: Vec::new(),
         }
     }
 

@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
+use closecall_traffic::input::read_text;
 
 use super::identity::JournalPlan;
 use super::journal::{self, Entry, Journal};
@@ -25,6 +26,7 @@ use super::lock::{LOCK, Lock};
 use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::record::Record;
 use super::saved::SavedError;
+use super::trust;
 use super::wall_times::{self, WallTime, WallTimes};
 
 pub use crate::folder_error::FolderError;
@@ -115,7 +117,7 @@ impl Folder {
     }
 
     /// Locks a folder for the campaign of `manifest`. Creates the folder and writes the manifest if the folder does not
-    /// exist or is empty. With `resume`, also accepts a folder that already holds the same campaign.
+    /// exist or is empty. With `resume`, also accepts a folder that already holds the same campaign, or the first samples of it.
     ///
     /// # Errors
     /// [`FolderError`] if the folder cannot be written, holds something else, or is locked by another program.
@@ -129,9 +131,14 @@ impl Folder {
         let lock = Lock::acquire(path)?;
         folder.remove_temporary_files()?;
         if folder.file(MANIFEST).exists() {
-            let differences = folder.manifest()?.differences(manifest);
+            let there = folder.manifest()?;
+            let grows = resume && there.grows_to(manifest);
+            let differences = if grows { Vec::new() } else { there.differences(manifest) };
             if !differences.is_empty() {
                 return Err(FolderError::OtherCampaign { path: path.to_owned(), differences });
+            }
+            if grows {
+                folder.write_manifest(manifest)?;
             }
             if !resume {
                 return Err(FolderError::AlreadyThere { path: path.to_owned() });
@@ -190,13 +197,30 @@ impl Folder {
     /// # Errors
     /// [`FolderError`] if there is no manifest, or if its layout has another version than this program's.
     pub fn manifest(&self) -> Result<Manifest, FolderError> {
+        Ok(self.manifest_with_hash()?.0)
+    }
+
+    /// Remembers that this user's program has written the manifest: the folder is the user's own from now on.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the manifest cannot be read, or the user's state folder not be written.
+    pub fn remember(&self) -> Result<(), FolderError> {
+        let (_, hash) = self.manifest_with_hash()?;
+        Ok(trust::remember(&hash).map_err(|source| WriteError::new(&self.path, source))?)
+    }
+
+    /// Returns the manifest, and the BLAKE3 hash of its text.
+    pub(crate) fn manifest_with_hash(&self) -> Result<(Manifest, String), FolderError> {
         let path = self.file(MANIFEST);
-        let text = fs::read_to_string(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
+        let text = read_text(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
         let content = |line, message| FolderError::Content { path: path.clone(), line, message };
         let not_json = |error: serde_json::Error| content(error.line(), error.to_string());
         let value: serde_json::Value = serde_json::from_str(&text).map_err(not_json)?;
         match value.get("manifest_version").and_then(serde_json::Value::as_u64) {
-            Some(version) if version == u64::from(MANIFEST_VERSION) => serde_json::from_str(&text).map_err(not_json),
+            Some(version) if version == u64::from(MANIFEST_VERSION) => {
+                let manifest = serde_json::from_str(&text).map_err(not_json)?;
+                Ok((manifest, blake3::hash(text.as_bytes()).to_string()))
+            }
             Some(version) => {
                 let message = format!("its layout has version {version}, this program has {MANIFEST_VERSION}");
                 Err(content(1, message))

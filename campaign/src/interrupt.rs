@@ -1,10 +1,10 @@
 //! Ctrl-C (SIGINT) and SIGTERM. No process of a controller is left when the program ends.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use closecall_simulation::controller::exec::end_all;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
 
 use crate::stop::StopFlag;
@@ -45,6 +45,8 @@ fn state() -> MutexGuard<'static, State> {
 /// Starts the thread that receives the signals. `announce` is called with the first signal if it stops a campaign, `exit` with
 /// one that ends the program.
 pub fn watch(announce: fn(Signal), exit: fn(Signal)) {
+    // A file that grows beyond the limit of the user (`ulimit -f`) is then an error of its write.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     // Without the thread the signals end the program as the system does by default.
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     let body = move || {

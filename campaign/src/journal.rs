@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::input;
 
 use super::record::Record;
 
@@ -24,6 +25,9 @@ use super::record::Record;
 const SYNC_EVERY: Duration = Duration::from_secs(1);
 /// Length of a line's checksum (hexadecimal digits): the first 64 bits of the BLAKE3 hash.
 const CHECKSUM_DIGITS: usize = 16;
+
+/// Longest line that is a record (bytes). An assumption: 50 times the line of three arms with 10,000 parameters each.
+const MOST_LINE_BYTES: u64 = 64 << 20;
 
 /// A journal that is open for appending.
 #[derive(Debug)]
@@ -40,8 +44,9 @@ impl Journal {
     /// [`WriteError`] if the file cannot be created or cut.
     pub fn open(path: &Path, keep: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
-        let options = OpenOptions::new().create(true).write(true).truncate(false).open(path);
-        let mut file = options.map_err(fail)?;
+        let mut options = OpenOptions::new();
+        options.create(true).write(true).truncate(false);
+        let mut file = input::open_in_folder(path, &mut options).map_err(fail)?;
         file.set_len(keep).map_err(fail)?;
         file.seek(SeekFrom::End(0)).map_err(fail)?;
         Ok(Self { file, path: path.to_owned(), synced: Instant::now() })
@@ -109,7 +114,8 @@ pub enum Entry {
 /// The error of the operating system if the file cannot be opened. An item of the iterator is an error if the file
 /// cannot be read further.
 pub fn read(path: &Path) -> io::Result<Entries> {
-    Ok(Entries { reader: BufReader::new(File::open(path)?), end: 0, line: 0, is_over: false, buffer: Vec::new() })
+    let file = input::open_in_folder(path, OpenOptions::new().read(true))?;
+    Ok(Entries { reader: BufReader::new(file), end: 0, line: 0, is_over: false, buffer: Vec::new() })
 }
 
 /// An iterator over the entries of a journal: see [`read`].
@@ -130,11 +136,11 @@ impl Iterator for Entries {
             return None;
         }
         self.buffer.clear();
-        match self.reader.read_until(b'\n', &mut self.buffer) {
+        match read_line(&mut self.reader, &mut self.buffer) {
             Ok(0) => None,
             Ok(read) => {
                 self.line += 1;
-                self.end += read as u64;
+                self.end += read;
                 Some(match parse(&self.buffer) {
                     Ok(record) => Ok(Entry::Record { record: Box::new(record), end: self.end }),
                     Err(reason) => self.torn(reason),
@@ -155,6 +161,17 @@ impl Entries {
         let is_last = self.reader.by_ref().bytes().next().transpose()?.is_none();
         Ok(Entry::Torn { line: self.line, reason, is_tail: is_unfinished && is_last })
     }
+}
+
+/// Reads a line. Of a line that is too long, as a damaged disk leaves it, no more than [`MOST_LINE_BYTES`] are kept, without its end.
+/// Returns its length (bytes), 0 at the end of the file.
+pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<u64> {
+    line.clear();
+    let mut read = reader.by_ref().take(MOST_LINE_BYTES).read_until(b'\n', line)? as u64;
+    if read == MOST_LINE_BYTES && line.last() != Some(&b'\n') {
+        read += reader.skip_until(b'\n')? as u64;
+    }
+    Ok(read)
 }
 
 pub(super) fn parse(line: &[u8]) -> Result<Record, String> {

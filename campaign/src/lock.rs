@@ -8,6 +8,7 @@ use std::io::{Read, Seek, Write};
 use std::path::Path;
 
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::input;
 
 use super::folder_error::FolderError;
 
@@ -41,8 +42,9 @@ impl Lock {
     fn acquire_file(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LOCK);
         let fail = |source| WriteError::new(&path, source);
-        let options = OpenOptions::new().create(true).read(true).write(true).truncate(false).open(&path);
-        let mut file = options.map_err(fail)?;
+        let mut options = OpenOptions::new();
+        options.create(true).read(true).write(true).truncate(false);
+        let mut file = input::open_in_folder(&path, &mut options).map_err(fail)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {

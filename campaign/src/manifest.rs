@@ -5,6 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, Setting};
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
@@ -188,6 +189,15 @@ impl Manifest {
         differences
     }
 
+    /// Returns true if `other` is the same campaign with more samples: its first samples are those of this one.
+    pub fn grows_to(&self, other: &Self) -> bool {
+        let (one, more) = (self.sampling, other.sampling);
+        let is_fixed = self.inference == Inference::FixedSamples;
+        let grown = Self { sampling: Sampling { samples: more.samples, ..one }, ..self.clone() };
+        // The points of a grid depend on their number.
+        is_fixed && one.design != Design::Grid && one.samples < more.samples && grown.differences(other).is_empty()
+    }
+
     /// Returns the settings: `--set` applies to every scenario.
     pub fn settings(&self) -> Vec<Setting> {
         let texts = self.scenarios.first().map_or(&[][..], |scenario| &scenario.settings);
@@ -226,10 +236,21 @@ impl Manifest {
 
     /// Returns one message for each difference between the controllers of the campaign and those that its commands start
     /// now.
-    pub fn changed_controllers(&self, scenario: &Scenario) -> Vec<String> {
+    ///
+    /// Only the controllers of the arms with these names are started.
+    pub fn changed_controllers(&self, scenario: &Scenario, names: &[&str]) -> Vec<String> {
         let fingerprint = |choice| Fingerprint::of_choice(choice, self.controller_folder(), Some(scenario));
-        let now: Vec<_> = self.arms.iter().filter_map(fingerprint).collect();
-        fingerprint::differences(&self.controllers, &now)
+        let arms = self.arms.iter().zip(self.arm_names());
+        let chosen = arms.filter(|(_, name)| names.contains(&name.as_str())).map(|(arm, _)| arm);
+        let now: Vec<_> = chosen.filter_map(fingerprint).collect();
+        let is_asked = |one: &&Fingerprint| now.iter().any(|other| other.command == one.command);
+        let there: Vec<_> = self.controllers.iter().filter(is_asked).cloned().collect();
+        fingerprint::differences(&there, &now)
+    }
+
+    /// Returns the commands, libraries and FMUs that the arms run.
+    pub fn foreign_code(&self) -> Vec<String> {
+        self.arms.iter().filter(|arm| arm.exec().is_some() || arm.native().is_some()).map(ToString::to_string).collect()
     }
 
     /// Returns the arms, the baseline first.
@@ -299,7 +320,6 @@ fn first_difference(there: &str, here: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use closecall_scenarios::sampling::Design;
     use closecall_simulation::controller::exec::ExecSettings;
 
     use super::*;
@@ -377,6 +397,16 @@ mod tests {
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
         other.partition = Some("1/3".parse().unwrap());
         assert_eq!(manifest().determining_json(), other.determining_json());
+    }
+
+    #[test]
+    fn a_campaign_grows_unless_its_samples_depend_on_their_number() {
+        let with = |samples, design| Manifest { sampling: Sampling { seed: 1, design, samples }, ..manifest() };
+        assert!(with(10, Design::Sobol).grows_to(&with(11, Design::Sobol)));
+        assert!(!with(10, Design::Random).grows_to(&with(9, Design::Random)));
+        assert!(!with(10, Design::Random).grows_to(&with(10, Design::Random)));
+        assert!(!with(10, Design::Grid).grows_to(&with(20, Design::Grid)));
+        assert!(!with(10, Design::Random).grows_to(&Manifest { retry_crashed: 1, ..with(20, Design::Random) }));
     }
 
     #[test]

@@ -1,15 +1,17 @@
 //! Repairs the journal of a campaign before it is resumed: the samples of damaged lines, and on request those that ended
-//! in an error, are run again, and their lines are put in their places. All other lines are kept.
+//! in an error, are run again, and their lines are put in their places. All other lines are kept. The same holds for the samples that a
+//! scenario lacks before the next one begins, because the campaign has grown.
 //!
 //! The journal is replaced in one step. A program that is killed meanwhile leaves the old one.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::fs::OpenOptions;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
 
 use closecall_traffic::atomic::write_file;
+use closecall_traffic::input;
 
 use super::execution::{Campaign, CampaignError};
 use super::folder::{FolderError, LockedFolder, TornLine};
@@ -28,6 +30,8 @@ pub(super) struct Repair {
     pub(super) retried: u64,
     /// Number of lines that repeated the line before them, and were removed.
     pub(super) doubled: u64,
+    /// Number of samples that were added to a scenario before the next one.
+    pub(super) added: u64,
 }
 
 /// A sample: the index of its scenario in the campaign, and its number.
@@ -56,7 +60,7 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
     let results = run_again(campaign, &redos)?;
     let is_complete = |redo: &&Redo| redo.samples.iter().all(|key| results.contains_key(key));
     let complete: Vec<&Redo> = redos.iter().filter(is_complete).collect();
-    let mut old = File::open(&path).map_err(read_error)?;
+    let mut old = input::open_in_folder(&path, OpenOptions::new().read(true)).map_err(read_error)?;
     write_file(&path, |new| {
         let mut copied = 0;
         for redo in &complete {
@@ -70,10 +74,12 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
         io::copy(&mut old, new).map(drop)
     })?;
     wall_times::replace(&folder.wall_times_path(), results.values())?;
-    let of_error = complete.iter().filter(|redo| redo.damaged.is_empty());
+    let of_error = complete.iter().filter(|redo| redo.damaged.is_empty() && !redo.bytes.is_empty());
+    let of_growth = complete.iter().filter(|redo| redo.bytes.is_empty());
     Ok(Repair {
         retried: of_error.map(|redo| redo.samples.len() as u64).sum(),
         doubled: complete.iter().filter(|redo| redo.samples.is_empty() && redo.damaged.is_empty()).count() as u64,
+        added: of_growth.map(|redo| redo.samples.len() as u64).sum(),
         damaged: complete.iter().flat_map(|redo| redo.damaged.clone()).collect(),
     })
 }
@@ -81,13 +87,12 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
 /// Returns the parts of the journal that are to be replaced, in their order. Damaged lines behind the last intact one are
 /// left out: they are cut off when the journal is opened.
 fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
-    let mut reader = BufReader::new(File::open(path)?);
+    let mut reader = BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?);
     let (mut redos, mut damaged, mut buffer, mut before) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut last, mut end, mut damaged_from) = (None, 0, 0);
     for number in 1.. {
         std::mem::swap(&mut buffer, &mut before);
-        buffer.clear();
-        let read = reader.read_until(b'\n', &mut buffer)? as u64;
+        let read = journal::read_line(&mut reader, &mut buffer)?;
         if read == 0 {
             break;
         }
@@ -111,6 +116,8 @@ fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
         if !damaged.is_empty() {
             let Some(samples) = between(campaign, last, key) else { break };
             redos.push(Redo { bytes: damaged_from..start, samples, damaged: std::mem::take(&mut damaged) });
+        } else if let Some(grown) = grown(campaign, last, key) {
+            redos.push(Redo { bytes: start..start, samples: grown, damaged: Vec::new() });
         }
         if campaign.retry_errors && record.arms.iter().any(ArmRecord::is_incomplete) {
             redos.push(Redo { bytes: start..end, samples: vec![key], damaged: Vec::new() });
@@ -140,6 +147,14 @@ fn between(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<K
         keys.extend(rest.take_while(|key| *key < before));
     }
     Some(keys)
+}
+
+/// Returns the last samples of a scenario that are missing before the first one of the next scenario; `None` if there are none.
+fn grown(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<Key>> {
+    let last = after?;
+    let samples = between(campaign, after, before).filter(|samples| !samples.is_empty())?;
+    let is_of_last = |key: &Key| key.0 == last.0;
+    (last.0 < before.0 && samples.iter().all(is_of_last)).then_some(samples)
 }
 
 /// Runs the samples of all parts again.

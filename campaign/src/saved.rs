@@ -1,6 +1,6 @@
 //! A campaign that is saved in a folder: its plan, read back from the manifest.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting};
@@ -9,6 +9,7 @@ use closecall_simulation::{Arm, RunKey, SampleError};
 use crate::folder::{Folder, FolderError};
 use crate::manifest::{Manifest, ManifestScenario};
 use crate::runner::{Work, concrete};
+use crate::trust;
 
 /// The reason for which a saved campaign cannot provide what was requested.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +50,19 @@ pub enum SavedError {
         /// The names to choose from.
         known: Vec<String>,
     },
+    /// The folder was written on another machine or by another user, and names code that would run.
+    #[error(
+        "{} was written by another user or on another machine, and its controllers would run with your rights:\n  {}\nthey run only with \
+         --trust-folder",
+        path.display(),
+        commands.join("\n  ")
+    )]
+    NotTrusted {
+        /// The folder.
+        path: PathBuf,
+        /// The commands, libraries and FMUs, and the folder in which they run.
+        commands: Vec<String>,
+    },
     /// The sampled values of a sample contradict each other.
     #[error("failed to run sample {sample}: {source}")]
     Sample {
@@ -64,24 +78,63 @@ pub enum SavedError {
 pub struct SavedCampaign {
     folder: Folder,
     manifest: Manifest,
+    /// Whether the code that the manifest names may run.
+    is_trusted: bool,
 }
 
 impl SavedCampaign {
-    /// Opens the folder of a campaign.
+    /// Opens the folder of a campaign. The code that it names runs only if the folder is the user's own, or is trusted.
     ///
     /// # Errors
     /// [`FolderError`] if there is no manifest, or it cannot be read.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
-        Self::of(Folder::open(path))
+        let folder = Folder::open(path);
+        let (manifest, hash) = folder.manifest_with_hash()?;
+        let is_trusted = manifest.foreign_code().is_empty() || trust::is_own(&hash);
+        Ok(Self { folder, manifest, is_trusted })
     }
 
-    /// Reads the manifest of a folder.
+    /// Reads the manifest of a folder that this program has just written, or that is read and not run.
     ///
     /// # Errors
     /// [`FolderError`] if there is no manifest, or it cannot be read.
     pub fn of(folder: Folder) -> Result<Self, FolderError> {
         let manifest = folder.manifest()?;
-        Ok(Self { folder, manifest })
+        Ok(Self { folder, manifest, is_trusted: true })
+    }
+
+    /// Lets the code run that the folder names.
+    pub const fn trust(&mut self) {
+        self.is_trusted = true;
+    }
+
+    /// Returns the commands, libraries and FMUs that do not run, because the folder is not the user's own and not trusted.
+    pub fn not_trusted(&self) -> Vec<String> {
+        if self.is_trusted {
+            return Vec::new();
+        }
+        let place = self.manifest.controller_folder().map(|folder| format!("(in {})", folder.display()));
+        self.manifest.foreign_code().into_iter().chain(place).collect()
+    }
+
+    /// Checks that all arms may run.
+    ///
+    /// # Errors
+    /// [`SavedError::NotTrusted`] if the folder names code that does not run.
+    pub fn check_trust(&self) -> Result<(), SavedError> {
+        let commands = self.not_trusted();
+        if commands.is_empty() {
+            return Ok(());
+        }
+        Err(SavedError::NotTrusted { path: self.folder.path().to_owned(), commands })
+    }
+
+    /// Gives the processes of the controllers other limits: the time limit of each answer (ms), and the memory (MiB). `None` leaves a limit
+    /// as the campaign had it.
+    pub fn limit(&mut self, timeout_ms: Option<u64>, memory_mib: Option<u64>) {
+        for arm in &mut self.manifest.arms {
+            *arm = arm.limited(timeout_ms, memory_mib);
+        }
     }
 
     /// Returns the folder.
@@ -102,10 +155,21 @@ impl SavedCampaign {
         works(self.folder.path(), &self.manifest)
     }
 
-    /// Returns the arm of the named controller, or the arm under test.
+    /// Returns the arms, the baseline first.
     ///
     /// # Errors
-    /// [`SavedError::UnknownArm`] if the campaign was not run with that controller.
+    /// [`SavedError::NotTrusted`] if the folder names code that does not run.
+    pub fn arms(&self) -> Result<Vec<Arm>, SavedError> {
+        self.check_trust()?;
+        Ok(self.manifest.arms())
+    }
+
+    /// Returns the arm of the named controller, or the arm under test. A controller that is named by its whole command, as in
+    /// `exec:COMMAND`, is the caller's and not the folder's: it runs in the working folder if the folder is not trusted.
+    ///
+    /// # Errors
+    /// [`SavedError::UnknownArm`] if the campaign was not run with that controller, [`SavedError::NotTrusted`] if the folder names it and
+    /// is not trusted.
     pub fn arm(&self, name: Option<&str>) -> Result<Arm, SavedError> {
         let (controllers, names) = (&self.manifest.arms, self.manifest.arm_names());
         let is_meant =
@@ -114,6 +178,15 @@ impl SavedCampaign {
             let known = controllers.iter().map(ToString::to_string).collect();
             return Err(SavedError::UnknownArm { name: name.unwrap_or_default().to_owned(), known });
         };
+        let controller = &controllers[index];
+        if self.is_trusted || !controller.has_limits() {
+            return Ok(self.manifest.arms().swap_remove(index));
+        }
+        if name == Some(controller.to_string().as_str()) {
+            let sensors = self.manifest.sensors;
+            return Ok(Arm { controller: controller.factory_in(None, names[index].clone()), sensors });
+        }
+        self.check_trust()?;
         Ok(self.manifest.arms().swap_remove(index))
     }
 

@@ -6,6 +6,7 @@ use closecall_scenarios::promise::{Goal, Hindrance};
 use closecall_simulation::Arm;
 
 use super::arm_pairs::ArmPair;
+use super::failures::{FailureKindCount, Failures};
 use super::ledger::{ArmCounts, Inference, PairFate, Pairs, Tally};
 use super::record::Record;
 use super::repeats::Repeats;
@@ -35,6 +36,8 @@ pub struct Counts {
     pub simulated_s: f64,
     /// Samples that repeat the parameters or the outcome of an earlier one. They count in `invalid`, `checks` and `simulated_s` only.
     pub repeated: u64,
+    /// Why samples have no outcome. The total of all scenarios has none: a sample is one of a scenario.
+    pub failures: Failures,
 }
 
 impl Counts {
@@ -55,6 +58,7 @@ impl Counts {
             }
             self.arm_pairs.iter_mut().for_each(|pair| pair.push(&tallies));
             self.push_reasons(record, &tallies);
+            self.failures.push(record);
             self.samples += 1;
         }
         for arm in &record.arms {
@@ -180,6 +184,21 @@ impl Summary {
             total.add(counts);
         }
         total
+    }
+
+    /// Returns why samples have no outcome: the kinds of failure of each scenario, by its name.
+    pub fn failures(&self) -> impl Iterator<Item = (&str, &FailureKindCount)> {
+        self.scenarios.iter().flat_map(|(name, counts)| counts.failures.iter().map(move |kind| (name.as_str(), kind)))
+    }
+
+    /// Returns the kinds of failure as JSON, each with the name of its scenario.
+    pub fn failures_json(&self) -> serde_json::Value {
+        let of = |(scenario, failure): (&str, &FailureKindCount)| {
+            let mut object = serde_json::json!(failure);
+            object["scenario"] = serde_json::json!(scenario);
+            object
+        };
+        self.failures().map(of).collect()
     }
 
     /// Returns true if a baseline stands beside the arm under test.

@@ -148,6 +148,14 @@ impl Judgement {
         self.decision.verdict()
     }
 
+    /// Adds reasons for which the campaign cannot be believed, found outside its records.
+    pub fn add_invalid(&mut self, reasons: Vec<String>) {
+        if !reasons.is_empty() && self.decision != Decision::SampleError {
+            self.decision = Decision::Invalid;
+        }
+        self.reasons.extend(reasons);
+    }
+
     /// Returns the word for reports; a measurement has no verdict.
     pub fn word(&self) -> &'static str {
         self.verdict().map_or("measured, not judged", Verdict::word)
@@ -204,6 +212,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let total = summary.total();
     if total.errors() > 0 {
         found.add(Decision::SampleError, format!("{} ended in an error", samples(total.errors())));
+        summary.failures().for_each(|(scenario, failure)| found.note(format!("{scenario}: {failure}")));
     }
     if summary.is_unchecked {
         found.note("the validity of the simulator was not checked: the checks were switched off".to_owned());

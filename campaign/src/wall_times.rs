@@ -5,14 +5,18 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input;
 
 use super::workers::Finished;
+
+/// Longest line (bytes). An assumption: 100 times the line of 100 arms.
+const MOST_LINE_BYTES: u64 = 1 << 20;
 
 /// The wall time of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,8 +47,9 @@ impl WallTimes {
     /// [`WriteError`] if the file cannot be created or cut.
     pub fn open(path: &Path, index: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
-        let mut file =
-            OpenOptions::new().create(true).read(true).write(true).truncate(false).open(path).map_err(fail)?;
+        let mut options = OpenOptions::new();
+        options.create(true).read(true).write(true).truncate(false);
+        let mut file = input::open_in_folder(path, &mut options).map_err(fail)?;
         let mut keep = 0;
         for (time, end) in lines(BufReader::new(&file)) {
             if time.index >= index {
@@ -104,7 +109,8 @@ pub(super) fn replace<'a>(path: &Path, run_again: impl Iterator<Item = &'a Finis
 /// # Errors
 /// The error of the operating system if the file cannot be opened.
 pub fn read(path: &Path) -> io::Result<impl Iterator<Item = WallTime> + use<>> {
-    Ok(lines(BufReader::new(File::open(path)?)).map(|(time, _)| time))
+    let file = input::open_in_folder(path, OpenOptions::new().read(true))?;
+    Ok(lines(BufReader::new(file)).map(|(time, _)| time))
 }
 
 /// Returns the content of each complete line, and the offset of its end (bytes).
@@ -112,7 +118,7 @@ fn lines(mut reader: impl BufRead) -> impl Iterator<Item = (WallTime, u64)> {
     let (mut end, mut line) = (0, Vec::new());
     std::iter::from_fn(move || {
         line.clear();
-        end += reader.read_until(b'\n', &mut line).ok()? as u64;
+        end += reader.by_ref().take(MOST_LINE_BYTES).read_until(b'\n', &mut line).ok()? as u64;
         let whole = line.strip_suffix(b"\n")?;
         Some((serde_json::from_slice(whole).ok()?, end))
     })

@@ -113,6 +113,10 @@ impl Check for ScenarioConfig {
     }
 }
 
+/// Longest name of a scenario (bytes): `NAME-SAMPLE.rrd` and the name of a temporary file beside it fit into 255 bytes, which file systems
+/// allow.
+const MOST_NAME_BYTES: usize = 120;
+
 impl ScenarioConfig {
     fn check_names(&self) -> Result<(), ConfigError> {
         if self.schema_version != SCHEMA_VERSION {
@@ -123,6 +127,10 @@ impl ScenarioConfig {
         let (name, member) = self.name.split_once('@').map_or((&self.name[..], None), |(name, of)| (name, Some(of)));
         if ActorId::new(name).is_err() || member.is_some_and(|member| ActorId::new(member).is_err()) {
             let allowed = "lower-case letters, digits and hyphens, starting with a letter".to_owned();
+            return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
+        }
+        if self.name.len() > MOST_NAME_BYTES {
+            let allowed = format!("names of at most {MOST_NAME_BYTES} characters, of which files are named");
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
         self.check_requirements()?;

@@ -1,6 +1,5 @@
 //! Reads scenario files. Errors name the file, the line, the key, and what is allowed.
 
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -8,8 +7,9 @@ use crate::parameters::ParameterSpace;
 use crate::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_sensors::camera::Pipeline;
+use closecall_traffic::input;
 use closecall_traffic::suggest::hint;
-use closecall_traffic::{ActorId, Check, ConfigError, KeyPath, ParameterName, Parameters, Segment};
+use closecall_traffic::{ActorId, Check, ConfigError, KeyPath, ParameterName, Parameters, Problem, Segment};
 use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
@@ -21,6 +21,10 @@ const CHECKED_SAMPLES: u64 = 64;
 
 /// Largest size of a scenario file (bytes). A scenario with minutes of recorded speeds has about 1 MiB.
 const MAX_FILE_BYTES: u64 = 64 << 20;
+
+/// Largest number of parameters. Each is checked at its bounds with the values of all others, so that time grows with the square of their
+/// number. An assumption: 30 times as many as any scenario of the library has.
+const MOST_PARAMETERS: u64 = 1_000;
 
 /// A scenario file that cannot be used. No run has been started.
 #[derive(Debug, thiserror::Error)]
@@ -170,6 +174,18 @@ impl ScenarioFile {
     fn parse_whole(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
         // The unchanged text is parsed first, so that errors in the file have the line numbers of the file.
         let mut config = deserialize(path, text)?;
+        let parameters = config.parameters.0.len() as u64;
+        if parameters > MOST_PARAMETERS {
+            let problem = Problem::WrongCount { value: parameters, allowed: "a number of parameters from 0 to 1000" };
+            let source = ConfigError::new("parameters", problem);
+            let line = locate::line_of(text, &source.path);
+            return Err(ScenarioError::Value {
+                path: path.to_owned(),
+                line,
+                source: Box::new(source),
+                at: String::new(),
+            });
+        }
         // A setting may replace the only use of a parameter. Only a parameter that the file itself does not use is a mistake.
         let unused = unused_parameter(&config, text);
         let mut text = text.to_owned();
@@ -243,15 +259,14 @@ impl ScenarioFile {
     /// Returns whether some sample may have this pipeline of the rear camera: the file names it, or a parameter can.
     pub fn may_have_pipeline(&self, pipeline: Pipeline) -> bool {
         let choice = &self.config.sensors.rear_camera.pipeline;
-        let words = self.space.extremes().into_iter().map(|parameters| parameters.word(choice, "pipeline"));
-        words.into_iter().any(|word| word == Ok(pipeline))
+        self.space.extremes().any(|parameters| parameters.word(choice, "pipeline") == Ok(pipeline))
     }
 
     /// Returns whether some sample may have this mode of the sensors, unless a command asks for the mode `asked`.
     pub fn may_have_mode(&self, mode: SensorMode, asked: Option<SensorMode>) -> bool {
         let choice = &self.config.sensors.mode;
         asked.map_or_else(
-            || self.space.extremes().into_iter().any(|parameters| parameters.word(choice, "mode") == Ok(mode)),
+            || self.space.extremes().any(|parameters| parameters.word(choice, "mode") == Ok(mode)),
             |asked| asked == mode,
         )
     }
@@ -308,7 +323,7 @@ impl ScenarioFile {
 /// Reads a file, or the first bytes of it if it is larger than [`MAX_FILE_BYTES`].
 fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    input::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 

@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use closecall_sensors::lidar::{LidarConfig, LidarKindConfig};
+use closecall_traffic::input::read_text;
 use toml_edit::{DocumentMut, Item, TableLike, Value};
 
 use super::{ScenarioConfig, ScenarioError, locate};
@@ -68,7 +69,7 @@ fn element_of(list: &mut Item, index: usize) -> Option<&mut dyn TableLike> {
 
 /// Reads and checks a pattern file, which the key `key` names.
 fn read(path: &Path, key: &str) -> Result<toml_edit::InlineTable, ScenarioError> {
-    let text = std::fs::read_to_string(path).map_err(|source| {
+    let text = read_text(path).map_err(|source| {
         let source = std::io::Error::new(source.kind(), format!("`{key}` names this file: {source}"));
         ScenarioError::Read { path: path.to_owned(), source }
     })?;

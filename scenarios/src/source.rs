@@ -10,6 +10,7 @@
 use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
+use closecall_traffic::input::read_text;
 use closecall_traffic::suggest::nearest;
 
 use super::{ScenarioError, ScenarioFile, Setting, library};
@@ -106,7 +107,7 @@ fn append_below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ScenarioE
 /// Returns false for a TOML file that has no key of a scenario, such as the drivers of an ensemble or a fleet, which may lie below a folder of scenarios. A
 /// file that cannot be read as TOML may be a scenario with a mistake, and is not passed over.
 fn may_be_scenario(path: &Path) -> bool {
-    let document = std::fs::read_to_string(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    let document = read_text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     document.is_none_or(|document| KEYS_OF_SCENARIO.iter().any(|key| document.contains_key(*key)))
 }
 

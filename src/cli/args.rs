@@ -14,6 +14,7 @@ use super::CliError;
 use super::arms::ArmArgs;
 use super::help::heading;
 use super::output::print_error;
+use super::saved::SavedArgs;
 
 /// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -208,4 +209,6 @@ pub(super) struct SavedSampleArgs {
     /// Controller of the arm to run again [default: the controller under test]
     #[arg(long, value_name = "NAME", help_heading = heading::CONTROLLER)]
     pub(super) controller: Option<String>,
+    #[command(flatten)]
+    pub(super) saved: SavedArgs,
 }

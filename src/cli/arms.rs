@@ -12,6 +12,7 @@ use super::CliError;
 use super::args::SensorsChoice;
 use super::help::heading;
 use super::protect::of_controller;
+use super::saved::LimitArgs;
 
 /// The controller under test.
 #[derive(Clone, Debug, Args)]
@@ -23,12 +24,8 @@ pub(super) struct ControllerArgs {
     /// program of your own, which reads a line per control step and answers with a line
     #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
-    /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000), help_heading = heading::CONTROLLER)]
-    controller_timeout_ms: Option<u64>,
-    /// Memory limit of each process of an `exec`, `lib` or `fmu` controller [default: 1024]
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576), help_heading = heading::CONTROLLER)]
-    controller_memory_mib: Option<u64>,
+    #[command(flatten)]
+    pub(super) limits: LimitArgs,
 }
 
 impl ControllerArgs {
@@ -39,7 +36,7 @@ impl ControllerArgs {
 
     /// Returns the controllers, the processes among them with the limits of the command line. Each is tried.
     fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
-        let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
+        let (timeout_ms, memory_mib) = (self.limits.controller_timeout_ms, self.limits.controller_memory_mib);
         if let (Some(last), true) = (controllers.last(), timeout_ms.is_some() || memory_mib.is_some())
             && !controllers.iter().any(ControllerChoice::has_limits)
         {

@@ -1,13 +1,17 @@
 //! The inference backend of the rear camera's network. It is loaded only by commands that may run the network.
 
 use std::path::Path;
+use std::time::Duration;
 
 use closecall_scenarios::Scenario;
-use closecall_sensors::camera::{Backend, Camera, CameraConfig, Classifier, Pipeline};
+use closecall_sensors::camera::{Backend, Camera, CameraConfig, Classifier, ClassifierError, Pipeline};
 use closecall_sensors::{SensorMode, inference_backend, set_inference_backend};
 use closecall_simulation::Arm;
+use closecall_simulation::controller::exec::{Child, ExecError, ExecSettings};
+use closecall_simulation::controller::native::command;
 
 use super::CliError;
+use crate::exit_code::ExitCode;
 
 /// Chooses the backend without loading it.
 pub(super) fn choose_backend(onnxruntime: Option<&Path>) {
@@ -18,9 +22,34 @@ pub(super) fn choose_backend(onnxruntime: Option<&Path>) {
 pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
     let backend = inference_backend();
     if is_used && *backend != Backend::Tract {
+        if let Backend::OnnxRuntime(library) = backend {
+            try_to_load(library, backend)?;
+        }
         Classifier::shipped(backend)?;
     }
     Ok(())
+}
+
+/// Longest time in which ONNX Runtime is loaded. An assumption: ten times what it takes on a slow disk.
+const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
+/// Memory of the process that tries it (MiB): that of the network and of all of ONNX Runtime, several times.
+const LOAD_MEMORY_MIB: u64 = 8_192;
+
+/// Loads the library in a process of its own: one that ends the process, or hangs it, must not end this program as if all was well.
+fn try_to_load(library: &Path, backend: &Backend) -> Result<(), ClassifierError> {
+    let words = command(&["onnxruntime", &library.display().to_string()]);
+    // A word with a NUL character, which cannot be quoted, names no file.
+    let command = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default();
+    let settings = ExecSettings { command, timeout_ms: 0, memory_mib: LOAD_MEMORY_MIB };
+    let fail = |reason: String| ClassifierError::Load { backend: backend.clone(), reason };
+    let answer = Child::start(&settings, None).and_then(|mut child| child.request_within(Vec::new(), LOAD_TIMEOUT));
+    match answer {
+        Ok(Some(_)) => Ok(()),
+        Ok(None) => Err(fail(format!("it is not loaded within {} s", LOAD_TIMEOUT.as_secs()))),
+        // It cannot be loaded: this process finds the same, and says why.
+        Err(ExecError::Ended { status, .. }) if status.code() == Some(ExitCode::SampleError as i32) => Ok(()),
+        Err(error) => Err(fail(error.to_string())),
+    }
 }
 
 /// Loads the Mask R-CNN of each camera.

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use closecall_campaign::arguments::positive;
+use closecall_campaign::controller_watch::ControllerWatch;
 use closecall_campaign::end_rule::EndMonitor;
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
 use closecall_campaign::folder::Folder;
@@ -40,7 +41,7 @@ use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{heartbeat, out, outln, print_error};
+use super::output::{heartbeat, out, outln, print_error, print_failure};
 use super::plan::PlanArgs;
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
 use super::terminal::for_terminal;
@@ -249,7 +250,31 @@ impl Companion for Alone {
     }
 }
 
+/// Checks what would fail after the samples have run.
+fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
+    if args.record.is_some() && args.results.place()? == Place::Nowhere {
+        return Err(CliError::usage(
+            "--record: the recordings are kept in a folder of results: name one with --out DIR",
+        ));
+    }
+    // The manifest names them, and it is text.
+    let folder = std::env::current_dir().ok();
+    let place = match args.results.place()? {
+        Place::Named(path) => Some(path),
+        Place::Default | Place::Nowhere => None,
+    };
+    let named = args.scenarios.iter().map(PathBuf::as_path).chain(place).chain(folder.as_deref());
+    match named.into_iter().find(|path| path.to_str().is_none()) {
+        Some(path) => Err(CliError::usage(format!(
+            "{}: the name is not text (UTF-8), so that the campaign cannot be resumed or replayed: use another name",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
+    check_arguments(args)?;
     let controllers = args.comparison.controllers(&args.controller, args.plan.wants_pairs())?;
     let is_paired = controllers.len() > 1;
     let mut gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
@@ -278,6 +303,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
     let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
     campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;
     let mut results = Results::start(planned.results, &mut campaign, &manifest)?;
+    let mut watch = ControllerWatch::start(&manifest);
     if let Some(folder) = results.complete() {
         companion.begin(folder)?;
     }
@@ -291,7 +317,10 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
         scenarios: campaign.works.len(),
     };
     let mut progress = Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
-    let resumption = campaign.run(results.locked.as_ref(), |next| progress.push(next))?;
+    let resumption = campaign.run(results.locked.as_ref(), |next| {
+        watch.look();
+        progress.push(next)
+    })?;
     progress.bar.finish_and_clear();
     resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));
     results.lose(resumption.lost);
@@ -301,7 +330,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
         let kept = results.locked.as_ref().map(|locked| locked.folder.path());
         let code = ending.print(planned.format, &campaign, &progress.tally.summary, kept);
         return Ok(results.into_lost().map_or(code, |error| {
-            print_error(format_args!("{:?}\n", miette::Report::new(error)));
+            print_failure(error);
             ExitCode::first_of([code, ExitCode::Io])
         }));
     }
@@ -309,7 +338,8 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
         companion.end(folder)?;
     }
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
-    let judged = tally.judgement();
+    let mut judged = tally.judgement();
+    judged.add_invalid(watch.finish());
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
     match planned.format {
         Format::Json => {
@@ -380,7 +410,12 @@ impl Progress {
             // Records read from the journal say nothing about how long the rest will take.
             self.bar.reset_eta();
         }
-        self.end.observe(next.record)?;
+        if next.is_new {
+            self.end.observe(next.record)?;
+        } else {
+            // The campaign went on after it.
+            self.end.count(next.record);
+        }
         let tested = self.tally.summary.tested(&self.names[next.work]);
         tested.map_or(ControlFlow::Continue(()), |tested| self.stop.observe(next.work, tested))
     }

@@ -24,8 +24,9 @@ use serde_json::json;
 use super::CliError;
 use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
-use super::output::{outln, print_written};
+use super::output::{outln, print_error, print_written};
 use super::protect::{of_campaign, protect};
+use super::saved::SavedArgs;
 use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
@@ -47,15 +48,22 @@ pub(super) struct ExplainArgs {
     /// Largest number of samples to explain: induced failures first, then those with the most harm
     #[arg(long, value_name = "N", value_parser = count, default_value = "100", conflicts_with = "sample", help_heading = heading::SAMPLES)]
     most: u64,
+    #[command(flatten)]
+    saved: SavedArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
 pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
-    let saved = SavedCampaign::open(&args.dir)?;
+    let saved = args.saved.open(&args.dir)?;
+    saved.check_trust()?;
     let (found, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
-    write_causes(&saved, &failures)?.iter().for_each(|path| print_written(path));
+    match write_causes(&saved, &failures) {
+        Ok(paths) => paths.iter().for_each(|path| print_written(path)),
+        // The explanation does not depend on it.
+        Err(error) => print_error(format_args!("warning: the explanation is not kept: {error}\n")),
+    }
     match (args.format, args.sample, &found[..]) {
         (Format::Json, Some(_), [one]) => outln!("{:#}", stamped(json!(one), Some(one.seed), None)),
         (Format::Json, ..) => outln!("{:#}", stamped(json!(found), None, None)),
@@ -89,7 +97,7 @@ pub(super) struct MinimizeArgs {
 }
 
 pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
-    let saved = SavedCampaign::open(&args.of.dir)?;
+    let saved = args.of.saved.open(&args.of.dir)?;
     let case = Case::of(&saved, args.of.scenario.as_deref(), args.of.sample, args.of.controller.as_deref());
     let case = case.map_err(CausesError::from)?;
     let paths = output_files(&case, args.output.as_deref())?;

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::CliError;
 use super::args::{FittedArgs, Format, SetArgs};
 use super::help::{examples, heading};
-use super::output::{outln, print_error};
+use super::output::{outln, print_failure};
 use super::watching::{WatchingArgs, watch};
 use crate::exit_code::ExitCode;
 
@@ -115,7 +115,7 @@ fn print(file: Result<ScenarioFile, ScenarioError>, path: &Path) {
             let count = file.space().iter().len();
             outln!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
         }
-        Err(error) => print_error(format_args!("{:?}\n", miette::Report::new(CliError::from(error)))),
+        Err(error) => print_failure(error.into()),
     }
 }
 

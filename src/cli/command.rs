@@ -7,12 +7,14 @@ use clap::{CommandFactory, Parser, Subcommand};
 use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
 use closecall_campaign::session::{Printed, Session, set_arguments};
+use closecall_controllers::external::remove_unpacked;
 use closecall_simulation::controller::exec::{adopt_orphans, end_all};
+use closecall_traffic::shown::shown;
 
 use super::backend::choose_backend;
 use super::groups::{Study, Tool, Traffic};
 use super::help::heading;
-use super::output::{announce, print_error};
+use super::output::{announce, print_error, print_failure};
 use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
 use crate::exit_code::ExitCode;
 
@@ -153,6 +155,12 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         Err(error) => {
             // Help and version are not errors: clap prints them to standard output.
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Pass };
+            let plain = error.render().to_string();
+            if shown(&plain) != plain {
+                // It quotes an argument with control characters.
+                print_error(format_args!("{plain}"));
+                return code;
+            }
             return if error.print().is_ok() { code } else { ExitCode::Io };
         }
     };
@@ -160,18 +168,39 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     if !matches!(cli.command, Command::View(_)) {
         adopt_orphans();
     }
-    watch(announce, |signal| std::process::exit(ExitCode::from(signal) as i32));
+    watch(announce, |signal| {
+        remove_unpacked();
+        std::process::exit(ExitCode::from(signal) as i32)
+    });
+    if let Some(message) = wrong_stack() {
+        print_failure(CliError::usage(message));
+        return ExitCode::Usage;
+    }
     choose_backend(cli.onnxruntime.as_deref());
     let result = dispatch(cli.command);
     end_all();
+    remove_unpacked();
     match result {
         Ok(code) => code,
         Err(error) => {
             let code = ExitCode::from(&error);
-            print_error(format_args!("{:?}\n", miette::Report::new(error)));
+            print_failure(error);
             code
         }
     }
+}
+
+/// Sizes of the stacks of threads that the variable `RUST_MIN_STACK` may name (bytes). The default of Rust is 2 MiB. A run needs less than
+/// 1 MiB; that a thread for each processor fits into the address space is an assumption.
+const STACK_BYTES: std::ops::RangeInclusive<u64> = 1 << 20..=1 << 30;
+
+/// Returns what is wrong with the stacks that the environment asks for. Samples would overflow them, or no thread could start.
+fn wrong_stack() -> Option<String> {
+    let stated = std::env::var("RUST_MIN_STACK").ok()?;
+    let bytes: u64 = stated.parse().ok()?;
+    let (least, most) = (STACK_BYTES.start(), STACK_BYTES.end());
+    (!STACK_BYTES.contains(&bytes))
+        .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
 }
 
 /// Runs a command that another program calls, and returns the exit code of the command line and what it has printed. The first

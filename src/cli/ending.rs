@@ -70,6 +70,7 @@ impl Ending {
             ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
             samples: [summary.total().samples, campaign.len()],
             errors: summary.total().errors(),
+            summary,
             kept: out.map(|out| (out, session::arguments())),
         };
         match format {

@@ -258,6 +258,7 @@ impl From<FailureKind> for ExitCode {
             FailureKind::Usage => Self::Usage,
             FailureKind::InvalidInput => Self::InvalidInput,
             FailureKind::Sample => Self::SampleError,
+            FailureKind::Validity => Self::Invalid,
             FailureKind::Io => Self::Io,
         }
     }

@@ -10,6 +10,7 @@ use closecall_scenarios::sampling::Design;
 
 use super::CliError;
 use super::help::heading;
+use super::output::print_error;
 
 /// The gates of a campaign.
 #[derive(Clone, Debug, Args)]
@@ -87,6 +88,7 @@ impl GateArgs {
             AssemblyError::Project(error) => error.into(),
             error => CliError::usage(error.to_string()),
         })?;
+        set.notes.iter().for_each(|note| print_error(format_args!("note: {note}\n")));
         Ok(set)
     }
 

@@ -14,8 +14,9 @@ use super::CliError;
 use super::args::Format;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{out, outln};
-use super::results::{ArtifactArgs, print_results, selection};
+use super::output::{out, outln, print_error};
+use super::results::{ArtifactArgs, print_results, remember, selection};
+use super::saved::TrustArgs;
 use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
@@ -39,6 +40,8 @@ pub(super) struct MergeArgs {
     #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
+    trust: TrustArgs,
+    #[command(flatten)]
     artifacts: ArtifactArgs,
     #[command(flatten)]
     gates: GateArgs,
@@ -49,11 +52,29 @@ pub(super) struct MergeArgs {
 
 pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let parts = Parts::open(&args.parts)?;
+    let mut is_trusted = true;
+    for part in &args.parts {
+        let saved = args.trust.open(part)?;
+        if args.record.is_some() {
+            saved.check_trust()?;
+        }
+        is_trusted &= saved.not_trusted().is_empty();
+    }
     let works = works(&args.parts[0], parts.manifest())?;
     parts.check(&works)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
     let merged = parts.merge(&works, &args.out, session::arguments())?;
+    // Samples are run again to record them. The merged folder is trusted as its parts are.
+    let selection = if is_trusted { selection(args.record) } else { Selection::default() };
+    if is_trusted {
+        remember(&merged.folder);
+    } else {
+        print_error(format_args!(
+            "no sample is recorded: parts were written by another user or on another machine, and their controllers run only with \
+             --trust-folder\n"
+        ));
+    }
     let saved = SavedCampaign::of(merged.folder.clone())?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let judged = tally.judgement();
@@ -67,7 +88,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
             out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: works.len() }));
         }
     }
-    let written = report.write(saved.folder(), selection(args.record));
+    let written = report.write(saved.folder(), selection);
     let code = args.artifacts.code((&judged).into(), &written);
     print_results(saved.folder(), &written.recorded);
     Ok(code)

@@ -36,6 +36,7 @@ mod results;
 mod robustness;
 mod run;
 mod sample;
+mod saved;
 mod schema;
 mod sensors;
 mod statistics;

@@ -1,6 +1,6 @@
 //! Prints results and messages. Writing to a pipe whose reader has closed it is not an error.
 
-use std::fmt::Arguments;
+use std::fmt::{self, Arguments};
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,22 @@ use closecall_campaign::session;
 use closecall_report::heartbeat::Heartbeat;
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::atomic::{WriteError, write_texts};
+use closecall_traffic::shown::shown;
 use indicatif::ProgressBar;
 
+use super::CliError;
 use crate::exit_code::ExitCode;
 
-/// Prints to standard output. A reader that has closed the pipe (`closecall … | head`) does not change the exit code.
+/// Prints to standard output, without control characters of others (see [`shown`]). A reader that has closed the pipe (`closecall … | head`) does not change the exit code.
 /// Any other failure ends the program with [`ExitCode::Io`].
 pub(super) fn print(text: Arguments<'_>) {
-    if session::keep_output(text) {
+    let text = text.to_string();
+    let text = shown(&text);
+    if session::keep_output(format_args!("{text}")) {
         return;
     }
     let mut out = stdout().lock();
-    if let Err(error) = out.write_fmt(text).and_then(|()| out.flush())
+    if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush())
         && error.kind() != ErrorKind::BrokenPipe
     {
         print_error(format_args!("failed to write to standard output: {error}\n"));
@@ -29,12 +33,41 @@ pub(super) fn print(text: Arguments<'_>) {
     }
 }
 
-/// Prints to standard error. A failure is ignored, since there is nowhere left to report it.
+/// Prints to standard error, without control characters of others (see [`shown`]). A failure is ignored, since there is nowhere left
+/// to report it.
 pub(super) fn print_error(text: Arguments<'_>) {
-    if session::keep_message(text) {
+    let text = text.to_string();
+    let text = shown(&text);
+    if session::keep_message(format_args!("{text}")) {
         return;
     }
-    drop(stderr().lock().write_fmt(text));
+    drop(stderr().lock().write_all(text.as_bytes()));
+}
+
+/// Prints why a command has no result. On a terminal, the frame of the message has colours.
+pub(super) fn print_failure(error: CliError) {
+    let text = format!("{:?}\n", miette::Report::new(Shown(error)));
+    if !session::keep_message(format_args!("{}", shown(&text))) {
+        drop(stderr().lock().write_all(text.as_bytes()));
+    }
+}
+
+/// An error whose message has no control characters of others.
+#[derive(Debug)]
+struct Shown(CliError);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&shown(&self.0.to_string()))
+    }
+}
+
+impl std::error::Error for Shown {}
+
+impl miette::Diagnostic for Shown {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.0.help().map(|help| Box::new(shown(&help.to_string()).into_owned()) as Box<dyn fmt::Display>)
+    }
 }
 
 /// Prints which signal stops the running campaign.

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
-use closecall_campaign::saved::SavedCampaign;
 use closecall_report::run::figure::{PictureFile, encounter, parse_width_mm};
 use closecall_report::run::film::{Film, Level, film_arms};
 use closecall_scenarios::Scenario;
@@ -19,6 +18,7 @@ use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::outln;
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
+use super::saved::{LimitArgs, TrustArgs};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
@@ -47,6 +47,8 @@ pub(super) struct PlotArgs {
     comparison: ComparisonArgs,
     #[command(flatten)]
     arm: ArmArgs,
+    #[command(flatten)]
+    trust: TrustArgs,
     #[command(flatten)]
     set: SetArgs,
     /// File to write; its extension, .svg, .png or .pdf, determines the format
@@ -93,9 +95,11 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         ));
     };
     protect(&files_of_campaign(&args.source), &[("--output", Some(args.output.path()))])?;
-    let saved = SavedCampaign::open(&args.source)?;
+    let LimitArgs { controller_timeout_ms, controller_memory_mib } = args.arm.controller.limits;
+    let mut saved = args.trust.open(&args.source)?;
+    saved.limit(controller_timeout_ms, controller_memory_mib);
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
-    let mut arms = saved.manifest().arms();
+    let mut arms = saved.arms()?;
     if args.comparison.paired && arms.len() < 2 {
         arms.insert(0, arm(&ControllerChoice::ACC, args.arm.sensors));
     }

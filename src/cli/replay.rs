@@ -3,7 +3,6 @@
 use clap::Args;
 use closecall_campaign::folder::Agreement;
 use closecall_campaign::manifest::{Manifest, version};
-use closecall_campaign::saved::SavedCampaign;
 
 use super::CliError;
 use super::args::{Format, SavedSampleArgs, SetArgs};
@@ -37,18 +36,19 @@ pub(super) struct ReplayArgs {
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
-    let saved = SavedCampaign::open(&args.of.dir)?;
+    let saved = args.of.saved.open(&args.of.dir)?;
     let controllers = saved.manifest().arms.iter().flat_map(of_controller);
     protect(&of_campaign(&args.of.dir).into_iter().chain(controllers).collect::<Vec<_>>(), &args.watch.outputs())?;
     let (scenario, key) = saved.sample_with(args.of.scenario.as_deref(), args.of.sample, &args.set.settings)?;
     let arms = match args.paired {
-        true => saved.manifest().arms(),
+        true => saved.arms()?,
         false => vec![saved.arm(args.of.controller.as_deref())?],
     };
     for arm in &arms {
         announce_process(saved.manifest(), arm.controller.name());
     }
-    let changes = saved.manifest().changed_controllers(&scenario);
+    let names: Vec<&str> = arms.iter().map(|arm| arm.controller.name()).collect();
+    let changes = saved.manifest().changed_controllers(&scenario, &names);
     for change in &changes {
         print_error(format_args!("{change}\n"));
     }

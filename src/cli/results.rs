@@ -149,6 +149,13 @@ impl Results {
                 }
             }
         };
+        // A command of a folder that runs elsewhere is not what the command line says.
+        let is_here = |there: &Manifest| there.working_folder == manifest.working_folder;
+        if let Some(locked) =
+            locked.as_ref().filter(|locked| locked.folder.manifest().is_ok_and(|there| is_here(&there)))
+        {
+            remember(&locked.folder);
+        }
         Ok(Self { locked, lost })
     }
 
@@ -167,6 +174,18 @@ impl Results {
     /// Returns the reason for which the results are not kept completely, if they should be.
     pub(super) fn into_lost(self) -> Option<CliError> {
         self.lost
+    }
+}
+
+/// Remembers that the folder is the user's own, if it names code that a later command would run.
+pub(super) fn remember(folder: &Folder) {
+    if folder.manifest().is_ok_and(|manifest| manifest.foreign_code().is_empty()) {
+        return;
+    }
+    if let Err(error) = folder.remember() {
+        print_error(format_args!(
+            "warning: {error}: commands that run samples of the folder again need --trust-folder\n"
+        ));
     }
 }
 

@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::{FittedArgs, SetArgs};
 use super::arms::{ArmArgs, ComparisonArgs};
 use super::help::heading;
-use super::output::{outln, print_error};
+use super::output::{outln, print_error, print_failure};
 use crate::exit_code::ExitCode;
 
 /// Time between two looks at the file.
@@ -78,7 +78,7 @@ pub(super) fn watch(
         }
         if let Err(error) = round(&path, changes, args) {
             code = ExitCode::from(&error);
-            print_error(format_args!("{:?}\n", miette::Report::new(error)));
+            print_failure(error);
         }
         if args.rounds.is_none_or(|last| rounds < last) {
             outln!("watching {} (Ctrl-C ends)\n", path.display());

@@ -66,6 +66,7 @@ impl GateSet {
         }
         let here = std::env::current_dir().ok();
         if let Some(project) = here.map(|folder| ProjectFile::find(&folder)).transpose()?.flatten() {
+            self.notes.extend(project.foreign_owner());
             project.add_to(self)?;
         }
         if self.probability.is_some() && design != Design::Random {

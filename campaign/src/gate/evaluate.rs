@@ -2,6 +2,7 @@
 
 use closecall_scenarios::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
 use closecall_traffic::maths::powf;
+use closecall_traffic::statistics::needed::{MAX_SAMPLES, first_that_holds};
 use closecall_traffic::statistics::quantiles::quantile;
 
 use crate::ledger::{Inference, PairFate};
@@ -102,6 +103,9 @@ pub struct Evaluation {
     pub samples: u64,
     /// Whether the bound is satisfied.
     pub answer: Answer,
+    /// Number of such samples by which the gate is decided if the rest is like these; `None` if it is decided, or if more than
+    /// 10⁸ would be needed.
+    pub needed: Option<u64>,
 }
 
 /// Gathers what a gate needs, sample by sample.
@@ -155,7 +159,7 @@ impl Accumulator {
             .then(|| inference.interval_95(hits, samples))
             .flatten();
         let value = (samples > 0 || aggregate == Aggregate::Count).then(|| self.value(inference)).flatten();
-        let open = |reason| Evaluation { value, interval_95, samples, answer: Answer::Open(reason) };
+        let open = |reason| Evaluation { value, interval_95, samples, answer: Answer::Open(reason), needed: None };
         if self.expression.needs_pairs() && !is_paired {
             return open(OpenReason::NotPaired);
         }
@@ -182,7 +186,26 @@ impl Accumulator {
         } else {
             Answer::Missed
         };
-        Evaluation { value, interval_95, samples, answer }
+        let is_open = answer == Answer::Open(OpenReason::TooFewSamples);
+        let of_bound = || if is_bound { self.needed(inference) } else { Some(least_samples(aggregate, is_varied)) };
+        Evaluation { value, interval_95, samples, answer, needed: is_open.then(of_bound).flatten() }
+    }
+
+    /// Returns the number of samples that decides a gate on a bound of a share, if the share stays as it is.
+    fn needed(&self, inference: Inference) -> Option<u64> {
+        let share = self.hits as f64 / self.samples as f64;
+        let is_decided = |samples: u64| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a share of a count; a cast saturates"
+            )]
+            let hits = (share * samples as f64).round() as u64;
+            let grown = Self { hits, samples, ..Self::new(self.expression) };
+            let Expression { operator, bound, .. } = self.expression;
+            grown.value(inference).is_some_and(|value| operator.holds(value, bound)) || !grown.is_undecided(inference)
+        };
+        first_that_holds(self.samples, MAX_SAMPLES, is_decided)
     }
 
     /// Returns true if the bound of the share on the other side still satisfies the gate: more samples may decide.

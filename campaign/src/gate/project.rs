@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::criteria::GateConfig;
 use closecall_scenarios::source::PROJECT_FILE;
+use closecall_traffic::input::read_text;
 use serde::Deserialize;
 
 use super::{GateSet, GateSource, GateSpec, ProbabilitySpec};
@@ -45,9 +46,23 @@ impl ProjectFile {
 
     fn read(path: &Path) -> Result<Self, ProjectError> {
         let fail = |message: String| ProjectError { path: path.to_owned(), message };
-        let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
+        let text = read_text(path).map_err(|error| fail(error.to_string()))?;
         let config: ProjectConfig = toml::from_str(&text).map_err(|error| fail(error.to_string()))?;
         Ok(Self { path: path.to_owned(), gate: config.gate })
+    }
+
+    /// Says so if the file belongs to another user, as in a folder that others can write to.
+    pub fn foreign_owner(&self) -> Option<String> {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt as _;
+            let owner = self.path.metadata().ok()?.uid();
+            if owner != rustix::process::geteuid().as_raw() {
+                let path = self.path.display();
+                return Some(format!("the gates of {path} are used, which belongs to another user (number {owner})"));
+            }
+        }
+        None
     }
 
     /// Adds the gates that no gate of the set, which are those of the command line and of a preset, replaces.

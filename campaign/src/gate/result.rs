@@ -78,7 +78,7 @@ impl GateResult {
 
 impl fmt::Display for GateResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Evaluation { value, interval_95, samples, answer } = self.evaluation;
+        let Evaluation { value, interval_95, samples, answer, needed } = self.evaluation;
         write!(f, "{}: {}", self.standing().word(), self.name())?;
         match value {
             Some(value) => write!(f, " (is {}", shown(value))?,
@@ -90,6 +90,11 @@ impl fmt::Display for GateResult {
         write!(f, ", {samples} samples")?;
         if let Answer::Open(reason) = answer {
             write!(f, "; {}", reason.text())?;
+            if let Some(needed) = needed {
+                write!(f, ", some {} would if they are like these", rounded_up(needed))?;
+            } else if reason == super::OpenReason::TooFewSamples {
+                f.write_str(", and no number would if they are like these")?;
+            }
         }
         match self.source {
             // The name says so already.
@@ -97,6 +102,12 @@ impl fmt::Display for GateResult {
             _ => write!(f, "; from {})", self.source),
         }
     }
+}
+
+/// Returns a number of samples with its first two digits, rounded up: the rest of it rests on a share that is not known better.
+fn rounded_up(samples: u64) -> u64 {
+    let step = samples.checked_ilog10().and_then(|digits| digits.checked_sub(1)).map_or(1, |digits| 10_u64.pow(digits));
+    samples.div_ceil(step) * step
 }
 
 /// Writes a value with as many digits as tell it apart, and no more than four.

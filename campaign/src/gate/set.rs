@@ -74,6 +74,8 @@ pub struct GateSet {
     pub max_flip_rate: f64,
     /// Most flaky samples; any number if `None`.
     pub max_flaky: Option<u64>,
+    /// What a reader should know of the origin of the gates.
+    pub notes: Vec<String>,
 }
 
 impl Default for GateSet {
@@ -84,6 +86,7 @@ impl Default for GateSet {
             is_measurement: false,
             max_flip_rate: MAX_FLIP_RATE,
             max_flaky: None,
+            notes: Vec::new(),
         }
     }
 }

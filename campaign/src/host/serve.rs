@@ -2,16 +2,19 @@
 
 use std::fs::File;
 use std::io::{self, BufRead, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use closecall_controllers::ControllerError;
-use closecall_controllers::external::{Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, watch};
+use closecall_controllers::external::{
+    Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, use_unpacked, watch,
+};
 use closecall_scenarios::ScenarioFile;
+use closecall_sensors::camera::{Backend, Classifier};
 use closecall_simulation::controller::exec::NEW_SAMPLE;
-use closecall_simulation::controller::native::Probe;
+use closecall_simulation::controller::native::{Probe, UNPACKED};
 use closecall_simulation::{Arm, SampleError};
 
 use super::{Answer, Question, REFUSED, Task, task_identity};
@@ -19,6 +22,9 @@ use crate::manifest::version;
 use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
 use crate::workers::Samples;
+
+/// What a process answers that has loaded ONNX Runtime.
+pub(crate) const ONNXRUNTIME_WORKS: &str = "onnxruntime";
 
 /// Number of tracks of the measurement of a control step: those of dense traffic.
 const COST_TRACKS: usize = 12;
@@ -32,6 +38,7 @@ const COST_STEPS: u32 = 200_000;
 /// | `probe lib:PATH VARIABLES` | loads the file, and writes what it is |
 /// | `step lib:PATH TABLE` | answers control steps, with the protocol of external processes |
 /// | `samples` | runs whole samples |
+/// | `onnxruntime PATH` | loads ONNX Runtime and the network |
 /// | `cost lib:PATH` | measures a control step, and writes its mean wall time |
 ///
 /// # Errors
@@ -43,6 +50,13 @@ pub fn serve(arguments: &[String]) -> Result<(), String> {
 }
 
 fn serve_one(arguments: &[String]) -> Result<(), String> {
+    let arguments = match arguments {
+        [option, folder, rest @ ..] if option == UNPACKED => {
+            use_unpacked(PathBuf::from(folder));
+            rest
+        }
+        all => all,
+    };
     // What a library prints must not be taken for an answer.
     let mut answers = take_output().map_err(|error| format!("failed to set up the output: {error}"))?;
     let requests = io::stdin().lock();
@@ -66,6 +80,12 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
             let step_s = cost::step_s(&loaded, COST_TRACKS, COST_STEPS)?;
             writeln!(answers, "{controller}: {:.3} µs per control step", 1e6 * step_s)
                 .map_err(|error| error.to_string())
+        }
+        // Loading it runs its code.
+        ["onnxruntime", library] => {
+            let library = PathBuf::from(library);
+            Classifier::shipped(&Backend::OnnxRuntime(library)).map_err(|error| error.to_string())?;
+            writeln!(answers, "{ONNXRUNTIME_WORKS}").map_err(|error| error.to_string())
         }
         ["samples"] => samples(requests, &Arc::new(Mutex::new(answers))),
         _ => Err("expected `samples`, or `probe`, `step` or `cost` with a controller such as `lib:PATH`".to_owned()),

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::external::error::LoadError;
 use crate::external::exchange::{Answer, Input, Setup};
-use crate::external::fmu::{Fmu, VariableTable};
+use crate::external::fmu::{self, Fmu, VariableTable};
 use crate::external::library::Library;
 
 /// The kind of a controller that is a file.
@@ -83,6 +83,22 @@ static LOADED: Mutex<BTreeMap<(Kind, PathBuf), Loaded>> = Mutex::new(BTreeMap::n
 pub fn unload_all() {
     let loaded = std::mem::take(&mut *LOADED.lock().unwrap_or_else(PoisonError::into_inner));
     drop(loaded);
+}
+
+/// Unpacks a controller once for all processes that this one starts, if it is an FMU, and returns the folder. Returns `None` if there is
+/// nothing to unpack, or it cannot be unpacked: the process that loads it says why. No code of the file runs.
+pub fn unpack_for_children(kind: Kind, path: &Path) -> Option<PathBuf> {
+    if kind == Kind::Fmu { fmu::unpacked_for_children(path) } else { None }
+}
+
+/// Uses the folder into which the process that started this one has unpacked its FMU. The first call counts.
+pub fn use_unpacked(folder: PathBuf) {
+    fmu::use_unpacked(folder);
+}
+
+/// Removes what this process has unpacked for others, at its end.
+pub fn remove_unpacked() {
+    fmu::remove_unpacked();
 }
 
 impl Loaded {

@@ -33,4 +33,4 @@ pub use controller::NativeController;
 pub use error::LoadError;
 pub use exchange::{Answer, Input, Setup};
 pub use fmu::{Given, VariableTable};
-pub use loaded::{Identity, Kind, Loaded, Variables, unload_all};
+pub use loaded::{Identity, Kind, Loaded, Variables, remove_unpacked, unload_all, unpack_for_children, use_unpacked};

@@ -1,9 +1,9 @@
 //! Reads files of recorded pairs.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use closecall_traffic::input;
 use flate2::read::MultiGzDecoder;
 
 use super::{FollowingPair, LeftOut, pair_table, platoon};
@@ -76,8 +76,10 @@ pub(super) type Pairs = Vec<Result<FollowingPair, LeftOut>>;
 pub fn read(paths: &[PathBuf]) -> Result<FollowingData, FollowingError> {
     let mut data = FollowingData::default();
     for path in paths {
-        let bytes = std::fs::read(path).map_err(|source| FollowingError::Read { path: path.clone(), source })?;
-        data.files.push(FollowingFile { path: path.clone(), blake3: blake3::hash(&bytes).to_string() });
+        let mut hasher = blake3::Hasher::new();
+        let hashed = input::open(path).and_then(|file| hasher.update_reader(file.take(MOST_BYTES)).map(drop));
+        hashed.map_err(|source| FollowingError::Read { path: path.clone(), source })?;
+        data.files.push(FollowingFile { path: path.clone(), blake3: hasher.finalize().to_string() });
         let found = read_one(path).map_err(|error| FollowingError::Content {
             path: path.clone(),
             line: error.line,
@@ -114,9 +116,44 @@ fn read_one(path: &Path) -> Result<Pairs, LineError> {
 
 fn opened(path: &Path) -> std::io::Result<Box<dyn BufRead>> {
     let mut magic = [0; 2];
-    let is_gzip = File::open(path)?.read_exact(&mut magic).is_ok() && magic == GZIP;
-    let file = File::open(path)?;
-    Ok(if is_gzip { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(BufReader::new(file)) })
+    let is_gzip = input::open(path)?.read_exact(&mut magic).is_ok() && magic == GZIP;
+    let file = input::open(path)?;
+    let source: Box<dyn Read> = if is_gzip { Box::new(MultiGzDecoder::new(file)) } else { Box::new(file) };
+    Ok(Box::new(BufReader::new(Bounded { source, read: 0, of_line: 0 })))
+}
+
+/// Largest file, decompressed (bytes). An assumption: 50 times the largest file of OpenACC.
+const MOST_BYTES: u64 = 512 << 20;
+/// Longest line (bytes). An assumption: 1,000 times a row of ten vehicles.
+const MOST_LINE_BYTES: u64 = 1 << 20;
+
+/// A source that ends with an error where a file or a line is longer than any that is meant.
+struct Bounded<R> {
+    source: R,
+    /// Number of bytes so far.
+    read: u64,
+    /// Number of bytes since the last line feed.
+    of_line: u64,
+}
+
+impl<R: Read> Read for Bounded<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        self.read += count as u64;
+        self.of_line = match buffer[..count].iter().rposition(|byte| *byte == b'\n') {
+            Some(at) => (count - at - 1) as u64,
+            None => self.of_line + count as u64,
+        };
+        let fail = |what: &str, most: u64| {
+            let message = format!("{what} is longer than {} MiB: it is no file of pairs", most >> 20);
+            Err(std::io::Error::new(std::io::ErrorKind::InvalidData, message))
+        };
+        match () {
+            () if self.of_line > MOST_LINE_BYTES => fail("a line", MOST_LINE_BYTES),
+            () if self.read > MOST_BYTES => fail("the file", MOST_BYTES),
+            () => Ok(count),
+        }
+    }
 }
 
 /// Returns the number in a cell, or `None` if the cell is empty.
@@ -137,6 +174,18 @@ pub(super) fn number(record: &csv::StringRecord, column: usize, name: &str) -> R
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_endless_field_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pairs.csv");
+        let head =
+            "pair_id,time_s,follower_front_y_m,follower_speed_mps,leader_front_y_m,leader_length_m,leader_speed_mps\n";
+        std::fs::write(&path, format!("{head}{}", "a".repeat(3 << 20))).unwrap();
+        assert!(read(&[path.clone()]).unwrap_err().to_string().contains("a line is longer than 1 MiB"));
+        std::fs::write(&path, "a".repeat(3 << 20)).unwrap();
+        assert!(read(&[path]).unwrap_err().to_string().contains("a line is longer than 1 MiB"));
+    }
 
     #[test]
     fn a_file_of_another_layout_or_with_a_word_for_a_number_is_refused() {

@@ -10,10 +10,10 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use closecall_traffic::input;
 use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
 use closecall_traffic::{Side, Time};
 use serde::{Deserialize, Serialize};
@@ -70,7 +70,7 @@ impl ReferenceError {
 /// Returns a [`ReferenceError`] with the file, the line and the required columns.
 pub fn read_references(path: &Path) -> Result<Vec<ReferenceChange>, ReferenceError> {
     let fail = |source| ReferenceError { path: path.to_owned(), source };
-    let file = File::open(path).map_err(|error| fail(error.into()))?;
+    let file = input::open(path).map_err(|error| fail(error.into()))?;
     let mut bytes = Vec::new();
     file.take(MAX_REFERENCE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| fail(error.into()))?;
     if bytes.len() as u64 > MAX_REFERENCE_BYTES {

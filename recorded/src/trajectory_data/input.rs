@@ -6,6 +6,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 use std::rc::Rc;
 
+use closecall_traffic::input;
 use flate2::bufread::MultiGzDecoder;
 
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
@@ -24,7 +25,7 @@ pub(super) fn with_path(path: &Path, ReadError { line, column, problem }: ReadEr
 
 /// Opens the file at `path`.
 pub(super) fn open_file(path: &Path) -> Result<File, TrajectoryFileError> {
-    File::open(path).map_err(|error| with_path(path, ReadError::of_file(TrajectoryFileProblem::Io(error))))
+    input::open(path).map_err(|error| with_path(path, ReadError::of_file(TrajectoryFileProblem::Io(error))))
 }
 
 /// The BLAKE3 hash of all bytes read from the files of a data set.

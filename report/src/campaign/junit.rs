@@ -176,7 +176,7 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
     }
     xml.write_event(Event::Start(BytesStart::new("properties")))?;
     for (name, value) in properties {
-        let property = xml.create_element("property").with_attribute(("name", name.as_str()));
+        let property = xml.create_element("property").with_attribute(("name", legal_xml(&name).as_str()));
         property.with_attribute(("value", legal_xml(&value).as_str())).write_empty()?;
     }
     xml.write_event(Event::End(BytesEnd::new("properties")))

@@ -13,6 +13,7 @@ use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::shown::shown;
 use closecall_traffic::statistics::format::percent;
 
 /// Largest number of samples that are listed for each scenario.
@@ -29,9 +30,9 @@ pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteE
 
 /// Returns the summary.
 pub fn markdown(findings: &Findings<'_>) -> String {
-    let mut text = format!("## Closecall: {}\n\n", sentence(findings.judged, findings.files.len()));
+    let mut text = format!("## Closecall: {}\n\n", plain(&sentence(findings.judged, findings.files.len())));
     for reason in &reasons(findings.judged) {
-        text.push_str(&format!("- {reason}\n"));
+        text.push_str(&format!("- {}\n", plain(reason)));
     }
     for (still, recording) in findings.worst_stills() {
         let (verdict, scenario, sample) = (still.verdict, cell(&still.scenario), still.sample);
@@ -58,7 +59,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
          closecall {version}.</sub>\n",
         sampling.seed, sampling.design,
     ));
-    text
+    shown(&text).into_owned()
 }
 
 fn counts(summary: &Summary) -> String {
@@ -189,15 +190,6 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
     let collided: Vec<&WorstSample> =
         scenario.worst.iter().filter(|sample| sample.delta_v_mps.is_some()).take(LISTED).collect();
     let mut text = String::new();
-    for ((arm, kind), error) in &scenario.errors {
-        let first_line = error.message.lines().next().unwrap_or_default();
-        let (count, sample) = (error.count, error.first_sample);
-        text.push_str(&format!(
-            "- {count} × `{kind}` in {}, first in sample {sample}: {}\n",
-            cell(arm),
-            cell(first_line)
-        ));
-    }
     for (arm, flaky) in &scenario.flaky {
         let first_line = flaky.message.lines().next().unwrap_or_default();
         let (count, sample) = (flaky.count, flaky.first_sample);
@@ -208,7 +200,7 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
         ));
     }
     if !text.is_empty() {
-        text = format!("**Errors in {}**\n\n{text}\n", cell(&scenario.name));
+        text = format!("**Flaky samples of {}**\n\n{text}\n", cell(&scenario.name));
     }
     if collided.is_empty() {
         return text;
@@ -230,6 +222,22 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
 /// Returns text for HTML within a line.
 fn in_line(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace(['\n', '\r'], " ")
+}
+
+/// Returns text in one line, in which nothing starts HTML, an image or a link: a controller's message may hold all of them.
+fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut characters = text.chars().map(|c| if matches!(c, '\n' | '\r') { ' ' } else { c }).peekable();
+    while let Some(c) = characters.next() {
+        match (c, characters.peek()) {
+            ('<', Some(next)) if next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?') => {
+                plain.push_str("&lt;")
+            }
+            (']', Some('(')) => plain.push_str("\\]"),
+            _ => plain.push(c),
+        }
+    }
+    plain
 }
 
 /// Returns the text as it may stand in a cell of a table.

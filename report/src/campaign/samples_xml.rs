@@ -15,6 +15,7 @@ use super::outcomes::OutcomeRow;
 use super::recordings::card_beside;
 use closecall_scenarios::outcome::Collision;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::shown::shown;
 
 /// The counts of one suite. The file states them before the cases.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -131,10 +132,10 @@ fn problem(row: &OutcomeRow, tested: &str) -> Option<(&'static str, String, Stri
     }
 }
 
-/// Returns the text without the characters that XML does not allow, not even escaped.
+/// Returns the text without control characters of others, and without what XML does not allow, not even escaped.
 pub(super) fn legal_xml(text: &str) -> String {
     let is_legal = |c: char| matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{fffd}' | '\u{10000}'..);
-    text.chars().map(|c| if is_legal(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
+    shown(text).chars().map(|c| if is_legal(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
 
 fn message(collision: &Collision) -> String {

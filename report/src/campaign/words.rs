@@ -21,9 +21,7 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
         let names = scenarios_of(judged, decided);
         let listed: Vec<String> = names.iter().map(|(name, marks)| named(name, marks)).collect();
         let what = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
-        let count = names.iter().filter(|(name, _)| name != ALL).count();
-        (!listed.is_empty()).then(|| match count {
-            0 => format!("{word}: the scenarios together {verb} {what}: {}", listed.join(", ")),
+        (!listed.is_empty()).then(|| match names.len() {
             1 => format!("{word}: 1 of {scenarios} scenarios {} {what}: {}", singular(verb), listed.join(", ")),
             count => format!("{word}: {count} of {scenarios} scenarios {verb} {what}: {}", listed.join(", ")),
         })
@@ -51,8 +49,6 @@ fn singular(verb: &str) -> String {
     if verb == "miss" { "misses".to_owned() } else { verb.replacen("do not", "does not", 1) }
 }
 
-/// What stands in the place of a scenario for a gate on all of them together.
-const ALL: &str = "all scenarios";
 
 /// Returns the scenarios with a gate of this standing, in the order of the gates, each with the marks of its requirements.
 fn scenarios_of(judged: &Judgement, standing: Standing) -> Vec<(String, Vec<String>)> {

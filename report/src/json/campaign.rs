@@ -58,6 +58,7 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
     object.insert("requirements".to_owned(), json!(judged.requirements.iter().map(requirement).collect::<Vec<_>>()));
     object.insert("expectations".to_owned(), json!(judged.expectations.iter().map(expectation).collect::<Vec<_>>()));
     object.insert("reasons".to_owned(), json!(judged.reasons));
+    object.insert("failures".to_owned(), summary.failures_json());
     object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("flaky_gate".to_owned(), json!(judged.flaky));
     object.insert("wall_s".to_owned(), json!(wall_s));
@@ -92,7 +93,7 @@ fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
 }
 
 fn gate(gate: &GateResult) -> Value {
-    let Evaluation { value, interval_95, samples, answer } = gate.evaluation;
+    let Evaluation { value, interval_95, samples, answer, needed } = gate.evaluation;
     let passed = match answer {
         Answer::Met => Some(true),
         Answer::Missed => Some(false),
@@ -112,6 +113,7 @@ fn gate(gate: &GateResult) -> Value {
     });
     if let Answer::Open(reason) = answer {
         object["passed_absent"] = json!(reason.text());
+        object["samples_needed"] = json!(needed);
     }
     object
 }

@@ -1,5 +1,6 @@
 //! A chart of curves over the distance, as SVG, and the legend of several charts.
 
+use crate::escape::escaped;
 use std::fmt::Write;
 
 use maud::{Markup, PreEscaped, html};
@@ -212,8 +213,4 @@ fn nice(largest: f64) -> f64 {
     }
     let power = maths::powf(10.0, maths::log10(largest).floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * power).find(|end| *end >= largest - 1e-12).unwrap_or(largest)
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use closecall_traffic::input::read_text;
 use closecall_traffic::suggest::nearest;
 
 use super::shipped::{all, named, names};
@@ -85,7 +86,7 @@ fn in_folder(folder: &Path) -> Result<Vec<Member>, MemberError> {
 }
 
 fn read(path: &Path) -> Result<Member, MemberError> {
-    let text = std::fs::read_to_string(path).map_err(|source| MemberError::Read { path: path.to_owned(), source })?;
+    let text = read_text(path).map_err(|source| MemberError::Read { path: path.to_owned(), source })?;
     Member::parse(path, &text)
 }
 

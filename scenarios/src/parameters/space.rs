@@ -102,19 +102,24 @@ impl ParameterSpace {
     /// Returns the nominal values, then variations of them with one parameter at one of its bounds or labels.
     ///
     /// If a scenario is valid for all of these, it passes every check that depends on a single parameter.
-    pub fn extremes(&self) -> Vec<Parameters> {
+    pub fn extremes(&self) -> impl Iterator<Item = Parameters> {
         let nominal = self.nominal();
-        let mut extremes = vec![nominal.clone()];
-        for (name, entry) in &self.entries {
-            let bounds = entry.distribution.bounds().into_iter().flatten().map(Value::Number);
-            let labels = entry.distribution.labels().iter().cloned().map(Value::Label);
-            for value in bounds.chain(labels).filter(|value| nominal.get(name) != Some(value)) {
-                let mut parameters = nominal.clone();
-                parameters.insert(name.clone(), value);
-                extremes.push(parameters);
-            }
-        }
-        extremes
+        let varied = {
+            let nominal = nominal.clone();
+            self.entries.iter().flat_map(move |(name, entry)| {
+                let bounds = entry.distribution.bounds().into_iter().flatten().map(Value::Number);
+                let labels = entry.distribution.labels().iter().cloned().map(Value::Label);
+                let nominal = nominal.clone();
+                let other = |value: &Value| nominal.get(name) != Some(value);
+                let values: Vec<Value> = bounds.chain(labels).filter(other).collect();
+                values.into_iter().map(move |value| {
+                    let mut parameters = nominal.clone();
+                    parameters.insert(name.clone(), value);
+                    parameters
+                })
+            })
+        };
+        std::iter::once(nominal).chain(varied)
     }
 
     /// Maps every parameter to a value. `value` receives its name, its index in the order of the names, and its

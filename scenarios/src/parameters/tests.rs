@@ -270,7 +270,6 @@ fn extremes_vary_one_parameter_at_a_time() {
     let space = space("a = { uniform = { min = 0, max = 1 } }\nb = { choice = { x = 2, y = 1 } }\nc = { fixed = 3 }");
     let shown: Vec<String> = space
         .extremes()
-        .iter()
         .map(|parameters| parameters.iter().map(|(_, value)| format!("{value:.6}")).collect::<Vec<_>>().join(" "))
         .collect();
     assert_eq!(shown.len(), 4);

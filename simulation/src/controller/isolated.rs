@@ -46,7 +46,7 @@ impl Isolated {
     /// Returns the settings of a worker process with these arguments, under the limits of the controller.
     pub fn process(&self, arguments: &[&str]) -> ExecSettings {
         match self {
-            Self::Native(native) => native.settings().process(arguments),
+            Self::Native(native) => native.process(arguments),
             Self::Hosted(hosted) => hosted.process(arguments),
         }
     }

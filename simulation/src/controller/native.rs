@@ -12,7 +12,10 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use closecall_controllers::external::{Identity, Kind, Loaded, NativeController, VariableTable, Variables};
+use closecall_controllers::external::watch::Call;
+use closecall_controllers::external::{
+    Identity, Kind, Loaded, NativeController, VariableTable, Variables, unpack_for_children,
+};
 use closecall_controllers::{CheckedDriver, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
 use serde::{Deserialize, Serialize};
 
@@ -20,12 +23,16 @@ use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecError, Exec
 use super::isolated::Isolated;
 use crate::run::ControllerFactory;
 use closecall_scenarios::Scenario;
+use closecall_traffic::Time;
+
+/// The option of the hidden command that names the folder of an unpacked FMU.
+pub const UNPACKED: &str = "--unpacked";
 
 /// The hidden command that serves libraries and FMUs.
 pub const COMMAND: &str = "host";
 
-/// Time limit for loading a library or an FMU. It may first have to unpack or to start an interpreter.
-const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time limit for loading a library or an FMU, at least. It may first have to read its files or to start an interpreter.
+const LOAD_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The words that start this program.
 static PROGRAM: OnceLock<Vec<String>> = OnceLock::new();
@@ -77,9 +84,13 @@ impl NativeSettings {
         format!("{}:{}", self.kind, stem.unwrap_or_default())
     }
 
-    /// Returns the settings of a process of this program with these arguments, under the limits of the controller.
-    pub fn process(&self, arguments: &[&str]) -> ExecSettings {
-        let words = command(arguments);
+    /// Returns the settings of a process of this program with these arguments, under the limits of the controller. A relative path of the
+    /// controller is in `folder`, or in that of this program. An FMU is unpacked before, so that the time for this is not that of the process.
+    pub fn process(&self, folder: Option<&Path>, arguments: &[&str]) -> ExecSettings {
+        let unpacked =
+            unpack_for_children(self.kind, &path_in(folder, self)).map(|folder| folder.display().to_string());
+        let unpacked = unpacked.iter().flat_map(|folder| [UNPACKED, folder.as_str()]);
+        let words = command(&unpacked.chain(arguments.iter().copied()).collect::<Vec<_>>());
         // A word with a NUL character, which cannot be quoted, names no file.
         let command = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default();
         ExecSettings { command, timeout_ms: self.timeout_ms, memory_mib: self.memory_mib }
@@ -108,11 +119,15 @@ impl NativeSettings {
 
     fn try_with(&self, folder: Option<&Path>, variables: Option<&Variables>) -> Result<Identity, NativeError> {
         let text = serde_json::to_string(&variables).unwrap_or_default();
-        let settings = self.process(&["probe", &self.text(), &text]);
+        let settings = self.process(folder, &["probe", &self.text(), &text]);
         let controller = self.text();
         let crash = |error: ExecError| NativeError::Crash { controller: controller.clone(), reason: error.to_string() };
         let mut child = Child::start(&settings, folder).map_err(crash)?;
-        let line = child.request(Vec::new(), LOAD_TIMEOUT).map_err(crash)?;
+        let limit = LOAD_TIMEOUT.max(Duration::from_millis(self.timeout_ms));
+        let Some(line) = child.request_within(Vec::new(), limit).map_err(crash)? else {
+            let reason = format!("it is not loaded within {} s: its constructor may wait or loop", limit.as_secs_f64());
+            return Err(NativeError::Crash { controller, reason });
+        };
         child.finish().map_err(crash)?;
         match serde_json::from_slice(&line) {
             Ok(Probe::Identity(identity)) => Ok(identity),
@@ -239,6 +254,11 @@ impl NativeFactory {
         Self { is_worker: true, ..self }
     }
 
+    /// Returns the settings of a process of this program with these arguments, under the limits of the controller.
+    pub fn process(&self, arguments: &[&str]) -> ExecSettings {
+        self.settings.process(self.folder.as_deref(), arguments)
+    }
+
     /// Returns the settings.
     pub const fn settings(&self) -> &NativeSettings {
         &self.settings
@@ -262,11 +282,15 @@ impl ControllerFactory for NativeFactory {
     fn build_with(&self, settings: &EgoSettings, table: &VariableTable) -> Box<dyn EgoController> {
         if !self.is_worker {
             let table = serde_json::to_string(table).unwrap_or_default();
-            let process = self.settings.process(&["step", &self.settings.text(), &table]);
+            let process = self.settings.process(self.folder.as_deref(), &["step", &self.settings.text(), &table]);
             return ExecFactory::new(process, self.folder.as_deref()).repeating_time().build(settings);
         }
         let path = path_in(self.folder.as_deref(), &self.settings);
-        match Loaded::open(self.settings.kind, &path) {
+        // Its constructor may loop.
+        let call = Call::begin_start(Time::ZERO);
+        let loaded = Loaded::open(self.settings.kind, &path);
+        drop(call);
+        match loaded {
             Ok(loaded) => Box::new(NativeController::new(loaded, settings, table)),
             Err(error) => Box::new(Refused { reason: error.to_string() }),
         }

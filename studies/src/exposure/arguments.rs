@@ -19,6 +19,9 @@ impl Counted {
     }
 }
 
+/// Largest number of encounters per km that is believed: a lead vehicle that brakes without an end every 100 m. An assumption.
+const MOST_PER_KM: f64 = 10.0;
+
 impl FromStr for Counted {
     type Err = String;
 
@@ -27,8 +30,17 @@ impl FromStr for Counted {
         let (events, distance) = text.split_once('/').ok_or_else(wrong)?;
         let (events, distance_km) =
             (events.trim().parse().map_err(|_| wrong())?, distance.trim().parse().map_err(|_| wrong())?);
-        let is_distance = distance_km > 0.0 && f64::is_finite(distance_km);
-        is_distance.then_some(Self { events, distance_km }).ok_or_else(wrong)
+        if !(distance_km > 0.0 && f64::is_finite(distance_km)) {
+            return Err(wrong());
+        }
+        let counted = Self { events, distance_km };
+        if events as f64 > MOST_PER_KM * distance_km {
+            return Err(format!(
+                "`{text}` means {} encounters in {distance_km} km, more than {MOST_PER_KM} per km: expected EVENTS/KM, such as 20/5000",
+                events
+            ));
+        }
+        Ok(counted)
     }
 }
 
@@ -58,6 +70,7 @@ mod tests {
     fn a_count_and_a_range_are_read_or_refused() {
         assert_eq!("20/5000".parse(), Ok(Counted { events: 20, distance_km: 5_000.0 }));
         assert_eq!("100..1e4".parse(), Ok(StatedRange([100.0, 10_000.0])));
+        assert!("5000/20".parse::<Counted>().unwrap_err().contains("more than 10 per km"));
         for text in ["20", "-1/5", "2/0", "2/nan", "x/3"] {
             assert!(text.parse::<Counted>().unwrap_err().contains("EVENTS/KM"), "{text}");
         }

@@ -38,7 +38,7 @@ pub fn samples_at_rate(hits: u64, samples: u64, passes: impl Fn(u64, u64) -> boo
 /// false to true once.
 ///
 /// The search doubles the distance from `from`, then bisects, since `holds` may be slow for large numbers.
-fn first_that_holds(from: u64, to: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
+pub fn first_that_holds(from: u64, to: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
     if holds(from) {
         return Some(from);
     }

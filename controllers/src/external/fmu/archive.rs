@@ -1,10 +1,14 @@
 //! The archive of an FMU: a zip file with a model description and a binary for each platform.
 
+use std::collections::BTreeMap;
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
 
+use closecall_traffic::input;
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
 use zip::result::ZipError;
@@ -20,13 +24,16 @@ const DESCRIPTION: &str = "modelDescription.xml";
 pub(super) struct Unpacked {
     pub(super) description: Description,
     pub(super) binary: PathBuf,
-    folder: Folder,
+    /// Where it is.
+    place: PathBuf,
+    /// The folder, if this process has unpacked it.
+    folder: Option<Folder>,
 }
 
 impl Unpacked {
     /// Returns the folder of the FMU's resources.
     pub(super) fn resources(&self) -> PathBuf {
-        self.folder.path.join("resources")
+        self.place.join("resources")
     }
 }
 
@@ -91,37 +98,205 @@ fn remove_abandoned(folder: &Path) {
     }
 }
 
-/// Unpacks an FMU. Its description and its binary for this platform are looked for first.
+/// Largest size of an FMU that is unpacked (bytes), its largest number of files, and the longest time that unpacking takes. Assumptions: 20
+/// times the largest FMU of the FMI cross-check repository.
+const MOST_BYTES: u64 = 2 << 30;
+const MOST_FILES: usize = 100_000;
+const LONGEST: Duration = Duration::from_secs(60);
+/// Largest description (bytes). An assumption: 100 times one with 10,000 variables.
+const MOST_DESCRIPTION_BYTES: u64 = 256 << 20;
+
+/// The folder into which the process that started this one has unpacked its FMU.
+static BY_PARENT: OnceLock<PathBuf> = OnceLock::new();
+
+/// What this process has unpacked for the processes that it starts, by the path of the FMU, and what was seen of the file then.
+static UNPACKED: Mutex<BTreeMap<PathBuf, (Seen, Folder)>> = Mutex::new(BTreeMap::new());
+
+/// The time of change and the length of a file.
+type Seen = (SystemTime, u64);
+
+/// Uses the folder into which the process that started this one has unpacked the FMU.
+pub(crate) fn use_unpacked(folder: PathBuf) {
+    BY_PARENT.get_or_init(|| folder);
+}
+
+/// Unpacks an FMU once for all processes that this one starts, and returns the folder. Returns `None` if it cannot be unpacked: a process
+/// that tries it again says why. No code of the FMU runs.
+pub(crate) fn unpacked_for_children(path: &Path) -> Option<PathBuf> {
+    let metadata = path.metadata().ok()?;
+    let seen = (metadata.modified().ok()?, metadata.len());
+    let mut unpacked = UNPACKED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, folder)) = unpacked.get(path).filter(|(there, _)| *there == seen) {
+        return Some(folder.path.clone());
+    }
+    let Unpacked { folder: Some(folder), .. } = unpack_into_new(path).ok()? else { return None };
+    let place = folder.path.clone();
+    unpacked.insert(path.to_owned(), (seen, folder));
+    Some(place)
+}
+
+/// Removes what this process has unpacked for others.
+pub(crate) fn remove_unpacked() {
+    let unpacked = std::mem::take(&mut *UNPACKED.lock().unwrap_or_else(PoisonError::into_inner));
+    drop(unpacked);
+}
+
+/// Returns the unpacked FMU: what the process that started this one has unpacked, or a folder of its own.
 pub(super) fn unpack(path: &Path) -> Result<Unpacked, LoadError> {
+    let Some(place) = BY_PARENT.get() else { return unpack_into_new(path) };
+    let shown = path.display().to_string();
+    let refuse = |reason: String| LoadError::Fmu { path: shown.clone(), reason };
+    let read = |source| LoadError::Read { path: shown.clone(), source };
+    let bytes = input::read(&place.join(DESCRIPTION), MOST_DESCRIPTION_BYTES).map_err(read)?;
+    let description = decoded(bytes).and_then(|text| Description::parse(&text)).map_err(&refuse)?;
+    let names = files_below(place, &place.join("binaries"));
+    let binary = binary(&names, &description).map_err(&refuse)?;
+    Ok(Unpacked { description, binary: place.join(binary), place: place.clone(), folder: None })
+}
+
+/// Returns the names of the files in a folder and below it, relative to `place`.
+fn files_below(place: &Path, folder: &Path) -> Vec<String> {
+    let mut names = Vec::new();
+    for path in std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+        if path.is_dir() {
+            names.extend(files_below(place, &path));
+        } else if let Ok(name) = path.strip_prefix(place) {
+            names.push(name.to_string_lossy().replace('\\', "/"));
+        }
+    }
+    names
+}
+
+/// Unpacks an FMU. Its description and its binary for this platform are looked for first.
+fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     let shown = path.display().to_string();
     let read = |source| LoadError::Read { path: shown.clone(), source };
     let refuse = |reason: String| LoadError::Fmu { path: shown.clone(), reason };
-    let file = File::open(path).map_err(read)?;
+    let file = input::open(path).map_err(read)?;
     let broken = |error: ZipError| match error {
         ZipError::Io(source) if source.kind() != io::ErrorKind::UnexpectedEof => read(source),
         error => refuse(format!("it is not an FMU, which is a zip archive ({error})")),
     };
     let mut archive = ZipArchive::new(file).map_err(broken)?;
+    if archive.len() > MOST_FILES {
+        return Err(refuse(format!("it has {} files, and may have {MOST_FILES}", archive.len())));
+    }
+    let mut entries: BTreeMap<String, usize> = BTreeMap::new();
+    for index in 0..archive.len() {
+        let entry = archive.by_index_raw(index).map_err(broken)?;
+        let raw = String::from_utf8_lossy(entry.name_raw()).into_owned();
+        let Some(name) = normal_name(&raw).map_err(&refuse)? else { continue };
+        if entry.is_symlink() {
+            return Err(refuse(format!("its archive has the symbolic link `{raw}`; expected files")));
+        }
+        if entries.insert(name, index).is_some() {
+            return Err(refuse(format!("its archive has `{raw}` twice")));
+        }
+    }
     let text = {
-        let mut entry = archive
-            .by_name(DESCRIPTION)
-            .map_err(|error| refuse(format!("it is not an FMU: its archive has no {DESCRIPTION} ({error})")))?;
-        io::read_to_string(&mut entry).map_err(|error| refuse(format!("its {DESCRIPTION} cannot be read: {error}")))?
+        let index = *entries
+            .get(DESCRIPTION)
+            .ok_or_else(|| refuse(format!("it is not an FMU: its archive has no {DESCRIPTION}")))?;
+        let mut bytes = Vec::new();
+        let entry = archive.by_index(index).map_err(broken)?;
+        let wrong = |error: io::Error| refuse(format!("its {DESCRIPTION} cannot be read: {error}"));
+        entry.take(MOST_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes).map_err(wrong)?;
+        if bytes.len() as u64 > MOST_DESCRIPTION_BYTES {
+            return Err(refuse(format!("its {DESCRIPTION} is larger than {} MiB", MOST_DESCRIPTION_BYTES >> 20)));
+        }
+        decoded(bytes).map_err(&refuse)?
     };
     let description = Description::parse(&text).map_err(&refuse)?;
-    let binary = binary(&archive, &description).map_err(&refuse)?;
+    let names: Vec<String> = entries.keys().cloned().collect();
+    let binary = binary(&names, &description).map_err(&refuse)?;
     let folder = Folder::new(&std::env::temp_dir()).map_err(read)?;
-    archive.extract(&folder.path).map_err(broken)?;
+    let (mut left, started) = (MOST_BYTES, Instant::now());
+    for (name, index) in &entries {
+        let mut entry = archive.by_index(*index).map_err(broken)?;
+        let target = folder.path.join(name);
+        if let Some(parent) = target.parent() {
+            std::fs::create_dir_all(parent).map_err(read)?;
+        }
+        let mut file = File::create(&target).map_err(read)?;
+        copy_bounded(&mut entry, &mut file, (&mut left, started)).map_err(|error| match error.kind() {
+            // The content is compressed in another way than its header says.
+            io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
+                refuse(format!("its archive is damaged in `{name}`: {error}"))
+            }
+            io::ErrorKind::FileTooLarge | io::ErrorKind::TimedOut => refuse(error.to_string()),
+            _ => read(error),
+        })?;
+        #[cfg(unix)]
+        if let Some(mode) = entry.unix_mode() {
+            use std::os::unix::fs::PermissionsExt as _;
+            const OWNER_READS_AND_WRITES: u32 = 0o600;
+            let mode = std::fs::Permissions::from_mode((mode & 0o777) | OWNER_READS_AND_WRITES);
+            file.set_permissions(mode).map_err(read)?;
+        }
+    }
     std::fs::create_dir_all(folder.path.join("resources")).map_err(read)?;
-    Ok(Unpacked { description, binary: folder.path.join(binary), folder })
+    let place = folder.path.clone();
+    Ok(Unpacked { description, binary: place.join(binary), place, folder: Some(folder) })
 }
 
-/// Returns the name of the binary for this platform in the archive, or why there is none.
-fn binary(archive: &ZipArchive<File>, description: &Description) -> Result<String, String> {
+/// Copies a file of an archive. `left` is the number of bytes that may still be written.
+fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mut u64, Instant)) -> io::Result<()> {
+    const CHUNK_BYTES: usize = 1 << 16;
+    let mut chunk = vec![0; CHUNK_BYTES];
+    loop {
+        let read = from.read(&mut chunk)?;
+        if read == 0 {
+            return Ok(());
+        }
+        *left = left.checked_sub(read as u64).ok_or_else(|| {
+            let message = format!("it holds more than the {} MiB that are unpacked", MOST_BYTES >> 20);
+            io::Error::new(io::ErrorKind::FileTooLarge, message)
+        })?;
+        if started.elapsed() > LONGEST {
+            let message = format!("it takes longer to unpack than the {} s allowed", LONGEST.as_secs());
+            return Err(io::Error::new(io::ErrorKind::TimedOut, message));
+        }
+        to.write_all(&chunk[..read])?;
+    }
+}
+
+/// Returns the name of a file in the notation of the standard: with slashes, and without `./`. Some tools write backslashes. Returns `None`
+/// for a folder.
+fn normal_name(raw: &str) -> Result<Option<String>, String> {
+    let slashed = raw.replace('\\', "/");
+    let parts: Vec<&str> = slashed.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
+    if slashed.starts_with('/') || parts.contains(&"..") || slashed.contains('\0') {
+        return Err(format!("its archive has the name `{raw}`, which leads out of the archive"));
+    }
+    Ok((!slashed.ends_with('/') && !parts.is_empty()).then(|| parts.join("/")))
+}
+
+/// Returns the text of a description in the encoding that it declares: UTF-8, which the standard prescribes, or ISO-8859-1.
+fn decoded(bytes: Vec<u8>) -> Result<String, String> {
+    let is_utf_16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).into_owned();
+    let declaration = head.trim_start_matches('\u{feff}').split("?>").next().filter(|text| text.starts_with("<?xml"));
+    let declared = declaration.and_then(|text| text.split_once("encoding")).and_then(|(_, rest)| {
+        let rest = rest.trim_start().strip_prefix('=')?.trim_start();
+        let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
+        rest[1..].split(quote).next()
+    });
+    let declared = if is_utf_16 { "UTF-16" } else { declared.unwrap_or("UTF-8") };
+    match declared.to_ascii_lowercase().as_str() {
+        "utf-8" | "utf8" | "us-ascii" | "ascii" => {
+            String::from_utf8(bytes).map_err(|error| format!("its {DESCRIPTION} is not UTF-8: {error}"))
+        }
+        "iso-8859-1" | "latin1" | "latin-1" => Ok(bytes.into_iter().map(char::from).collect()),
+        _ => Err(format!(
+            "its {DESCRIPTION} has the encoding {declared}; expected UTF-8, which the standard prescribes, or ISO-8859-1"
+        )),
+    }
+}
+
+/// Returns the name of the binary for this platform among those of the archive, or why there is none.
+fn binary(names: &[String], description: &Description) -> Result<String, String> {
     let own = own_platforms(description.version);
     let name = |platform: &str| format!("binaries/{platform}/{}{DLL_SUFFIX}", description.identifier);
-    // A name that is no text names no binary.
-    let names: Vec<String> = archive.file_names().flatten().map(|name| name.into_owned()).collect();
     if let Some(found) = own.iter().map(|platform| name(platform)).find(|name| names.contains(name)) {
         return Ok(found);
     }
@@ -155,6 +330,32 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     use super::*;
+
+    #[test]
+    fn names_and_encodings_of_other_tools_are_read() {
+        let normal = |raw: &str| normal_name(raw).unwrap();
+        assert_eq!(normal("binaries\\linux64\\a.so").as_deref(), Some("binaries/linux64/a.so"));
+        assert_eq!(normal("./././a//b.xml").as_deref(), Some("a/b.xml"));
+        assert_eq!((normal("resources/"), normal("resources\\"), normal("./")), (None, None, None));
+        for raw in ["../a", "a/..\\..\\b", "/etc/passwd", "\\a"] {
+            assert!(normal_name(raw).unwrap_err().contains("leads out of the archive"), "{raw}");
+        }
+        let latin = b"<?xml version='1.0' encoding = 'ISO-8859-1'?><a n=\"M\xfcller\"/>".to_vec();
+        assert!(decoded(latin).unwrap().contains("Müller"));
+        assert!(decoded(b"<?xml version=\"1.0\"?><a n=\"M\xfcller\"/>".to_vec()).unwrap_err().contains("is not UTF-8"));
+        let other = b"<?xml version=\"1.0\" encoding=\"Shift_JIS\"?><a/>".to_vec();
+        assert!(decoded(other).unwrap_err().contains("has the encoding Shift_JIS; expected UTF-8"));
+        assert!(decoded(vec![0xff, 0xfe, b'<', 0]).unwrap_err().contains("UTF-16"));
+    }
+
+    #[test]
+    fn what_is_unpacked_is_bounded() {
+        let (mut left, mut written) = (10, Vec::new());
+        let error = copy_bounded(&mut [0; 11].as_slice(), &mut written, (&mut left, Instant::now())).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        copy_bounded(&mut [0; 10].as_slice(), &mut written, (&mut left, Instant::now())).unwrap();
+        assert_eq!((left, written.len()), (0, 10));
+    }
 
     #[test]
     fn a_live_folder_is_not_taken_for_an_abandoned_one() {

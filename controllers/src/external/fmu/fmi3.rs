@@ -58,8 +58,7 @@ pub(super) struct Functions {
     exit: unsafe extern "C-unwind" fn(Component) -> Status,
     terminate: unsafe extern "C-unwind" fn(Component) -> Status,
     reset: unsafe extern "C-unwind" fn(Component) -> Status,
-    do_step:
-        unsafe extern "C-unwind" fn(Component, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> Status,
+    do_step: unsafe extern "C-unwind" fn(Component, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64) -> Status,
     set_f64: Setter<f64>,
     get_f64: Getter<f64>,
     set_f32: Option<Setter<f32>>,
@@ -258,7 +257,8 @@ impl Instance for Instance3 {
     }
 
     fn do_step(&mut self, time_s: f64, step_s: f64) -> Result<(), String> {
-        let (mut event, mut ends, mut is_early, mut reached_s) = (false, false, false, time_s);
+        // The FMU may write any byte, and a `bool` of Rust must be 0 or 1.
+        let (mut event, mut ends, mut is_early, mut reached_s) = (0_u8, 0_u8, 0_u8, time_s);
         // SAFETY: as above; the values live during the call.
         let status = unsafe {
             (self.functions.do_step)(
@@ -273,10 +273,10 @@ impl Instance for Instance3 {
             )
         };
         self.check(status, "fmi3DoStep")?;
-        if ends {
+        if ends != 0 {
             return Err(format!("the FMU asked to end the simulation{}", logged()));
         }
-        if is_early {
+        if is_early != 0 {
             return Err(format!("fmi3DoStep returned early, at {reached_s} s: that was not allowed"));
         }
         Ok(())

@@ -19,5 +19,6 @@ mod mapping;
 mod quantity;
 mod run;
 
+pub(crate) use archive::{remove_unpacked, unpacked_for_children, use_unpacked};
 pub use mapping::{Given, VariableTable};
 pub(crate) use run::Fmu;

@@ -11,6 +11,7 @@ use super::page::{document, table};
 use crate::campaign::recordings::card_beside;
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::shown::shown;
 
 /// One recorded sample.
 #[derive(Clone, Debug)]
@@ -45,7 +46,7 @@ pub(in crate::campaign) struct IndexEntry {
 /// [`WriteError`] if the page cannot be written.
 pub(in crate::campaign) fn write_index(path: &Path, entries: &[IndexEntry]) -> Result<(), WriteError> {
     let page = page(entries).into_string();
-    write_file(path, |file| file.write_all(page.as_bytes()))
+    write_file(path, |file| file.write_all(shown(&page).as_bytes()))
 }
 
 fn page(entries: &[IndexEntry]) -> Markup {

@@ -7,6 +7,7 @@ use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{Axis, ScenarioOverview, WorstSample};
 use crate::units::labelled;
+use closecall_campaign::failures::replay_command;
 use closecall_scenarios::outcome::Phase;
 
 /// Returns the worst samples of a scenario, with the command that runs the first of them again.
@@ -85,24 +86,27 @@ fn measured(value: Measured) -> Markup {
     }
 }
 
-/// Returns the errors of a scenario, by arm and kind; empty if there are none.
-pub(super) fn errors(scenario: &ScenarioOverview) -> Markup {
-    if scenario.errors.is_empty() {
+/// Returns why samples of a scenario have no outcome; empty if all have one.
+pub(super) fn errors(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Markup {
+    let counts = findings.summary.scenarios.iter().find(|(name, _)| *name == scenario.name);
+    let Some((_, counts)) = counts.filter(|(_, counts)| !counts.failures.is_empty()) else {
         return Markup::default();
-    }
+    };
     let head = html! {
         (text_heads(&["controller", "kind"]))
         (number_heads(&["samples", "first"]))
         th { "message of the first" }
+        th { "to run it again" }
     };
     let rows = html! {
-        @for ((arm, kind), error) in &scenario.errors {
+        @for failure in counts.failures.iter() {
             tr.collided {
-                td { (arm) }
-                td { (kind) }
-                (number(error.count))
-                (number(error.first_sample))
-                td { code { (error.message) } }
+                td { (failure.controller) }
+                td { (failure.kind) }
+                (number(failure.samples))
+                (number(failure.first_sample))
+                td { code { (failure.first_message) } }
+                td { code { (replay_command(".", &scenario.name, failure)) } }
             }
         }
     };

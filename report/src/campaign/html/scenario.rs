@@ -25,7 +25,7 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
         section {
             h2 { (scenario.name) }
             @if let Some(file) = file { p.what { (file.config().description) } (faults(file)) }
-            (samples::errors(scenario))
+            (samples::errors(findings, scenario))
             (samples::flaky(scenario))
             details {
                 summary { "Samples, margins and coverage" }

@@ -27,10 +27,10 @@ pub struct ArmTotals {
     pub errors: usize,
 }
 
-/// The errors of one kind.
+/// The flaky samples of one arm.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorGroup {
-    /// The number of samples that ended in such an error.
+    /// The number of samples.
     pub count: u64,
     /// The number of the first such sample.
     pub first_sample: u64,
@@ -59,8 +59,6 @@ pub struct ScenarioOverview {
     pub influence: InfluenceCounts,
     /// The worst samples of the arm under test, beginning with the worst.
     pub worst: Vec<WorstSample>,
-    /// Errors by arm and kind.
-    pub errors: BTreeMap<(String, String), ErrorGroup>,
     /// Samples with an outcome only because they were run again after a crash or a hang, by arm.
     pub flaky: BTreeMap<String, ErrorGroup>,
     /// The samples with the smallest hashes of their number, for each fate: an even choice of all samples.
@@ -84,7 +82,6 @@ impl ScenarioOverview {
             influence: InfluenceCounts::new(space, arms.len() > 1),
             margins: vec![vec![MarginBins::EMPTY; arms.len()]; MARGINS.len()],
             worst: Vec::with_capacity(MOST_WORST + 1),
-            errors: BTreeMap::new(),
             flaky: BTreeMap::new(),
             points: BTreeMap::new(),
             point_counts: [0; Fate::ALL.len()],
@@ -139,11 +136,7 @@ impl ScenarioOverview {
                     bins[index].push(kind, outcome);
                 }
             }
-            Err(failure) => {
-                totals.errors += 1;
-                let first = || ErrorGroup { count: 0, first_sample: sample, message: failure.message.clone() };
-                self.errors.entry((arm.controller.clone(), failure.kind.clone())).or_insert_with(first).count += 1;
-            }
+            Err(_) => totals.errors += 1,
         }
     }
 

@@ -135,7 +135,7 @@ fn the_worst_samples_come_first_and_nan_is_the_worst() {
 }
 
 #[test]
-fn an_error_is_not_a_pass_and_keeps_its_message() {
+fn an_error_is_not_a_pass() {
     let file = file();
     let mut overview = Overview::new([&file], &arms());
     let mut broken = record(7, 5.0, "car", [false, false]);
@@ -145,7 +145,5 @@ fn an_error_is_not_a_pass_and_keeps_its_message() {
     overview.push(&broken);
     let scenario = &overview.scenarios[0];
     assert_eq!(scenario.totals[1], ArmTotals { samples: 2, failures: 0, errors: 2 });
-    let error = &scenario.errors[&("mis".to_owned(), "panic".to_owned())];
-    assert_eq!((error.count, error.first_sample, error.message.as_str()), (2, 7, "a panic: no"));
     assert!(scenario.points().all(|point| point.fate == Fate::Error));
 }

@@ -6,7 +6,7 @@
 //! then close.
 
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -54,6 +54,8 @@ pub struct Child {
     memory_mib: u64,
     /// Number of answers so far, including the greeting.
     answered: u64,
+    /// When the memory of its descendants was looked at last.
+    tree_looked: Instant,
     /// Whether the process has failed, so that it is killed without time to end by itself.
     has_failed: bool,
     /// The entry in the registry of processes; `None` once the process is reaped.
@@ -94,6 +96,7 @@ impl Child {
             stderr_end,
             memory_mib: settings.memory_mib,
             answered: 0,
+            tree_looked: Instant::now(),
             has_failed: true,
             entry: Some(entry),
         };
@@ -186,6 +189,30 @@ impl Child {
         self.process.id()
     }
 
+    /// Returns the files that the process has mapped or opened, if the system tells.
+    pub fn open_files(&self) -> Vec<PathBuf> {
+        let of_process = PathBuf::from(format!("/proc/{}", self.process.id()));
+        let maps = std::fs::read_to_string(of_process.join("maps")).unwrap_or_default();
+        let is_shared = |line: &&str| line.split_whitespace().nth(1).is_some_and(|rights| rights.starts_with("rw-s"));
+        let mapped = maps
+            .lines()
+            .filter(|line| !is_shared(line))
+            .filter_map(|line| Some(PathBuf::from(&line[line.find('/')?..])));
+        let opened = std::fs::read_dir(of_process.join("fd")).into_iter().flatten().flatten();
+        // A file that the process writes changes, and is no part of it.
+        let is_read = |link: &std::fs::DirEntry| {
+            let info = std::fs::read_to_string(of_process.join("fdinfo").join(link.file_name())).unwrap_or_default();
+            let flags = info.lines().find_map(|line| line.strip_prefix("flags:"));
+            flags.is_some_and(|flags| flags.trim().ends_with(['0', '4']))
+        };
+        let opened = opened.filter(is_read).filter_map(|link| std::fs::read_link(link.path()).ok());
+        let mut files: Vec<PathBuf> =
+            mapped.chain(opened).filter(|path| path.is_absolute() && path.is_file()).collect();
+        files.sort();
+        files.dedup();
+        files
+    }
+
     /// Lets the process be killed without time to end by itself.
     pub const fn condemn(&mut self) {
         self.has_failed = true;
@@ -244,7 +271,9 @@ impl Child {
         loop {
             let left = limit.saturating_sub(started.elapsed());
             let line = self.answers.recv_timeout(left.min(MEMORY_CHECK_INTERVAL));
-            if line != Err(RecvTimeoutError::Disconnected) && self.peak_memory_mib() > self.memory_mib {
+            if line != Err(RecvTimeoutError::Disconnected)
+                && (self.peak_memory_mib() > self.memory_mib || self.tree_memory_mib() > self.memory_mib)
+            {
                 return Err(ExecError::Memory { limit_mib: self.memory_mib });
             }
             match line {
@@ -270,6 +299,21 @@ impl Child {
         peak_kib
             .and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok())
             .map_or(0, |kib| kib.div_ceil(1_024))
+    }
+
+    /// Returns the memory of the process and its descendants (MiB), each page counted once, or 0 if the process has none, or they have been
+    /// looked at just before. A peak between two looks is not seen.
+    fn tree_memory_mib(&mut self) -> u64 {
+        if self.tree_looked.elapsed() < MEMORY_CHECK_INTERVAL {
+            return 0;
+        }
+        self.tree_looked = Instant::now();
+        let own = self.process.id();
+        let descendants = processes::descendants(own);
+        if descendants.is_empty() {
+            return 0;
+        }
+        descendants.into_iter().chain([own]).map(proportional_kib).sum::<u64>().div_ceil(1_024)
     }
 
     /// Returns why standard output has ended: with the process, or before it.
@@ -332,6 +376,13 @@ impl Drop for Child {
         }
         drop(self.reap());
     }
+}
+
+/// Returns the memory of a process (KiB), of shared pages its share; 0 if the system does not tell.
+fn proportional_kib(process: u32) -> u64 {
+    let summary = std::fs::read_to_string(format!("/proc/{process}/smaps_rollup")).unwrap_or_default();
+    let pss = summary.lines().find_map(|line| line.strip_prefix("Pss:"));
+    pss.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or(0)
 }
 
 fn spawn_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {

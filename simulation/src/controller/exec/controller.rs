@@ -47,7 +47,8 @@ impl ExecFactory {
     }
 }
 
-/// Starts a process in the given folder, or in that of this program, greets it, and returns what it states about itself in its first answer.
+/// Starts a process in the given folder, or in that of this program, greets it, and returns what it states about itself in its first answer,
+/// and the files that it has open.
 ///
 /// # Errors
 /// [`ExecError`] if the process cannot be started, or does not give a valid first answer.
@@ -56,8 +57,8 @@ pub fn identify(
     folder: Option<&Path>,
     ego_settings: &EgoSettings,
     road: &Road,
-) -> Result<Identity, ExecError> {
-    greet(settings, folder, ego_settings, road).map(|(_, identity)| identity)
+) -> Result<(Identity, Vec<PathBuf>), ExecError> {
+    greet(settings, folder, ego_settings, road).map(|(child, identity)| (identity, child.open_files()))
 }
 
 /// Starts a process, and greets it.
@@ -117,7 +118,11 @@ impl ExecController {
                 self.child.insert(child)
             }
         };
-        let line = child.request(protocol::step(input, front), self.settings.timeout())?;
+        // A library or an FMU creates its controller in its first step.
+        let is_start = self.repeats_time && child.answered() == 1;
+        let timeout = self.settings.timeout();
+        let limit = if is_start { START_TIMEOUT.max(timeout) } else { timeout };
+        let line = child.request(protocol::step(input, front), limit)?;
         let asked = protocol::Asked {
             time_ns: input.time.ns(),
             must_be_repeated: self.repeats_time,

@@ -212,6 +212,22 @@ fn kill_and_reap(pid: Pid) {
     }
 }
 
+/// Returns the descendants of a process. Those whose parents have ended are children of this program, and not among them.
+pub(super) fn descendants(process: u32) -> Vec<u32> {
+    let mut found = vec![process];
+    let mut index = 0;
+    while let Some(parent) = found.get(index).copied() {
+        let threads = fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten().flatten();
+        let lists = threads.filter_map(|thread| fs::read_to_string(thread.path().join("children")).ok());
+        let children: Vec<u32> = lists
+            .flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>())
+            .collect();
+        found.extend(children.into_iter().filter(|child| !found.contains(child)).collect::<Vec<_>>());
+        index += 1;
+    }
+    found.split_off(1)
+}
+
 /// Returns the children of this program, which include adopted ones.
 fn own_children() -> Vec<Pid> {
     let Ok(threads) = fs::read_dir("/proc/self/task") else { return Vec::new() };

@@ -100,6 +100,9 @@ impl From<&Track> for TrackMessage {
     }
 }
 
+/// The mark by which some runtimes begin a text: U+FEFF in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Returns the first message.
 pub(super) fn hello(settings: &EgoSettings, road: &Road) -> Vec<u8> {
     let road = RoadMessage {
@@ -202,6 +205,8 @@ pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecErro
 }
 
 fn object(line: &[u8]) -> Result<Map<String, Value>, ExecError> {
+    // Some runtimes begin their output with a byte order mark.
+    let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
     match serde_json::from_slice(line) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(ExecError::NotJson { line: excerpt(line), reason: "it must be an object".to_owned() }),

@@ -1,0 +1,192 @@
+//! Whether the controllers of a campaign stay the same while it runs: their files are hashed at the start and at the end, and looked at
+//! meanwhile.
+//!
+//! ```text
+//!  the command ─▶ files that it names ─▶ files beside them whose names stand in their text (imports)
+//!  its process ─▶ files that it has mapped or opened after its greeting
+//! ```
+//!
+//! Between the hashes, a file counts as looked at if its time of change, its length and its place on the disk are the same.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+use closecall_simulation::controller::ControllerChoice;
+
+use crate::fingerprint::{Fingerprint, named_files};
+use crate::manifest::{Manifest, file_hash};
+
+/// Shortest time between two looks at the files.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// Largest number of files that are followed as imports. An assumption: more are no controller but a data set.
+const MOST_IMPORTS: usize = 500;
+/// Longest text in which names of imports are looked for (bytes). An assumption: 100 times a long script.
+const MOST_TEXT_BYTES: u64 = 4 << 20;
+/// Largest file that is hashed because a process has it open or mapped (bytes), so that hashing takes less than a second.
+const MOST_OPEN_BYTES: u64 = 512 << 20;
+
+/// What is seen of a file without reading it.
+type Look = Option<(SystemTime, u64, u64)>;
+
+/// A file of a controller.
+#[derive(Debug)]
+struct Watched {
+    /// BLAKE3 hash at the start, or why it cannot be read.
+    hash: String,
+    look: Look,
+}
+
+/// The files of the controllers of a running campaign.
+#[derive(Debug)]
+pub struct ControllerWatch {
+    files: BTreeMap<PathBuf, Watched>,
+    looked: Instant,
+    changed: BTreeSet<PathBuf>,
+}
+
+impl ControllerWatch {
+    /// Hashes the files of the controllers of a campaign that begins.
+    pub fn start(manifest: &Manifest) -> Self {
+        let folder = manifest.controller_folder();
+        let mut paths: BTreeSet<PathBuf> = BTreeSet::new();
+        for arm in &manifest.arms {
+            let named: Vec<PathBuf> = match arm {
+                ControllerChoice::Exec(exec) => named_files(exec, folder).into_iter().map(|(_, path)| path).collect(),
+                ControllerChoice::Native(native) => vec![in_folder(folder, Path::new(&native.path))],
+                ControllerChoice::BuiltIn(_) | ControllerChoice::Hosted(_) => continue,
+            };
+            paths.extend(imports(&named));
+            paths.extend(named);
+        }
+        let is_small =
+            |path: &&PathBuf| path.metadata().is_ok_and(|file| file.is_file() && file.len() <= MOST_OPEN_BYTES);
+        let open = manifest.controllers.iter().flat_map(Fingerprint::open_files);
+        paths.extend(open.filter(is_small).cloned());
+        let watched = |path: PathBuf| {
+            let (hash, look) = (hash(&path), look(&path));
+            (path, Watched { hash, look })
+        };
+        let files = paths.into_iter().map(watched).collect();
+        Self { files, looked: Instant::now(), changed: BTreeSet::new() }
+    }
+
+    /// Looks at the files, at most once in a second.
+    pub fn look(&mut self) {
+        if self.looked.elapsed() >= LOOK_EVERY {
+            self.looked = Instant::now();
+            for (path, watched) in &mut self.files {
+                let now = look(path);
+                if now != watched.look {
+                    watched.look = now;
+                    if hash(path) != watched.hash {
+                        self.changed.insert(path.clone());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Hashes the files again. Returns a message for each that is not what it was at the start, or was not meanwhile.
+    pub fn finish(mut self) -> Vec<String> {
+        self.changed
+            .extend(self.files.iter().filter(|(path, file)| hash(path) != file.hash).map(|(path, _)| path.clone()));
+        let message = |path: &PathBuf| {
+            format!("the controller changed during the campaign: {} is not what it was at the start", path.display())
+        };
+        self.changed.iter().map(message).collect()
+    }
+}
+
+fn in_folder(folder: Option<&Path>, path: &Path) -> PathBuf {
+    folder.map_or_else(|| path.to_owned(), |folder| folder.join(path))
+}
+
+fn hash(path: &Path) -> String {
+    file_hash(path).map_or_else(|error| error.to_string(), |hash| hash.to_string())
+}
+
+fn look(path: &Path) -> Look {
+    #[cfg(unix)]
+    fn place(metadata: &fs::Metadata) -> u64 {
+        std::os::unix::fs::MetadataExt::ino(metadata)
+    }
+    #[cfg(not(unix))]
+    fn place(_: &fs::Metadata) -> u64 {
+        0
+    }
+    let metadata = path.metadata().ok()?;
+    Some((metadata.modified().ok()?, metadata.len(), place(&metadata)))
+}
+
+/// Returns the files beside the named ones, or in folders beside them, that a text among them seems to load: it holds their names as
+/// words, and they have its extension.
+fn imports(named: &[PathBuf]) -> BTreeSet<PathBuf> {
+    let mut found = BTreeSet::new();
+    let mut left: Vec<PathBuf> = named.to_vec();
+    while let Some(path) = left.pop() {
+        let (Some(folder), Some(extension)) = (path.parent(), path.extension()) else { continue };
+        let Some(text) = text_of(&path) else { continue };
+        let words: BTreeSet<&str> = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-')).collect();
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let Ok(entries) = fs::read_dir(folder) else { continue };
+        for entry in entries.flatten().map(|entry| entry.path()) {
+            let is_meant = entry.file_stem().and_then(|stem| stem.to_str()).is_some_and(|stem| words.contains(stem));
+            let loaded = match is_meant {
+                true if entry.is_dir() => {
+                    fs::read_dir(&entry).into_iter().flatten().flatten().map(|file| file.path()).collect()
+                }
+                true => vec![entry],
+                false => continue,
+            };
+            for file in loaded {
+                if file.extension() == Some(extension)
+                    && file.is_file()
+                    && !named.contains(&file)
+                    && found.len() < MOST_IMPORTS
+                {
+                    if found.insert(file.clone()) {
+                        left.push(file);
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Returns the content of a file if it is a text.
+fn text_of(path: &Path) -> Option<String> {
+    let metadata = path.metadata().ok()?;
+    if !metadata.is_file() || metadata.len() > MOST_TEXT_BYTES {
+        return None;
+    }
+    fs::read_to_string(path).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn imports_of_imports_are_followed_and_other_files_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("package/below")).unwrap();
+        for (name, text) in [
+            ("a.py", "import b\nfrom package.c import d\n"),
+            ("b.py", "import e"),
+            ("e.py", ""),
+            ("package/c.py", ""),
+            ("package/c.txt", ""),
+            ("unused.py", ""),
+            ("b.json", ""),
+        ] {
+            fs::write(at(name), text).unwrap();
+        }
+        let expected: BTreeSet<PathBuf> = ["b.py", "e.py", "package/c.py"].map(at).into();
+        assert_eq!(imports(&[at("a.py")]), expected);
+        assert!(imports(&[at("b.json"), at("none.py")]).is_empty());
+    }
+}

@@ -1,0 +1,140 @@
+//! Files are opened so that none hangs the program, fills its memory, or leads to another file.
+//!
+//! | at the path is | an input | a file of a campaign's folder |
+//! |---|---|---|
+//! | a file | opened | opened |
+//! | a symbolic link | followed | refused: it may lead to a file that the campaign would overwrite |
+//! | a named pipe, a socket, a device | refused: it may never end, or never begin | refused |
+//! | `/dev/stdin`, `/dev/fd/N`, `/dev/null` | opened | refused |
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+/// Largest text that is read as a whole (bytes). An assumption: 100 times the largest file that a command writes as one text.
+const MOST_TEXT_BYTES: u64 = 256 << 20;
+
+/// The mark by which some editors begin a file: U+FEFF in UTF-8.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// Opens an input for reading.
+///
+/// # Errors
+/// The error of the system, or [`ErrorKind::InvalidInput`] if the path leads to something that is neither a file nor a folder.
+pub fn open(path: &Path) -> io::Result<File> {
+    let is_stream = cfg!(unix) && ["/dev/stdin", "/dev/fd", "/dev/null", "/proc"].iter().any(|at| path.starts_with(at));
+    if is_stream { File::open(path) } else { checked(path, OpenOptions::new().read(true), false) }
+}
+
+/// Opens a file of a campaign's folder with these options.
+///
+/// # Errors
+/// The error of the system, or [`ErrorKind::InvalidInput`] if something else than a file is at the path, such as a link.
+pub fn open_in_folder(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    checked(path, options, true)
+}
+
+/// Reads an input of at most `most` bytes.
+///
+/// # Errors
+/// As of [`open`], and [`ErrorKind::InvalidData`] if it is larger.
+pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most {
+        return Err(io::Error::new(ErrorKind::InvalidData, format!("it is larger than {} MiB", most >> 20)));
+    }
+    Ok(bytes)
+}
+
+/// Reads an input as text, without a byte order mark.
+///
+/// # Errors
+/// As of [`read`], and [`ErrorKind::InvalidData`] if it is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    let text = String::from_utf8(read(path, MOST_TEXT_BYTES)?)
+        .map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is not text (UTF-8)"))?;
+    Ok(without_mark(&text).map(str::to_owned).unwrap_or(text))
+}
+
+/// Returns the text behind a byte order mark, if it begins with one.
+pub fn without_mark(text: &str) -> Option<&str> {
+    text.strip_prefix(BYTE_ORDER_MARK)
+}
+
+#[cfg(unix)]
+fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Result<File> {
+    use std::os::unix::fs::{FileTypeExt as _, OpenOptionsExt as _};
+
+    use rustix::fs::OFlags;
+
+    // Opening a named pipe waits for another program, unless the system is told not to. A file is not affected.
+    let flags = if is_in_folder { OFlags::NONBLOCK | OFlags::NOFOLLOW } else { OFlags::NONBLOCK };
+    let flags = i32::try_from(flags.bits()).map_err(io::Error::other)?;
+    let refused = |what: &str| io::Error::new(ErrorKind::InvalidInput, format!("it is {what}, and no file"));
+    let file = match options.custom_flags(flags).open(path) {
+        Ok(file) => file,
+        Err(_) if is_in_folder && path.is_symlink() => return Err(refused("a symbolic link")),
+        // A named pipe that is opened for writing, or a socket.
+        Err(error) => return Err(what_is(path).map_or(error, refused)),
+    };
+    let kind = file.metadata()?.file_type();
+    match () {
+        () if kind.is_fifo() => Err(refused("a named pipe")),
+        () if kind.is_char_device() || kind.is_block_device() => Err(refused("a device")),
+        () => Ok(file),
+    }
+}
+
+/// Returns what is at a path that cannot be opened, if it is neither a file nor a folder.
+#[cfg(unix)]
+fn what_is(path: &Path) -> Option<&'static str> {
+    use std::os::unix::fs::FileTypeExt as _;
+    let kind = path.metadata().ok()?.file_type();
+    let kinds = [(kind.is_fifo(), "a named pipe"), (kind.is_socket(), "a socket")];
+    kinds.into_iter().find_map(|(is_it, what)| is_it.then_some(what))
+}
+
+#[cfg(not(unix))]
+fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Result<File> {
+    if is_in_folder && path.is_symlink() {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "it is a symbolic link, and no file"));
+    }
+    options.open(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_read_without_its_mark_and_a_large_file_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        std::fs::write(&path, "\u{feff}text\u{feff}").unwrap();
+        assert_eq!(read_text(&path).unwrap(), "text\u{feff}");
+        assert!(read(&path, 5).unwrap_err().to_string().contains("larger than"));
+        assert_eq!(read(&path, 10).unwrap().len(), 10);
+        std::fs::write(&path, [0xff]).unwrap();
+        assert!(read_text(&path).unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn neither_a_pipe_nor_a_socket_nor_a_device_hangs_and_a_link_is_no_file_of_a_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let [pipe, socket, link, victim] = ["pipe", "socket", "link", "victim"].map(|name| folder.path().join(name));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        std::fs::write(&victim, "kept").unwrap();
+        std::os::unix::fs::symlink(&victim, &link).unwrap();
+        let in_folder = |path: &Path| open_in_folder(path, OpenOptions::new().create(true).write(true).truncate(true));
+        for path in [pipe.as_path(), &socket, Path::new("/dev/zero")] {
+            assert_eq!(open(path).unwrap_err().kind(), ErrorKind::InvalidInput, "{}", path.display());
+            assert_eq!(in_folder(path).unwrap_err().kind(), ErrorKind::InvalidInput, "{}", path.display());
+        }
+        assert!(in_folder(&link).unwrap_err().to_string().contains("symbolic link"));
+        assert_eq!(read_text(&link).unwrap(), "kept");
+        assert_eq!(read(Path::new("/dev/null"), 1).unwrap(), Vec::<u8>::new());
+    }
+}
