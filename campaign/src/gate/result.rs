@@ -78,7 +78,7 @@ impl GateResult {
 
 impl fmt::Display for GateResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Evaluation { value, interval_95, samples, answer, needed } = self.evaluation;
+        let Evaluation { value, interval_95, samples, .. } = self.evaluation;
         write!(f, "{}: {}", self.standing().word(), self.name())?;
         match value {
             Some(value) => write!(f, " (is {}", shown(value))?,
@@ -88,19 +88,29 @@ impl fmt::Display for GateResult {
             write!(f, ", share {} to {} with 95 %", shown(low), shown(high))?;
         }
         write!(f, ", {samples} samples")?;
-        if let Answer::Open(reason) = answer {
-            write!(f, "; {}", reason.text())?;
-            if let Some(needed) = needed {
-                write!(f, ", some {} would if they are like these", rounded_up(needed))?;
-            } else if reason == super::OpenReason::TooFewSamples {
-                f.write_str(", and no number would if they are like these")?;
-            }
+        if let Some(why) = self.evaluation.undecided() {
+            write!(f, "; {why}")?;
         }
         match self.source {
             // The name says so already.
             GateSource::Requirement(_) => f.write_str(")"),
             _ => write!(f, "; from {})", self.source),
         }
+    }
+}
+
+impl Evaluation {
+    /// Returns why the samples do not decide, and how many would; `None` if they decide.
+    pub fn undecided(&self) -> Option<String> {
+        let Answer::Open(reason) = self.answer else { return None };
+        let more = match self.needed {
+            Some(needed) => format!(", some {} would if they are like these", rounded_up(needed)),
+            None if reason == super::OpenReason::TooFewSamples => {
+                ", and no number would if they are like these".to_owned()
+            }
+            None => String::new(),
+        };
+        Some(format!("{}{more}", reason.text()))
     }
 }
 

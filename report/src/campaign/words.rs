@@ -109,7 +109,7 @@ pub(crate) fn gate_line(gate: &GateResult) -> String {
 /// Returns what a gate found and what it requires, in plain words.
 pub(crate) fn gate_words(gate: &GateResult) -> String {
     let expression = &gate.expression;
-    let Evaluation { value, interval_95, samples, answer } = gate.evaluation;
+    let Evaluation { value, interval_95, samples, .. } = gate.evaluation;
     let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
     let of = expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
     let unit = match (&expression.quantity, is_share) {
@@ -129,10 +129,7 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
     let is = value.map_or_else(|| "has no value".to_owned(), |value| format!("{bounded}{}", shown(value)));
     let interval = interval_95
         .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
-    let open = match answer {
-        Answer::Open(reason) => format!("; {}", reason.text()),
-        Answer::Met | Answer::Missed => String::new(),
-    };
+    let open = gate.evaluation.undecided().map_or_else(String::new, |why| format!("; {why}"));
     format!("{subject}{of}: {is} ({samples} samples{interval}{open}); required: {sides} {}", shown(expression.bound))
 }
 
@@ -185,10 +182,10 @@ mod tests {
 
     fn gate(scenario: &str, text: &str, mark: Option<&str>, value: f64, answer: Answer) -> GateResult {
         GateResult {
-            scenario: Some(scenario.to_owned()),
+            scenario: scenario.to_owned(),
             expression: text.parse().unwrap(),
             source: mark.map_or(GateSource::CommandLine, |mark| GateSource::Requirement(mark.to_owned())),
-            evaluation: Evaluation { value: Some(value), interval_95: Some([0.2, 0.4]), samples: 60, answer },
+            evaluation: Evaluation { value: Some(value), interval_95: Some([0.2, 0.4]), samples: 60, answer, needed: None },
         }
     }
 

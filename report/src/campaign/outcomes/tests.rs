@@ -69,6 +69,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
             time_lost_s: 1.75,
             imposed_braking_mps2: 0.5,
         }),
+        promise: None,
     }
 }
 
