@@ -280,6 +280,7 @@ impl OvertakerDriver {
         }
         if !in_target_lane && self.must_abort(step, overtaken) {
             self.phase = Phase::Aborting { origin: change.origin };
+            self.observe_side(step.side.opposite());
             let back = LaneChange { target: change.origin, duration_s: ABORT_DURATION_S };
             let following = self.cruise(step, step.scene.ahead.as_ref());
             return DriverAction { lane_change: Some(back), note: Some(DriverNote::CutOutAborted), ..following };
@@ -301,12 +302,17 @@ impl OvertakerDriver {
         action
     }
 
-    /// Follows the vehicle ahead until the driver is back in the original lane.
+    /// Follows the nearer of the vehicles ahead, in the driver's lane and in the original one, until the driver is back there: its
+    /// centre may swing into the passing lane before it turns back.
     fn abort(&mut self, step: &Step<'_>, origin: Lane) -> DriverAction {
         if step.input.lane_change_target != Some(origin) {
             self.phase = Phase::Approaching;
+            self.observe_side(step.side);
         }
-        self.cruise(step, step.scene.ahead.as_ref())
+        let beside = step.scene.adjacent(step.side.opposite()).filter(|_| step.scene.lane != origin);
+        let in_origin = beside.and_then(|lane| lane.lead.as_ref());
+        let ahead = [step.scene.ahead.as_ref(), in_origin].into_iter().flatten();
+        self.cruise(step, ahead.min_by(|a, b| a.lead.gap_m.total_cmp(&b.lead.gap_m)))
     }
 
     /// Drives past the overtaken vehicle in the passing lane.
@@ -353,10 +359,13 @@ impl OvertakerDriver {
         self.model.acceleration_mps2(step.speed_mps, step.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
     }
 
-    /// Returns true if the driver is no longer willing to change to the passing lane.
+    /// Returns true if the driver is no longer willing to change to the passing lane: if the change asks for more braking than
+    /// it tolerates. A gap to the lead vehicle there that is shorter than the preferred headway is no reason to turn back.
     fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
         let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
-        !self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
+        let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE);
+        let standstill_gap_m = self.settings.follow.safe_gap_m(0.0);
+        !GapAcceptance { safe_gap_m: standstill_gap_m, ..acceptance }.accepts(lane)
     }
 
     /// Returns the criterion by which the driver accepts an adjacent lane.
@@ -418,7 +427,7 @@ mod tests {
 
     use super::*;
     use crate::driver::testing::{car_ahead, overtaker_config, with_input};
-    use crate::driver::{LaneNeighbours, Lead, Neighbours};
+    use crate::driver::{LaneNeighbours, Lead, Neighbour, Neighbours};
 
     /// Returns the actions of a driver at 30 m/s in its first seconds, 14 m behind a vehicle at `lead_mps` and with a free
     /// passing lane. The vehicle shows its brake light, though it keeps its speed, once the driver has pulled out.
@@ -440,6 +449,28 @@ mod tests {
             time += PHYSICS_STEP;
         }
         actions
+    }
+
+    #[test]
+    fn a_driver_does_not_turn_back_because_the_gap_in_the_passing_lane_falls_below_its_headway() {
+        // The safe gap is 1.5 m + 0.8 s · 30 m/s = 25.5 m. The driver pulls out with 26 m, which shrink to 23 m.
+        let mut driver = overtaker_config(0.5, 0.8).check(&Parameters::default()).unwrap().driver();
+        let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+        let mut notes = Vec::new();
+        for step in 0..300 {
+            let time = Time::from_ms(10 * step);
+            let slow = Lead { gap_m: 30.0 - 5.0 * time.s(), speed_mps: 25.0, acceleration_mps2: 0.0 };
+            let passing = Lead { gap_m: 26.0 - time.s(), speed_mps: 29.0, acceleration_mps2: 0.0 };
+            let ahead_at = |lead| LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() };
+            let left = Neighbour { actor: 2, lateral_offset_m: 3.75, ..car_ahead(passing, false) };
+            let neighbours = Neighbours {
+                own: ahead_at(car_ahead(slow, false)),
+                left: Some(ahead_at(left)),
+                ..Neighbours::default()
+            };
+            notes.extend(with_input(time, &neighbours, |input| driver.step(input, &mut rng).unwrap()).note);
+        }
+        assert!(notes.contains(&DriverNote::CutOutStarted) && !notes.contains(&DriverNote::CutOutAborted), "{notes:?}");
     }
 
     #[test]
