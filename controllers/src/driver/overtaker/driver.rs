@@ -163,8 +163,20 @@ impl Step<'_> {
     /// ahead one reaction time ago, in the original lane, may have been passed since. The next vehicle in the path then
     /// takes its place. An overtaken vehicle that comes into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
-        leaders.find(|leader| Some(leader.actor) != overtaken || leader.is_in_path(self.input))
+        let is_meant = |ahead: &&PerceivedVehicle| Some(ahead.actor) != overtaken || ahead.is_in_path(self.input);
+        let beyond = self.scene.beyond.as_ref().filter(|beyond| beyond.is_in_path(self.input));
+        self.scene.ahead.as_ref().filter(is_meant).or(beyond)
+    }
+
+    /// Returns the perceived lead vehicle in the passing lane, in which the driver is by now. One reaction time ago that lane may
+    /// have been the adjacent one.
+    fn lead_in_passing_lane(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
+        let lane = self.input.road.lane_at(self.input.own.d_m);
+        if self.input.road.beside(self.scene.lane, self.side) == Some(lane) {
+            self.scene.adjacent(self.side).and_then(|lane| lane.lead.as_ref())
+        } else {
+            self.ahead_except(overtaken)
+        }
     }
 
     /// Returns the vehicle that is being overtaken: the nearest one ahead in the original lane `origin`. If the first one leaves
@@ -296,7 +308,8 @@ impl OvertakerDriver {
                 action.lane_change = evade(step, &mut change, ahead, &self.settings);
             }
             let course = self.course(step, ahead, change.distance_to_clear_m(own.s_m));
-            action.acceleration_mps2 = self.limited_by_course_mps2(requested_mps2, &course);
+            let kept_mps2 = if course.allows(requested_mps2) { requested_mps2 } else { requested_mps2.min(0.0) };
+            action.acceleration_mps2 = self.limited_by_course_mps2(kept_mps2, &course);
         }
         self.phase = Phase::Changing(change);
         action
@@ -317,7 +330,7 @@ impl OvertakerDriver {
 
     /// Drives past the overtaken vehicle in the passing lane.
     fn overtake(&mut self, step: &Step<'_>, overtaken: Option<usize>) -> DriverAction {
-        let mut action = self.cruise(step, step.ahead_except(overtaken));
+        let mut action = self.cruise(step, step.lead_in_passing_lane(overtaken));
         if step.input.lane_change_target.is_some() {
             action.indicator = step.indicator();
         }
@@ -359,13 +372,16 @@ impl OvertakerDriver {
         self.model.acceleration_mps2(step.speed_mps, step.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
     }
 
-    /// Returns true if the driver is no longer willing to change to the passing lane: if the change asks for more braking than
-    /// it tolerates. A gap to the lead vehicle there that is shorter than the preferred headway is no reason to turn back.
+    /// Returns true if the driver turns back: if the change asks for more braking than it tolerates, and the gap to the vehicle that
+    /// it overtakes still allows it. A gap in the passing lane that is shorter than the preferred headway is no reason, nor is a
+    /// gain of speed that turns out small.
     fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
         let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
         let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE);
         let standstill_gap_m = self.settings.follow.safe_gap_m(0.0);
-        !GapAcceptance { safe_gap_m: standstill_gap_m, ..acceptance }.accepts(lane)
+        let back = Course { min_gap_m: standstill_gap_m, ..self.course(step, ahead, 0.0) };
+        let can_return = BRAKING_MARGIN * back.stay_behind_mps2() <= self.settings.follow.hardest_braking_mps2();
+        can_return && !GapAcceptance { safe_gap_m: standstill_gap_m, ..acceptance }.is_free(lane)
     }
 
     /// Returns the criterion by which the driver accepts an adjacent lane.
