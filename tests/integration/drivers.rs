@@ -86,7 +86,7 @@ then = { brake = { deceleration-mps2 = 6.0 } }
 id = "rear"
 vehicle = { class = "car" }
 start = { behind = { of = "ego", thw-s = 1.0, speed-mps = 30.0 } }
-driver = { wiedemann99 = { cc1-s = 0.9, reaction-s = { log-normal = { median = 0.9, sigma = 0.3 } } } }
+driver = { wiedemann99 = { cc1-s = 0.9, reaction-s = { log-normal = { median = 0.9, sigma = 0.3 } }, perception = { anticipation = 0.0 } } }
 "#;
 
 /// The time at which the ego's brake light goes on, and the time at which the rear vehicle then decelerates.

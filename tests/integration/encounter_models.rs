@@ -188,3 +188,34 @@ fn a_rear_driver_about_to_overtake_brakes_one_reaction_time_after_the_brake_ligh
     let (_, then_mps2) = rear.accelerations.iter().find(|(time, _)| *time >= due).unwrap();
     assert!(*then_mps2 < -1.5, "{then_mps2} m/s² at {due}");
 }
+
+/// Returns whether any vehicle collides in one sample without the system.
+fn collides_without_the_system(name: &str, key: RunKey) -> bool {
+    !run(&sample(name, &[], key), key, BuiltIn::Acc, &mut NoObserver).collisions.is_empty()
+}
+
+#[test]
+fn human_drivers_do_not_collide_where_nothing_happens_ahead() {
+    for name in ["rear-vehicle-is-followed-without-brake", "rear-vehicles-one-after-another-without-brake"] {
+        for index in 0..100 {
+            let key = RunKey { seed: 5001, sample: index };
+            assert!(!collides_without_the_system(name, key), "{name}, sample {index}");
+        }
+    }
+}
+
+#[test]
+fn a_driver_does_not_turn_back_into_the_vehicle_that_it_overtakes() {
+    for index in [127, 1133, 1185, 1461, 1860] {
+        let key = RunKey { seed: 5001, sample: index };
+        assert!(!collides_without_the_system("rear-vehicle-is-followed-without-brake", key), "sample {index}");
+    }
+}
+
+#[test]
+fn a_driver_who_pulls_out_behind_another_one_does_not_strike_the_vehicle_that_both_overtake() {
+    for index in [274, 467, 859, 861] {
+        let key = RunKey { seed: 7, sample: index };
+        assert!(!collides_without_the_system("rear-vehicles-one-after-another-without-brake", key), "sample {index}");
+    }
+}

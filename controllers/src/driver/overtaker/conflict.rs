@@ -54,6 +54,13 @@ impl Course {
         self.lead.gap_m + self.lead_distance_m(time_s) - distance_m
     }
 
+    /// Returns true if the driver may accelerate at `acceleration_mps2` until it is clear, without having to brake then.
+    pub(super) fn allows(&self, acceleration_mps2: f64) -> bool {
+        let time_s = self.distance_to_clear_m.max(0.0) / self.speed_mps.max(STANDING_MPS);
+        let faster = Self { speed_mps: self.speed_mps + acceleration_mps2.max(0.0) * time_s, ..*self };
+        faster.required_braking_mps2() <= 0.0
+    }
+
     /// Returns the deceleration that keeps the minimum gap until the driver is clear (m/s²), 0 if none is required.
     pub(super) fn required_braking_mps2(&self) -> f64 {
         let lead_distance_m = self.distance_to_clear_m - self.lead.gap_m + self.min_gap_m;
@@ -74,7 +81,7 @@ impl Course {
     }
 
     /// Returns the deceleration that keeps the minimum gap if the driver stays behind (m/s²).
-    fn stay_behind_mps2(&self) -> f64 {
+    pub(super) fn stay_behind_mps2(&self) -> f64 {
         Behind {
             speed_mps: self.speed_mps,
             lead_mps: self.lead.speed_mps,
@@ -107,6 +114,14 @@ mod tests {
         let course = course(20.0, 40.0, 30.0, 0.0, 40.0);
         assert_eq!(course.required_braking_mps2(), 0.0);
         assert!((course.gap_after_m(40.0) - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_driver_does_not_accelerate_into_the_vehicle_that_it_overtakes() {
+        // 40 m take 1 s at 40 m/s and leave 4 m; at 44 m/s the gap shrinks by 12.7 m.
+        let course = course(14.0, 40.0, 30.0, 0.0, 40.0);
+        assert!(course.allows(0.0) && course.allows(-1.0));
+        assert!(!course.allows(4.0));
     }
 
     #[test]

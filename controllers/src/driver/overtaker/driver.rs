@@ -163,8 +163,20 @@ impl Step<'_> {
     /// ahead one reaction time ago, in the original lane, may have been passed since. The next vehicle in the path then
     /// takes its place. An overtaken vehicle that comes into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
-        leaders.find(|leader| Some(leader.actor) != overtaken || leader.is_in_path(self.input))
+        let is_meant = |ahead: &&PerceivedVehicle| Some(ahead.actor) != overtaken || ahead.is_in_path(self.input);
+        let beyond = self.scene.beyond.as_ref().filter(|beyond| beyond.is_in_path(self.input));
+        self.scene.ahead.as_ref().filter(is_meant).or(beyond)
+    }
+
+    /// Returns the perceived lead vehicle in the passing lane, in which the driver is by now. One reaction time ago that lane may
+    /// have been the adjacent one.
+    fn lead_in_passing_lane(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
+        let lane = self.input.road.lane_at(self.input.own.d_m);
+        if self.input.road.beside(self.scene.lane, self.side) == Some(lane) {
+            self.scene.adjacent(self.side).and_then(|lane| lane.lead.as_ref())
+        } else {
+            self.ahead_except(overtaken)
+        }
     }
 
     /// Returns the vehicle that is being overtaken: the nearest one ahead in the original lane `origin`. If the first one leaves
@@ -280,6 +292,7 @@ impl OvertakerDriver {
         }
         if !in_target_lane && self.must_abort(step, overtaken) {
             self.phase = Phase::Aborting { origin: change.origin };
+            self.observe_side(step.side.opposite());
             let back = LaneChange { target: change.origin, duration_s: ABORT_DURATION_S };
             let following = self.cruise(step, step.scene.ahead.as_ref());
             return DriverAction { lane_change: Some(back), note: Some(DriverNote::CutOutAborted), ..following };
@@ -295,23 +308,29 @@ impl OvertakerDriver {
                 action.lane_change = evade(step, &mut change, ahead, &self.settings);
             }
             let course = self.course(step, ahead, change.distance_to_clear_m(own.s_m));
-            action.acceleration_mps2 = self.limited_by_course_mps2(requested_mps2, &course);
+            let kept_mps2 = if course.allows(requested_mps2) { requested_mps2 } else { requested_mps2.min(0.0) };
+            action.acceleration_mps2 = self.limited_by_course_mps2(kept_mps2, &course);
         }
         self.phase = Phase::Changing(change);
         action
     }
 
-    /// Follows the vehicle ahead until the driver is back in the original lane.
+    /// Follows the nearer of the vehicles ahead, in the driver's lane and in the original one, until the driver is back there: its
+    /// centre may swing into the passing lane before it turns back.
     fn abort(&mut self, step: &Step<'_>, origin: Lane) -> DriverAction {
         if step.input.lane_change_target != Some(origin) {
             self.phase = Phase::Approaching;
+            self.observe_side(step.side);
         }
-        self.cruise(step, step.scene.ahead.as_ref())
+        let beside = step.scene.adjacent(step.side.opposite()).filter(|_| step.scene.lane != origin);
+        let in_origin = beside.and_then(|lane| lane.lead.as_ref());
+        let ahead = [step.scene.ahead.as_ref(), in_origin].into_iter().flatten();
+        self.cruise(step, ahead.min_by(|a, b| a.lead.gap_m.total_cmp(&b.lead.gap_m)))
     }
 
     /// Drives past the overtaken vehicle in the passing lane.
     fn overtake(&mut self, step: &Step<'_>, overtaken: Option<usize>) -> DriverAction {
-        let mut action = self.cruise(step, step.ahead_except(overtaken));
+        let mut action = self.cruise(step, step.lead_in_passing_lane(overtaken));
         if step.input.lane_change_target.is_some() {
             action.indicator = step.indicator();
         }
@@ -353,10 +372,16 @@ impl OvertakerDriver {
         self.model.acceleration_mps2(step.speed_mps, step.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
     }
 
-    /// Returns true if the driver is no longer willing to change to the passing lane.
+    /// Returns true if the driver turns back: if the change asks for more braking than it tolerates, and the gap to the vehicle that
+    /// it overtakes still allows it. A gap in the passing lane that is shorter than the preferred headway is no reason, nor is a
+    /// gain of speed that turns out small.
     fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
         let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
-        !self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
+        let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE);
+        let standstill_gap_m = self.settings.follow.safe_gap_m(0.0);
+        let back = Course { min_gap_m: standstill_gap_m, ..self.course(step, ahead, 0.0) };
+        let can_return = BRAKING_MARGIN * back.stay_behind_mps2() <= self.settings.follow.hardest_braking_mps2();
+        can_return && !GapAcceptance { safe_gap_m: standstill_gap_m, ..acceptance }.is_free(lane)
     }
 
     /// Returns the criterion by which the driver accepts an adjacent lane.
@@ -418,7 +443,7 @@ mod tests {
 
     use super::*;
     use crate::driver::testing::{car_ahead, overtaker_config, with_input};
-    use crate::driver::{LaneNeighbours, Lead, Neighbours};
+    use crate::driver::{LaneNeighbours, Lead, Neighbour, Neighbours};
 
     /// Returns the actions of a driver at 30 m/s in its first seconds, 14 m behind a vehicle at `lead_mps` and with a free
     /// passing lane. The vehicle shows its brake light, though it keeps its speed, once the driver has pulled out.
@@ -440,6 +465,28 @@ mod tests {
             time += PHYSICS_STEP;
         }
         actions
+    }
+
+    #[test]
+    fn a_driver_does_not_turn_back_because_the_gap_in_the_passing_lane_falls_below_its_headway() {
+        // The safe gap is 1.5 m + 0.8 s · 30 m/s = 25.5 m. The driver pulls out with 26 m, which shrink to 23 m.
+        let mut driver = overtaker_config(0.5, 0.8).check(&Parameters::default()).unwrap().driver();
+        let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+        let mut notes = Vec::new();
+        for step in 0..300 {
+            let time = Time::from_ms(10 * step);
+            let slow = Lead { gap_m: 30.0 - 5.0 * time.s(), speed_mps: 25.0, acceleration_mps2: 0.0 };
+            let passing = Lead { gap_m: 26.0 - time.s(), speed_mps: 29.0, acceleration_mps2: 0.0 };
+            let ahead_at = |lead| LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() };
+            let left = Neighbour { actor: 2, lateral_offset_m: 3.75, ..car_ahead(passing, false) };
+            let neighbours = Neighbours {
+                own: ahead_at(car_ahead(slow, false)),
+                left: Some(ahead_at(left)),
+                ..Neighbours::default()
+            };
+            notes.extend(with_input(time, &neighbours, |input| driver.step(input, &mut rng).unwrap()).note);
+        }
+        assert!(notes.contains(&DriverNote::CutOutStarted) && !notes.contains(&DriverNote::CutOutAborted), "{notes:?}");
     }
 
     #[test]
