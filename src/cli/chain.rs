@@ -34,7 +34,7 @@ use closecall_report::run::figure::still;
 use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::{is_recording_enabled, write_recording};
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::{ScenarioFile, Spreads, logical};
+use closecall_scenarios::{ScenarioError, ScenarioFile, Spreads, logical};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::engagement::engagements;
 use closecall_traffic::atomic::{WriteError, write_file};
@@ -225,11 +225,23 @@ impl Chain {
             *origins.refused.entry(reason.clone()).or_default() += number;
         }
         let mut encounters = Vec::new();
-        for chosen in most_relevant(&approaches, count) {
+        for chosen in most_relevant(&approaches, approaches.len()) {
+            if encounters.len() == count {
+                break;
+            }
             let (index, approach) = (all[chosen.index].0, approaches[chosen.index].clone());
             let names = encounters.iter().map(|(_, _, file): &(usize, Approach, ScenarioFile)| &file.config().name);
             let name = distinct(name_of(&approach), names);
-            let file = logical(&approach, &spreads, &name, &out.join(SCENARIOS).join(format!("{name}.toml")))?;
+            let path = out.join(SCENARIOS).join(format!("{name}.toml"));
+            let file = match logical(&approach, &spreads, &name, &path) {
+                Ok(file) => file,
+                // A vehicle or a road that no scenario can have: the next encounter takes its place.
+                Err(ScenarioError::Value { source, .. }) => {
+                    *origins.refused.entry(format!("no scenario can have its values: {source}")).or_default() += 1;
+                    continue;
+                }
+                Err(error) => return Err(error.into()),
+            };
             origins.encounters.push(origin(&name, &recordings[index].path, (&approach, chosen)));
             encounters.push((index, approach, file));
         }
@@ -273,7 +285,11 @@ fn name_of(approach: &Approach) -> String {
     let is_kept = |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit();
     let kept: String =
         approach.data_name.to_lowercase().chars().map(|letter| if is_kept(letter) { letter } else { '-' }).collect();
-    let words: Vec<&str> = kept.split('-').filter(|word| !word.is_empty()).collect();
+    let mut words: Vec<&str> = kept.split('-').filter(|word| !word.is_empty()).collect();
+    // A name begins with a letter; highD's recordings are numbers.
+    if !words.first().is_some_and(|word| word.starts_with(|first: char| first.is_ascii_lowercase())) {
+        words.insert(0, "recording");
+    }
     format!("{}-track-{}-at-{:.0}-s", words.join("-"), approach.rear.track_id, approach.to_s.max(0.0))
 }
 

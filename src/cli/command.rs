@@ -97,8 +97,9 @@ enum Command {
 }
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may know them by their name alone.
-const GROUPED: [(&str, &str); 23] = [
+const GROUPED: [(&str, &str); 24] = [
     ("calibrate", "traffic calibrate"),
+    ("chain", "traffic chain"),
     ("completions", "tool completions"),
     ("criticality", "traffic criticality"),
     ("drift", "traffic drift"),

@@ -155,7 +155,8 @@ fn each_sample_of_an_encounter_differs_and_an_interrupted_chain_resumes() {
     let parameters: BTreeSet<String> = journal
         .lines()
         .map(|line| {
-            let record: Value = serde_json::from_str(line).unwrap();
+            // Each line begins with its hash.
+            let record: Value = serde_json::from_str(line.split_once(' ').unwrap().1).unwrap();
             record["arms"][0]["result"]["Ok"]["parameters"].to_string()
         })
         .collect();

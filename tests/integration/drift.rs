@@ -3,7 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::{closecall, code, folder, json, library, message, stdout};
+use closecall_testing::data;
+use serde_json::Value;
+
+use crate::support::{ROOT, all_of_library, closecall, code, folder, json, library, message, stdout};
 
 fn recorded(folder: &Path, name: &str, seed: &str, settings: &[&str]) -> PathBuf {
     let csv = folder.join(name);
@@ -54,4 +57,30 @@ fn too_few_values_are_inconclusive_and_other_files_are_refused() {
     let other = folder.path().join("other.toml");
     fs::write(&other, "[parameters]\nx = { fixed = 1.0 }\n").unwrap();
     refused(["traffic", "drift", other.to_str().unwrap(), first], 3, "no parameter has quantiles");
+}
+
+#[test]
+fn the_library_has_not_drifted_from_the_recordings_that_it_was_fitted_to() {
+    let Some(data) = data() else { return };
+    let recordings = ["a", "b", "f", "g", "h", "i"]
+        .map(|name| data.join(format!("ngsim_us101/trajectories/us101_{name}.csv")).to_str().unwrap().to_owned());
+    let is_fitted = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("quantiles");
+    let scenarios: Vec<PathBuf> = all_of_library().into_iter().filter(is_fitted).collect();
+    assert!(scenarios.len() >= 10, "{scenarios:?}");
+    let fitted = Path::new(ROOT).join("scenarios/library/fitted/us101.toml");
+    for file in scenarios.iter().chain([&fitted]) {
+        let words = ["traffic", "drift", file.to_str().unwrap(), "--format", "json"].map(str::to_owned);
+        let found = json(&closecall(words.iter().chain(&recordings)), 0);
+        let of_front = |one: &&Value| one["quantity"] == "front-thw-s";
+        let front = found["quantities"].as_array().unwrap().iter().find(of_front).unwrap();
+        let of_itself = |one: &Value| one["fitted_n"] == one["n"];
+        assert!(of_itself(front), "both sides have the same cut: {front}");
+    }
+    // What must not pass: the headways below half a second, as if they had the cut of the scenario.
+    let folder = folder();
+    let shifted = folder.path().join("shifted.toml");
+    let text = fs::read_to_string(library("low-thw-overtake")).unwrap();
+    fs::write(&shifted, text.replace("cut = [0.5, 0.9]", "cut = [0.0, 3.0]")).unwrap();
+    let words = ["traffic", "drift", shifted.to_str().unwrap()].map(str::to_owned);
+    assert!(stdout(&closecall(words.iter().chain(&recordings)), 1).contains("DRIFTED"));
 }

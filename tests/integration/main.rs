@@ -26,6 +26,7 @@ mod evidence;
 mod exec_controller;
 mod exit_codes;
 mod faulty_controllers;
+mod fitted;
 mod fmu_controllers;
 mod gate;
 mod hidden_lead;

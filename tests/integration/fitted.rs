@@ -1,0 +1,56 @@
+//! `--fitted` applies fitted distributions to the parameters of a scenario.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::{ROOT, closecall, code, folder, json, library, message, stdout};
+
+#[test]
+fn fitted_distributions_replace_those_of_a_scenario_and_stand_in_the_manifest() {
+    let folder = folder();
+    let fitted = folder.path().join("fitted.toml");
+    let entry = "brake-mps2 = { empirical = { quantiles = [5.0, 5.5, 6.0] }, fitted = { n = 9, source = \"own\" } }";
+    fs::write(&fitted, format!("[parameters]\n{entry}\n")).unwrap();
+    let (fitted, out, scenario) = (fitted.to_str().unwrap(), folder.path().join("out"), library("low-thw-overtake"));
+    let scenario = scenario.to_str().unwrap();
+    stdout(&closecall(["check", scenario, "--fitted", fitted]), 0);
+    let words = ["campaign", scenario, "-n", "8", "--sensors", "object", "--no-gate", "--fitted", fitted, "--out"];
+    stdout(&closecall(words.into_iter().chain([out.to_str().unwrap()])), 0);
+    let manifest: Value = serde_json::from_str(&fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
+    let settings = manifest["scenarios"][0]["settings"].to_string();
+    assert!(settings.contains("parameters.brake-mps2") && settings.contains("blake3"), "{settings}");
+    let text = manifest["scenarios"][0]["text"].as_str().unwrap();
+    assert!(text.contains("quantiles = [5.0, 5.5, 6.0]") && !text.contains("min = 4.0, max = 8.0"), "{text}");
+    let journal = fs::read_to_string(out.join("journal.jsonl")).unwrap();
+    for line in journal.lines() {
+        // Each line begins with its hash.
+        let record: Value = serde_json::from_str(line.split_once(' ').unwrap().1).unwrap();
+        let drawn = record["arms"][0]["result"]["Ok"]["parameters"]["brake-mps2"].as_f64().unwrap();
+        assert!((5.0..=6.0).contains(&drawn), "{drawn}");
+    }
+    // The same with a value that is set afterwards.
+    let run = ["run", scenario, "--sensors", "object", "--fitted", fitted, "--set", "brake-mps2=7", "--format", "json"];
+    let outcome = json(&closecall(run), 0);
+    assert_eq!(outcome["parameters"]["brake-mps2"], 7.0);
+    assert!(outcome["settings"].to_string().contains("blake3"), "{}", outcome["settings"]);
+}
+
+#[test]
+fn an_unknown_name_in_a_fitted_file_is_refused_with_the_allowed_ones() {
+    let folder = folder();
+    let fitted = folder.path().join("fitted.toml");
+    fs::write(&fitted, "[parameters]\nbrake = { uniform = { min = 1, max = 2 } }\n").unwrap();
+    let scenario = library("low-thw-overtake");
+    for command in ["run", "campaign", "check"] {
+        let output = closecall([command, scenario.to_str().unwrap(), "--fitted", fitted.to_str().unwrap()]);
+        assert_eq!(code(&output), 3, "{command}: {}", message(&output));
+        let said = message(&output);
+        assert!(said.contains("`brake` is no parameter of low-thw-overtake: allowed are brake-mps2"), "{said}");
+    }
+    let missing = closecall(["check", scenario.to_str().unwrap(), "--fitted", "/no/such.toml"]);
+    assert_eq!(code(&missing), 6, "{}", message(&missing));
+    // The file of the library fits its scenarios.
+    let us101 = std::path::Path::new(ROOT).join("scenarios/library/fitted/us101.toml");
+    stdout(&closecall(["check", scenario.to_str().unwrap(), "--fitted", us101.to_str().unwrap()]), 0);
+}
