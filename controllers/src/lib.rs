@@ -36,6 +36,6 @@ pub use driver::{
 pub use ego::{
     ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter,
-    Front, GOAL_TOLERANCE_S, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry, R157Driver, R157Fuzzy,
-    Reason, SensorAvailability, Slower, Slowing, Solution,
+    Front, GOAL_TOLERANCE_S, Horizon, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry, R157Driver,
+    R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution,
 };

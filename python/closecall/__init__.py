@@ -14,7 +14,7 @@ from ._controller import Controller, State
 from ._errors import ClosecallError, FileError, InputError, SampleError, UsageError
 from ._native import VERSION as __version__
 from ._native import ControllerInput, LeadVehicle, Odometry, Sensors, Setup, Table, Track
-from ._outcome import Collision, Margins, MisSummary, Moment, Outcome
+from ._outcome import Collision, Margins, MisSummary, Moment, Outcome, Promise
 from ._run import run
 from ._scenario import Scenario
 from ._traffic import criticality, fit, lane_changes
@@ -33,6 +33,7 @@ __all__ = [
     "Moment",
     "Odometry",
     "Outcome",
+    "Promise",
     "SampleError",
     "Scenario",
     "Sensors",

@@ -50,10 +50,10 @@ impl Goal {
     pub const fn text(self) -> &'static str {
         match self {
             Self::Reached => "goal reached",
-            Self::TooFast => "vehicle behind too fast for the goal",
-            Self::TooLate => "engaged too late for the goal",
+            Self::TooFast => "rear vehicle too fast",
+            Self::TooLate => "engaged too late",
             Self::HazardFirst => "lead vehicle braked first",
-            Self::CutShort => "stopped short of the goal",
+            Self::CutShort => "stopped short",
         }
     }
 
@@ -117,7 +117,7 @@ impl fmt::Display for Hindrance {
         match self {
             Self::NotEngaged(reason) => reason.fmt(f),
             Self::Engaged(goal) => f.write_str(goal.text()),
-            Self::NothingPromised => f.write_str("engaged without effect"),
+            Self::NothingPromised => f.write_str("engaged, nothing promised"),
         }
     }
 }

@@ -17,7 +17,7 @@ use super::saved::LimitArgs;
 /// The controller under test.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ControllerArgs {
-    /// Controller of the ego vehicle: `acc`, `mis`, `mis-extended`, `blind` and `crawl` (slower from the start,
+    /// Controller of the ego vehicle: `acc`, `mis`, `mis-ttce`, `mis-extended`, `blind` and `crawl` (slower from the start,
     /// without looking back), `gap-SECONDS` (cruise control with a longer time gap:
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
     /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a

@@ -20,8 +20,8 @@ pub use acc::{Acc, AccConfig};
 pub use aeb::{Aeb, AebConfig};
 pub use interface::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Odometry, SensorAvailability};
 pub use mis::{
-    ACTUATOR_LAG_S, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse, Caution, Encounter, GOAL_TOLERANCE_S,
-    Horizon, MisConfig, MisPlan, MisSettings, Solution,
+    ACTUATOR_LAG_S, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse, Encounter, GOAL_TOLERANCE_S, Horizon,
+    MisConfig, MisPlan, MisSettings, Solution,
 };
 pub use r157_driver::R157Driver;
 pub use r157_fuzzy::R157Fuzzy;

@@ -7,6 +7,9 @@
 //! | hold at a | −a, whatever the ACC requests; a is 0 from the critical gap on |
 //! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
+//! Behind a braking lead vehicle the extended MIS brakes at once, by the constant braking that just suffices, instead of using
+//! up the margin first; only holding has precedence.
+//!
 //! The result is the *comfort command*. Emergency braking overrides it if it requests more braking. The jerk limits hold
 //! for the comfort command alone, and each step starts from the comfort command of the step before: while emergency
 //! braking acts, the comfort command goes on beneath it, and once emergency braking ends, the ego follows the comfort
@@ -23,6 +26,14 @@ use super::{Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettin
 /// Largest acceleration while the margin is returned (m/s²): an assumption, half of what the ACC may use; plausible are
 /// 0.5 to 1.5.
 const RELEASE_ACCELERATION_MPS2: f64 = 0.8;
+
+/// Braking of the lead vehicle from which on it counts as braking (m/s²): an assumption, above the ripple of its measured
+/// acceleration; 1 to 3 are plausible.
+const LEAD_BRAKES_MPS2: f64 = 1.5;
+
+/// Gap that early braking leaves behind a standing lead vehicle (m): an assumption, that of the emergency braking; 1 to 5 are
+/// plausible.
+const STANDSTILL_GAP_M: f64 = 2.0;
 
 /// The built-in ego stack.
 #[derive(Clone, Debug)]
@@ -54,7 +65,6 @@ impl EgoStack {
             self.last_comfort.map_or((0.0, 0.0), |(time, last_mps2)| (last_mps2, (input.time - time).s()));
         let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);
         let acc_mps2 = Acc::limit_jerk_mps2(acc_mps2, last_mps2, speed_mps, step_s);
-        let early_mps2 = self.early_braking_mps2(speed_mps, lead);
         let Some(mis) = &mut self.mis else {
             return EgoCommand {
                 acceleration_mps2: acc_mps2,
@@ -74,30 +84,19 @@ impl EgoStack {
         let decision = mis.step(&situation);
         let lowest = last_mps2 - mis.settings().max_jerk_mps3 * step_s;
         let highest = last_mps2 + BRAKE_RELEASE_JERK_MPS3 * step_s;
-        let acceleration_mps2 = match decision.request {
-            Request::Follow => acc_mps2,
-            Request::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)),
-            Request::Hold => 0.0_f64.max(lowest).min(highest),
-            Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest),
-        };
-        let acceleration_mps2 = acceleration_mps2.min(early_mps2.max(lowest));
-        EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }
-    }
-}
-
-/// Braking of the lead vehicle from which on it counts as braking (m/s²): an assumption, above the ripple of traffic; 1 to 3 are plausible.
-const LEAD_BRAKES_MPS2: f64 = 1.5;
-
-impl EgoStack {
-    /// Returns the acceleration that a cautious system does not exceed behind a braking lead vehicle (m/s²).
-    fn early_braking_mps2(&self, speed_mps: f64, lead: Option<&Front>) -> f64 {
-        let is_cautious = self.settings.mis.is_some_and(|mis| mis.caution.brakes_early);
-        match lead {
-            Some(lead) if is_cautious && lead.acceleration_mps2 < -LEAD_BRAKES_MPS2 => {
-                -lead.required_braking_mps2(speed_mps, 2.0)
+        let most_mps2 = match lead {
+            Some(lead) if mis.settings().is_cautious && lead.acceleration_mps2 < -LEAD_BRAKES_MPS2 => {
+                (-lead.required_braking_mps2(speed_mps, STANDSTILL_GAP_M)).max(lowest)
             }
             _ => f64::INFINITY,
-        }
+        };
+        let acceleration_mps2 = match decision.request {
+            Request::Follow => acc_mps2.min(most_mps2),
+            Request::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)).min(most_mps2),
+            Request::Hold => 0.0_f64.max(lowest).min(highest),
+            Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest).min(most_mps2),
+        };
+        EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }
     }
 }
 

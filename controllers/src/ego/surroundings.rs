@@ -3,7 +3,7 @@
 //! Tracks give the centres of boxes in the vehicle frame of the ego, whereas gaps are bumper to bumper. A track counts
 //! as being in a lane if the tracker gives that lane a probability of at least one half.
 
-use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
+use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, touching_distance_m};
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
 use serde::Serialize;
 
@@ -298,8 +298,13 @@ pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> 
     Some(rear_vehicle_from(best, input))
 }
 
-/// Returns true if an established track follows `rear` in the lane of the ego at a time headway below `headway_s` (s).
-pub(crate) fn is_followed(input: &EgoInput<'_>, rear: &RearVehicle, headway_s: f64) -> bool {
+/// Time headway below which a vehicle follows the rear vehicle closely (s): an assumption; 0.9 s is the headway below which
+/// the method calls following critical, and 0.5 to 2 are plausible.
+const FOLLOWED_HEADWAY_S: f64 = CRITICAL_THW_S;
+
+/// Returns true if an established track follows `rear` closely in the lane of the ego. Its driver sees the ego only when
+/// `rear` has pulled out.
+pub(crate) fn is_followed(input: &EgoInput<'_>, rear: &RearVehicle) -> bool {
     input.tracks.iter().any(|track| {
         let gap_m = rear.x_m - track.x_m() - touching_distance_m(track.length_m, rear.length_m);
         track.x_m() < rear.x_m
@@ -307,7 +312,7 @@ pub(crate) fn is_followed(input: &EgoInput<'_>, rear: &RearVehicle, headway_s: f
             && is_established(track)
             && exists(track)
             && in_own_lane(track)
-            && gap_m < headway_s * track.vx_mps()
+            && gap_m < FOLLOWED_HEADWAY_S * track.vx_mps()
     })
 }
 

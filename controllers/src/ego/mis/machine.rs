@@ -207,7 +207,7 @@ impl Mis {
         if !(least_speed_mps - situation.speed_mps() >= settings.engage_closing_mps) {
             return Err(Reason::RearNotApproaching);
         }
-        if is_followed(situation.input, &rear, settings.caution.second_headway_s) {
+        if settings.is_cautious && is_followed(situation.input, &rear) {
             return Err(Reason::RearFollowed);
         }
         match passing_lane(situation.input, &rear, settings.follower_headway_s) {
@@ -255,7 +255,7 @@ impl Mis {
             release(Reason::RearFellBack)
         } else if now - target.last_approached > FOLLOWING_DELAY {
             release(Reason::RearFollows)
-        } else if is_followed(situation.input, rear, settings.caution.second_headway_s) {
+        } else if settings.is_cautious && is_followed(situation.input, rear) {
             release(Reason::RearFollowed)
         } else if lane == PassingLane::Occupied {
             release(Reason::PassingLaneOccupied)
@@ -328,15 +328,15 @@ impl Mis {
         };
         let prediction = ArrivalPrediction { encounter, response: self.response(situation) };
         let bound = self.settings.max_deceleration_mps2;
-        let solution = situation.lead.filter(|lead| target.may_cost_speed(lead, ego_mps)).and_then(|_| {
-            match self.settings.horizon {
+        let solution = situation
+            .lead
+            .filter(|lead| target.may_cost_speed(lead, ego_mps))
+            .filter(|lead| lead.speed_mps - ego_mps < self.settings.max_deficit_mps)
+            .and_then(|_| match self.settings.horizon {
                 Horizon::CriticalGap => prediction.solve(target.goal_thw_s, bound),
                 Horizon::Ttce => encounter.solve_by_ttce(target.goal_thw_s, bound),
-            }
-        });
-        let deficit_mps = lead_mps - ego_mps;
+            });
         let braking = solution.map_or(0.0, |solution| solution.deceleration_mps2);
-        let braking = if deficit_mps > self.settings.caution.max_deficit_mps { 0.0 } else { braking };
         let touching = Encounter { critical_gap_m: 0.0, ..encounter };
         let ttce_s = if rear.gap_m <= 0.0 {
             Err(Absent::Touching)

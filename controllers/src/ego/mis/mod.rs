@@ -29,6 +29,7 @@
 //! | it is a vehicle | car, truck or motorcycle: together at least as probable as not, and one of them more probable than background | `RearUnclassified` |
 //! | it is near | d_R ≤ `engage-gap-m` | `RearFar` |
 //! | it approaches | Δv − 1.645·σ ≥ `engage-closing-mps`: with confidence, judged by the covariance of its track | `RearNotApproaching` |
+//! | it is not followed closely (the extended system only) | no vehicle is less than 0.9 s behind it in the lane of the ego | `RearFollowed` |
 //! | it has a passing lane | the road has a lane on the overtaking side of the ego | `NoPassingLane` |
 //! | the state of that lane is known | no unconfirmed track is in the way there | `PassingLaneUnknown` |
 //! | that lane is free | no vehicle there is within 15 m of the rear vehicle while that uses it: from 40 m behind the ego until 10 m ahead of it, all at constant speed | `PassingLaneOccupied` |
@@ -48,6 +49,7 @@
 //! | | releasing | d_R ≤ `critical-gap-m`, but there is no room, or `hold-s` is 0 | `NoRoomToHold`, `HoldExpired` |
 //! | | releasing | d_R > 1.2 × `engage-gap-m` | `RearFellBack` |
 //! | | releasing | Δv < ½ `engage-closing-mps` for 1 s | `RearFollows` |
+//! | | releasing | another vehicle follows the rear vehicle closely (the extended system only) | `RearFollowed` |
 //! | | releasing | the passing lane is occupied | `PassingLaneOccupied` |
 //! | | releasing | the passing lane has not been known to be free for half a second; this includes sensor failures | `PassingLaneUnknown`, or which sensor has failed |
 //! | holding | releasing | the lead vehicle is lost; the rear vehicle is entirely ahead; the rear vehicle is lost for half a second | as above |
@@ -102,6 +104,10 @@
 //! [`ArrivalPrediction`] solves the same problem with it by a bracketed search. All assume that the lead vehicle and
 //! the rear vehicle keep their speeds; the plan is computed afresh at every step.
 //!
+//! With [`Horizon::Ttce`] a* is instead the braking that gains the headway within the time to closest encounter at present
+//! speeds, as the paper's text has it. The ego's own braking brings the rear vehicle earlier than that, so that this plan brakes
+//! at 0.39 m/s² at the reference point and misses the goal, which the paper's figure reaches at 1 m/s².
+//!
 //! The rear vehicle crosses the marking at a time headway of 0.15 to 0.4 s, mostly before it reaches d_c. If there is room,
 //! the ego stops braking there, although the plan aims at a time headway at d_c: from the marking on, the paper's ego does
 //! not brake in front of the rear vehicle. Without room it continues its plan until d_c. A rear vehicle that leaves the lane
@@ -147,7 +153,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use config::{Caution, Horizon, MisConfig, MisSettings};
+pub use config::{Horizon, MisConfig, MisSettings};
 pub use machine::{ACTUATOR_LAG_S, BRAKE_RELEASE_JERK_MPS3, GOAL_TOLERANCE_S};
 pub(crate) use machine::{Mis, Request, Situation};
 pub use plan::MisPlan;

@@ -10,7 +10,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
 use crate::table::ROWS_PER_GROUP;
-use closecall_scenarios::outcome::{ClosedBy, Cost, EndReason, Margins, Phase};
+use closecall_scenarios::outcome::{ClosedBy, Cost, EndReason, Margins, Phase, Promise};
 
 fn parameters(rear_class: &str) -> Parameters {
     let values = [("closing-mps", Value::Number(6.5)), ("rear-class", Value::Label(rear_class.to_owned()))];
@@ -69,7 +69,11 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
             time_lost_s: 1.75,
             imposed_braking_mps2: 0.5,
         }),
-        promise: None,
+        promise: Some(Promise {
+            in_reach: Some(true),
+            thw_raised_s: Ok(1.95),
+            crossing_braking_mps2: if controller == "acc" { Err(Absent::NeverCrossed) } else { Ok(0.75) },
+        }),
     }
 }
 

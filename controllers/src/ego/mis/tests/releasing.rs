@@ -56,6 +56,30 @@ fn it_releases_when_the_passing_lane_is_occupied_or_the_rear_vehicle_changes_lan
 }
 
 #[test]
+fn the_extended_system_does_not_accelerate_towards_a_braking_lead_vehicle() {
+    let least_mps2 = |mis: MisSettings| {
+        let mut bench = Bench::with_mis(mis);
+        assert_eq!(bench.step().state, EgoState::Increasing);
+        // The rear vehicle is past, and the margin is long; then the lead vehicle brakes at 6 m/s².
+        bench.tracks.truncate(1);
+        bench.lead().state[0] = 100.0;
+        bench.step_for(1.0);
+        let mut most = f64::NEG_INFINITY;
+        for step in 0..25 {
+            bench.lead().state[2] = 30.0 - 6.0 * 0.04 * f64::from(step);
+            let command = bench.step();
+            // The acceleration of the lead vehicle is smoothed over 0.2 s, and the command changes within its jerk limit.
+            if step > 15 {
+                most = most.max(command.acceleration_mps2);
+            }
+        }
+        most
+    };
+    assert!(least_mps2(MisSettings::PAPER) >= 0.0, "the paper's system uses up the margin first");
+    assert!(least_mps2(MisSettings::PAPER.extended()) < 0.0);
+}
+
+#[test]
 fn the_margin_is_returned_gently_before_following_again() {
     let mut bench = Bench::engaged();
     bench.lead().state[0] = 60.0;
