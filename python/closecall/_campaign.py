@@ -31,6 +31,8 @@ class CampaignResult:
     samples: int
     #: Number of samples that ended in an error.
     errors: int
+    #: Why: the first message of each kind of failure, with its count and the first sample.
+    failures: list[dict[str, Any]]
     #: All keys of the output.
     report: dict[str, Any] = field(repr=False)
     #: The folder of the campaign, if there is one.
@@ -113,7 +115,7 @@ def campaign(
         code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
     keys = json.loads(output)
     folder = None if out is None else Path(out)
-    return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys, folder)
+    return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys, folder)
 
 
 #: The options that limit worker processes, with their largest values.

@@ -1,5 +1,6 @@
 //! The commands of the program.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -156,10 +157,10 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         Err(error) => {
             // Help and version are not errors: clap prints them to standard output.
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Pass };
-            let plain = error.render().to_string();
-            if shown(&plain) != plain {
-                // It quotes an argument with control characters.
-                print_error(format_args!("{plain}"));
+            let is_odd = |text: &std::ffi::OsString| matches!(shown(&text.to_string_lossy()), Cow::Owned(_));
+            if arguments.iter().any(is_odd) {
+                // It may quote an argument with control characters.
+                print_error(format_args!("{}", error.render()));
                 return code;
             }
             return if error.print().is_ok() { code } else { ExitCode::Io };

@@ -133,7 +133,7 @@ fn a_fault_of_an_fmu_costs_its_samples_and_changes_no_other() {
         }
         assert!(failed > 1, "{fault} shows in {failed} samples");
     }
-    // A process that has crashed leaves its folder behind, which the next one removes.
+    // A process that crashes leaves nothing behind: the program that has unpacked the FMU for it removes the folder.
     let temporary = folder.path().join("temporary");
     std::fs::create_dir(&temporary).unwrap();
     let run = |fault: &str| {
@@ -149,10 +149,9 @@ fn a_fault_of_an_fmu_costs_its_samples_and_changes_no_other() {
     let left =
         || -> Vec<PathBuf> { std::fs::read_dir(&temporary).unwrap().map(|entry| entry.unwrap().path()).collect() };
     assert_eq!(code(&run("segfault")), 5);
-    let crashed = left();
-    assert!(!crashed.is_empty());
+    assert!(left().is_empty(), "{:?}", left());
     stdout(&run("none"), 0);
-    assert!(!left().iter().any(|path| crashed.contains(path)), "{crashed:?}");
+    assert!(left().is_empty(), "{:?}", left());
     let out = folder.path().join("none");
     assert_eq!(code(&campaign(&controller, &out, "1", Some("no-instance"), &[])), 5);
     let failure = records(&out)[0].arms[1].result.clone().unwrap_err();
@@ -252,4 +251,97 @@ fn an_fmu_that_cannot_be_used_is_refused_before_the_first_sample() {
         assert!(message(&output).contains(expected), "{controller}: {}", stderr(&output));
         assert!(!out.exists(), "{controller}");
     }
+}
+
+/// Writes an archive with the files of another one, whose names and description a line of Python changes.
+const REWRITE: &str = "\
+import sys, zipfile
+source, target, change = sys.argv[1:]
+with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, 'w') as new:
+    for info in old.infolist():
+        name, data = info.filename, old.read(info)
+        is_description = name == 'modelDescription.xml'
+        exec(change)
+        entry = zipfile.ZipInfo(name)
+        entry.filename = name
+        new.writestr(entry, data)
+";
+
+#[test]
+fn archives_of_other_tools_are_read_or_refused_by_what_is_odd_in_them() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let plain = fmu("2", &folder.path().join("plain.fmu"), &[]);
+    let run = |controller: &str| {
+        let arguments = ["run", "low-thw-overtake", "--sensors", "object", "--controller", controller];
+        program().args(arguments).output().unwrap()
+    };
+    let expected = stdout(&run(&plain), 0);
+    let odd = |name: &str, change: &str| {
+        let target = folder.path().join(name).join("plain.fmu");
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+        let mut command = Command::new("python3");
+        let output =
+            command.args(["-c", REWRITE, plain.trim_start_matches("fmu:")]).arg(&target).arg(change).output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        run(&format!("fmu:{}", target.display()))
+    };
+    let accepted = [
+        ("backslash", r"name = name.replace('/', '\\')"),
+        ("dotslash", "name = './' + name"),
+        (
+            "latin1",
+            "data = data.replace(b'encoding=\"UTF-8\"', b'encoding=\"ISO-8859-1\"').replace(b'modelName', b'author=\"M\\xfcller\" modelName') \
+             if is_description else data",
+        ),
+    ];
+    for (name, change) in accepted {
+        assert_eq!(stdout(&odd(name, change), 0), expected, "{name}");
+    }
+    let refused = [
+        (
+            "utf16",
+            "data = data.decode().encode('utf-16') if is_description else data",
+            "has the encoding UTF-16; expected UTF-8",
+        ),
+        (
+            "other",
+            "data = data.replace(b'encoding=\"UTF-8\"', b'encoding=\"Shift_JIS\"') if is_description else data",
+            "has the encoding Shift_JIS; expected UTF-8",
+        ),
+        ("above", "name = '../' + name", "leads out of the archive"),
+        ("absolute", "name = '/tmp/' + name", "leads out of the archive"),
+    ];
+    for (name, change, expected) in refused {
+        let output = odd(name, change);
+        assert_eq!(code(&output), 3, "{name}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{name}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn an_fmu_is_unpacked_once_for_all_processes_of_a_campaign_and_removed_at_its_end() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let controller = fmu("2", &folder.path().join("plain.fmu"), &[]);
+    let place = folder.path().join("temporary");
+    std::fs::create_dir(&place).unwrap();
+    let words = ["campaign", "low-thw-overtake", "-n", "40", "--sensors", "object", "--no-gate", "--no-out"];
+    let mut command = program();
+    command.args(words).args(["--jobs", "2", "--controller", &controller]).env("TMPDIR", &place);
+    command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null());
+    let mut child = command.spawn().unwrap();
+    let mut most = 0;
+    while child.try_wait().unwrap().is_none() {
+        let unpacked = std::fs::read_dir(&place).unwrap().flatten();
+        most = most.max(unpacked.filter(|entry| entry.path().extension().is_some_and(|end| end == "unpacked")).count());
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(child.wait().unwrap().success());
+    assert_eq!(most, 1);
+    assert_eq!(std::fs::read_dir(&place).unwrap().count(), 0);
 }

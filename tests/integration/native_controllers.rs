@@ -234,7 +234,7 @@ fn a_library_that_is_replaced_during_a_campaign_ends_it() {
         .args(["--controller", &lib(&own), "--out", out.to_str().unwrap()])
         .envs([("FAULT_ALWAYS", "1".as_ref()), ("OWN", own.as_os_str()), ("NEXT", next.as_os_str())]);
     let output = with_fault(&mut command, Some("replaces"));
-    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert_eq!(code(&output), 7, "{}", stderr(&output));
     assert!(stderr(&output).contains("own.so has changed since the start"), "{}", stderr(&output));
     // The sample of the library that was named is kept.
     assert_eq!(std::fs::read_to_string(out.join("journal.jsonl")).unwrap().lines().count(), 1);

@@ -39,7 +39,8 @@ fn library_folder() -> PathBuf {
 /// Returns the program, ready to run in the folder of the repository.
 pub(crate) fn program() -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_closecall"));
-    program.current_dir(ROOT);
+    // What the tests run is not remembered among the user's own campaigns.
+    program.current_dir(ROOT).env("XDG_STATE_HOME", env!("CARGO_TARGET_TMPDIR"));
     program
 }
 

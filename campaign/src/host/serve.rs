@@ -35,6 +35,7 @@ const COST_STEPS: u32 = 200_000;
 ///
 /// | arguments | what the process does |
 /// |---|---|
+/// | `unpacked FOLDER …` | uses the folder of an FMU that is unpacked there already |
 /// | `probe lib:PATH VARIABLES` | loads the file, and writes what it is |
 /// | `step lib:PATH TABLE` | answers control steps, with the protocol of external processes |
 /// | `samples` | runs whole samples |
@@ -51,7 +52,7 @@ pub fn serve(arguments: &[String]) -> Result<(), String> {
 
 fn serve_one(arguments: &[String]) -> Result<(), String> {
     let arguments = match arguments {
-        [option, folder, rest @ ..] if option == UNPACKED => {
+        [word, folder, rest @ ..] if word == UNPACKED => {
             use_unpacked(PathBuf::from(folder));
             rest
         }

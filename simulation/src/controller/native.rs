@@ -25,8 +25,8 @@ use crate::run::ControllerFactory;
 use closecall_scenarios::Scenario;
 use closecall_traffic::Time;
 
-/// The option of the hidden command that names the folder of an unpacked FMU.
-pub const UNPACKED: &str = "--unpacked";
+/// The word of the hidden command before the folder of an unpacked FMU.
+pub const UNPACKED: &str = "unpacked";
 
 /// The hidden command that serves libraries and FMUs.
 pub const COMMAND: &str = "host";

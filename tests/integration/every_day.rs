@@ -1,0 +1,339 @@
+//! What a user meets every day: why samples failed, a campaign that grows, and inputs that are refused before any sample runs.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::native_controllers::{compile, lib, with_fault};
+use crate::support::{closecall, code, folder, headline_with, json, message, program, stderr, stdout};
+
+/// A step of a controller in Python that answers with `answer`.
+fn python(answer: &str) -> String {
+    format!(
+        "import json, os, sys, time\nsys.stdin.readline()\n\
+         print(json.dumps({{'type': 'hello', 'protocol': 1, 'name': 'a', 'version': '1'}}), flush=True)\n\
+         for line in sys.stdin:\n    {answer}\n"
+    )
+}
+
+/// Twelve controllers that fail in twelve ways: what each is, and what tells its author what to mend.
+fn twelve(folder: &Path) -> Vec<(String, Vec<&'static str>)> {
+    let script = |name: &str, text: &str| {
+        fs::write(folder.join(name), text).unwrap();
+        format!("exec:python3 {name}")
+    };
+    let answer = |text: &str| format!("print({text}, flush=True)");
+    let source = "tests/fixtures/controllers/faulty.c";
+    let library = lib(&compile(source, &folder.join("faulty.so"), &[]));
+    vec![
+        ("exec:python3 nothere.py".to_owned(), vec!["nothere.py", "No such file"]),
+        (script("syntax.py", "def step(:\n"), vec!["syntax.py", "SyntaxError"]),
+        (script("silent.py", &python("pass")), vec!["hangs", "before its first answer"]),
+        (script("words.py", "print('ready', flush=True)\n"), vec!["ready", "not JSON"]),
+        (
+            script("version.py", "print('{\"type\":\"hello\",\"protocol\":9}', flush=True)\n"),
+            vec!["version 9 of the protocol"],
+        ),
+        (script("raises.py", &python("speeds = {}; print(speeds['front'])")), vec!["raises.py", "KeyError: 'front'"]),
+        (
+            script("key.py", &python(&answer("json.dumps({'acceleration': 0, 'state': 'following'})"))),
+            vec!["`acceleration_mps2` must be a number"],
+        ),
+        (
+            script("nan.py", &python(&answer("'{\"acceleration_mps2\": NaN, \"state\": \"following\"}'"))),
+            vec!["NaN", "not a finite number"],
+        ),
+        (
+            script("state.py", &python(&answer("json.dumps({'acceleration_mps2': 0, 'state': 'driving'})"))),
+            vec!["`state` must be one of following"],
+        ),
+        (script("exits.py", &python("sys.exit(0)")), vec!["the process ended (exit status: 0)"]),
+        (format!("{library}#segfault"), vec!["SIGSEGV", "about to crash"]),
+        (format!("{library}#error"), vec!["error 7: the map is missing"]),
+    ]
+}
+
+/// Runs a campaign of few samples in a folder. What follows `#` names the fault of a library.
+fn failing(folder: &Path, controller: &str, more: &[&str]) -> Output {
+    let (controller, fault) = controller.split_once('#').map_or((controller, None), |(one, fault)| (one, Some(fault)));
+    let mut command = program();
+    command.current_dir(folder).env("FAULT_ALWAYS", "1");
+    command.args(["campaign", "short.toml", "-n", "2", "--sensors", "object", "--no-gate", "--no-validity-checks"]);
+    // Only a controller that hangs need not wait.
+    let timeout_ms = if controller.contains("silent") { "400" } else { "20000" };
+    command.args(["--controller", controller, "--controller-timeout-ms", timeout_ms]).args(more);
+    with_fault(&mut command, fault)
+}
+
+fn short(folder: &Path) {
+    fs::write(folder.join("short.toml"), headline_with("duration-s = 60.0", "duration-s = 20.0")).unwrap();
+}
+
+#[test]
+fn the_console_alone_tells_the_author_of_each_of_twelve_controllers_what_to_mend() {
+    let folder = folder();
+    short(folder.path());
+    for (controller, expected) in twelve(folder.path()) {
+        let text = stdout(&failing(folder.path(), &controller, &["--no-out"]), 5);
+        let line = text
+            .lines()
+            .find(|line| line.contains("first in sample 0"))
+            .unwrap_or_else(|| panic!("{controller}: {text}"));
+        assert!(line.contains("2 × ") && line.contains("low-thw-overtake: "), "{controller}: {line}");
+        for words in expected {
+            assert!(line.contains(words), "{controller}: no `{words}` in: {line}");
+        }
+    }
+}
+
+#[test]
+fn every_report_says_why_samples_failed_and_which_to_replay() {
+    let folder = folder();
+    short(folder.path());
+    let controller = "exec:python3 nothere.py";
+    let output = failing(folder.path(), controller, &["--out", "out", "--format", "json"]);
+    let report: Value = json(&output, 5);
+    let failure = &report["failures"][0];
+    assert_eq!((&failure["scenario"], &failure["samples"]), (&"low-thw-overtake".into(), &2.into()), "{failure}");
+    assert_eq!((&failure["first_sample"], &failure["controller"]), (&0.into(), &"exec".into()), "{failure}");
+    assert!(failure["first_message"].as_str().unwrap().contains("nothere.py"), "{failure}");
+    for name in ["junit.xml", "summary.md", "report.html"] {
+        let text = fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+        assert!(text.contains("No such file") && text.contains("nothere.py"), "{name}: {text}");
+    }
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("closecall replay . 0 --scenario low-thw-overtake --controller exec"));
+    // A campaign that ends early says it, too.
+    let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast"]), 5);
+    assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");
+}
+
+#[test]
+fn control_characters_of_a_controller_reach_no_reader() {
+    let folder = folder();
+    short(folder.path());
+    // Escape, backspace, NUL, and a character that turns the direction of text.
+    let text = "import sys\nsys.stderr.write('\\x1b[2Jred\\x08\\x00\\u202egreen\\x9b<img src=x>')\n";
+    fs::write(folder.path().join("odd.py"), text).unwrap();
+    let controller = "exec:env PYTHONIOENCODING=utf-8 python3 odd.py";
+    let output = failing(folder.path(), controller, &["--out", "out"]);
+    let console = [stdout(&output, 5), stderr(&output)].concat();
+    assert!(console.contains("\\u001b[2Jred\\u0008\\u0000\\u202egreen\\u009b"), "{console}");
+    let is_hidden =
+        |c: char| (c.is_control() && !matches!(c, '\n' | '\t' | '\r')) || matches!(c, '\u{202a}'..='\u{202e}');
+    assert!(!console.contains(is_hidden));
+    for name in ["junit.xml", "samples.xml", "summary.md", "report.html"] {
+        let text = fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+        assert!(text.contains("\\u001b[2Jred") && !text.contains(is_hidden), "{name}");
+        assert!(!text.contains("<img src=x>"), "{name}");
+    }
+    // So do the names that a user gives.
+    let output = closecall(["check", "\u{1b}[31mnone.toml"]);
+    assert!(code(&output) != 0 && !stderr(&output).contains('\u{1b}') && stderr(&output).contains("\\u001b"));
+    let output = closecall(["check", "--\u{1b}[31m"]);
+    assert!(code(&output) == 2 && !stderr(&output).contains('\u{1b}'), "{}", stderr(&output));
+}
+
+#[test]
+fn a_byte_order_mark_of_a_controller_is_no_error() {
+    let folder = folder();
+    short(folder.path());
+    let text = python(
+        "sys.stdout.write('\\ufeff' + json.dumps({'acceleration_mps2': 0, 'state': 'following'}) + '\\n'); sys.stdout.flush()",
+    );
+    fs::write(folder.path().join("mark.py"), text.replace("print(json", "print('\\ufeff' + json")).unwrap();
+    let controller = "exec:env PYTHONIOENCODING=utf-8 python3 mark.py";
+    let mut command = program();
+    command.current_dir(folder.path()).args(["run", "short.toml", "--sensors", "object", "--controller", controller]);
+    stdout(&command.args(["--controller-timeout-ms", "60000"]).output().unwrap(), 0);
+}
+
+const FILES: [&str; 5] = ["journal.jsonl", "outcomes.parquet", "arm_pairs.parquet", "samples.xml", "recordings"];
+
+/// Returns the bytes of the files that do not depend on how a campaign came about.
+fn bytes(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    for path in FILES.map(|name| out.join(name)) {
+        let files: Vec<_> = match path.is_dir() {
+            true => fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()).collect(),
+            false => vec![path],
+        };
+        for file in files {
+            // A recording has times of its own: which there are must be the same.
+            let is_recording = file.extension().is_some_and(|end| end == "rrd" || end == "html");
+            let content = if is_recording { Vec::new() } else { fs::read(&file).unwrap_or_default() };
+            found.push((file.file_name().unwrap().to_string_lossy().into_owned(), content));
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn a_campaign_that_grows_has_the_bytes_of_one_that_ran_at_once() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let campaign = |out: &str, samples: &str, more: &[&str]| {
+        let scenarios = ["low-thw-overtake", "overtake-without-brake"];
+        let mut command = program();
+        command.arg("campaign").args(scenarios).args(["-n", samples, "--paired", "--sensors", "object", "--no-gate"]);
+        command.args(["--record", "worst:1", "--out", at(out).to_str().unwrap()]).args(more).output().unwrap()
+    };
+    for (part, more) in [("whole", &[][..]), ("half", &["--partition", "2/2"][..])] {
+        let [once, grown] = ["once", "grown"].map(|name| format!("{name}-{part}"));
+        stdout(&campaign(&once, "14", more), 0);
+        stdout(&campaign(&grown, "6", more), 0);
+        // Without --resume nothing is touched, and fewer samples are another campaign.
+        assert_eq!(code(&campaign(&grown, "14", more)), 2);
+        let resume = [more, &["--resume"]].concat();
+        assert_eq!(code(&campaign(&grown, "5", &resume)), 2);
+        stdout(&campaign(&grown, "14", &resume), 0);
+        for ((name, one), (_, other)) in bytes(&at(&once)).iter().zip(bytes(&at(&grown))) {
+            assert!(*one == other, "{part}: {name}");
+        }
+        assert_eq!(bytes(&at(&once)).len(), bytes(&at(&grown)).len());
+        stdout(&closecall(["check", at(&grown).to_str().unwrap()]), 0);
+    }
+}
+
+#[test]
+fn a_resumption_that_fails_fast_ends_at_the_next_failing_sample_and_blames_no_journal() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let campaign = |more: &[&str]| {
+        let mut command = program();
+        command.args(["campaign", "low-thw-overtake", "-n", "60", "--sensors", "ground-truth", "--controller", "acc"]);
+        command.args(["--no-gate", "--jobs", "1", "--record", "failures:0", "--out", out.to_str().unwrap()]);
+        command.args(more).output().unwrap()
+    };
+    let samples = || fs::read_to_string(out.join("journal.jsonl")).unwrap().lines().count();
+    assert_eq!(code(&campaign(&["--fail-fast"])), 1);
+    let first = samples();
+    let output = campaign(&["--fail-fast", "--resume"]);
+    assert_eq!(code(&output), 1, "{}", stderr(&output));
+    assert!(samples() > first && samples() < 60, "{} after {first}", samples());
+    stdout(&campaign(&["--resume"]), 0);
+    assert_eq!(samples(), 60);
+    stdout(&campaign(&["--resume", "--fail-fast"]), 0);
+}
+
+#[test]
+fn an_inconclusive_gate_says_how_many_samples_would_decide() {
+    let gate = |samples: &str| {
+        let args = ["campaign", "overtake-without-brake", "-n", samples, "--sensors", "ground-truth", "--gate"];
+        closecall(args.into_iter().chain(["upper(ego_collided) <= 0.05"]))
+    };
+    let text = stdout(&gate("30"), 4);
+    // 1 - 0.05^(1/59) is 0.0495: 59 samples without a collision.
+    assert!(text.contains("too few samples to decide, some 59 would if they are like these"), "{text}");
+    stdout(&gate("59"), 0);
+    stdout(&gate("58"), 4);
+}
+
+#[test]
+fn what_cannot_end_well_is_refused_before_any_sample_runs() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let endless = |command: &mut std::process::Command| {
+        command.args(["campaign", "low-thw-overtake", "-n", "1000000"]).output().unwrap()
+    };
+    // A stack that no thread can have, or that every run overflows.
+    for bytes in ["1", "1000000000000000"] {
+        let output = endless(program().env("RUST_MIN_STACK", bytes));
+        assert_eq!(code(&output), 2, "{}", stderr(&output));
+        assert!(message(&output).contains(&format!("RUST_MIN_STACK={bytes}: expected 1048576 to 1073741824 bytes")));
+    }
+    stdout(&program().env("RUST_MIN_STACK", "4194304").arg("list").output().unwrap(), 0);
+    // A limit of the size of files.
+    let out = at("limited");
+    let words = format!(
+        "ulimit -f 0; exec {} campaign low-thw-overtake -n 1000000 --out {}",
+        program().get_program().display(),
+        out.display()
+    );
+    let output = std::process::Command::new("bash").args(["-c", &words]).output().unwrap();
+    assert_eq!(code(&output), 6, "{}", stderr(&output));
+    assert!(message(&output).contains("File too large"), "{}", stderr(&output));
+    // The recordings have no place.
+    let output = closecall(["campaign", "low-thw-overtake", "-n", "1000000", "--no-out", "--record", "worst:1"]);
+    assert_eq!(code(&output), 2, "{}", stderr(&output));
+    // A name of which no file can be named.
+    let long = at("long.toml");
+    fs::write(&long, headline_with("name = \"low-thw-overtake\"", &format!("name = \"{}\"", "a".repeat(200)))).unwrap();
+    let output = closecall(["campaign", long.to_str().unwrap(), "-n", "1000000"]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(message(&output).contains("at most 120 characters"), "{}", stderr(&output));
+    // More encounters than there could be.
+    let output = closecall(["study", "exposure", "--counted", "5000/20"]);
+    assert_eq!(code(&output), 2);
+    assert!(message(&output).contains("more than 10 per km"), "{}", stderr(&output));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_campaign_whose_names_are_no_text_is_refused() {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt as _;
+
+    let folder = folder();
+    let out = folder.path().join(OsString::from_vec(b"out\xff".to_vec()));
+    let output = program().args(["campaign", "low-thw-overtake", "-n", "1000000", "--out"]).arg(&out).output().unwrap();
+    assert_eq!(code(&output), 2, "{}", stderr(&output));
+    assert!(message(&output).contains("the name is not text (UTF-8)"), "{}", stderr(&output));
+    assert!(!out.exists());
+}
+
+#[test]
+fn ten_thousand_parameters_are_refused_by_their_number() {
+    let folder = folder();
+    let path = folder.path().join("many.toml");
+    let many: String = (0..10_000).map(|n| format!("p{n} = {{ uniform = {{ min = 0.0, max = 1.0 }} }}\n")).collect();
+    fs::write(&path, headline_with("[parameters]", &format!("[parameters]\n{many}"))).unwrap();
+    let output = closecall(["check", path.to_str().unwrap()]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(message(&output).contains("a number of parameters from 0 to 1000"), "{}", stderr(&output));
+}
+
+#[test]
+fn an_explanation_does_not_need_to_write_into_the_folder() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let words = ["campaign", "low-thw-overtake", "-n", "30", "--sensors", "object", "--controller", "acc", "--no-gate"];
+    stdout(&closecall(words.into_iter().chain(["--record", "failures:0", "--out", out.to_str().unwrap()])), 0);
+    // A folder in the place of the file: nobody can write it, not even root.
+    drop(fs::remove_file(out.join("causes.json")));
+    fs::create_dir(out.join("causes.json")).unwrap();
+    let output = closecall(["explain", out.to_str().unwrap(), "--most", "1"]);
+    assert!(!stdout(&output, 0).is_empty());
+    assert!(message(&output).contains("warning: the explanation is not kept"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_slow_start_that_a_campaign_allows_is_allowed_everywhere() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let source = at("slow.c");
+    let text = "#include <unistd.h>\n#define closecall_controller_create acc_create\n#include \"../../../examples/acc_controller.c\"\n\
+        #undef closecall_controller_create\nvoid *closecall_controller_create(const closecall_setup *setup) { sleep(3); return acc_create(setup); }\n";
+    let example = Path::new(crate::support::ROOT).join("examples/acc_controller.c");
+    fs::write(&source, text.replace("../../../examples/acc_controller.c", example.to_str().unwrap())).unwrap();
+    let library = lib(&compile(source.to_str().unwrap(), &at("slow.so"), &[]));
+    let out = at("out");
+    let words = ["low-thw-overtake", "--sensors", "object", "--controller", &library];
+    stdout(&program().arg("run").args(words).output().unwrap(), 0);
+    let campaign =
+        ["-n", "1", "--no-gate", "--no-validity-checks", "--record", "failures:0", "--out", out.to_str().unwrap()];
+    stdout(&program().arg("campaign").args(words).args(campaign).output().unwrap(), 0);
+    let replay = ["replay", out.to_str().unwrap(), "0"];
+    stdout(&program().args(replay).output().unwrap(), 0);
+    stdout(
+        &program()
+            .args(replay)
+            .args(["--controller-timeout-ms", "5000", "--controller-memory-mib", "2048"])
+            .output()
+            .unwrap(),
+        0,
+    );
+}

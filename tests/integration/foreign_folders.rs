@@ -1,0 +1,266 @@
+//! A folder that another machine or another user has written runs nothing unasked, and leads to no other file.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+use crate::native_controllers::{compile, lib};
+use crate::support::{code, folder, headline_with, message, program, stderr, stdout};
+
+/// A controller that says that it runs, in a file beside it.
+const TELLING: &str = r#"#!/bin/sh
+echo ran >> "$1"
+echo '{"type":"hello","protocol":1,"name":"telling","version":"1"}'
+read -r line
+while read -r line; do echo '{"acceleration_mps2":0.0,"state":"following"}'; done
+"#;
+
+/// The program of a user with the state folder `home`.
+fn of_user(home: &Path, folder: &Path) -> Command {
+    let mut command = program();
+    command.current_dir(folder).env("XDG_STATE_HOME", home);
+    command
+}
+
+fn run(command: &mut Command, words: &[&str]) -> Output {
+    command.args(words).output().unwrap()
+}
+
+#[test]
+fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first() {
+    let place = folder();
+    let at = |name: &str| place.path().join(name);
+    fs::write(at("telling.sh"), TELLING).unwrap();
+    let ran = at("ran");
+    let controller = format!("exec:sh telling.sh {}", ran.display());
+    let text = headline_with("duration-s = 60.0", "duration-s = 20.0");
+    fs::write(at("short.toml"), text).unwrap();
+    let campaign = ["campaign", "short.toml", "-n", "3", "--sensors", "object", "--no-gate", "--paired"];
+    let limits = ["--controller", &controller, "--controller-timeout-ms", "60000"];
+    let [own, foreign] = ["own", "foreign"].map(at);
+    let user = |home: &Path| of_user(home, place.path());
+    stdout(&run(user(&own).args(campaign).args(limits), &["--out", "out", "--record", "failures:0"]), 0);
+    fs::remove_file(&ran).unwrap();
+
+    let commands: [&[&str]; 5] = [
+        &["replay", "out", "1"],
+        &["replay", "out", "1", "--paired"],
+        &["plot", "out", "1", "-o", "figure.svg"],
+        &["explain", "out", "1"],
+        &["minimize", "out", "1"],
+    ];
+    for words in commands {
+        let output = run(&mut user(&foreign), words);
+        assert_eq!(code(&output), 2, "{words:?}: {}", stderr(&output));
+        for named in ["telling.sh", "--trust-folder", place.path().to_str().unwrap()] {
+            assert!(message(&output).contains(named), "{words:?}: {}", stderr(&output));
+        }
+        assert!(!ran.exists(), "{words:?}");
+    }
+    // The baseline of the program needs nothing of the folder.
+    stdout(&run(&mut user(&foreign), &["replay", "out", "1", "--controller", "acc"]), 0);
+    assert!(!ran.exists());
+    // A command that the user writes is the user's own.
+    let words = ["replay", "out", "1", "--controller", &controller];
+    stdout(&run(&mut user(&foreign), &words), 0);
+    assert!(ran.exists());
+    let trusted = run(&mut user(&foreign), &["replay", "out", "1", "--trust-folder"]);
+    stdout(&trusted, 0);
+    assert!(message(&trusted).contains("trusting out, which names: exec:sh telling.sh"), "{}", stderr(&trusted));
+    // The user who has run the campaign is not asked, nor after the folder was moved.
+    fs::rename(at("out"), at("moved")).unwrap();
+    stdout(&run(&mut user(&own), &["replay", "moved", "1"]), 0);
+    // An edited manifest is not the one that was written.
+    let manifest = at("moved/manifest.json");
+    let edited = fs::read_to_string(&manifest).unwrap().replace("sh telling.sh", "sh  telling.sh");
+    fs::write(&manifest, edited).unwrap();
+    assert_eq!(code(&run(&mut user(&own), &["replay", "moved", "1"])), 2);
+}
+
+#[test]
+fn parts_of_others_are_merged_without_running_their_commands() {
+    let place = folder();
+    let at = |name: &str| place.path().join(name);
+    fs::write(at("telling.sh"), TELLING).unwrap();
+    let ran = at("ran");
+    let controller = format!("exec:sh telling.sh {}", ran.display());
+    let [own, foreign] = ["own", "foreign"].map(at);
+    let user = |home: &Path| of_user(home, place.path());
+    for part in ["1/2", "2/2"] {
+        let out = format!("part-{}", &part[..1]);
+        let words = ["campaign", "low-thw-overtake", "-n", "4", "--sensors", "object", "--no-gate", "--out", &out];
+        let more = [
+            "--partition",
+            part,
+            "--controller",
+            &controller,
+            "--controller-timeout-ms",
+            "60000",
+            "--record",
+            "failures:0",
+        ];
+        stdout(&run(user(&own).args(words), &more), 0);
+    }
+    fs::remove_file(&ran).unwrap();
+    let merge = ["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "merged"];
+    let output = run(&mut user(&foreign), &merge);
+    stdout(&output, 0);
+    assert!(
+        message(&output).contains("no sample is recorded: parts were written by another user"),
+        "{}",
+        stderr(&output)
+    );
+    assert!(!ran.exists());
+    // Merging makes nobody's commands one's own.
+    assert_eq!(code(&run(&mut user(&foreign), &["replay", "merged", "1"])), 2);
+    let recorded = ["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "third", "--record", "worst:1"];
+    assert_eq!(code(&run(&mut user(&foreign), &recorded)), 2);
+    stdout(&run(&mut user(&own), &["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "again"]), 0);
+    stdout(&run(&mut user(&own), &["replay", "again", "1"]), 0);
+}
+
+/// Runs a command, and fails if it takes longer than a minute.
+fn within_a_minute(command: &mut Command) -> Output {
+    let mut child = command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let started = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        assert!(started.elapsed() < Duration::from_mins(1), "it hangs: {command:?}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.wait_with_output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn neither_a_link_nor_a_named_pipe_is_taken_for_a_file_of_a_folder() {
+    let place = folder();
+    let at = |name: &str| place.path().join(name);
+    let campaign = || {
+        let mut command = program();
+        command.current_dir(place.path()).args([
+            "campaign",
+            "low-thw-overtake",
+            "-n",
+            "2",
+            "--sensors",
+            "ground-truth",
+        ]);
+        command.args(["--no-gate", "--record", "failures:0", "--out", "out", "--resume"]);
+        command
+    };
+    for name in ["lock", "journal.jsonl", "wall-times.jsonl"] {
+        for is_pipe in [false, true] {
+            drop(fs::remove_dir_all(at("out")));
+            stdout(&campaign().output().unwrap(), 0);
+            let victim = at("victim");
+            fs::write(&victim, "kept").unwrap();
+            fs::remove_file(at("out").join(name)).unwrap();
+            if is_pipe {
+                assert!(Command::new("mkfifo").arg(at("out").join(name)).status().unwrap().success());
+            } else {
+                std::os::unix::fs::symlink(&victim, at("out").join(name)).unwrap();
+            }
+            let output = within_a_minute(&mut campaign());
+            assert_eq!(code(&output), 6, "{name}: {}", stderr(&output));
+            let what = if is_pipe { "it is a named pipe, and no file" } else { "it is a symbolic link, and no file" };
+            assert!(message(&output).contains(name) && message(&output).contains(what), "{name}: {}", stderr(&output));
+            assert_eq!(fs::read_to_string(&victim).unwrap(), "kept", "{name}");
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn no_input_that_is_a_named_pipe_hangs() {
+    let place = folder();
+    let pipe = place.path().join("pipe.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let pipe = pipe.to_str().unwrap();
+    let commands: [&[&str]; 7] = [
+        &["check", pipe],
+        &["run", pipe],
+        &["campaign", pipe, "-n", "2", "--no-out"],
+        &["campaign", "low-thw-overtake", "--ensemble", pipe, "-n", "2", "--no-out"],
+        &["traffic", "inspect", pipe],
+        &["traffic", "calibrate", pipe],
+        &["run", "low-thw-overtake", "--controller", &format!("fmu:{pipe}")],
+    ];
+    for words in commands {
+        let output = within_a_minute(program().args(words));
+        assert_ne!(code(&output), 0, "{words:?}");
+        assert!(message(&output).contains("pipe"), "{words:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_controller_that_changes_during_the_campaign_makes_it_invalid() {
+    let place = folder();
+    let at = |name: &str| place.path().join(name);
+    // The controller edits a file in its first run: itself, or one that it reads.
+    let script = |edited: &str| {
+        format!(
+            "#!/bin/sh\n. ./helper.sh\nun=un\n[ -e edited ] || {{ : > edited; echo '# more' >> {edited}; }}\n\
+             echo '{{\"type\":\"hello\",\"protocol\":1,\"name\":\"a\",\"version\":\"1\"}}'\nread -r line\n\
+             while read -r line; do echo '{{\"acceleration_mps2\":0.0,\"state\":\"following\"}}'; done\n"
+        )
+    };
+    for (edited, is_noticed) in [("own.sh", true), ("helper.sh", true), ("unused.sh", false)] {
+        for name in ["out", "edited"] {
+            drop(fs::remove_dir_all(at(name)));
+            drop(fs::remove_file(at(name)));
+        }
+        fs::write(at("helper.sh"), "true\n").unwrap();
+        fs::write(at("unused.sh"), "true\n").unwrap();
+        // A name that stands in the text would count as that of a part.
+        fs::write(at("own.sh"), script(&edited.replace("unused", "${un}used"))).unwrap();
+        // The greeting before the campaign is no part of it.
+        fs::write(at("edited"), "").unwrap();
+        let mut command = program();
+        command.current_dir(place.path());
+        command.args(["campaign", "low-thw-overtake", "-n", "3", "--sensors", "object", "--no-gate", "--out", "out"]);
+        command.args(["--controller", "exec:sh own.sh", "--controller-timeout-ms", "60000", "--record", "failures:0"]);
+        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
+        let child = command.spawn().unwrap();
+        let started = Instant::now();
+        while !at("out/journal.jsonl").exists() {
+            assert!(started.elapsed() < Duration::from_mins(1), "the campaign does not begin");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        drop(fs::remove_file(at("edited")));
+        let output = child.wait_with_output().unwrap();
+        let expected = if is_noticed { 7 } else { 0 };
+        let text = stdout(&output, expected);
+        let says = text.contains(&format!("the controller changed during the campaign: {edited}"))
+            || text.contains(&format!("/{edited} is not what it was at the start"));
+        assert_eq!(says, is_noticed, "{edited}: {text}");
+    }
+}
+
+#[test]
+fn a_library_whose_constructor_loops_or_ends_the_process_is_refused() {
+    let place = folder();
+    let source = place.path().join("odd.c");
+    for (body, expected) in
+        [("for (;;) ;", "is not loaded within 10 s"), ("exit(0);", "the process ended (exit status: 0)")]
+    {
+        let text = format!(
+            "#include <stdlib.h>\n__attribute__((constructor)) static void begin(void) {{ {body} }}\n\
+             unsigned closecall_controller_abi(void) {{ return 1; }}\nvoid *closecall_controller_create(const void *s) {{ return 0; }}\n\
+             int closecall_controller_step(void *c, const void *i, void *o) {{ return 0; }}\nvoid closecall_controller_destroy(void *c) {{}}\n"
+        );
+        fs::write(&source, text).unwrap();
+        let library = lib(&compile(source.to_str().unwrap(), &place.path().join("odd.so"), &[]));
+        let output = within_a_minute(program().args(["run", "low-thw-overtake", "--controller", &library]));
+        assert_eq!(code(&output), 3, "{}", stderr(&output));
+        assert!(message(&output).contains(expected), "{}", stderr(&output));
+        // The inference backend is such a library, too.
+        let library = place.path().join("odd.so");
+        let words = ["run", "low-thw-overtake", "--sensors", "full", "--onnxruntime", library.to_str().unwrap()];
+        if body == "exit(0);" {
+            let output = within_a_minute(program().args(words));
+            assert_eq!(code(&output), 3, "{}", stderr(&output));
+            assert!(message(&output).contains("exit status: 0"), "{}", stderr(&output));
+        }
+    }
+}
