@@ -35,6 +35,10 @@ references:
 evidence: references
     cargo run --release -p closecall-xtask -- write-mis -n 2000 --member-samples 400 --seed 1001
 
+# Draws the pictures of docs/how-to/looking again, in the real viewer. Needs `pip install rerun-sdk==0.36.3 pillow`.
+pictures *names: build
+    python3 .ci/pictures.py {{names}}
+
 # Measures the peak memory of each mode.
 memory: build
     cargo run --release -p closecall-xtask -- validate-memory modes

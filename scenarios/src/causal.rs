@@ -67,6 +67,12 @@ impl CausalSentence<'_> {
         self.outcome.ego_collisions().next().or(self.outcome.collisions.first())
     }
 
+    /// Returns who struck whom: *R struck E*.
+    pub fn who(&self, collision: &Collision) -> String {
+        let [one, other] = collision.roles().map(|role| self.letter(&collision.between[role]));
+        format!("{one} struck {other}")
+    }
+
     /// Returns who struck whom on which side, and how fast: *R struck E from behind at 9.2 m/s*.
     pub fn struck(&self, collision: &Collision) -> String {
         let [striking, struck] = collision.roles();
@@ -86,8 +92,7 @@ impl CausalSentence<'_> {
 
     /// Returns the change of velocity of each vehicle: *ΔV R 5.1, E 5.1 m/s*.
     pub fn delta_v(&self, collision: &Collision) -> String {
-        let texts =
-            collision.roles().map(|role| (self.letter(&collision.between[role]), collision.delta_v_mps[role]));
+        let texts = collision.roles().map(|role| (self.letter(&collision.between[role]), collision.delta_v_mps[role]));
         let [(one, one_mps), (other, other_mps)] = texts;
         format!("ΔV {one} {one_mps:.1}, {other} {other_mps:.1} m/s")
     }
@@ -150,29 +155,33 @@ pub fn causal_sentence(scenario: &Scenario, sensors: Option<SensorMode>, outcome
     CausalSentence { outcome, letters: &letters, faults: &faults, reason_span_s: None }.to_string()
 }
 
+impl CausalSentence<'_> {
+    /// Returns the part of the sentence about the vehicles.
+    pub fn happened(&self) -> String {
+        let Some(first) = self.first() else {
+            let braked = self.outcome.moment(Moment::FrontBrakes);
+            let braked = braked.map_or_else(String::new, |time| format!("; F braked at {}", seconds(time)));
+            return format!("no vehicle collided{braked}");
+        };
+        let at = seconds(first.time);
+        let others = self.outcome.collisions.iter().filter(|other| *other != first).map(|other| {
+            let when = if other.time < first.time { "before it" } else { "then" };
+            format!("; {when} {} at {}", self.struck(other), seconds(other.time))
+        });
+        let others: String = others.collect();
+        format!("{} ({}) at {at}{}{others}", self.struck(first), self.delta_v(first), self.after_braking(first))
+    }
+
+    /// Returns the part of the sentence about the system and the faults.
+    pub fn reason(&self) -> String {
+        let mis = self.mis().map_or_else(String::new, |mis| format!("{mis}; "));
+        format!("{mis}faults: {}", self.faults())
+    }
+}
+
 impl fmt::Display for CausalSentence<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.first() {
-            Some(first) => {
-                write!(f, "{} ({}) at {}", self.struck(first), self.delta_v(first), seconds(first.time))?;
-                f.write_str(&self.after_braking(first))?;
-                let others = self.outcome.collisions.iter().filter(|other| *other != first);
-                for other in others {
-                    let when = if other.time < first.time { "before it" } else { "then" };
-                    write!(f, "; {when} {} at {}", self.struck(other), seconds(other.time))?;
-                }
-            }
-            None => {
-                f.write_str("no vehicle collided")?;
-                if let Some(time) = self.outcome.moment(Moment::FrontBrakes) {
-                    write!(f, "; F braked at {}", seconds(time))?;
-                }
-            }
-        }
-        if let Some(mis) = self.mis() {
-            write!(f, "; {mis}")?;
-        }
-        write!(f, "; faults: {}", self.faults())
+        write!(f, "{}; {}", self.happened(), self.reason())
     }
 }
 

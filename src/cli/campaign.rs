@@ -428,7 +428,10 @@ pub(super) fn progress_bar(samples: u64) -> ProgressBar {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {rate} samples/s, {eta} left") {
-        let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| drop(text.write_str(&rate_text(state.per_sec())));
+        let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
+            // A bar that cannot be written has no reader.
+            let _ = text.write_str(&rate_text(state.per_sec()));
+        };
         bar.set_style(style.with_key("rate", rate));
     }
     bar

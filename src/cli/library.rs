@@ -2,7 +2,7 @@
 
 use clap::Args;
 use closecall_report::json::stamped;
-use closecall_scenarios::library::entries;
+use closecall_scenarios::library::{LibraryEntry, entries};
 use closecall_scenarios::member;
 use serde_json::json;
 
@@ -10,16 +10,26 @@ use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
 use super::output::outln;
+use super::terminal::{cut, for_terminal};
 use crate::exit_code::ExitCode;
+
+/// The names of the groups that `closecall list` does not list one by one.
+const FAULTS: &str = "faults";
+const MEMBERS: &str = "members";
+/// The tag of a scenario that injects a fault.
+const FAULT_TAG: &str = "fault";
 
 /// Arguments of `closecall list`.
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall list",
-    "closecall list --format json",
+    "closecall list faults",
     "closecall list --format json > library.json",
 ]))]
 pub(super) struct ListArgs {
+    /// Describe these scenarios in full: part of their names, `faults`, or the `members` of the driver ensemble [default: a line
+    /// for each scenario without a fault]
+    what: Option<String>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
@@ -27,15 +37,54 @@ pub(super) struct ListArgs {
 
 pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
     let (listed, members) = (entries()?, member::entries()?);
-    match args.format {
-        Format::Json => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
-        Format::Human => {
-            listed.iter().for_each(|scenario| outln!("{scenario}"));
-            outln!("Members of the driver ensemble (`closecall campaign SCENARIO --ensemble NAME`):");
-            members.iter().for_each(|member| outln!("{member}"));
-            outln!("\nA command takes such a name in place of a file: `closecall run {}`.", listed[0].name);
-            outln!("`closecall new NAME --from LIBRARY_NAME` writes a copy to start from.");
+    match (args.format, args.what.as_deref()) {
+        (Format::Json, _) => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
+        (Format::Human, None) => overview(&listed, &members.iter().map(|member| member.name).collect::<Vec<_>>()),
+        (Format::Human, Some(MEMBERS)) => {
+            members.iter().for_each(|member| outln!("{}", for_terminal(member).trim_end()));
+            outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
+        }
+        (Format::Human, Some(what)) => {
+            let is_meant = |one: &&LibraryEntry| if what == FAULTS { is_fault(one) } else { one.name.contains(what) };
+            let meant: Vec<&LibraryEntry> = listed.iter().filter(is_meant).collect();
+            if meant.is_empty() {
+                return Err(CliError::usage(format!(
+                    "no scenario has `{what}` in its name: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"
+                )));
+            }
+            meant.into_iter().for_each(|scenario| outln!("{}", for_terminal(scenario)));
         }
     }
     Ok(ExitCode::Pass)
+}
+
+fn is_fault(scenario: &LibraryEntry) -> bool {
+    scenario.tags.iter().any(|tag| tag == FAULT_TAG)
+}
+
+/// Prints a line for each scenario without a fault, and how many others there are.
+fn overview(listed: &[LibraryEntry], members: &[&str]) {
+    let (faults, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) = listed.iter().partition(|one| is_fault(one));
+    let width = plain.iter().map(|scenario| scenario.name.len()).max().unwrap_or(0);
+    for scenario in &plain {
+        outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));
+    }
+    outln!(
+        "{}",
+        for_terminal(&format!(
+            "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.",
+            faults.len()
+        ))
+    );
+    outln!(
+        "{}",
+        for_terminal(&format!("Members of the driver ensemble (`closecall list {MEMBERS}`): {}", members.join(", ")))
+    );
+    outln!(
+        "{}",
+        for_terminal(&format!(
+            "A command takes a name in place of a file: `closecall run {}`. `closecall new NAME --from LIBRARY_NAME` writes a copy.",
+            plain.first().map_or("paper-figure", |first| first.name)
+        ))
+    );
 }

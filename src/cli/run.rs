@@ -68,12 +68,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
 
 /// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first. `settings` are those of the
 /// command line.
-pub(super) fn print(
-    (scenario, arms): (&Scenario, &[Arm]),
-    outcomes: &[Outcome],
-    format: Format,
-    settings: &[Setting],
-) {
+pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome], format: Format, settings: &[Setting]) {
     let settings = Some(settings);
     match (format, outcomes) {
         (Format::Json, [outcome]) => outln!("{:#}", json::stamped(json::outcome(outcome), None, settings)),

@@ -25,6 +25,18 @@ pub(super) fn for_terminal(text: &impl Display) -> String {
     if console::colors_enabled() { coloured(&wrapped) } else { wrapped }
 }
 
+/// Returns a line that is cut off at the width of the terminal.
+pub(super) fn cut(line: &str) -> String {
+    let columns = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    match columns.filter(|_| stdout().is_terminal() && !session::is_active()) {
+        Some(width) if line.chars().count() > width.max(LEAST_WIDTH) => {
+            let kept: String = line.chars().take(width.max(LEAST_WIDTH) - 1).collect();
+            format!("{kept}…")
+        }
+        _ => line.to_owned(),
+    }
+}
+
 /// Wraps each line at words. A line that goes on is indented further than its begin.
 fn wrapped(text: &str, width: usize) -> String {
     let width = width.max(LEAST_WIDTH);
@@ -70,9 +82,8 @@ fn undecided() -> Style {
 fn coloured(text: &str) -> String {
     let colour = |line: &str| {
         let start = line.trim_start();
-        let is_word = |word: &str| {
-            start.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with([':', ' ']))
-        };
+        let is_word =
+            |word: &str| start.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with([':', ' ']));
         match WORDS.iter().find(|(word, _)| is_word(word)) {
             Some((word, style)) => {
                 let (indent, rest) = (&line[..line.len() - start.len()], &start[word.len()..]);

@@ -58,7 +58,14 @@ fn the_library_is_listed_and_works_from_anywhere() {
     assert!(scenarios.len() >= 8);
     assert!(scenarios.iter().all(|one| !one["requirements"].as_array().unwrap().is_empty()));
     let text = stdout(&run_in(folder.path(), &["list"]), 0);
-    assert!(text.contains("paper-figure\n  Does the margin increase system"), "{text}");
+    let line = text.lines().find(|line| line.starts_with("paper-figure ")).expect("a line for each scenario");
+    assert!(line.contains("  Does the margin increase system"), "{text}");
+    assert!(text.lines().count() < 40 && text.contains("closecall list faults"), "{text}");
+    let faults = stdout(&run_in(folder.path(), &["list", "faults"]), 0);
+    assert!(faults.contains("lidar-dead\n  What does the system do"), "{faults}");
+    let one = stdout(&run_in(folder.path(), &["list", "paper"]), 0);
+    assert!(one.starts_with("paper-figure\n  Does the margin increase system"), "{one}");
+    assert!(message(&run_in(folder.path(), &["list", "no-such"])).contains("no scenario has `no-such` in its name"));
     let run = json(&run_in(folder.path(), &["run", "paper-figure", "--format", "json"]), 0);
     assert_eq!(run["scenario"], "paper-figure");
     assert!(message(&run_in(folder.path(), &["run", "paper-figur"])).contains("did you mean `paper-figure`"));

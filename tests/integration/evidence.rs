@@ -37,7 +37,11 @@ fn an_ego_that_is_slower_and_does_not_look_back_fails_the_headline() {
     for controller in BLIND {
         let args = ["-n", "200", "--seed", "46", "--paired", "--sensors", "object", "--controller", controller];
         let text = stdout(&campaign(&library("low-thw-overtake"), &args), 1);
-        assert!(text.contains("FAIL\n") && text.contains("NOT MET: low-thw-overtake: MIS-9"), "{text}");
+        assert!(
+            text.contains("FAIL: the scenario misses a requirement: low-thw-overtake (MIS-9)")
+                && text.contains("NOT MET: low-thw-overtake: MIS-9"),
+            "{text}"
+        );
         // It prevents more than the system does: the demand on what is prevented does not tell them apart.
         assert!(text.contains("\n  met: low-thw-overtake: MIS-1"), "{text}");
     }
@@ -61,7 +65,11 @@ fn the_system_passes_the_headline_on_seeds_that_nobody_tuned_on() {
     for seed in ["460", "461"] {
         let args = ["-n", "800", "--seed", seed, "--arms", "acc,blind,crawl,mis", "--sensors", "object"];
         let text = stdout(&campaign(&library("low-thw-overtake"), &args), 0);
-        assert!(text.contains("met: low-thw-overtake: MIS-9: upper(slowed_unprompted) <= 0.05"), "{text}");
+        assert!(
+            text.contains("met: low-thw-overtake: MIS-9: share of ")
+                && text.contains("[upper(slowed_unprompted) <= 0.05]"),
+            "{text}"
+        );
     }
 }
 

@@ -37,7 +37,10 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     for (still, recording) in findings.worst_stills() {
         let (verdict, scenario, sample) = (still.verdict, cell(&still.scenario), still.sample);
         let card = card_beside(recording);
-        text.push_str(&format!("- {verdict}: {scenario}, sample {sample}: {} ([incident card]({card}))\n", cell(&still.sentence)));
+        text.push_str(&format!(
+            "- {verdict}: {scenario}, sample {sample}: {} ([incident card]({card}))\n",
+            cell(&still.sentence)
+        ));
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));

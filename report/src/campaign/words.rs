@@ -22,6 +22,7 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
         let listed: Vec<String> = names.iter().map(|(name, marks)| named(name, marks)).collect();
         let what = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
         (!listed.is_empty()).then(|| match names.len() {
+            1 if scenarios == 1 => format!("{word}: the scenario {} {what}: {}", singular(verb), listed.join(", ")),
             1 => format!("{word}: 1 of {scenarios} scenarios {} {what}: {}", singular(verb), listed.join(", ")),
             count => format!("{word}: {count} of {scenarios} scenarios {verb} {what}: {}", listed.join(", ")),
         })
@@ -35,7 +36,11 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
         Decision::Inconclusive => because(Standing::Inconclusive, "do not decide").or_else(first_reason),
         Decision::Pass => {
             let met = judged.gates.iter().filter(|gate| gate.standing() == Standing::Pass).count();
-            let all = if scenarios == 1 { "the scenario meets".to_owned() } else { format!("all {scenarios} scenarios meet") };
+            let all = if scenarios == 1 {
+                "the scenario meets".to_owned()
+            } else {
+                format!("all {scenarios} scenarios meet")
+            };
             Some(format!("{word}: {all} what is required, {met} of {} gates", judged.gates.len()))
         }
         Decision::NotJudged | Decision::Overridden | Decision::SampleError | Decision::Invalid => first_reason(),
@@ -113,7 +118,9 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
     let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
     let of = expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
     let unit = match (&expression.quantity, is_share) {
-        (Quantity::Tested(measure) | Quantity::Baseline(measure), false) if !expression.aggregate.is_of_flag() => unit_of(measure.name),
+        (Quantity::Tested(measure) | Quantity::Baseline(measure), false) if !expression.aggregate.is_of_flag() => {
+            unit_of(measure.name)
+        }
         _ => None,
     };
     let shown = |value: f64| match (is_share, unit) {
@@ -125,7 +132,11 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
         Operator::AtLeast => "at least",
         Operator::AtMost => "at most",
     };
-    let bounded = if matches!(expression.aggregate, Aggregate::Lower | Aggregate::Upper) { format!("{sides} ") } else { String::new() };
+    let bounded = if matches!(expression.aggregate, Aggregate::Lower | Aggregate::Upper) {
+        format!("{sides} ")
+    } else {
+        String::new()
+    };
     let is = value.map_or_else(|| "has no value".to_owned(), |value| format!("{bounded}{}", shown(value)));
     let interval = interval_95
         .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
@@ -138,7 +149,9 @@ fn subject(aggregate: Aggregate, quantity: &Quantity) -> (String, bool) {
     let words = flag_words(quantity);
     match aggregate {
         Aggregate::Count => (format!("number of samples in which {words}"), false),
-        Aggregate::Share | Aggregate::Lower | Aggregate::Upper => (format!("share of the samples in which {words}"), true),
+        Aggregate::Share | Aggregate::Lower | Aggregate::Upper => {
+            (format!("share of the samples in which {words}"), true)
+        }
         Aggregate::Min => (format!("smallest value of: {words}"), false),
         Aggregate::Max => (format!("largest value of: {words}"), false),
         Aggregate::Mean => (format!("mean of: {words}"), false),
@@ -212,16 +225,23 @@ mod tests {
         assert_eq!(sentence(&found, 14), "FAIL: 2 of 14 scenarios miss a requirement: c (MIS-1), a (MIS-1)");
         let lines = reasons(&found);
         assert!(lines[0].starts_with("NOT MET: c: MIS-1: share of the samples in which a collision is prevented, where the ego collides in the baseline: at least 5"), "{lines:?}");
-        assert!(lines[0].contains("required: at least 50") && lines[0].ends_with("[lower(prevented | baseline.ego_collided) >= 0.5]"), "{lines:?}");
+        assert!(
+            lines[0].contains("required: at least 50")
+                && lines[0].ends_with("[lower(prevented | baseline.ego_collided) >= 0.5]"),
+            "{lines:?}"
+        );
         assert_eq!(lines[2], "a note");
-        assert!(lines[3].starts_with("met: b: MIS-2: share of the samples in which a collision is induced: at most 2"), "{lines:?}");
+        assert!(
+            lines[3].starts_with("met: b: MIS-2: share of the samples in which a collision is induced: at most 2"),
+            "{lines:?}"
+        );
     }
 
     #[test]
     fn what_is_open_or_met_is_said_so() {
         let open = Answer::Open(OpenReason::TooFewSamples);
         let found = judged(Decision::Inconclusive, vec![gate("a", "p1(min_ttc_rear_s) >= 1", None, 0.9, open)]);
-        assert_eq!(sentence(&found, 1), "INCONCLUSIVE: 1 of 1 scenarios does not decide a gate: a");
+        assert_eq!(sentence(&found, 1), "INCONCLUSIVE: the scenario does not decide a gate: a");
         let words = gate_words(&found.gates[0]);
         assert_eq!(
             words,

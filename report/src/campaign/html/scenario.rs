@@ -8,9 +8,9 @@ use maud::{Markup, PreEscaped, html};
 use super::page::legend_key;
 use super::{influence, samples};
 use crate::campaign::findings::Findings;
+use crate::campaign::overview::{Fate, MARGINS, MarginBins, ScenarioOverview};
 use crate::campaign::recordings::card_beside;
 use crate::campaign::words::worst_first;
-use crate::campaign::overview::{Fate, MARGINS, MarginBins, ScenarioOverview};
 use crate::charts;
 use crate::charts::style::{arm_colour, css, fate_colour};
 use crate::units::labelled;
@@ -41,7 +41,8 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
 
 /// Returns the faults that a scenario injects; nothing if it injects none.
 fn faults(file: &ScenarioFile) -> Markup {
-    let stated = file.concrete(&file.space().nominal()).map_or_else(|_| Vec::new(), |concrete| concrete.sensors.stated_faults());
+    let stated =
+        file.concrete(&file.space().nominal()).map_or_else(|_| Vec::new(), |concrete| concrete.sensors.stated_faults());
     let texts: Vec<String> = stated.iter().map(ToString::to_string).collect();
     html! { @if !texts.is_empty() { p { strong { "Injected faults: " } (texts.join("; ")) "." } } }
 }

@@ -13,9 +13,9 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 
 use super::page::campaign;
-use crate::campaign::{Still, Tally};
 use crate::campaign::findings::{Findings, Recordings};
 use crate::campaign::timings::Timing;
+use crate::campaign::{Still, Tally};
 
 /// Returns the page of 30 samples with and without the margin increase system.
 fn page() -> String {
@@ -77,7 +77,7 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
         "How it was made",
         "closing [m/s]",
         "<a href=\"#part-0\">Gates</a>",
-        "FAIL: 1 of 1 scenarios misses a ",
+        "FAIL: the scenario misses a ",
         "R struck E from behind",
         "recordings/low-thw-overtake-1.html",
         "Signature",

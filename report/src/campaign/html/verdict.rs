@@ -85,7 +85,7 @@ pub(super) fn gates(findings: &Findings<'_>) -> Markup {
 }
 
 fn gate_table(gates: &[&GateResult]) -> Markup {
-    let head = text_heads(&["result", "scenario", "from", "what is required, and what was found", "criterion"]);
+    let head = text_heads(&["result", "scenario", "from", "found and required", "criterion"]);
     let rows = html! {
         @for gate in gates {
             tr {

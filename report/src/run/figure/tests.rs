@@ -35,7 +35,7 @@ fn the_figure_of_the_papers_scenario_shows_all_five_moments_and_the_prevented_co
         "(d)",
         "(e)",
         "PREVENTED",
-        "collision of ego and rear",
+        "R struck E from behind at ",
         "no collision",
         "m from E",
         "critical 0.9 s",
@@ -44,6 +44,27 @@ fn the_figure_of_the_papers_scenario_shows_all_five_moments_and_the_prevented_co
         assert!(text.contains(letter), "{letter}");
     }
     assert!(!text.contains("NaN") && !text.contains("inf"), "the figure contains a number that is not finite");
+}
+
+#[test]
+fn in_dense_traffic_all_but_ego_lead_and_rear_vehicle_are_grey_and_share_one_entry_of_the_legend() {
+    let films = films("traffic/busy-overtake", &[ControllerChoice::ACC, ControllerChoice::MIS]);
+    let film = &films[1];
+    assert!(film.actors.len() > 8, "{}", film.actors.len());
+    let names: Vec<String> = (0..film.actors.len()).map(|actor| colours::legend_name(film, actor)).collect();
+    let named: Vec<&String> = names.iter().filter(|name| !name.is_empty()).collect();
+    assert_eq!(named.len(), 4, "{named:?}");
+    let colours: std::collections::BTreeSet<&str> =
+        (0..film.actors.len()).map(|actor| colours::colour(film, actor)).collect();
+    assert_eq!(colours.len(), 4, "{colours:?}");
+    assert_eq!(film.actors.iter().filter(|actor| actor.is_plotted).count(), 3);
+    let card = card(&films, "closecall replay . 0");
+    assert!(card.len() < 300_000, "{} bytes", card.len());
+    assert!(card.contains("R struck E from behind at ") && card.contains("animateTransform"), "{card}");
+    assert!(card.contains("closecall replay . 0") && card.matches("<svg").count() == 4);
+    for loaded in ["<script", "<link", "<img", "src=", "url(", "http://", "https://", "NaN"] {
+        assert!(!card.contains(loaded), "{loaded}");
+    }
 }
 
 #[test]

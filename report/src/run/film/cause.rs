@@ -25,6 +25,12 @@ impl Film {
         self.sentence().map_or_else(String::new, |sentence| sentence.struck(collision))
     }
 
+    /// Returns who struck whom, in a few letters, with the relative speed.
+    pub(in crate::run) fn mark_text(&self, collision: &Collision) -> String {
+        let who = self.sentence().map_or_else(String::new, |sentence| sentence.who(collision));
+        format!("{who}, {:.1} m/s", collision.relative_speed_mps)
+    }
+
     /// Returns who struck whom, how fast, and the change of velocity of each.
     pub(in crate::run) fn collision_text(&self, collision: &Collision) -> String {
         let sentence = self.sentence();

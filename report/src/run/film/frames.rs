@@ -191,9 +191,8 @@ impl Film {
             let mut margins = self.frames.iter().map(|frame| &frame.margins);
             margins.any(|near| near.follower == Some(actor) || near.lead.is_ok_and(|lead| lead.actor == actor))
         };
-        let is_relevant: Vec<bool> = (0..self.actors.len())
-            .map(|actor| collides(&self.actors[actor].name) || is_near(actor))
-            .collect();
+        let is_relevant: Vec<bool> =
+            (0..self.actors.len()).map(|actor| collides(&self.actors[actor].name) || is_near(actor)).collect();
         for (actor, is_relevant) in self.actors.iter_mut().zip(is_relevant) {
             if let Part::Other(_) = actor.part {
                 actor.is_plotted = false;

@@ -47,7 +47,7 @@ const AXIS_STEP_M: i32 = 10;
 /// Marks of the axis that have a number are this many steps apart.
 const AXIS_NUMBERED: i32 = 2;
 /// Width of a letter of a label in a window of 1280 px (m in the picture), and of the room between two labels.
-const LETTER_M: f64 = 1.15;
+const LETTER_M: f64 = 1.6;
 const BETWEEN_LABELS_M: f64 = 1.5;
 /// Letters of the clock besides the name of the arm.
 const CLOCK_LETTERS: usize = 10;
@@ -157,16 +157,16 @@ fn clock_m(canvas: &Canvas<'_>) -> f64 {
 
 /// Returns the text at the end of the row above the road from a collision on.
 fn collision_mark(film: &Film, collision: &Collision) -> String {
-    format!("COLLISION: {}", film.struck_text(collision))
+    film.mark_text(collision)
 }
 
 /// Returns the room that the text about the collision takes in a frame (m in the picture).
 fn collision_m(canvas: &Canvas<'_>, row: usize) -> f64 {
     let film = canvas.film;
     let happened = |collision: &&Collision| film.frames[row].time >= collision.time;
-    film.worst_collision().filter(happened).map_or(0.0, |collision| {
-        LETTER_M * collision_mark(film, collision).chars().count() as f64 + BETWEEN_LABELS_M
-    })
+    film.worst_collision()
+        .filter(happened)
+        .map_or(0.0, |collision| LETTER_M * collision_mark(film, collision).chars().count() as f64 + BETWEEN_LABELS_M)
 }
 
 /// Writes the name of the arm with the time of the frame. A label is centred at its point.

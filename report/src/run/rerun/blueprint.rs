@@ -83,7 +83,7 @@ pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(),
     }
     right.extend(tabs(plots).map(|node| (2.4, node)));
     let story = View::new("TextDocument", "Story", "summary").into();
-    let told = films.iter().any(|film| film.has_states).then(|| states(films)).into_iter().chain([log(films), story]);
+    let told = films.iter().any(|film| film.has_states).then(states).into_iter().chain([log(films), story]);
     right.extend(tabs(told.collect()).map(|node| (5.1, node)));
     // Camera and point cloud need the room.
     let left_share = if has_camera { 13.0 } else { 11.0 };
@@ -96,8 +96,8 @@ pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(),
 fn bird_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 2.2,
-        _ => 3.9,
+        [_] => 2.6,
+        _ => 4.6,
     }
 }
 
@@ -115,8 +115,8 @@ fn scenes_share(films: &[FilmContents], has_camera: bool) -> f32 {
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 1.8,
-        _ => 2.2,
+        [_] => 2.3,
+        _ => 2.7,
     }
 }
 
@@ -136,7 +136,10 @@ fn scenes(films: &[FilmContents]) -> Option<Node> {
         (_, true) => beside(scenes),
         (1, false) => below(scenes.into_iter().chain(cameras).collect()),
         _ => {
-            let [scenes, cameras] = [beside(scenes).map(|node| named("Scenes", node)), below(cameras).map(|node| named("Rear cameras", node))];
+            let [scenes, cameras] = [
+                beside(scenes).map(|node| named("Scenes", node)),
+                below(cameras).map(|node| named("Rear cameras", node)),
+            ];
             tabs(scenes.into_iter().chain(cameras).collect())
         }
     }
@@ -195,8 +198,10 @@ fn films_plots(films: &[FilmContents]) -> Vec<Node> {
         let contents = of_kind.iter().map(|(film, _)| format!("/{}plots/{}/**", film.root, kind.name()));
         let low = of_kind.iter().map(|(_, plot)| plot.range[0]).fold(f64::INFINITY, f64::min);
         let high = of_kind.iter().map(|(_, plot)| plot.range[1]).fold(f64::NEG_INFINITY, f64::max);
-        let note = if films.len() > 1 { " · thin: " } else { "" };
-        let baseline = films.first().filter(|_| films.len() > 1).map_or("", |film| film.name.as_str());
+        // The first plot says what the thin curves of all plots are.
+        let is_first = films.len() > 1 && nodes.is_empty();
+        let note = if is_first { " · thin: " } else { "" };
+        let baseline = films.first().filter(|_| is_first).map_or("", |film| film.name.as_str());
         let view = View::new("TimeSeries", format!("{}{note}{baseline}", kind.title(is_traffic(films))), "/")
             .with_contents(contents)
             .with("PlotLegend", PlotLegend::new().with_visible(false))
@@ -230,10 +235,8 @@ fn log(films: &[FilmContents]) -> Node {
 }
 
 /// Returns the view of the bands of states of all films. The moments have the colours of their lines in the plots.
-fn states(films: &[FilmContents]) -> Node {
-    let arms = if films.len() > 1 { " of both arms" } else { "" };
-    let title = format!("States{arms} · colours of the moments: lines in the plots");
-    View::new("StateTimeline", title, super::plots::STATES_ENTITY).into()
+fn states() -> Node {
+    View::new("StateTimeline", "States · moments: colours of the lines", super::plots::STATES_ENTITY).into()
 }
 
 /// Returns the title of a view, followed by the name of its arm if there are several films.

@@ -72,7 +72,7 @@ impl Kind {
     pub(super) const fn title(self, is_traffic: bool) -> &'static str {
         match self {
             Self::Acceleration if is_traffic => "Acceleration [m/s²] · subject blue",
-            Self::Headway => "Time headway [s] · front orange · rear pink · 0.9 s red",
+            Self::Headway => "Time headway [s] · F orange · R pink · 0.9 s red",
             Self::Acceleration => "Acceleration [m/s²] · E blue · F orange · R pink",
             Self::Speed => "Speed [m/s]",
             Self::Gap => "Gap [m] · seen grey",
@@ -113,12 +113,12 @@ impl Kind {
     /// Returns the largest span of the value axis. Curves may leave it.
     const fn largest_range(self) -> [f64; 2] {
         match self {
-            Self::Headway => [0.0, 4.0],
+            Self::Headway => [0.0, 3.8],
             Self::Acceleration => [-11.0, 5.0],
             Self::Speed => [0.0, f64::INFINITY],
             Self::Gap => [0.0, 130.0],
             Self::Ttc | Self::Encounter => [0.0, 10.0],
-            Self::Margin => [-1.5, 4.5],
+            Self::Margin => [-1.0, 2.8],
         }
     }
 }
@@ -442,7 +442,17 @@ mod tests {
     fn every_value_axis_has_two_ticks() {
         assert_eq!(with_two_ticks([0.0, 3.0]), [0.0, 3.0]);
         assert_eq!(ticks([-7.0, 2.0]), 1);
-        for range in [[-7.0, 2.0], [-6.3, 2.1], [22.0, 36.0], [31.0, 38.0], [0.0, 60.0], [0.0, 130.0], [-0.5, 2.5], [0.0, 10.0], [28.5, 28.6]] {
+        for range in [
+            [-7.0, 2.0],
+            [-6.3, 2.1],
+            [22.0, 36.0],
+            [31.0, 38.0],
+            [0.0, 60.0],
+            [0.0, 130.0],
+            [-0.5, 2.5],
+            [0.0, 10.0],
+            [28.5, 28.6],
+        ] {
             let [low, high] = with_two_ticks(range);
             assert!(low <= range[0] && high >= range[1] && ticks([low, high]) >= 2, "{range:?}: {low} to {high}");
         }

@@ -58,7 +58,10 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     surface.add([from_m, to_m], [right_m, left_m]);
     writer.write_static("world/road/surface", &surface.mesh(tint(palette::ROAD)))?;
 
-    writer.write_static("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::lit(palette::MARKING, light)))?;
+    writer.write_static(
+        "world/road/markings",
+        &markings(road, [from_m, to_m]).mesh(palette::lit(palette::MARKING, light)),
+    )?;
     if road.has_guard_rails() {
         writer.write_static("world/road/guard_rails", &guard_rails(road, [from_m, to_m]))?;
     }

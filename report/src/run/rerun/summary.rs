@@ -7,6 +7,7 @@ use closecall_traffic::{Measured, Time};
 use crate::run::film::{Film, fate_word, headway_text, headways};
 use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
+use closecall_scenarios::causal::CausalSentence;
 
 /// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
 pub(super) fn verdict(films: &[Film]) -> String {
@@ -42,10 +43,13 @@ fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
     let [baseline, tested] = films;
     push_head(page, fate_word(fate), tested);
     // Writing to a string cannot fail.
-    for film in films {
-        let sentence = film.sentence().map_or_else(String::new, |sentence| sentence.to_string());
-        let _ = writeln!(page, "- **{}:** {sentence}", film.arm_label());
-    }
+    let [without, with] = [baseline, tested].map(Film::sentence);
+    let happened = |told: &Option<CausalSentence<'_>>| told.as_ref().map_or_else(String::new, CausalSentence::happened);
+    let is_same = happened(&without) == happened(&with);
+    let _ = writeln!(page, "- **{}:** {}", baseline.arm_label(), happened(&without));
+    let reason = with.as_ref().map_or_else(String::new, CausalSentence::reason);
+    let in_tested = if is_same { "the same".to_owned() } else { happened(&with) };
+    let _ = writeln!(page, "- **{}:** {in_tested}; {reason}", tested.arm_label());
     let without = baseline.outcome.as_ref().map_or_else(String::new, headways);
     if let Some(line) = tested.headways_and_sight() {
         let _ = writeln!(page, "- {line} Without it: {without}.");

@@ -361,7 +361,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         let mark = Points3D::new([[x, y, 0.6], [text_x_m, 0.0, 0.0]])
             .with_colors([palette::CRITICAL, palette::text(palette::CRITICAL)])
             .with_radii([0.45_f32, 0.05])
-            .with_labels([String::new(), film.collision_text(collision)])
+            .with_labels([String::new(), film.mark_text(collision)])
             .with_show_labels(true);
         // The mark appears at the first frame at or after the contact: in earlier frames the vehicles are still apart.
         let appears_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);

@@ -216,10 +216,9 @@ impl GroupSums {
             _ if !is_event && changes < MIN_CHANGES => (None, None),
             Some(bounds) if changes < MIN_CHANGES => (with(first, [0.0, bounds[1]]), with(total, bounds)),
             // The first-order index is no larger than the total index.
-            _ if is_event && self.changes.iter().any(|side| *side < MIN_ON_EACH_SIDE) => (
-                first.zip(total).map(|(first, total)| first.with_interval([0.0, total.interval_95[1]])),
-                total,
-            ),
+            _ if is_event && self.changes.iter().any(|side| *side < MIN_ON_EACH_SIDE) => {
+                (first.zip(total).map(|(first, total)| first.with_interval([0.0, total.interval_95[1]])), total)
+            }
             _ => (first, total),
         };
         Indices { first, total, changes, rows: self.rows }

@@ -137,9 +137,14 @@ mod tests {
     fn no_name_covers_another_and_none_leaves_its_room() {
         let name = |x_m, text: &str| Name { x_m, is_above: true, text: text.to_owned(), colour: palette::NOTE };
         for at_m in [[-34.0, -33.0, -30.0], [70.0, 72.0, 74.0], [0.0, 1.0, 74.0]] {
-            let mut names: Vec<Name> = at_m.into_iter().zip(["R rear 30.0 m/s", "left-2", "E ego"]).map(|(x_m, text)| name(x_m, text)).collect();
+            let mut names: Vec<Name> = at_m
+                .into_iter()
+                .zip(["R rear 30.0 m/s", "left-2", "E ego"])
+                .map(|(x_m, text)| name(x_m, text))
+                .collect();
             keep_apart([-20.0, 60.0], &mut names);
-            let ends: Vec<[f64; 2]> = names.iter().map(|name| [-0.5, 0.5].map(|side| name.x_m + side * name.width_m())).collect();
+            let ends: Vec<[f64; 2]> =
+                names.iter().map(|name| [-0.5, 0.5].map(|side| name.x_m + side * name.width_m())).collect();
             assert!(ends[0][0] >= -20.0 - 1e-9 && ends[2][1] <= 60.0 + 1e-9, "{ends:?}");
             assert!(ends.windows(2).all(|pair| pair[0][1] <= pair[1][0] + 1e-9), "{ends:?}");
         }

@@ -62,9 +62,9 @@ fn boxes(found: &[Instance]) -> Boxes2D {
     let mut labels: Vec<String> = shown.iter().map(|instance| label(instance)).collect();
     clear_covered(&places, &mut labels);
     Boxes2D::from_mins_and_sizes(places.iter().map(|place| place.0), places.iter().map(|place| place.1))
-    .with_colors(shown.iter().map(colour))
-    .with_labels(labels)
-    .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))))
+        .with_colors(shown.iter().map(colour))
+        .with_labels(labels)
+        .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))))
 }
 
 /// Returns class and score. What is rather no vehicle has no label, so that the image stays visible.

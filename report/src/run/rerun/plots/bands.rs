@@ -70,9 +70,9 @@ const FAILED: &str = "failed";
 type HealthRow = (&'static str, fn(&SensorHealth) -> Health, SensorGroup);
 
 const HEALTH_ROWS: [HealthRow; 3] = [
-    ("5_front_sensor", |health| health.front, SensorGroup::Front),
     ("5_rear_sensors", |health| health.rear, SensorGroup::Rear),
-    ("5_side_sensors", |health| health.surround, SensorGroup::Surround),
+    ("7_front_sensor", |health| health.front, SensorGroup::Front),
+    ("7_side_sensors", |health| health.surround, SensorGroup::Surround),
 ];
 
 const BRAKING: [Word<'static>; 2] =
@@ -104,9 +104,17 @@ pub(in super::super) const fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-/// Returns what a short bar shows of a text: its first word.
+/// Letters of a word that says little alone, such as *no*.
+const SHORT_WORD: usize = 3;
+
+/// Returns what a short bar shows of a text: its first word, and the second one if that says little.
 fn first_word(text: &str) -> &str {
-    text.split([' ', ':', ',']).next().unwrap_or(text)
+    let ends: Vec<usize> = text.match_indices([' ', ':', ',']).map(|(at, _)| at).collect();
+    match ends[..] {
+        [first, second, ..] if first <= SHORT_WORD => &text[..second],
+        [first, ..] if first > SHORT_WORD => &text[..first],
+        _ => text,
+    }
 }
 
 impl Plots<'_> {
@@ -124,7 +132,7 @@ impl Plots<'_> {
                 Some(Phase::Approach) if frame.margins.follower.is_none() => NO_REAR,
                 phase => phase.map_or("", phase_name),
             };
-            self.band("7_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASES)?;
+            self.band("8_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASES)?;
         }
         self.moments()?;
         self.collisions()?;
@@ -132,7 +140,7 @@ impl Plots<'_> {
             let braking = frames.iter().map(|frame| frame.states[index].brake_light);
             let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
             if words.contains(&BRAKES) {
-                self.band(&format!("8_brake_light_{}", actor.name), &words, &BRAKING)?;
+                self.band(&format!("9_brake_light_{}", actor.name), &words, &BRAKING)?;
             }
         }
         Ok(())
@@ -142,15 +150,18 @@ impl Plots<'_> {
     fn reasons(&self) -> Result<(), RecordingError> {
         let reason = |frame: &Frame| frame.command.map_or("", |command| command.reason.text());
         let words: Vec<&str> = self.film.frames.iter().map(reason).collect();
-        if changes(&words).len() < 2 {
+        if changes(&words).len() < 2 || self.film.outcome().is_some_and(|outcome| outcome.mis.is_err()) {
             return Ok(());
         }
         let colour = |frame: &Frame| match frame.command.map(|command| command.state) {
             Some(EgoState::Following) | None => palette::QUIET,
-            Some(state) => STATES.iter().find(|word| word.text == ego_state_name(state)).map_or(palette::QUIET, |it| it.colour),
+            Some(state) => {
+                STATES.iter().find(|word| word.text == ego_state_name(state)).map_or(palette::QUIET, |it| it.colour)
+            }
         };
         let frames = self.film.frames.iter().zip(&words);
-        let states: Vec<Word<'_>> = frames.map(|(frame, text)| Word::new(text, first_word(text), colour(frame))).collect();
+        let states: Vec<Word<'_>> =
+            frames.map(|(frame, text)| Word::new(text, first_word(text), colour(frame))).collect();
         self.band("2_reason", &words, &states)
     }
 
@@ -164,8 +175,13 @@ impl Plots<'_> {
         let latest = |time: Time| collisions.iter().rposition(|collision| collision.time <= time);
         let words: Vec<&str> =
             self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
-        let states = texts.iter().map(|text| Word::new(text, text.split(' ').next().unwrap_or(text), palette::CRITICAL));
-        self.band("4_collisions", &words, &states.chain([Word::new(BEFORE, BEFORE, palette::QUIET)]).collect::<Vec<_>>())
+        let states =
+            texts.iter().map(|text| Word::new(text, text.split(' ').next().unwrap_or(text), palette::CRITICAL));
+        self.band(
+            "4_collisions",
+            &words,
+            &states.chain([Word::new(BEFORE, BEFORE, palette::QUIET)]).collect::<Vec<_>>(),
+        )
     }
 
     /// Writes a band for each group of sensors: its health as the ego knows it, and injected faults that the ego has not noticed. The

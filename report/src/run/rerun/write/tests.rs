@@ -303,17 +303,83 @@ fn the_threads_of_recordings_end() {
 }
 
 #[test]
+fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
+    let data = chunks(&films, StoreKind::Recording);
+    let has = |entity: &str| data.iter().any(|chunk| chunk.entity_path().to_string() == entity);
+    for plot in ["headway", "acceleration", "speed", "gap", "ttc", "encounter"] {
+        assert!(has(&format!("/acc/plots/{plot}/collisions/1")), "{plot}");
+        assert!(!has(&format!("/mis/plots/{plot}/collisions/1")), "{plot}");
+    }
+    assert!(has("/states/4_collisions/without_MIS") && !has("/states/4_collisions/with_MIS"));
+    assert!(has("/states/2_reason/with_MIS") && !has("/states/2_reason/without_MIS"));
+    assert!(has("/__properties/arms/acc/collision_1") && !has("/__properties/arms/mis/collision_1"));
+}
+
+#[test]
+fn both_halves_of_a_pair_open_at_the_same_moment() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
+    let shown = films[0].worst_collision().unwrap().time;
+    assert!(films[1].critical_moment() != shown, "the moments of the arms differ");
+    let opening = TimelineName::from_static_str(OPENING_TIMELINE);
+    let copy = (Time::ZERO - films[0].period).ns();
+    let data = chunks(&films, StoreKind::Recording);
+    let clocks: Vec<String> = ["/acc/bird/clock", "/mis/bird/clock"]
+        .into_iter()
+        .flat_map(|entity| {
+            let is_copy = |chunk: &&Chunk| {
+                chunk.entity_path().to_string() == entity
+                    && chunk.timelines().get(&opening).is_some_and(|times| times.times_raw() == [copy])
+            };
+            texts(data.iter().find(is_copy).unwrap(), "Points2D:labels")
+        })
+        .collect();
+    let time = format!("{:.2} s", films[0].critical_frame_time().s());
+    assert_eq!(clocks, [format!("without MIS · {time}"), format!("with MIS · {time}")]);
+}
+
+#[test]
+fn a_fault_is_in_the_verdict_and_in_the_states_of_its_sensor() {
+    let film = |name| filmed(name, ControllerChoice::MIS, (None, Level::Events));
+    for (fault, words, row) in [
+        ("faults/lidar-dead", "rear LiDAR dead", "5_rear_sensors"),
+        ("faults/front-radar-ghost", "a vehicle that does not exist", "7_front_sensor"),
+    ] {
+        let films = [film(fault)];
+        let verdict = summary::verdict(&films);
+        assert!(verdict.contains("faults: ") && verdict.contains(words), "{verdict}");
+        let data = chunks(&films, StoreKind::Recording);
+        let entity = format!("/states/{row}/with_MIS");
+        let states: Vec<String> = data
+            .iter()
+            .filter(|chunk| chunk.entity_path().to_string() == entity)
+            .flat_map(|chunk| texts(chunk, "StateConfiguration:values"))
+            .collect();
+        assert!(states.iter().any(|state| state.starts_with("failed") || state.starts_with("faulty")), "{states:?}");
+        assert!(states.iter().any(|state| state.contains(words)), "{states:?}");
+    }
+    let healthy = summary::verdict(&[default_film()]);
+    assert!(healthy.contains("faults: none"), "{healthy}");
+}
+
+#[test]
 fn the_verdict_on_a_pair_is_its_first_word() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
     let [baseline, tested] = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let first = |films: &[Film]| summary::verdict(films).lines().next().unwrap_or_default().to_owned();
-    assert_eq!(first(&[baseline.clone(), tested.clone()]), "### PREVENTED");
-    assert_eq!(first(&[tested.clone(), baseline.clone()]), "### INDUCED");
-    assert_eq!(first(&[baseline.clone(), baseline.clone()]), "### BOTH COLLIDE");
-    assert_eq!(first(&[tested.clone(), tested.clone()]), "### NEITHER COLLIDES");
+    let sample = " · paper-figure · seed 1 · sample 0";
+    assert_eq!(first(&[baseline.clone(), tested.clone()]), format!("**PREVENTED**{sample}"));
+    assert_eq!(first(&[tested.clone(), baseline.clone()]), format!("**INDUCED**{sample}"));
+    assert_eq!(first(&[baseline.clone(), baseline.clone()]), format!("**BOTH COLLIDE**{sample}"));
+    assert_eq!(first(&[tested.clone(), tested.clone()]), format!("**NEITHER COLLIDES**{sample}"));
     let text = summary::verdict(&[baseline, tested]);
-    assert!(text.contains("- **without MIS:** collision of ego and rear at "), "{text}");
-    assert!(text.contains("- **with MIS:** no collision; smallest headway: front "), "{text}");
+    assert!(text.contains("- **without MIS:** R struck E from behind at "), "{text}");
+    assert!(text.contains(" s after F braked"), "{text}");
+    assert!(text.contains("- **with MIS:** no vehicle collided; F braked at "), "{text}");
+    assert!(text.contains("; the MIS engaged at ") && text.contains("; faults: none\n"), "{text}");
+    assert!(text.contains("- Smallest headway: front "), "{text}");
 }
 
 #[test]
