@@ -198,7 +198,7 @@ mod tests {
     use crate::outcome::{ClosedBy, EndReason, Margins, Phase, ReachedMoment};
 
     fn id(name: &str) -> ActorId {
-        name.parse().unwrap()
+        ActorId::new(name).unwrap()
     }
 
     fn letters() -> VehicleLetters {
@@ -248,9 +248,12 @@ mod tests {
                 mean_deceleration_mps2: Err(Absent::NeverEngaged),
                 goal_in_reach: None,
                 reason,
+                reasons: Vec::new(),
+                decided_s: None,
                 unavailable: None,
             }),
             cost: None,
+            promise: None,
         }
     }
 
