@@ -39,7 +39,9 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
     let (listed, members) = (entries()?, member::entries()?);
     match (args.format, args.what.as_deref()) {
         (Format::Json, _) => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
-        (Format::Human, None) => overview(&listed, &members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>()),
+        (Format::Human, None) => {
+            overview(&listed, &members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>())
+        }
         (Format::Human, Some(MEMBERS)) => {
             members.iter().for_each(|member| outln!("{}", for_terminal(member).trim_end()));
             outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
