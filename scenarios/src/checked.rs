@@ -201,16 +201,21 @@ impl ScenarioConfig {
         let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
         let mut vehicles = Vec::with_capacity(self.actors.len());
         let mut fleets = Vec::with_capacity(self.actors.len());
+        let mut drivers = Vec::with_capacity(self.actors.len());
         for (index, actor) in self.actors.iter().enumerate() {
             let in_vehicle = |error: ConfigError| at(index, error.within("vehicle"));
             vehicles.push(actor.vehicle.check(parameters).map_err(in_vehicle)?);
             fleets.push(FleetOf::check(&actor.vehicle).map_err(in_vehicle)?);
+            drivers.push(actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?);
         }
-        let states = placement::initial_states(&self.actors, &vehicles, road, parameters)?;
+        let states = placement::initial_states(
+            placement::Actors { actors: &self.actors, vehicles: &vehicles, drivers: &drivers },
+            road,
+            parameters,
+        )?;
         let start = events::Start { actors: &self.actors, vehicles: &vehicles, states: &states };
         let mut checked = Vec::with_capacity(self.actors.len());
-        for (index, actor) in self.actors.iter().enumerate() {
-            let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
+        for ((index, actor), driver) in self.actors.iter().enumerate().zip(drivers) {
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
             let Keeping { lane_keeping, speed_keeping } =
                 actor.check_keeping(parameters).map_err(|error| at(index, error))?;

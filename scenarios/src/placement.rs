@@ -2,9 +2,7 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_traffic::metrics::touching_distance_m;
-use closecall_traffic::{
-    ActorId, Check, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState,
-};
+use closecall_traffic::{ActorId, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState};
 
 use super::config::{ActorConfig, RelativeStartConfig, StartConfig};
 
@@ -14,13 +12,20 @@ const GAP_RANGE_M: Range = Range::closed(-50.0, 1_000.0);
 const THW_RANGE_S: Range = Range::closed(0.0, 60.0);
 const CLOSING_RANGE_MPS: Range = Range::closed(-60.0, 60.0);
 
+/// The actors of a scenario, with their checked vehicles and drivers in the same order.
+#[derive(Clone, Copy)]
+pub(super) struct Actors<'a> {
+    pub(super) actors: &'a [ActorConfig],
+    pub(super) vehicles: &'a [Vehicle],
+    pub(super) drivers: &'a [CheckedDriver],
+}
+
 /// Returns the state of every actor at time zero, in the order of the actors.
 ///
 /// # Errors
 /// [`ConfigError`] if a value is out of range, if positions depend on each other in a cycle, or if vehicles overlap.
 pub(super) fn initial_states(
-    actors: &[ActorConfig],
-    vehicles: &[Vehicle],
+    Actors { actors, vehicles, drivers }: Actors<'_>,
     road: &Road,
     parameters: &Parameters,
 ) -> Result<Vec<VehicleState>, ConfigError> {
@@ -30,7 +35,7 @@ pub(super) fn initial_states(
         let before = placed.iter().flatten().count();
         for (index, actor) in actors.iter().enumerate() {
             if placed[index].is_none() {
-                let placement = Placement { actors, vehicles, road, parameters, placed: &placed };
+                let placement = Placement { actors, vehicles, drivers, road, parameters, placed: &placed };
                 placed[index] = placement.state(index, actor).map_err(|error| at(index, error))?;
             }
         }
@@ -86,6 +91,7 @@ fn reject_overlaps(
 struct Placement<'a> {
     actors: &'a [ActorConfig],
     vehicles: &'a [Vehicle],
+    drivers: &'a [CheckedDriver],
     road: &'a Road,
     parameters: &'a Parameters,
     /// The states that are known so far.
@@ -169,8 +175,7 @@ impl Placement<'_> {
         if direction > 0.0 {
             return Err(refuse("ahead", "only a vehicle that is behind follows"));
         }
-        let driver = self.actors[index].driver.check(self.parameters)?;
-        let gap_m = match &driver {
+        let gap_m = match &self.drivers[index] {
             CheckedDriver::Human(human) => human.settled_gap_m(speed_mps),
             CheckedDriver::Ego(_) => None,
         };
@@ -228,5 +233,59 @@ fn exactly_one<'a>(
             Err(ConfigError::new(first.key, Problem::Contradiction { other: second.key, rule }))
         }
         (None, None) => Err(ConfigError::new(first.key, Problem::Missing { needed })),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use closecall_traffic::metrics::bumper_gap_m;
+
+    use crate::sampling::Design;
+    use crate::{Scenario, ScenarioFile};
+
+    /// A vehicle with this start and driver, and the ego at 30 m/s.
+    fn scenario(start: &str, driver: &str) -> Result<Scenario, String> {
+        let text = format!(
+            "schema-version = 1\nname = 'settled'\nduration-s = 5.0\nroad = {{ lanes = 3 }}\n\
+             [[actor]]\nid = 'ego'\nvehicle = {{ class = 'car' }}\n\
+             start = {{ absolute = {{ lane = 2, s-m = 500.0, speed-mps = 30.0 }} }}\n\
+             driver = {{ ego-stack = {{ acc = {{ time-gap-s = 0.7 }} }} }}\n\
+             [[actor]]\nid = 'rear'\nvehicle = {{ class = 'car' }}\nstart = {{ {start} }}\ndriver = {{ {driver} }}\n"
+        );
+        let file = ScenarioFile::parse(Path::new("settled.toml"), &text, &[]).map_err(|error| error.to_string())?;
+        let sample = file.space().sample(Design::Random, 0, 0, 1);
+        file.concrete(&sample).map_err(|error| error.to_string())
+    }
+
+    fn gap_m(driver: &str) -> f64 {
+        let start = "behind = { of = 'ego', settled = true, closing-mps = 0.0 }";
+        let actors = scenario(start, driver).unwrap().actors;
+        let [ahead_m, behind_m] = [0, 1].map(|actor| actors[actor].vehicle.dimensions.length_m);
+        bumper_gap_m(actors[0].start.s_m - actors[1].start.s_m, ahead_m, behind_m)
+    }
+
+    #[test]
+    fn a_settled_vehicle_starts_at_the_gap_that_its_driver_keeps() {
+        assert!((gap_m("wiedemann99 = { cc0-m = 1.5, cc1-s = 0.5, cc2-m = 4.0 }") - (1.5 + 15.0 + 2.0)).abs() < 1e-9);
+        assert!((gap_m("idm = { standstill-gap-m = 2.5, time-gap-s = 0.6 }") - (2.5 + 18.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_settled_start_needs_a_driver_that_follows_and_no_other_gap() {
+        let follows = "wiedemann99 = {}";
+        let refused = |start, driver| scenario(start, driver).unwrap_err();
+        let prescribed = "prescribed = { profile = [[0.0, 30.0]] }";
+        let settled = "behind = { of = 'ego', settled = true, closing-mps = 0.0 }";
+        assert!(refused(settled, prescribed).contains("settled"));
+        assert!(
+            refused("behind = { of = 'ego', settled = true, gap-m = 9.0, closing-mps = 0.0 }", follows)
+                .contains("gap-m")
+        );
+        assert!(refused("ahead = { of = 'ego', settled = true, closing-mps = 0.0 }", follows).contains("behind"));
+        // A wrong value of the driver is an error of the driver.
+        let error = refused(settled, "wiedemann99 = { cc1-s = 99.0 }");
+        assert!(error.contains("driver") && !error.contains("settled"), "{error}");
     }
 }
