@@ -23,7 +23,7 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
         let what = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
         let count = names.iter().filter(|(name, _)| name != ALL).count();
         (!listed.is_empty()).then(|| match count {
-            0 => format!("{word}: the scenarios together {verb} {what}: {}", listed.join(", ")),
+            0 => format!("{word}: {ALL} together {verb} {what}"),
             1 if scenarios == 1 => format!("{word}: the scenario {} {what}: {}", singular(verb), listed.join(", ")),
             1 => format!("{word}: 1 of {scenarios} scenarios {} {what}: {}", singular(verb), listed.join(", ")),
             count => format!("{word}: {count} of {scenarios} scenarios {verb} {what}: {}", listed.join(", ")),
