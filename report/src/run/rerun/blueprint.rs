@@ -116,7 +116,7 @@ fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
         [_] => 2.3,
-        _ => 2.7,
+        _ => 3.0,
     }
 }
 

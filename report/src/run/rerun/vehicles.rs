@@ -34,7 +34,7 @@ const FRONT_TEXT_Y_M: f32 = 7.0;
 /// Gap below which the vehicles touch and no headway is written (m).
 const TOUCHING_M: f64 = 0.3;
 /// Front gap below which no headway is written, since the name of the ego is there (m).
-const NAMED_GAP_M: f64 = 15.0;
+const NAMED_GAP_M: f64 = 25.0;
 /// Share of the rear gap that is added to it.
 const NAMED_GAP_SHARE: f64 = 0.4;
 /// Height at which gaps are drawn (m).

@@ -175,8 +175,11 @@ impl Plots<'_> {
         let latest = |time: Time| collisions.iter().rposition(|collision| collision.time <= time);
         let words: Vec<&str> =
             self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
-        let states =
-            texts.iter().map(|text| Word::new(text, text.split(' ').next().unwrap_or(text), palette::CRITICAL));
+        // A short bar has the letters of the two vehicles only.
+        let letters =
+            |text: &String| text.split(' ').filter(|word| *word != "struck").take(2).collect::<Vec<_>>().join(" → ");
+        let shorts: Vec<String> = texts.iter().map(letters).collect();
+        let states = texts.iter().zip(&shorts).map(|(text, short)| Word::new(text, short, palette::CRITICAL));
         self.band(
             "4_collisions",
             &words,
