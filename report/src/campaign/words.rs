@@ -245,7 +245,7 @@ mod tests {
         let words = gate_words(&found.gates[0]);
         assert_eq!(
             words,
-            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20.0 % to 40.0 %; too few \
+            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20 % to 40 %; too few \
              samples to decide); required: at least 1 s"
         );
         let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);
