@@ -117,7 +117,7 @@ fn a_goal_that_is_in_reach_is_reached_unless_the_lead_vehicle_brakes_first() {
     let mut reached = 0;
     for name in ["overtake-without-brake", "low-thw-overtake"] {
         for (sample, (_, outcome)) in run(name, &[], 100).iter().enumerate() {
-            let (mis, critical) = (outcome.mis.unwrap(), outcome.moment(Moment::CriticalDistance));
+            let (mis, critical) = (outcome.mis.as_ref().unwrap(), outcome.moment(Moment::CriticalDistance));
             let lead_brakes_first = match (outcome.moment(Moment::FrontBrakes), critical) {
                 (Some(brakes), Some(critical)) => brakes <= critical,
                 (_, None) => true,
