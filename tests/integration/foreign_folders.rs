@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use crate::native_controllers::{compile, lib};
-use crate::support::{code, folder, headline_with, message, program, stderr, stdout};
+use crate::support::{code, folder, message, program, stderr, stdout};
 
 /// A controller that says that it runs, in a file beside it.
 const TELLING: &str = r#"#!/bin/sh
@@ -34,9 +34,7 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
     fs::write(at("telling.sh"), TELLING).unwrap();
     let ran = at("ran");
     let controller = "exec:sh telling.sh";
-    let text = headline_with("duration-s = 60.0", "duration-s = 20.0");
-    fs::write(at("short.toml"), text).unwrap();
-    let campaign = ["campaign", "short.toml", "-n", "3", "--sensors", "object", "--no-gate", "--paired"];
+    let campaign = ["campaign", "low-thw-overtake", "-n", "3", "--sensors", "object", "--no-gate", "--paired"];
     let limits = ["--controller", controller, "--controller-timeout-ms", "60000"];
     let [own, foreign] = ["own", "foreign"].map(at);
     let user = |home: &Path| of_user(home, place.path());
