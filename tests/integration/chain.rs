@@ -101,7 +101,8 @@ fn arguments<'a>(recording: &'a Path, out: &'a Path, more: &[&'a str]) -> Vec<&'
 
 /// Returns the sum of a count over the encounters of a chain.
 fn sum(report: &Value, key: &str) -> u64 {
-    report["scenarios"].as_array().unwrap().iter().map(|scenario| scenario["pairs"][key].as_u64().unwrap()).sum()
+    let scenarios = report["scenarios"].as_object().unwrap();
+    scenarios.values().map(|scenario| scenario["arm_pairs"][0][key].as_u64().unwrap()).sum()
 }
 
 #[test]
