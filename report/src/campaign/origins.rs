@@ -250,14 +250,14 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
                     Some(one) => { (number(one.engaged)) (number(one.before_braking)) },
                     None => { (number("-")) (number("-")) },
                 }
-                td.whole { (origin.reason().map_or_else(|| "-".to_owned(), |(reason, count)| format!("{reason} ({count})"))) }
+                td { (origin.reason().map_or_else(|| "-".to_owned(), |(reason, count)| format!("{reason} ({count})"))) }
             }
         }
     };
     let head = html! {
         (text_heads(&["encounter", "recorded"]))
         (number_heads(&[
-            "ego [m/s]", "closing [m/s]", "headway at the crossing [s]", "front headway [s]", "prevented", "induced", "both", "neither",
+            "ego [m/s]", "closing [m/s]", "headway [s]", "front [s]", "prevented", "induced", "both", "neither",
             "engaged", "before braking",
         ]))
         (text_heads(&["mostly missing in the rest"]))

@@ -12,7 +12,7 @@ use closecall_recorded::criticality::{
 use closecall_recorded::filters::{PERIOD, SmoothedTrajectoryData};
 use closecall_traffic::metrics::{CRITICAL_THW_S, time_headway_s, time_to_collision_s};
 use closecall_traffic::{
-    Absent, Check, ConfigError, Environment, Num, Parameters, Road, RoadConfig, Side, Time, Trajectory,
+    Absent, Check, ConfigError, Environment, Lane, Num, Parameters, Road, RoadConfig, Side, Time, Trajectory,
     TrajectoryPoint, Vehicle, VehicleState, maths,
 };
 
@@ -25,6 +25,8 @@ use closecall_simulation::{CurrentMargins, Lead};
 const CONTEXT_TIME: Time = Time::from_ms(2_000);
 /// Vehicles that never come closer to the ego than this along the road are left out (m).
 const REACH_M: f64 = 150.0;
+/// Lateral distance beyond which a vehicle is on another carriageway (m). The readers put carriageways 1 km apart.
+const SEPARATE_M: f64 = 200.0;
 /// Largest number of vehicles that are named and coloured. All others are the traffic around them.
 const MAX_MAIN: usize = 5;
 /// Largest number of vehicles whose speed and acceleration are plotted.
@@ -63,10 +65,14 @@ pub fn film_lane_change(
     let track_id = change.lane_change.track_id;
     let own = recording.trajectories().find(|track| track.track_id == track_id);
     let own = own.ok_or(TrafficFilmError::NoTrack { track_id })?;
+    let carriageway = Carriageway::of(recording, own);
+    let own = &carriageway.moved(own);
     let (from, to) = (Time::from_s(change.lane_change.start_s), Time::from_s(change.lane_change.end_s));
     let is_shown = |point: &&TrajectoryPoint| point.time >= from - CONTEXT_TIME && point.time <= to + CONTEXT_TIME;
     let instants: Vec<&TrajectoryPoint> = own.points.iter().filter(is_shown).collect();
-    let tracks = nearby_tracks(recording, own, &instants);
+    let others: Vec<Trajectory> =
+        recording.trajectories().filter(|track| carriageway.has(track)).map(|track| carriageway.moved(track)).collect();
+    let tracks = nearby_tracks(&others, own, &instants);
     let frames = instants.iter().map(|point| frame_at(&tracks, point.time)).collect();
     let film_actor = |track: &&Trajectory| FilmActor {
         name: format!("track-{}", track.track_id),
@@ -100,9 +106,49 @@ pub fn film_lane_change(
     Ok(film)
 }
 
+/// The carriageway on which a lane change is shown. The readers put the second carriageway of a recording 1 km to the right of the first,
+/// and continue its lane numbers; the film shows it as a road of its own.
+struct Carriageway {
+    /// Lateral position of its left edge in the recording (m).
+    left_m: f64,
+    /// Number of the lanes to the left of it.
+    lanes_before: u8,
+    /// Lateral position of the vehicle that changes lanes in the recording (m).
+    own_m: f64,
+}
+
+impl Carriageway {
+    /// Returns the carriageway of a track.
+    fn of(recording: &SmoothedTrajectoryData, own: &Trajectory) -> Self {
+        let own_m = own.points.first().map_or(0.0, |point| point.d_m);
+        let edge_m = |lane: u8| recording.markings.right_edge_m(Lane(lane));
+        let is_before = |lane: &u8| edge_m(*lane).is_some_and(|edge_m| edge_m > own_m + SEPARATE_M);
+        let lanes_before = (1..u8::MAX).filter(is_before).max().map_or(0, |last| last + 1);
+        match edge_m(lanes_before) {
+            Some(left_m) if lanes_before > 0 => Self { left_m, lanes_before, own_m },
+            _ => Self { left_m: 0.0, lanes_before: 0, own_m },
+        }
+    }
+
+    /// Returns whether a track is on this carriageway.
+    fn has(&self, track: &Trajectory) -> bool {
+        track.points.first().is_some_and(|point| (point.d_m - self.own_m).abs() < SEPARATE_M)
+    }
+
+    /// Returns a track in the frame of this carriageway.
+    fn moved(&self, track: &Trajectory) -> Trajectory {
+        let moved = |point: &TrajectoryPoint| TrajectoryPoint {
+            d_m: point.d_m - self.left_m,
+            lane: Lane(point.lane.0.saturating_sub(self.lanes_before).max(1)),
+            ..*point
+        };
+        track.with_points(track.points.iter().map(moved).collect())
+    }
+}
+
 /// Returns the track `own`, followed by all other tracks that come near it.
 fn nearby_tracks<'a>(
-    recording: &'a SmoothedTrajectoryData,
+    others: &'a [Trajectory],
     own: &'a Trajectory,
     instants: &[&TrajectoryPoint],
 ) -> Vec<&'a Trajectory> {
@@ -110,7 +156,7 @@ fn nearby_tracks<'a>(
         track.track_id != own.track_id
             && instants.iter().any(|own| track.at(own.time).is_some_and(|at| (at.s_m - own.s_m).abs() < REACH_M))
     };
-    std::iter::once(own).chain(recording.trajectories().filter(is_near)).collect()
+    std::iter::once(own).chain(others.iter().filter(is_near)).collect()
 }
 
 /// Gives the vehicle that changes lanes, its neighbours and the nearest others their parts, at the critical moment.
