@@ -145,10 +145,9 @@ fn imports(named: &[PathBuf]) -> BTreeSet<PathBuf> {
                     && file.is_file()
                     && !named.contains(&file)
                     && found.len() < MOST_IMPORTS
+                    && found.insert(file.clone())
                 {
-                    if found.insert(file.clone()) {
-                        left.push(file);
-                    }
+                    left.push(file);
                 }
             }
         }
