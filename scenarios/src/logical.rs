@@ -282,7 +282,15 @@ fn id(name: &str) -> Result<ActorId, String> {
 }
 
 fn relative(of: &str) -> Result<RelativeStartConfig, String> {
-    Ok(RelativeStartConfig { of: id(of)?, gap_m: None, thw_s: None, speed_mps: None, closing_mps: None, settled: None, lane: None })
+    Ok(RelativeStartConfig {
+        of: id(of)?,
+        gap_m: None,
+        thw_s: None,
+        speed_mps: None,
+        closing_mps: None,
+        settled: None,
+        lane: None,
+    })
 }
 
 /// Returns an actor at the start of the road, to be placed by the caller.

@@ -149,7 +149,10 @@ fn every_report_holds_all_pairs_as_the_journal_counts_them() {
         let summary = std::fs::read_to_string(out.join("summary.md")).unwrap();
         assert!(summary.contains(&format!("| low-thw-overtake | {baseline} | {tested} | {prevented} | ")), "{summary}");
         let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-        assert!(page.contains("All pairs of arms") && page.contains(&format!("<td>{baseline}</td><td>{tested}</td>")));
+        assert!(
+            page.contains("All pairs of arms")
+                && page.contains(&format!(">{baseline}</td><td data-name=\"to\">{tested}</td>"))
+        );
     }
     assert!(prevented_by_any > 0, "nothing is compared");
     // Holm: the smallest p counts once for each pair.

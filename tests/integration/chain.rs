@@ -111,12 +111,12 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
     let recording = two_carriageways(folder.path(), true);
     let out = folder.path().join("chain");
     let report =
-        json(&closecall(arguments(&recording, &out, &["-n", "40", "--encounters", "8", "--format", "json"])), 0);
+        json(&closecall(arguments(&recording, &out, &["-n", "20", "--encounters", "6", "--format", "json"])), 0);
     let origins = report["origins"]["encounters"].as_array().unwrap();
-    assert_eq!(origins.len(), 8);
+    assert_eq!(origins.len(), 6);
     assert!(sum(&report, "prevented") >= 1, "{report:#}");
     let names: BTreeSet<&str> = origins.iter().map(|origin| origin["scenario"].as_str().unwrap()).collect();
-    assert_eq!(names.len(), 8, "names are distinct: {names:?}");
+    assert_eq!(names.len(), 6, "names are distinct: {names:?}");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     let (mut engaged, mut samples, mut carriageways) = (0, 0, BTreeSet::new());
     for origin in origins {
@@ -138,8 +138,8 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
         engaged += engagement["engaged"].as_u64().unwrap();
         samples += engagement["engaged"].as_u64().unwrap() + missing;
     }
-    assert_eq!((samples, carriageways.len()), (320, 2));
-    assert!(engaged > 0 && page.contains(&format!("the system engages in {engaged} of 320 samples")), "{engaged}");
+    assert_eq!((samples, carriageways.len()), (120, 2));
+    assert!(engaged > 0 && page.contains(&format!("the system engages in {engaged} of 120 samples")), "{engaged}");
     // The folder is that of a campaign.
     stdout(&closecall(["check", out.to_str().unwrap()]), 0);
     stdout(&closecall(["check", out.join("scenarios").to_str().unwrap()]), 0);
@@ -198,7 +198,8 @@ fn a_window_of_us_101_gives_encounters_of_which_the_system_prevents_some() {
     let folder = folder();
     let out = folder.path().join("chain");
     let recording = data.join("ngsim_us101/trajectories/us101_a.csv");
-    let report = json(&closecall(arguments(&recording, &out, &["-n", "60", "--format", "json"])), 0);
+    let report =
+        json(&closecall(arguments(&recording, &out, &["-n", "20", "--encounters", "6", "--format", "json"])), 0);
     let origins = report["origins"]["encounters"].as_array().unwrap();
     assert!(origins.len() >= 5, "{}", origins.len());
     assert!(sum(&report, "prevented") >= 1, "{report:#}");
@@ -207,7 +208,7 @@ fn a_window_of_us_101_gives_encounters_of_which_the_system_prevents_some() {
         let count = origin["engagement"]["engaged"].as_u64().unwrap();
         engaged += count;
         let has_reason = !origin["engagement"]["missing"].as_object().unwrap().is_empty();
-        assert!(count == 60 || has_reason, "the rest has a reason: {origin}");
+        assert!(count == 20 || has_reason, "the rest has a reason: {origin}");
     }
     assert!(engaged > 0);
 }

@@ -26,6 +26,7 @@ use super::findings::Findings;
 use super::overview::ErrorGroup;
 use super::recordings::card_beside;
 use super::samples_xml::legal_xml;
+use super::words::{gate_line, reasons};
 
 /// The answer of one case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +60,7 @@ fn cases(judged: &Judgement) -> Vec<Case> {
             Standing::Inconclusive if !is_measured => Status::Error,
             Standing::Fail | Standing::Inconclusive | Standing::NotChecked => Status::Skipped,
         },
-        message: gate.to_string(),
+        message: gate_line(gate),
     };
     let mut cases: Vec<Case> = judged.gates.iter().map(gate).collect();
     for (scenario, finding) in &judged.probabilities {
@@ -96,7 +97,7 @@ fn cases(judged: &Judgement) -> Vec<Case> {
                 Verdict::Error | Verdict::Invalid | Verdict::Inconclusive | Verdict::NotJudged | Verdict::Overridden,
             ) => Status::Error,
         },
-        message: format!("{}: {}", judged.word(), judged.reasons.join("; ")),
+        message: format!("{}: {}", judged.word(), reasons(judged).join("; ")),
     });
     cases
 }
@@ -172,7 +173,7 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
         }
     }
     if suite == CAMPAIGN_SUITE {
-        properties.extend(findings.judged.reasons.iter().map(|reason| ("reason".to_owned(), reason.to_string())));
+        properties.extend(reasons(findings.judged).into_iter().map(|reason| ("reason".to_owned(), reason)));
     }
     xml.write_event(Event::Start(BytesStart::new("properties")))?;
     for (name, value) in properties {

@@ -24,7 +24,7 @@ pub mod samples_xml;
 mod tally;
 mod text;
 pub mod timings;
-mod words;
+pub(crate) mod words;
 
 pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};

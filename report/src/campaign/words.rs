@@ -54,7 +54,6 @@ fn singular(verb: &str) -> String {
     if verb == "miss" { "misses".to_owned() } else { verb.replacen("do not", "does not", 1) }
 }
 
-
 /// Returns the scenarios with a gate of this standing, in the order of the gates, each with the marks of its requirements.
 fn scenarios_of(judged: &Judgement, standing: Standing) -> Vec<(String, Vec<String>)> {
     let mut names: Vec<(String, Vec<String>)> = Vec::new();
@@ -198,7 +197,13 @@ mod tests {
             scenario: scenario.to_owned(),
             expression: text.parse().unwrap(),
             source: mark.map_or(GateSource::CommandLine, |mark| GateSource::Requirement(mark.to_owned())),
-            evaluation: Evaluation { value: Some(value), interval_95: Some([0.2, 0.4]), samples: 60, answer, needed: None },
+            evaluation: Evaluation {
+                value: Some(value),
+                interval_95: Some([0.2, 0.4]),
+                samples: 60,
+                answer,
+                needed: None,
+            },
         }
     }
 

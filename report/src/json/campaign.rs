@@ -13,6 +13,7 @@ use serde_json::{Map, Value, json};
 use super::influence::influence;
 use super::stamp::stamped;
 use crate::campaign::overview::{ErrorGroup, Overview, ScenarioOverview};
+use crate::campaign::words::reasons;
 use crate::campaign::{CampaignReport, ensemble_json};
 
 /// Returns the result of a campaign: its counts, its verdict, what moves its result, and how it was made. `wall_s` is its wall time
@@ -57,7 +58,7 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
     object.insert("gates".to_owned(), json!(judged.gates.iter().map(gate).collect::<Vec<_>>()));
     object.insert("requirements".to_owned(), json!(judged.requirements.iter().map(requirement).collect::<Vec<_>>()));
     object.insert("expectations".to_owned(), json!(judged.expectations.iter().map(expectation).collect::<Vec<_>>()));
-    object.insert("reasons".to_owned(), json!(judged.reasons));
+    object.insert("reasons".to_owned(), json!(reasons(judged)));
     object.insert("failures".to_owned(), summary.failures_json());
     object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("flaky_gate".to_owned(), json!(judged.flaky));

@@ -160,7 +160,7 @@ impl Setup {
         campaign.retry_errors = run.retry_errors;
         let work = campaign.works[0].as_ref().clone();
         campaign.works = vec![Arc::new(crate::runner::Work { retry_crashed: run.retry_crashed, ..work })];
-        let (mut summary, mut seen) = (campaign.summary(), 0);
+        let (mut summary, mut seen, mut run_now) = (campaign.summary(), 0, 0);
         let mut judge = Judge::new(&campaign.works, &self.gates, campaign.inference);
         let locked = Folder::lock(path, &self.manifest, true).unwrap();
         campaign
@@ -168,8 +168,9 @@ impl Setup {
                 summary.push(next.record);
                 judge.push(next.record);
                 seen += 1;
+                run_now += u64::from(next.is_new);
                 match run.kill_after {
-                    Some(last) if last == seen => ControlFlow::Break(End::Campaign),
+                    Some(last) if next.is_new && last == run_now => ControlFlow::Break(End::Campaign),
                     _ => ControlFlow::Continue(()),
                 }
             })
@@ -285,7 +286,7 @@ impl Setup {
 /// How a run of the campaign goes.
 #[derive(Clone, Copy)]
 struct Run {
-    /// The number of records after which the program is killed.
+    /// The number of new records after which the program is killed.
     kill_after: Option<u64>,
     retry_errors: bool,
     retry_crashed: u32,

@@ -98,12 +98,12 @@ fn remove_abandoned(folder: &Path) {
     }
 }
 
-/// Largest size of an FMU that is unpacked (bytes), its largest number of files, and the longest time that unpacking takes. Assumptions: 20
-/// times the largest FMU of the FMI cross-check repository.
+/// Largest size of an FMU that is unpacked (bytes), its largest number of files, and the longest time that unpacking takes:
+/// limits of this program, 20 times the largest FMU of the FMI cross-check repository.
 const MOST_BYTES: u64 = 2 << 30;
 const MOST_FILES: usize = 100_000;
 const LONGEST: Duration = Duration::from_secs(60);
-/// Largest description (bytes). An assumption: 100 times one with 10,000 variables.
+/// Largest description that is read (bytes): a limit of this program, 100 times a description with 10,000 variables.
 const MOST_DESCRIPTION_BYTES: u64 = 256 << 20;
 
 /// The folder into which the process that started this one has unpacked its FMU.
