@@ -261,9 +261,12 @@ fn other_files(path: &Path, kept: &Kept) -> Result<Vec<String>, FolderError> {
 }
 
 impl Kept {
-    /// Returns true if a recording of this campaign has this name.
+    /// Returns true if a recording of this campaign, or its incident card, has this name.
     fn has_recording(&self, name: &str) -> bool {
-        let sample = |scenario: &String| name.strip_prefix(scenario.as_str())?.strip_prefix('-')?.strip_suffix(".rrd");
+        let sample = |scenario: &String| {
+            let rest = name.strip_prefix(scenario.as_str())?.strip_prefix('-')?;
+            rest.strip_suffix(".rrd").or_else(|| rest.strip_suffix(".html"))
+        };
         self.scenarios.iter().filter_map(sample).any(|sample| sample.parse::<u64>().is_ok())
     }
 }

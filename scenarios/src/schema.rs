@@ -56,13 +56,16 @@ pub fn strict_schema() -> Value {
     put("/$defs/ActorId", "pattern", json!(NAME_PATTERN));
     put("/$defs/ParameterName", "pattern", json!(NAME_PATTERN));
     put("/$defs/Lane", "minimum", json!(1));
-    let one_of = |keys: [&str; 2]| json!({ "oneOf": keys.map(|key| json!({ "required": [key] })) });
+    let one_of = |keys: &[&str]| {
+        let alternatives: Vec<Value> = keys.iter().map(|key| json!({ "required": [key] })).collect();
+        json!({ "oneOf": alternatives })
+    };
     put(
         "/$defs/RelativeStartConfig",
         "allOf",
-        json!([one_of(["gap-m", "thw-s"]), one_of(["speed-mps", "closing-mps"])]),
+        json!([one_of(&["gap-m", "thw-s", "settled"]), one_of(&["speed-mps", "closing-mps"])]),
     );
-    put("/$defs/TrafficConfig", "allOf", json!([one_of(["mean-thw-s", "density-per-km"])]));
+    put("/$defs/TrafficConfig", "allOf", json!([one_of(&["mean-thw-s", "density-per-km"])]));
     schema
 }
 

@@ -16,7 +16,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, library, stderr, stdout};
+use crate::support::{closecall, code, folder, library, stderr, stdout, words_of_gate};
 
 /// Number of synthetic campaigns.
 const CAMPAIGNS: u64 = 500;
@@ -184,7 +184,7 @@ fn verdict_of(part: &Path, records: &[Record], gates: &[String], out: &Path) -> 
     assert!(page.contains(&format!("<title>{word}: ")), "{context}");
     assert!(summary.starts_with(&format!("## Closecall: {word}")), "{context}");
     for reason in &reasons {
-        let escaped = reason.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+        let escaped = words_of_gate(reason).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
         assert!(page.contains(&escaped) && summary.contains(reason), "{context}: {reason}");
     }
     word.to_owned()

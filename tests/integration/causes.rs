@@ -59,7 +59,7 @@ fn an_injected_fault_is_named_in_the_failures_that_it_causes() {
 #[test]
 fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
     let parent = folder();
-    let path = campaign(parent.path(), "paired", 200, &["--paired"]);
+    let path = campaign(parent.path(), "paired", 300, &["--paired"]);
     let dir = path.to_str().unwrap();
     let explained = json(&closecall(["explain", dir, "--format", "json"]), 0);
     let explained = explained.as_array().unwrap();
@@ -96,7 +96,7 @@ fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
 #[test]
 fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
     let parent = folder();
-    let path = campaign(parent.path(), "usual", 200, &[]);
+    let path = campaign(parent.path(), "usual", 300, &[]);
     let failing = failing(&path);
     assert!(failing.len() >= 5, "{} failures only", failing.len());
     for sample in failing.into_iter().take(5) {

@@ -40,8 +40,9 @@ fn consistency(files: &[ScenarioFile], mode: SensorMode, samples: u64) -> (Consi
     (Consistency::of(&runs).unwrap(), runs.concat())
 }
 
-/// Runs `samples` samples of every scenario of the library. Fails if the errors of the tracks exceed their covariance, or are smaller where
-/// drivers weave; those of the full chain may be smaller by a quarter. Where no driver weaves, the tracker expects more than there is.
+/// Runs `samples` samples of every scenario of the library. Fails if the errors of the tracks exceed their covariance, or are smaller by more than a
+/// quarter where drivers weave. Drivers who anticipate and start in equilibrium accelerate less than the tracker expects. Where no driver
+/// weaves, the tracker expects more than there is.
 fn assert_consistent(mode: SensorMode, samples: u64) {
     let mut files: Vec<_> = all_of_library().iter().map(|path| ScenarioFile::load(path, &[]).unwrap()).collect();
     // A twin, in which nothing happens ahead, has the vehicles and the noise of its scenario: its tracks would count twice.
@@ -64,9 +65,9 @@ fn assert_consistent(mode: SensorMode, samples: u64) {
     let (found, all) = consistency(&files, mode, samples);
     match (mode, found.credibility()) {
         (_, Credibility::Consistent) => {}
-        // The slow error of the boxes has one smoothed deviation for both sides of the mirror. Its share of the error was
-        // measured before that, and is now too large.
-        (SensorMode::Full, Credibility::Conservative) => assert!(found.mean > 3.0, "{found:?}"),
+        // In mode `full`, the slow error of the boxes has one smoothed deviation for both sides of the mirror, and its share
+        // of the error was measured without that.
+        (SensorMode::Full | SensorMode::Object, Credibility::Conservative) => assert!(found.mean > 3.0, "{found:?}"),
         _ => panic!("{found:?}"),
     }
     // The mean does not consist of a few large errors among many small ones.

@@ -75,6 +75,20 @@ pub(crate) fn message(output: &Output) -> String {
     stderr(output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// Returns the words of a gate in a line of a verdict. The page has its scenario, its words and its criterion in cells of their own.
+pub(crate) fn words_of_gate(line: &str) -> &str {
+    let words = line.split_once(" [").map_or(line, |(words, _)| words);
+    let of_requirement = |words: &'_ str| words.rsplit_once("MIS-").map(|(_, rest)| rest.len());
+    match (words.split_once("samples in which "), of_requirement(words)) {
+        (Some((_, rest)), _) => rest,
+        (None, Some(length)) => {
+            let rest = &words[words.len() - length..];
+            rest.split_once(": ").map_or(rest, |(_, rest)| rest)
+        }
+        (None, None) => words,
+    }
+}
+
 /// Returns the JSON value that the program printed. Fails if the program ended with another exit code than `expected`.
 pub(crate) fn json(output: &Output, expected: i32) -> Value {
     serde_json::from_str(&stdout(output, expected)).expect("the output is JSON")

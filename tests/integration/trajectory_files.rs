@@ -106,7 +106,7 @@ fn every_criterion_finds_the_true_lane_changes_of_an_in_car_log_and_two_tolerate
     let csv = csv.to_str().unwrap();
     let scenario = library("overtake-without-brake");
     let args =
-        ["traffic", "record", scenario.to_str().unwrap(), "-n", "12", "--controller", "acc", "--in-car", "-o", csv];
+        ["traffic", "record", scenario.to_str().unwrap(), "-n", "24", "--controller", "acc", "--in-car", "-o", csv];
     stdout(&closecall(args), 0);
     let truth: Vec<_> =
         truth(&folder.path().join("drive.truth.csv")).into_iter().filter(|(.., complete)| *complete).collect();

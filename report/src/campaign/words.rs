@@ -29,7 +29,9 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     };
     let first_reason = || {
         let is_of_gate = |reason: &&String| judged.gates.iter().any(|gate| gate.to_string() == **reason);
-        judged.reasons.iter().find(|reason| !is_of_gate(reason)).map(|reason| format!("{word}: {reason}"))
+        let decides = |reason: &&String| !is_of_gate(reason) && !reason.starts_with(AS_EXPECTED);
+        let told = |reason: &String| reason.strip_prefix(&format!("{word}: ")).unwrap_or(reason).to_owned();
+        judged.reasons.iter().find(decides).map(|reason| format!("{word}: {}", told(reason)))
     };
     let told = match judged.decision {
         Decision::Fail => because(Standing::Fail, "miss").or_else(first_reason),
@@ -48,6 +50,9 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     };
     told.unwrap_or_else(|| word.to_owned())
 }
+
+/// The beginning of what a verdict says of an expectation that is met.
+const AS_EXPECTED: &str = "happened as expected: ";
 
 /// Returns a verb as one scenario has it.
 fn singular(verb: &str) -> String {
@@ -251,7 +256,7 @@ mod tests {
         assert_eq!(
             words,
             "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20 % to 40 %; too few \
-             samples to decide); required: at least 1 s"
+             samples to decide, and no number would if they are like these); required: at least 1 s"
         );
         let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);
         assert_eq!(sentence(&met, 1), "PASS: the scenario meets what is required, 1 of 1 gates");

@@ -258,7 +258,7 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
         [
             &program(&["traffic", "drift", &fitted, &csv], 0),
             &program(&["traffic", "drift", &fitted, &few], 4),
-            &program(&["traffic", "drift", &headline, &csv], 1),
+            &program(&["traffic", "drift", &headline, &csv], 0),
         ],
     );
     hold("statistics", [&program(&["traffic", "statistics", &csv], 0)]);

@@ -51,6 +51,8 @@ pub(super) fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
 /// What arrives in the pipe.
 enum Arrival {
     Line(Vec<u8>),
+    /// A line that says that a call hangs and that the process ends.
+    LastLine(Vec<u8>),
     TooLong,
     /// The process has ended.
     End,
@@ -212,8 +214,8 @@ impl Process {
             Fault::HangingCall => {
                 let failure = SampleFailure { kind: "controller".to_owned(), message: "no answer in time".to_owned() };
                 let record = ArmRecord::new(right.record.controller.clone(), Err(failure));
-                self.write(at, line(&Answer { record, is_last: true, ..right }));
-                state.crashes += 1;
+                let last = Answer { record, is_last: true, ..right };
+                self.write(at, Arrival::LastLine(serde_json::to_vec(&last).unwrap()));
             }
         }
     }
@@ -239,7 +241,7 @@ impl Peer for Process {
         let (now, answered) = (state.now, self.answered);
         match self.take(now) {
             None => {}
-            Some((_, Arrival::Line(line))) => {
+            Some((_, Arrival::Line(line) | Arrival::LastLine(line))) => {
                 let line = String::from_utf8_lossy(&line).into_owned();
                 return Err(ExecError::OutOfTurn { answered, line });
             }
@@ -257,6 +259,10 @@ impl Peer for Process {
             Some((at, arrival)) => {
                 state.now = at;
                 match arrival {
+                    Arrival::LastLine(line) => {
+                        state.crashes += 1;
+                        Ok(Some(line))
+                    }
                     Arrival::Line(line) => {
                         self.answered += 1;
                         Ok(Some(line))

@@ -49,6 +49,8 @@ pub(super) enum Violation {
     HiddenError { errors: u64, verdict: Option<Verdict> },
     /// A journal with a line of another campaign was resumed.
     ForeignLine,
+    /// The program refuses the journal that it has written.
+    OwnJournalRefused { message: String },
     /// The last run, which has no fault, does not give the records of an undisturbed campaign.
     Unlike { what: String },
 }
@@ -64,6 +66,7 @@ impl fmt::Display for Violation {
             }
             Self::PartialData { has } => write!(f, "{has} of {SAMPLES} records pass for all of them"),
             Self::HiddenError { errors, verdict } => write!(f, "{errors} errors, and the verdict is {verdict:?}"),
+            Self::OwnJournalRefused { message } => write!(f, "the program refuses its own journal: {message}"),
             Self::ForeignLine => f.write_str("a journal with a line of another campaign is resumed"),
             Self::Unlike { what } => write!(f, "the last run, without faults, is unlike an undisturbed one: {what}"),
         }
@@ -163,18 +166,20 @@ impl Setup {
         let (mut summary, mut seen, mut run_now) = (campaign.summary(), 0, 0);
         let mut judge = Judge::new(&campaign.works, &self.gates, campaign.inference);
         let locked = Folder::lock(path, &self.manifest, true).unwrap();
-        campaign
-            .run(Some(&locked), |next| {
-                summary.push(next.record);
-                judge.push(next.record);
-                seen += 1;
-                run_now += u64::from(next.is_new);
-                match run.kill_after {
-                    Some(last) if next.is_new && last == run_now => ControlFlow::Break(End::Campaign),
-                    _ => ControlFlow::Continue(()),
-                }
-            })
-            .unwrap();
+        let ended = campaign.run(Some(&locked), |next| {
+            summary.push(next.record);
+            judge.push(next.record);
+            seen += 1;
+            run_now += u64::from(next.is_new);
+            match run.kill_after {
+                Some(last) if next.is_new && last == run_now => ControlFlow::Break(End::Campaign),
+                _ => ControlFlow::Continue(()),
+            }
+        });
+        if let Err(CampaignError::Folder(error)) = &ended {
+            return Err(Violation::OwnJournalRefused { message: error.to_string() });
+        }
+        ended.unwrap();
         if let Some(violation) = machine.violation.lock().unwrap().take() {
             return Err(violation);
         }
