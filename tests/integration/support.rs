@@ -75,17 +75,16 @@ pub(crate) fn message(output: &Output) -> String {
     stderr(output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the words of a gate in a line of a verdict. The page has its scenario, its words and its criterion in cells of their own.
+/// Returns the words of a gate in a line of a verdict. The page has its scenario, its words and its criterion in cells of their
+/// own.
 pub(crate) fn words_of_gate(line: &str) -> &str {
-    let words = line.split_once(" [").map_or(line, |(words, _)| words);
-    let of_requirement = |words: &'_ str| words.rsplit_once("MIS-").map(|(_, rest)| rest.len());
-    match (words.split_once("samples in which "), of_requirement(words)) {
-        (Some((_, rest)), _) => rest,
-        (None, Some(length)) => {
-            let rest = &words[words.len() - length..];
-            rest.split_once(": ").map_or(rest, |(_, rest)| rest)
-        }
-        (None, None) => words,
+    const STANDINGS: [&str; 4] = ["NOT MET: ", "open: ", "met: ", "not checked: "];
+    let Some(of_scenario) = STANDINGS.iter().find_map(|standing| line.strip_prefix(standing)) else { return line };
+    let words = of_scenario.split_once(" [").map_or(of_scenario, |(words, _)| words);
+    let words = words.split_once(": ").map_or(words, |(_, rest)| rest);
+    match words.split_once(": ") {
+        Some((mark, rest)) if mark.starts_with("MIS-") => rest,
+        _ => words,
     }
 }
 
