@@ -29,7 +29,6 @@ pub enum DriverConfig {
 
 /// A checked driver, which cannot be invalid.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them")]
 pub enum CheckedDriver {
     /// The controller under test.
     Ego(EgoSettings),

@@ -51,8 +51,11 @@ fn wrapped(text: &str, width: usize) -> String {
     lines.join("\n")
 }
 
+/// Returns a style of the terminal.
+type NewStyle = fn() -> Style;
+
 /// The words at the begin of a line that have a colour.
-const WORDS: [(&str, fn() -> Style); 11] = [
+const WORDS: [(&str, NewStyle); 11] = [
     ("PASS", good),
     ("FAIL", bad),
     ("INVALID", bad),

@@ -60,7 +60,7 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
     stdout(&run(&mut user(&foreign), &["replay", "out", "1", "--controller", "acc"]), 0);
     assert!(!ran.exists());
     // A command that the user writes is the user's own.
-    let words = ["replay", "out", "1", "--controller", &controller];
+    let words = ["replay", "out", "1", "--controller", controller];
     stdout(&run(&mut user(&foreign), &words), 0);
     assert!(ran.exists());
     let trusted = run(&mut user(&foreign), &["replay", "out", "1", "--trust-folder"]);
@@ -92,7 +92,7 @@ fn parts_of_others_are_merged_without_running_their_commands() {
             "--partition",
             part,
             "--controller",
-            &controller,
+            controller,
             "--controller-timeout-ms",
             "60000",
             "--record",

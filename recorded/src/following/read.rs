@@ -182,7 +182,7 @@ mod tests {
         let head =
             "pair_id,time_s,follower_front_y_m,follower_speed_mps,leader_front_y_m,leader_length_m,leader_speed_mps\n";
         std::fs::write(&path, format!("{head}{}", "a".repeat(3 << 20))).unwrap();
-        assert!(read(&[path.clone()]).unwrap_err().to_string().contains("a line is longer than 1 MiB"));
+        assert!(read(std::slice::from_ref(&path)).unwrap_err().to_string().contains("a line is longer than 1 MiB"));
         std::fs::write(&path, "a".repeat(3 << 20)).unwrap();
         assert!(read(&[path]).unwrap_err().to_string().contains("a line is longer than 1 MiB"));
     }
