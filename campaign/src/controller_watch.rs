@@ -72,6 +72,11 @@ impl ControllerWatch {
         Self { files, looked: Instant::now(), changed: BTreeSet::new() }
     }
 
+    /// Returns a watch of no files.
+    pub fn of_no_files() -> Self {
+        Self { files: BTreeMap::new(), looked: Instant::now(), changed: BTreeSet::new() }
+    }
+
     /// Looks at the files, at most once in a second.
     pub fn look(&mut self) {
         if self.looked.elapsed() >= LOOK_EVERY {

@@ -47,6 +47,13 @@ pub struct Selection {
 /// The word for the worst sample of each kind.
 const EACH_KIND: &str = "each-kind";
 
+impl Selection {
+    /// Returns true if no sample is selected.
+    pub const fn is_empty(&self) -> bool {
+        self.worst == 0 && self.failures == 0 && self.random == 0 && !self.each_kind
+    }
+}
+
 impl FromStr for Selection {
     type Err = String;
 

@@ -252,7 +252,7 @@ impl Companion for Alone {
 
 /// Checks what would fail after the samples have run.
 fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
-    if args.record.is_some() && args.results.place()? == Place::Nowhere {
+    if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place()? == Place::Nowhere {
         return Err(CliError::usage(
             "--record: the recordings are kept in a folder of results: name one with --out DIR",
         ));
@@ -303,7 +303,9 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
     let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
     campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;
     let mut results = Results::start(planned.results, &mut campaign, &manifest)?;
-    let mut watch = ControllerWatch::start(&manifest);
+    // Other machines run the files that were shipped at the start.
+    let mut watch =
+        if planned.ray.is_some() { ControllerWatch::of_no_files() } else { ControllerWatch::start(&manifest) };
     if let Some(folder) = results.complete() {
         companion.begin(folder)?;
     }
