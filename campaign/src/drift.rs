@@ -76,7 +76,7 @@ impl FittedParameter {
         Ok(summary.map(|summary| Self { name: name.to_owned(), quantity, cut, summary }))
     }
 
-    /// Returns whether another parameter repeats this one, or has all values of which this one has a part.
+    /// Returns whether another parameter has the same values, or more of them.
     fn is_part_of(&self, other: &Self) -> bool {
         self.quantity == other.quantity && (other.cut.is_none() || self.cut == other.cut)
     }

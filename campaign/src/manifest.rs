@@ -189,7 +189,7 @@ impl Manifest {
         differences
     }
 
-    /// Returns true if `other` is the same campaign with more samples: its first samples are those of this one.
+    /// Returns true if `other` is the same campaign with more samples: it begins with the same samples.
     pub fn grows_to(&self, other: &Self) -> bool {
         let (one, more) = (self.sampling, other.sampling);
         let is_fixed = self.inference == Inference::FixedSamples;

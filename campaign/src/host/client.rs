@@ -41,7 +41,7 @@ impl Peer for Child {
     }
 }
 
-/// Processes and clock: those of the operating system, or simulated ones.
+/// The processes and the clock that a client uses: real or simulated.
 pub(super) trait World {
     /// A process.
     type Peer: Peer;

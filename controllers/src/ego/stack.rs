@@ -31,7 +31,7 @@ const RELEASE_ACCELERATION_MPS2: f64 = 0.8;
 /// acceleration; 1 to 3 are plausible.
 const LEAD_BRAKES_MPS2: f64 = 1.5;
 
-/// Gap that early braking leaves behind a standing lead vehicle (m): an assumption, that of the emergency braking; 1 to 5 are
+/// Gap that early braking leaves behind a standing lead vehicle (m): an assumption, equal to the gap of the emergency braking; 1 to 5 are
 /// plausible.
 const STANDSTILL_GAP_M: f64 = 2.0;
 

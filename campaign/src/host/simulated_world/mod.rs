@@ -5,7 +5,7 @@
 //!                 └▶ kills, damaged journals ─────────────────────────────┘
 //! ```
 //!
-//! The client, the campaign, the journal, the repair and the verdict are those of the program. A schedule runs a small
+//! A schedule tests the real client, campaign, journal, repair and verdict. Only processes and clock are simulated. It runs a small
 //! campaign in a folder, interrupts and resumes it, and ends with a run without faults. Whatever happens,
 //!
 //! 1. an outcome in the journal is the one of its sample,

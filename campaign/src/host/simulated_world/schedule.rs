@@ -39,7 +39,7 @@ const RATES: [f64; 3] = [0.02, 0.1, 0.3];
 /// What a schedule has shown and must never show.
 #[derive(Debug)]
 pub(super) enum Violation {
-    /// The journal has an outcome that is not that of the sample.
+    /// The journal files the outcome of another sample.
     OtherOutcome { sample: u64, arm: usize },
     /// A sample was run again after a crash, and its record does not say so.
     SilentRetry { arm: usize, sample: u64, crashes: u32, told: u32 },
