@@ -7,7 +7,7 @@ use closecall_traffic::atomic::WriteError;
 
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
-use super::host::refusal;
+use super::host::{Refusal, refusal};
 use super::identity::of_work;
 use super::ledger::Inference;
 use super::partition::Partition;
@@ -90,11 +90,13 @@ pub enum CampaignError {
     /// The worker threads could not be started.
     #[error(transparent)]
     Workers(#[from] WorkersError),
-    /// A worker process has found another controller, or is another version of this program.
+    /// A worker process has found another controller, cannot read it, or is another version of this program.
     #[error("failed to go on: {reason}")]
     Refused {
-        /// What has changed.
+        /// The reason.
         reason: String,
+        /// True if something is another one than at the start, false if the controller cannot be read.
+        has_changed: bool,
     },
     /// The samples cannot run on other machines.
     #[error(transparent)]
@@ -312,7 +314,9 @@ impl Campaign {
         mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), CampaignError> {
         let mut on_finished = |finished: Finished| match refusal(&finished.record) {
-            Some(reason) => Err(CampaignError::Refused { reason: reason.to_owned() }),
+            Some(Refusal { reason, has_changed }) => {
+                Err(CampaignError::Refused { reason: reason.to_owned(), has_changed })
+            }
             None => on_finished(finished),
         };
         match &self.remote {

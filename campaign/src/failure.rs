@@ -82,7 +82,8 @@ impl From<&CampaignError> for FailureKind {
     fn from(error: &CampaignError) -> Self {
         match error {
             CampaignError::Folder(error) => Self::from(error),
-            CampaignError::Refused { .. } => Self::Validity,
+            CampaignError::Refused { has_changed: true, .. } => Self::Validity,
+            CampaignError::Refused { has_changed: false, .. } => Self::InvalidInput,
             CampaignError::Remote(error) if error.is_input() => Self::InvalidInput,
             CampaignError::Write(_) | CampaignError::Workers(_) | CampaignError::Remote(_) => Self::Io,
         }

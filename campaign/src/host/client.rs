@@ -10,7 +10,7 @@ use closecall_simulation::SampleError;
 use closecall_simulation::controller::exec::{Child, ExecError};
 use closecall_simulation::controller::isolated::Isolated;
 
-use super::{Answer, Question, REFUSED, Task, task_identity};
+use super::{Answer, Question, Refusal, Task, task_identity};
 use crate::identity::of_work;
 use crate::manifest::version;
 use crate::record::{ArmRecord, Flaky, SampleFailure};
@@ -176,8 +176,7 @@ pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answ
             "a copy of the process gave it, because the controller has forked process {process} and both go on"
         )));
     }
-    let refused = answer.record.result.as_ref().err().filter(|failure| failure.kind == REFUSED);
-    if refused.is_some() {
+    if answer.record.result.as_ref().err().and_then(Refusal::of).is_some() {
         return Ok(answer);
     }
     if answer.question != *question {

@@ -36,17 +36,36 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::isolated::Isolated;
 use serde::{Deserialize, Serialize};
 
-use super::record::{ArmRecord, Record};
+use super::record::{ArmRecord, Record, SampleFailure};
 use super::runner::Sampling;
 use super::validity::CheckPlan;
 
-/// The kind of the failure of a sample that a worker process has refused to run.
-const REFUSED: &str = "refused";
+/// The kind of the failure of a sample that a worker process has refused to run, because the program or a file is another one
+/// than at the start.
+const CHANGED: &str = "refused";
+/// The kind of the failure of a sample whose controller a worker process cannot read.
+const UNREADABLE: &str = "unreadable";
+
+/// Why a worker process has refused to run a sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Refusal<'a> {
+    /// The reason.
+    pub(crate) reason: &'a str,
+    /// True if something is another one than at the start, false if the controller cannot be read.
+    pub(crate) has_changed: bool,
+}
+
+impl<'a> Refusal<'a> {
+    /// Returns why a worker process has refused to run a sample; `None` if the failure is another one.
+    fn of(failure: &'a SampleFailure) -> Option<Self> {
+        let has_changed = failure.kind == CHANGED;
+        (has_changed || failure.kind == UNREADABLE).then_some(Self { reason: &failure.message, has_changed })
+    }
+}
 
 /// Returns why a worker process has refused to run the sample of a record; `None` if it has run it.
-pub(crate) fn refusal(record: &Record) -> Option<&str> {
-    let failures = record.arms.iter().filter_map(|arm| arm.result.as_ref().err());
-    failures.into_iter().find(|failure| failure.kind == REFUSED).map(|failure| failure.message.as_str())
+pub(crate) fn refusal(record: &Record) -> Option<Refusal<'_>> {
+    record.arms.iter().filter_map(|arm| arm.result.as_ref().err()).find_map(Refusal::of)
 }
 
 /// What a worker process has to know before its first sample.

@@ -17,7 +17,7 @@ use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::{Probe, UNPACKED};
 use closecall_simulation::{Arm, SampleError};
 
-use super::{Answer, Question, REFUSED, Task, task_identity};
+use super::{Answer, CHANGED, Question, Task, UNREADABLE, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
@@ -120,14 +120,15 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
             "Closecall has changed since the start: it was {there}, and is {}. The results so far are kept",
             version()
         );
-        return refuse(answers, lines.next(), reason);
+        return refuse(answers, lines.next(), (CHANGED, reason));
     }
     let task: Task = read(&first)?;
     let identity = task_identity(first.as_bytes());
     let timeout_ms = task.controller.timeout_ms();
+    let kind = if task.controller.native().is_some() { CHANGED } else { UNREADABLE };
     let controller = match task.controller.in_this_process() {
         Ok(controller) => controller,
-        Err(reason) => return refuse(answers, lines.next(), reason),
+        Err(reason) => return refuse(answers, lines.next(), (kind, reason)),
     };
     let name = controller.name().to_owned();
     let file = ScenarioFile::parse(&task.path, &task.text, &[]).map_err(|error| error.to_string())?;
@@ -192,12 +193,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Answers the first question, if there is one, with the reason for which this process runs no sample. The question of another
-/// version may have any form.
-fn refuse(answers: &Arc<Mutex<File>>, question: Option<io::Result<String>>, message: String) -> Result<(), String> {
+/// Answers the first question, if there is one, with the reason for which this process runs no sample, and its kind. The
+/// question of another version may have any form.
+fn refuse(
+    answers: &Arc<Mutex<File>>,
+    question: Option<io::Result<String>>,
+    (kind, message): (&str, String),
+) -> Result<(), String> {
     let Some(question) = question else { return Ok(()) };
     let question: serde_json::Value = question.map_err(|error| error.to_string()).and_then(|line| read(&line))?;
-    let failure = SampleFailure { kind: REFUSED.to_owned(), message };
+    let failure = SampleFailure { kind: kind.to_owned(), message };
     let record = ArmRecord::new(String::new(), Err(failure));
     let answering = Answering { answers: answers.clone(), process: std::process::id() };
     answering.answer(question, ArmRun { record, wall_s: 0.0, check_s: 0.0 }, true)

@@ -15,7 +15,7 @@ use super::answer;
 use super::engine::RemoteError;
 use super::shipment::Shipment;
 use crate::folder::FolderError;
-use crate::host::refusal;
+use crate::host::{Refusal, refusal};
 use crate::manifest::{Manifest, version};
 use crate::plan::Plan;
 use crate::runner::Work;
@@ -98,7 +98,7 @@ impl BlockRunner {
         let mut results: Vec<Finished> = Vec::with_capacity(samples.len());
         let done = self.run_in_pool((work, found), samples, |finished| results.push(finished));
         done.map_err(|error| super::EngineError { message: error.to_string(), is_input: false })?;
-        if let Some(reason) = results.iter().find_map(|finished| refusal(&finished.record)) {
+        if let Some(Refusal { reason, .. }) = results.iter().find_map(|finished| refusal(&finished.record)) {
             return Err(super::EngineError { message: reason.to_owned(), is_input: true }.into());
         }
         Ok(answer::encode(&self.version, &self.configuration, &results)?)

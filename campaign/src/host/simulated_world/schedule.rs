@@ -312,7 +312,9 @@ impl crate::workers::SampleRunner for Refusing {
     ) -> Result<(), CampaignError> {
         match samples.next() {
             None => Ok(()),
-            Some(sample) => Err(CampaignError::Refused { reason: format!("sample {sample} is not run") }),
+            Some(sample) => {
+                Err(CampaignError::Refused { reason: format!("sample {sample} is not run"), has_changed: true })
+            }
         }
     }
 }
