@@ -63,17 +63,17 @@ fn an_endless_input_is_refused() {
         0,
     );
     let csv = csv.to_str().unwrap();
-    let cases: [(&[&str], &str); 5] = [
-        (&["check", endless], "larger than 64 MiB"),
-        (&["campaign", endless, "-n", "1"], "larger than 64 MiB"),
-        (&["traffic", "inspect", endless], "this is not text"),
-        (&["traffic", "criticality", endless], "this is not text"),
-        (&["traffic", "lane-changes", csv, "--reference", endless], "larger than 64 MiB"),
+    let cases: [&[&str]; 5] = [
+        &["check", endless],
+        &["campaign", endless, "-n", "1"],
+        &["traffic", "inspect", endless],
+        &["traffic", "criticality", endless],
+        &["traffic", "lane-changes", csv, "--reference", endless],
     ];
-    for (case, expected) in cases {
+    for case in cases {
         let output = closecall(case);
         assert!([3, 6].contains(&code(&output)), "{case:?}: {}", stderr(&output));
-        assert!(message(&output).contains(expected), "{case:?}: {}", stderr(&output));
+        assert!(message(&output).contains("it is a device, and no file"), "{case:?}: {}", stderr(&output));
     }
 }
 

@@ -79,12 +79,11 @@ fn fitted_distributions_equal_those_of_the_committed_fit() {
                 continue;
             }
             count += 1;
-            // A headway of another vehicle is drawn from the fitted headways to the vehicle ahead.
+            // A quantity of another vehicle is drawn from the fit of all vehicles, or of the vehicle ahead.
             let name = name.to_string();
-            let of_front = name.split_once('-').map(|(_, quantity)| format!("front-{quantity}"));
-            let names: Vec<String> = [Some(name.clone()), of_front]
+            let quantity = name.split_once('-').map_or("", |(_, quantity)| quantity);
+            let names: Vec<String> = [name.clone(), quantity.to_owned(), format!("front-{quantity}")]
                 .iter()
-                .flatten()
                 .flat_map(|name| [name.clone(), format!("critical-{name}"), format!("short-{name}")])
                 .collect();
             let is_committed = tables

@@ -9,6 +9,7 @@ use closecall_traffic::{Measured, Time};
 use maud::{Markup, html};
 
 use super::colours::{FRONT, REAR, colour};
+use super::road::{REACH_M, STRETCH, road};
 use crate::campaign::html::page::document;
 use crate::run::film::{Film, Frame, Part};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
@@ -18,14 +19,8 @@ const BEFORE: Time = Time::from_ms(12_000);
 const AFTER: Time = Time::from_ms(3_000);
 /// Time between two positions of a vehicle. The browser moves it evenly in between.
 const STEP: Time = Time::from_ms(200);
-/// Rear and front end of the visible road, relative to the ego (m).
-const REACH_M: [f64; 2] = [-65.0, 75.0];
 /// Distance at which a vehicle is out of sight (m).
 const AWAY_M: f64 = 400.0;
-/// The road is drawn wider than it is by this factor.
-const STRETCH: f64 = 2.0;
-/// Room above and below the road (m in the picture).
-const ROOM_M: f64 = 1.5;
 /// Size of a plot of headways, and its margin (px).
 const PLOT_PX: [f64; 2] = [700.0, 130.0];
 const MARGIN_PX: f64 = 26.0;
@@ -52,7 +47,7 @@ pub(crate) fn card(films: &[Film], replay: &str) -> String {
                 @if let Some(sentence) = film.sentence() {
                     p.failure[film.worst_collision().is_some()] { (sentence.to_string()) }
                 }
-                figure { (road(film, window)) (headways(film, window)) }
+                figure { (road(film, &vehicles(film, window))) (headways(film, window)) }
             }
         }
         p.note {
@@ -91,22 +86,9 @@ fn frame_index(film: &Film, time: Time) -> usize {
     film.frames.partition_point(|frame| frame.time <= time).saturating_sub(1)
 }
 
-/// Returns the road with its moving vehicles.
-fn road(film: &Film, window: Window) -> Markup {
-    let right_m = -film.road.right_edge_m() * STRETCH;
-    let [rear_m, front_m] = REACH_M;
-    let view = format!("{rear_m} {:.1} {} {:.1}", -ROOM_M, front_m - rear_m, right_m + 2.0 * ROOM_M);
-    let lanes = f64::from(film.road.lanes());
-    let lines = (1..film.road.lanes()).map(|line| right_m * f64::from(line) / lanes);
-    html! {
-        svg viewBox=(view) role="img" aria-label={ "The road from above, " (film.arm_label()) } {
-            rect x=(rear_m) y="0" width=(front_m - rear_m) height=(format!("{right_m:.1}")) fill="#e9eaec" {}
-            @for y_m in lines {
-                line x1=(rear_m) x2=(front_m) y1=(format!("{y_m:.1}")) y2=(format!("{y_m:.1}")) stroke="#9aa0a6" stroke-width="0.2" {}
-            }
-            @for actor in 0..film.actors.len() { (vehicle(film, actor, window)) }
-        }
-    }
+/// Returns the vehicles that move.
+fn vehicles(film: &Film, window: Window) -> Markup {
+    html! { @for actor in 0..film.actors.len() { (vehicle(film, actor, window)) } }
 }
 
 /// Returns a vehicle that moves. One that never comes into view has no place on the card.

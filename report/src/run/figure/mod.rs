@@ -15,6 +15,7 @@ mod colours;
 mod encounter;
 mod pdf;
 mod picture;
+mod road;
 mod scrubber;
 mod still;
 mod strip;

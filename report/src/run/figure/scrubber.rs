@@ -7,17 +7,11 @@ use std::fmt::Write as _;
 use maud::{Markup, PreEscaped, html};
 
 use super::colours::{colour, legend_name};
+use super::road::{STRETCH, road};
 use crate::run::film::Film;
 
 /// Number of frames between two positions of the slider.
 const EVERY: usize = 5;
-/// Rear and front end of the visible road, relative to the ego (m).
-const REACH_M: [f64; 2] = [-65.0, 75.0];
-/// The road is drawn wider than it is by this factor.
-const STRETCH: f64 = 2.0;
-/// Room above and below the road (m in the picture).
-const ROOM_M: f64 = 1.5;
-
 /// Returns the views of the films below each other, with one slider, which stands at the critical moment of the last.
 pub(crate) fn scrubber(films: &[Film]) -> Markup {
     let last = |film: &Film| film.frames.len().saturating_sub(1) / EVERY;
@@ -29,7 +23,7 @@ pub(crate) fn scrubber(films: &[Film]) -> Markup {
         div.scrubber hidden {
             @for film in films {
                 p { strong { (film.arm_label()) } ": " output {} }
-                (road(film))
+                (road(film, &boxes(film)))
             }
             label {
                 "Time " input type="range" min="0" max=(films.iter().map(last).max().unwrap_or(0)) value=(start);
@@ -45,26 +39,15 @@ pub(crate) fn scrubber(films: &[Film]) -> Markup {
     }
 }
 
-/// Returns the road with a box for each vehicle.
-fn road(film: &Film) -> Markup {
-    let right_m = -film.road.right_edge_m() * STRETCH;
-    let [rear_m, front_m] = REACH_M;
-    let view = format!("{rear_m} {:.1} {} {:.1}", -ROOM_M, front_m - rear_m, right_m + 2.0 * ROOM_M);
-    let lanes = f64::from(film.road.lanes());
-    let lines = (1..film.road.lanes()).map(|line| right_m * f64::from(line) / lanes);
+/// Returns a box for each vehicle.
+fn boxes(film: &Film) -> Markup {
     html! {
-        svg viewBox=(view) role="img" aria-label={ "The road from above, " (film.arm_label()) } {
-            rect x=(rear_m) y="0" width=(front_m - rear_m) height=(format!("{right_m:.1}")) fill="#e9eaec" {}
-            @for y_m in lines {
-                line x1=(rear_m) x2=(front_m) y1=(format!("{y_m:.1}")) y2=(format!("{y_m:.1}")) stroke="#9aa0a6" stroke-width="0.2" {}
-            }
-            @for (index, actor) in film.actors.iter().enumerate() {
-                @let size = &actor.vehicle.dimensions;
-                @let [length_m, width_m] = [size.length_m, size.width_m * STRETCH];
-                rect x=(format!("{:.1}", -0.5 * length_m)) y=(format!("{:.1}", -0.5 * width_m))
-                    width=(format!("{length_m:.1}")) height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(film, index)) {
-                    title { (actor.name) }
-                }
+        @for (index, actor) in film.actors.iter().enumerate() {
+            @let size = &actor.vehicle.dimensions;
+            @let [length_m, width_m] = [size.length_m, size.width_m * STRETCH];
+            rect x=(format!("{:.1}", -0.5 * length_m)) y=(format!("{:.1}", -0.5 * width_m))
+                width=(format!("{length_m:.1}")) height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(film, index)) {
+                title { (actor.name) }
             }
         }
     }

@@ -97,11 +97,15 @@ impl<'a> Writer<'a> {
         times: &[Time],
         build: impl BuildColumns,
     ) -> Result<(), RecordingError> {
+        self.curve(entity.into(), times, build)
+    }
+
+    fn curve(&self, path: EntityPath, times: &[Time], build: impl BuildColumns) -> Result<(), RecordingError> {
         if times.is_empty() {
             return Ok(());
         }
         let columns = build(0..times.len()).map_err(RecordingStreamError::from)?;
-        self.recording.send_columns(entity.into(), self.timelines(times), columns)
+        self.recording.send_columns(path, self.timelines(times), columns)
     }
 
     /// Writes one row of components for each of `times`, which must ascend, and a copy of the row that holds at the
@@ -150,11 +154,7 @@ impl<'a> Writer<'a> {
         times: &[Time],
         build: impl BuildColumns,
     ) -> Result<(), RecordingError> {
-        if times.is_empty() {
-            return Ok(());
-        }
-        let columns = build(0..times.len()).map_err(RecordingStreamError::from)?;
-        self.recording.send_columns(self.path(entity), self.timelines(times), columns)
+        self.curve(self.path(entity), times, build)
     }
 
     /// Writes components that hold from `time` on.
