@@ -1,0 +1,106 @@
+//! The CI files that users copy: a gate that fails does not cost the next job a build.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::support::{ROOT, folder};
+
+/// The files for GitHub, with the words that start the gate.
+const GITHUB: [(&str, &str); 4] = [
+    ("docs/how-to/ci/github.yml", "closecall campaign scenarios"),
+    (".github/actions/campaign/action.yml", "closecall campaign \"${scenarios[@]}\""),
+    ("docs/start/tutorial.md", "closecall/target/release/closecall campaign my-scenario.toml --preset pr"),
+    (".github/workflows/ci.yml", "run: bash .ci/run"),
+];
+
+/// Writes a program.
+#[cfg(unix)]
+fn write_executable(path: &Path, text: &str) {
+    use std::os::unix::fs::PermissionsExt;
+
+    fs::write(path, text).unwrap();
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+fn text(path: &str) -> String {
+    fs::read_to_string(Path::new(ROOT).join(path)).unwrap()
+}
+
+#[test]
+fn a_job_on_github_saves_what_it_built_whatever_the_gate_says() {
+    for (path, gate) in GITHUB {
+        let text = text(path);
+        let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{path} lacks {words}"));
+        let (restore, save) = (place("uses: actions/cache/restore@"), place("uses: actions/cache/save@"));
+        // `actions/cache` itself saves at the end of a job, and only if the job succeeds.
+        assert!(!text.contains("uses: actions/cache@"), "{path}");
+        assert!(restore < save, "{path}");
+        let step_of_save = &text[text[..save].rfind("- ").unwrap()..save];
+        assert!(save < place(gate) || step_of_save.contains("always()"), "{path}: {step_of_save}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_second_job_on_gitlab_builds_nothing_after_a_failed_gate() {
+    let yaml = text("docs/how-to/ci/gitlab.yml");
+    let block = |start: &str| yaml.split_once(start).unwrap_or_else(|| panic!("{start}")).1;
+    let script: Vec<&str> = block("  script:\n").lines().map_while(|line| line.strip_prefix("    - ")).collect();
+    assert!(script.iter().any(|line| line.contains("cargo install")), "{script:?}");
+    let cache = block("  cache:\n").split("  script:").next().unwrap();
+    let kept = cache.split_once("paths: [").unwrap().1.split_once(']').unwrap().0;
+    let is_kept_after_failure = cache.lines().any(|line| line.trim() == "when: always");
+
+    let (tools, cached) = (folder(), folder());
+    // A `cargo` that notes each build and installs a program whose gate fails.
+    let cargo = "#!/bin/sh\necho built >> \"$BUILDS\"\nmkdir -p .closecall/bin\n\
+        printf '#!/bin/sh\\n[ \"$1\" = check ]\\n' > .closecall/bin/closecall\nchmod +x .closecall/bin/closecall\n";
+    write_executable(&tools.path().join("cargo"), cargo);
+    let builds = tools.path().join("builds");
+    for _ in 0..2 {
+        let project = folder();
+        let copy = |from: &Path, to: &Path| Command::new("cp").arg("-a").arg(from).arg(to).status().unwrap();
+        if cached.path().join(kept).exists() {
+            copy(&cached.path().join(kept), project.path());
+        }
+        let job = Command::new("sh")
+            .args(["-e", "-c", &script.join("\n")])
+            .current_dir(project.path())
+            .env("PATH", format!("{}:/usr/bin:/bin", tools.path().display()))
+            .env("BUILDS", &builds)
+            .env("CONTROLLER", "mis")
+            .output()
+            .unwrap();
+        assert_eq!(job.status.code(), Some(1), "{job:?}");
+        if is_kept_after_failure {
+            copy(&project.path().join(kept), cached.path());
+        }
+    }
+    assert_eq!(fs::read_to_string(builds).unwrap(), "built\n");
+}
+
+#[test]
+#[cfg(unix)]
+fn the_action_carries_a_quoted_gate() {
+    let yaml = text(".github/actions/campaign/action.yml");
+    let run = yaml.split_once("      run: |\n        code=0\n").unwrap().1;
+    let script: Vec<&str> = run.lines().map_while(|line| line.strip_prefix("        ")).collect();
+    let home = folder();
+    let program = home.path().join(".closecall/bin/closecall");
+    fs::create_dir_all(program.parent().unwrap()).unwrap();
+    write_executable(&program, "#!/bin/sh\nprintf '<%s>' \"$@\"\nexit 1\n");
+    let job = Command::new("bash")
+        .args(["-e", "-c", &format!("code=0\n{}", script.join("\n"))])
+        .env("HOME", home.path())
+        .envs([("SCENARIOS", "a b"), ("PRESET", "pr"), ("SEED", "1"), ("CONTROLLER", "exec:python3 my.py")])
+        .envs([("OPTIONS", "--gate 'max(contacts) < 1' --max-induced 0 '$(touch x)'"), ("OUT", "out")])
+        .env("GITHUB_OUTPUT", home.path().join("output"))
+        .output()
+        .unwrap();
+    assert_eq!(job.status.code(), Some(1), "{job:?}");
+    let words = String::from_utf8(job.stdout).unwrap();
+    assert!(words.starts_with("<campaign><a><b><--preset>"), "{words}");
+    assert!(words.contains("<--controller><exec:python3 my.py>"), "{words}");
+    assert!(words.ends_with("<--gate><max(contacts) < 1><--max-induced><0><$(touch x)>"), "{words}");
+}
