@@ -32,13 +32,34 @@ static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 /// Number of parts of the executable that are hashed at the same time.
 const HASH_PARTS: u64 = 8;
 
-/// Returns the version of this program: the release and an identifier of the build, since two builds of one release may
-/// differ.
+/// The commit of the sources, or nothing if they lie in no repository.
+const COMMIT: &str = env!("CLOSECALL_COMMIT");
+
+/// Whether the sources differ from the commit.
+const IS_MODIFIED: bool = !env!("CLOSECALL_MODIFIED").is_empty();
+
+/// What this program is built from, in lines: the release, the commit with its date, the platform, the backends of the
+/// network.
+pub const BUILD: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit:   ",
+    env!("CLOSECALL_SOURCES"),
+    "\nplatform: ",
+    env!("CLOSECALL_TARGET"),
+    "\nnetwork:  tract (built in), ONNX Runtime (a library that is named)",
+);
+
+/// Returns the version of this program: the release and what tells two builds of it apart, `0.1.0+0a1b2c3d4e5f`.
 ///
-/// The identifier is the one that the linker computes from the content of the executable (`readelf -n`: the build ID). An
-/// executable without one is hashed, which takes longer than a short campaign.
+/// That is the commit: what is built twice from one commit, such as the command and the Python package, computes the
+/// same outcomes. If the sources differ from the commit, or have none, it is the identifier of the executable, which the
+/// linker computes from its content (`readelf -n`: the build ID). An executable without one is hashed, which takes longer
+/// than a short campaign.
 pub fn version() -> String {
     let release = env!("CARGO_PKG_VERSION");
+    if !COMMIT.is_empty() && !IS_MODIFIED {
+        return format!("{release}+{COMMIT}");
+    }
     let program = PROGRAM.get().map_or_else(std::env::current_exe, |path| Ok(path.clone()));
     let build = program.and_then(|path| match build_id(&path) {
         Some(id) => Ok(id.iter().map(|byte| format!("{byte:02x}")).collect()),
@@ -360,8 +381,13 @@ mod tests {
         let digits = id.unwrap_or_default().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
         let version = version();
         let (release, build) = version.split_once('+').unwrap();
-        assert_eq!((release, build.len()), (env!("CARGO_PKG_VERSION"), BUILD_DIGITS));
-        assert!(digits.is_empty() || digits.starts_with(build), "{digits} {build}");
+        assert_eq!(release, env!("CARGO_PKG_VERSION"));
+        if COMMIT.is_empty() || IS_MODIFIED {
+            assert_eq!(build.len(), BUILD_DIGITS);
+            assert!(digits.is_empty() || digits.starts_with(build), "{digits} {build}");
+        } else {
+            assert_eq!(build, COMMIT);
+        }
         // A file that is not an executable has no identifier.
         assert_eq!(build_id(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml").as_path()), None);
     }

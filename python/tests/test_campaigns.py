@@ -57,6 +57,22 @@ def test_the_folder_is_that_of_the_command_line(tmp_path: Path) -> None:
     assert manifests[0]["closecall_version"] == manifests[1]["closecall_version"]
 
 
+def test_the_package_resumes_what_the_command_of_the_same_commit_began(tmp_path: Path) -> None:
+    program = Path(__file__).parents[2] / "target/release/closecall"
+    if not program.exists():
+        pytest.skip("the command is not built: cargo build --release")
+    built = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    if built != command("--version").stdout or "modified" in built:
+        pytest.skip("the command and the package are not built from one commit")
+    words = ["--seed", "3", "--sensors", "object", "--out"]
+    subprocess.run([program, "campaign", SCENARIO, "-n", "10", *words, tmp_path / "grown"], check=False)
+    grown = cc.campaign(SCENARIO, n=30, seed=3, sensors="object", out=tmp_path / "grown", resume=True)
+    whole = cc.campaign(SCENARIO, n=30, seed=3, sensors="object", out=tmp_path / "whole")
+    assert grown.report["samples"] == whole.report["samples"] == 30
+    file = "outcomes.parquet"
+    assert sha256(tmp_path / "grown" / file) == sha256(tmp_path / "whole" / file)
+
+
 def test_a_python_controller_reproduces_acc_to_the_last_bit(tmp_path: Path) -> None:
     names = {"acc": "acc", "own": Acc}
     tables = {}

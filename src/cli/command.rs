@@ -25,7 +25,7 @@ use crate::exit_code::ExitCode;
 /// sensors, controller and world, and reports with numbers, pictures and an exit code whether the margin increase
 /// system (MIS) prevents collisions or causes them.
 #[derive(Debug, Parser)]
-#[command(name = "closecall", version, after_help = AFTER_HELP)]
+#[command(name = "closecall", version, long_version = closecall_campaign::manifest::BUILD, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
