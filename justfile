@@ -31,9 +31,13 @@ spell:
 references:
     cargo run --release -p closecall-xtask -- write-references
 
-# Writes the results that the documentation shows (hours).
-evidence: references
-    cargo run --release -p closecall-xtask -- write-mis -n 2000 --member-samples 400 --seed 1001
+# Writes the results that the documentation shows, in the sizes for a night (hours).
+evidence: references build
+    cargo run --release -p closecall-xtask -- write-evidence
+
+# The same in the sizes for minutes (half an hour).
+evidence-quick: references build
+    cargo run --release -p closecall-xtask -- write-evidence -n 500 --member-samples 50
 
 # Draws the pictures of docs/how-to/looking again, in the real viewer. Needs `pip install rerun-sdk==0.36.3 pillow`.
 pictures *names: build

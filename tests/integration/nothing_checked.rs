@@ -113,3 +113,29 @@ fn copies_of_one_sample_are_one_sample() {
     assert_eq!(report["samples"], 2, "{report}");
     assert_eq!(report["controllers"]["mis"]["interval_95"][1].as_f64().map(|high| high > 0.8), Some(true), "{report}");
 }
+
+#[test]
+fn a_system_that_was_not_there_to_be_tested_is_not_judged() {
+    let folder = folder();
+    let path = folder.path().join("own.toml");
+    let judged = |text: &str, controller: &str, expected: i32| {
+        std::fs::write(&path, text).unwrap();
+        let args = ["-n", "40", "--seed", "46", "--paired", "--sensors", "object", "--controller", controller];
+        stdout(&closecall(["campaign", path.to_str().unwrap()].iter().chain(&args)), expected)
+    };
+    // It may induce whatever it likes, but its sensors fail in each sample.
+    let dead = std::fs::read_to_string(library("faults/object-dead")).unwrap();
+    let (before, rest) = dead.split_once("[checks]").unwrap();
+    let (_, after) = rest.split_once("\n\n").unwrap();
+    let text = judged(&format!("{before}[checks]\nMIS-2 = [\"upper(induced) <= 0.9\"]\n\n{after}"), "mis", 4);
+    assert!(text.contains("NOT JUDGED") && text.contains("was not available, because sensors had failed"), "{text}");
+    // A longer gap prevents collisions, and never acts on what comes from behind.
+    let headline = std::fs::read_to_string(library("low-thw-overtake")).unwrap();
+    let (before, rest) = headline.split_once("[checks]").unwrap();
+    let (_, after) = rest.split_once("\n\n").unwrap();
+    let checks = "MIS-1 = [\"lower(prevented | baseline.ego_collided) >= 0.05\"]";
+    let text = format!("{before}[checks]\n{checks}\n\n{after}");
+    let refused = judged(&text, "gap-1.6", 4);
+    assert!(refused.contains("NOT JUDGED") && refused.contains("never slowed the ego"), "{refused}");
+    assert!(judged(&text, "mis", 0).contains("PASS"));
+}

@@ -28,7 +28,7 @@ mod validate_perception;
 mod validate_reference_models;
 mod validate_statistics;
 mod validate_tracking;
-mod write_mis;
+mod write_evidence;
 mod write_references;
 
 use std::process::{ExitCode, Termination};
@@ -84,8 +84,8 @@ enum Task {
     ValidateStatistics(Words),
     /// Checks that the tracker's uncertainty is consistent with its errors
     ValidateTracking(Words),
-    /// Writes the tables of docs/evidence/mis.md
-    WriteMis(write_mis::Args),
+    /// Writes the tables of docs/evidence that rest on outcomes
+    WriteEvidence(write_evidence::Args),
     /// Writes docs/reference/scenario.md and docs/evidence/determinism.json
     WriteReferences,
 }
@@ -127,7 +127,7 @@ fn main() -> ExitCode {
             validate_tracking::main(words);
             ExitCode::SUCCESS
         }
-        Task::WriteMis(args) => write_mis::main(args).report(),
+        Task::WriteEvidence(args) => write_evidence::main(args).report(),
         Task::WriteReferences => write_references::main().report(),
     }
 }

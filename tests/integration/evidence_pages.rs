@@ -1,0 +1,103 @@
+//! The pages of `docs/evidence` have the sections that `xtask write-evidence` writes, of the outcomes of this version.
+
+use std::path::PathBuf;
+
+use crate::support::{ROOT, all_of_library, traffic_of_library};
+
+#[path = "../../xtask/src/write_evidence/mod.rs"]
+#[expect(dead_code, reason = "the program's entry is not called")]
+mod write_evidence;
+
+use write_evidence::Size;
+use write_evidence::page::{Section, between_markers, outcomes, with_section};
+
+/// Returns a committed section.
+fn committed(section: Section) -> String {
+    let page = std::fs::read_to_string(PathBuf::from(ROOT).join(section.page())).unwrap();
+    between_markers(&page, section).unwrap_or_else(|missing| panic!("{}: {missing}", section.page())).to_owned()
+}
+
+/// The rows of the tables: the cells of each.
+fn rows(tables: &str) -> Vec<Vec<String>> {
+    let rows = tables.lines().filter(|line| line.starts_with("| `"));
+    rows.map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
+}
+
+/// The names of the scenarios of a folder of the library.
+fn names(paths: &[PathBuf]) -> Vec<String> {
+    paths.iter().map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn no_section_is_older_than_the_outcomes_that_it_shows() {
+    let stale: Vec<String> = Section::ALL
+        .into_iter()
+        .filter_map(|section| {
+            let row = committed(section).lines().nth(4).unwrap_or_default().to_owned();
+            let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+            let [commit, date, machine, command, shown] = cells[..] else {
+                return Some(format!("{}: {row}", section.name()));
+            };
+            assert!(!commit.contains("unknown") && date.starts_with("20") && !machine.contains("unknown"), "{row}");
+            assert!(command.contains(&format!("write-evidence {} -n ", section.name())), "{row}");
+            // Seed 1 was looked at while constants were chosen.
+            assert!(!command.contains("--seed 1`"), "{row}");
+            (shown != outcomes(section).unwrap()).then(|| section.name())
+        })
+        .collect();
+    assert!(
+        stale.is_empty(),
+        "outcomes have changed since these were measured: {stale:?}; `just evidence` writes them"
+    );
+}
+
+#[test]
+fn the_committed_sections_have_the_form_that_the_program_writes() {
+    let size = Size { samples: 3, member_samples: 2, seed: 1001 };
+    for section in [Section::Arms, Section::Slowing] {
+        let written = size.section(section).unwrap();
+        let head = |text: &str| -> Vec<String> {
+            text.lines()
+                .filter(|line| line.starts_with("| ") && line.contains(" without | with |"))
+                .map(str::to_owned)
+                .collect()
+        };
+        assert_eq!(head(&committed(section)), head(&written), "{section:?}");
+        let page = std::fs::read_to_string(PathBuf::from(ROOT).join(section.page())).unwrap();
+        let replaced = with_section(&page, section, &written).unwrap();
+        assert!(between_markers(&replaced, section).unwrap().contains("-n 3 --member-samples 2 --seed 1001"));
+        assert_eq!(page.split("<!-- ").count(), replaced.split("<!-- ").count());
+    }
+}
+
+#[test]
+fn every_scenario_of_the_library_is_in_the_tables() {
+    let tables = committed(Section::Scenarios);
+    let mut names = names(&all_of_library());
+    names.extend(self::names(&traffic_of_library()));
+    let expected = names
+        .iter()
+        .flat_map(|name| ["mis", "mis-extended", "gap-1.6"].map(|arm| vec![format!("`{name}`"), format!("`{arm}`")]));
+    let (scenarios, agreement) = tables.split_once("### Agreement of the sensor modes").unwrap();
+    let found = rows(scenarios);
+    assert_eq!(found.iter().map(|row| row[..2].to_vec()).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
+    for row in &found {
+        assert_eq!(row.len(), 13, "{row:?}");
+        let count = |index: usize| row[index].parse::<u64>().unwrap();
+        assert_eq!(count(3), count(5) + count(9), "without = prevented + both: {row:?}");
+    }
+    let agreement = rows(agreement);
+    assert_eq!(
+        agreement.iter().map(|row| row[0].clone()).collect::<Vec<_>>(),
+        names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>()
+    );
+    for (row, arm) in agreement.iter().zip(found.iter().step_by(3)) {
+        assert_eq!(row.len(), 6, "{row:?}");
+        let count = |cell: &str| cell.parse::<u64>().unwrap();
+        assert!((1..=count(&arm[2])).contains(&count(&row[1])), "the first of the same samples: {row:?} {arm:?}");
+        assert!(count(&row[2]) <= count(&arm[4]), "collisions of `mis` with full sensors: {row:?} {arm:?}");
+    }
+    let members = rows(&committed(Section::Ensemble));
+    assert!(members.len() >= 3 * 6 && members.iter().all(|row| row.len() == 10), "{members:?}");
+    assert!(members.iter().any(|row| row[0] == "`low-thw-overtake`" && row[1] == "`mis`"), "{members:?}");
+}

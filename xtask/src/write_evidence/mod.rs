@@ -1,0 +1,79 @@
+//! Writes the tables of `docs/evidence` that rest on outcomes of runs.
+//!
+//! ```sh
+//! cargo run --release -p closecall-xtask -- write-evidence
+//! cargo run --release -p closecall-xtask -- write-evidence twins --samples 10000
+//! ```
+//!
+//! Each section of a page stands between two markers, and everything else on the page stays as it is. A section names the
+//! commit, the date, the machine, the command, and the outcomes that it rests on: a test fails when the outcomes change.
+
+pub(crate) mod page;
+mod printed;
+mod rows;
+pub(crate) mod scenarios;
+
+use std::error::Error;
+use std::time::Instant;
+
+use page::Section;
+
+/// The command line.
+#[derive(clap::Parser)]
+pub(crate) struct Args {
+    /// The sections to write [default: all]
+    #[arg(value_enum)]
+    sections: Vec<Section>,
+    /// Number of samples of each campaign
+    #[arg(short = 'n', long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
+    samples: u64,
+    /// Number of samples of each member of the driver ensemble, of each scenario with surrounding traffic and of each fault
+    #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..))]
+    member_samples: u64,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 1001)]
+    seed: u64,
+}
+
+/// How many samples are run, with which seed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Size {
+    /// Of each campaign.
+    pub(crate) samples: u64,
+    /// Of each member of the driver ensemble, of each scenario with surrounding traffic, of each fault.
+    pub(crate) member_samples: u64,
+    pub(crate) seed: u64,
+}
+
+impl Size {
+    /// Returns what a section has between its markers.
+    pub(crate) fn section(self, section: Section) -> Result<String, Box<dyn Error>> {
+        let table = match section {
+            Section::Scenarios => scenarios::library(self),
+            Section::Ensemble => scenarios::ensemble(self),
+            Section::Arms => rows::arms(self),
+            Section::Promise => rows::promise(self),
+            Section::Twins => rows::twins(self),
+            Section::Distributions => rows::distributions(self),
+            Section::Slowing => rows::slowing(self),
+            Section::Faults => rows::faults(self),
+            Section::Sensitivity => printed::sensitivity(self),
+            Section::Frontier => printed::frontier(self),
+        }?;
+        Ok(format!("{}\n{table}", page::provenance(section, self)?))
+    }
+}
+
+#[expect(clippy::print_stdout, reason = "a program on the command line")]
+pub(crate) fn main(args: Args) -> Result<(), Box<dyn Error>> {
+    let size = Size { samples: args.samples, member_samples: args.member_samples, seed: args.seed };
+    let sections = if args.sections.is_empty() { Section::ALL.to_vec() } else { args.sections };
+    for section in sections {
+        let started = Instant::now();
+        let written = size.section(section)?;
+        let path = page::root().join(section.page());
+        std::fs::write(&path, page::with_section(&std::fs::read_to_string(&path)?, section, &written)?)?;
+        println!("{}: {} after {:.0} s", section.page(), section.name(), started.elapsed().as_secs_f64());
+    }
+    Ok(())
+}

@@ -1,0 +1,141 @@
+//! The sections of the pages, their markers, and where their figures come from.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::ValueEnum;
+
+use super::Size;
+
+/// A section of a page, which stands between markers of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Section {
+    /// Every scenario with its own drivers and full sensors, and the agreement of the object-level sensors
+    Scenarios,
+    /// The driver ensemble with object-level sensors
+    Ensemble,
+    /// Every controller that ships, on the headline
+    Arms,
+    /// What becomes of the goal of 2 s
+    Promise,
+    /// Scenarios in which nothing happens ahead
+    Twins,
+    /// The headline with one distribution changed
+    Distributions,
+    /// The headline with a lead vehicle that slows down and drives on
+    Slowing,
+    /// Every fault of the library
+    Faults,
+    /// The factors that move the headline
+    Sensitivity,
+    /// The settings of the system
+    Frontier,
+}
+
+/// The file of the outcomes' digests, below the folder of the repository.
+const DIGESTS: &str = "docs/evidence/determinism.json";
+/// The digits of a fingerprint.
+const DIGITS: usize = 12;
+
+impl Section {
+    pub(crate) const ALL: [Self; 10] = [
+        Self::Scenarios,
+        Self::Ensemble,
+        Self::Arms,
+        Self::Promise,
+        Self::Twins,
+        Self::Distributions,
+        Self::Slowing,
+        Self::Faults,
+        Self::Sensitivity,
+        Self::Frontier,
+    ];
+
+    /// Returns the page, below the folder of the repository.
+    pub(crate) const fn page(self) -> &'static str {
+        match self {
+            Self::Faults => "docs/evidence/faults.md",
+            Self::Sensitivity | Self::Frontier => "docs/evidence/sensitivity.md",
+            _ => "docs/evidence/mis.md",
+        }
+    }
+
+    /// Returns true if the figures rest on runs with full sensors.
+    const fn is_full(self) -> bool {
+        matches!(self, Self::Scenarios | Self::Promise | Self::Twins | Self::Faults)
+    }
+
+    /// Returns the name on the command line.
+    pub(crate) fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    fn markers(self) -> [String; 2] {
+        let name = self.name();
+        [
+            format!("<!-- evidence {name}: `xtask write-evidence {name}` writes the lines up to the next marker -->"),
+            format!("<!-- evidence {name}: end -->"),
+        ]
+    }
+}
+
+/// Returns the folder of the repository, for the program and for the tests of the root package.
+pub(crate) fn root() -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    if folder.ends_with("xtask") { folder.join("..") } else { folder.to_owned() }
+}
+
+/// Returns what a section has between its markers.
+pub(crate) fn between_markers(page: &str, section: Section) -> Result<&str, String> {
+    let [begin, end] = section.markers();
+    let (_, after) = page.split_once(&begin).ok_or_else(|| format!("the page has no line `{begin}`"))?;
+    let (written, _) = after.split_once(&end).ok_or_else(|| format!("the page has no line `{end}`"))?;
+    Ok(written)
+}
+
+/// Returns a page with something else in one section.
+pub(crate) fn with_section(page: &str, section: Section, written: &str) -> Result<String, String> {
+    let [begin, end] = section.markers();
+    let old = between_markers(page, section)?;
+    Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}\n\n{}\n\n{end}", written.trim_end()), 1))
+}
+
+/// Returns the outcomes that a section rests on, in a few digits: those of [`DIGESTS`], and with full sensors also the verdict of the
+/// headline that the README shows.
+pub(crate) fn outcomes(section: Section) -> Result<String, Box<dyn Error>> {
+    let digests: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(root().join(DIGESTS))?)?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(digests["outcomes"].to_string().as_bytes());
+    if section.is_full() {
+        let readme = std::fs::read_to_string(root().join("README.md"))?;
+        let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next());
+        let shown = shown.ok_or("the README shows no output")?;
+        // The time that it took differs from machine to machine.
+        let lines = shown.lines().filter(|line| !line.contains(" simulated seconds in "));
+        lines.for_each(|line| _ = hasher.update(line.as_bytes()));
+    }
+    Ok(hasher.finalize().to_hex().chars().take(DIGITS).collect())
+}
+
+/// Returns the table that says where the figures of a section come from.
+pub(crate) fn provenance(section: Section, size: Size) -> Result<String, Box<dyn Error>> {
+    let printed = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).current_dir(root()).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit =
+        printed("git", &["describe", "--always", "--dirty", "--exclude=*"]).unwrap_or_else(|| "unknown".to_owned());
+    let date = printed("date", &["+%Y-%m-%d"]).unwrap_or_else(|| "unknown".to_owned());
+    let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpus.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("unknown processor");
+    let model = model.trim_start_matches([' ', '\t', ':']);
+    let Size { samples, member_samples, seed } = size;
+    let name = section.name();
+    Ok(format!(
+        "| commit | date | machine | command | outcomes |\n|---|---|---|---|---|\n\
+         | {commit} | {date} | {model}; the result does not depend on it | `just xtask write-evidence {name} -n {samples} \
+         --member-samples {member_samples} --seed {seed}` | {} |\n",
+        outcomes(section)?
+    ))
+}

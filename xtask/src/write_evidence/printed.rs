@@ -1,0 +1,37 @@
+//! Sections that are what a command prints.
+
+use std::error::Error;
+use std::process::Command;
+
+use super::{Size, page};
+
+/// Returns a command and what it prints, as blocks of Markdown. The program lies beside this one.
+fn printed(words: &[&str]) -> Result<String, Box<dyn Error>> {
+    let program = std::env::current_exe()?.with_file_name("closecall");
+    let output = Command::new(program).args(words).current_dir(page::root()).env("COLUMNS", "120").output()?;
+    if !output.status.success() {
+        return Err(format!("{}: {}", words.join(" "), String::from_utf8_lossy(&output.stderr)).into());
+    }
+    let text = String::from_utf8_lossy(&output.stdout);
+    Ok(format!("`closecall {}` prints:\n\n```\n{}\n```\n", words.join(" "), text.trim_end()))
+}
+
+/// The factors that move the number of prevented collisions.
+pub(super) fn sensitivity(size: Size) -> Result<String, Box<dyn Error>> {
+    printed(&["study", "sensitivity", "low-thw-overtake", "--seed", &size.seed.to_string(), "--sensors", "object"])
+}
+
+/// What settings of the system prevent, induce and cost.
+pub(super) fn frontier(size: Size) -> Result<String, Box<dyn Error>> {
+    let (seed, samples) = (size.seed.to_string(), size.samples.to_string());
+    let mut text = String::new();
+    for scenario in ["low-thw-overtake", "lead-brakes-at-any-time"] {
+        let mut words = vec!["study", "frontier", scenario, "--sensors", "object", "-n", &samples, "--seed", &seed];
+        let settings = ["max-deceleration-mps2=1.0,2.0,3.0", "engage-gap-m=100,150", "thw-gain-s=2,3"];
+        let settings = settings.map(|values| format!("actor.ego.driver.ego-stack.mis.{values}"));
+        settings.iter().for_each(|values| words.extend(["--vary", values]));
+        text.push_str(&printed(&words)?);
+        text.push('\n');
+    }
+    Ok(text)
+}
