@@ -1,4 +1,5 @@
-"""Draws the pictures of docs/how-to/looking again: in the real viewer, off screen.
+"""Draws the pictures of docs/how-to/looking again: in the real viewer, off screen. A test fails when they are older than the
+code that draws them.
 
 Needs the Rerun viewer with its Python package (`pip install rerun-sdk==0.36.3`) and Pillow. CLOSECALL_RERUN names the viewer's
 program, WAIT_S the time that it gets to load a recording (s; 15 unless set).
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zlib
 from pathlib import Path
 
 from PIL import Image
@@ -53,6 +55,18 @@ def shrink(picture):
     Image.open(picture).convert("RGB").quantize(256).save(picture, optimize=True)
 
 
+def fingerprint():
+    """Returns the CRC-32 of the code that draws: without comments, blank lines and tests."""
+    total = 0
+    for path in sorted((ROOT / "report/src/run").rglob("*.rs"), key=lambda path: path.relative_to(ROOT).as_posix()):
+        if path.name == "tests.rs":
+            continue
+        for line in path.read_text().splitlines():
+            if line.strip() and not line.strip().startswith("//"):
+                total = zlib.crc32(line.strip().encode(), total)
+    return f"{total:08x}"
+
+
 def main():
     chosen = set(sys.argv[1:])
     with tempfile.TemporaryDirectory() as folder:
@@ -72,6 +86,8 @@ def main():
             picture = picture.resize((1000, round(picture.height * 1000 / picture.width)))
             picture.save(FOLDER / "figure.png")
             shrink(FOLDER / "figure.png")
+    if not chosen:
+        (FOLDER / "drawn-by.txt").write_text(f"{fingerprint()}\n")
 
 
 main()

@@ -1,11 +1,12 @@
-//! The files of a repository of scenarios: a commented scenario, the project file, CI jobs for GitHub and GitLab, and the list of
-//! what Git leaves alone.
+//! The files of a repository of scenarios: a commented scenario, its schema for editors, the project file, CI jobs for GitHub and
+//! GitLab, and the list of what Git leaves alone.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::source::{PROJECT_FILE, SCENARIOS};
+use closecall_scenarios::strict_schema;
 use closecall_traffic::atomic::WriteError;
 
 const SCENARIO: &str = include_str!("repository/scenario.toml");
@@ -14,6 +15,9 @@ const GITHUB: &str = include_str!("../../docs/how-to/ci/github.yml");
 const GITLAB: &str = include_str!("../../docs/how-to/ci/gitlab.yml");
 /// What Git leaves alone: the results of campaigns.
 const IGNORED: &str = "/closecall-results/\n/closecall-results.previous/\n";
+
+/// The schema of scenario files in a repository.
+const SCHEMA: &str = "scenario.schema.json";
 
 /// The name of the scenario in the template.
 const TEMPLATE_NAME: &str = "NAME";
@@ -29,9 +33,17 @@ pub struct Installation<'a> {
     pub rev: &'a str,
 }
 
-/// Returns the commented template of a scenario, with the name `name`.
-pub fn scenario_template(name: &str) -> String {
-    SCENARIO.replace(&format!("name = \"{TEMPLATE_NAME}\""), &format!("name = \"{name}\""))
+/// Returns the commented template of a scenario, with the name `name`. Below a `repository` that has a schema, it begins with the
+/// line by which editors (Taplo, Even Better TOML in VS Code) find the schema.
+pub fn scenario_template(name: &str, repository: Option<&Path>) -> String {
+    let text = SCENARIO.replace(&format!("name = \"{TEMPLATE_NAME}\""), &format!("name = \"{name}\""));
+    let has_schema = repository.is_some_and(|folder| folder.join(SCHEMA).is_file());
+    if has_schema { format!("{}{text}", schema_line()) } else { text }
+}
+
+/// The first line of a scenario of a repository.
+fn schema_line() -> String {
+    format!("#:schema ../{SCHEMA}\n\n")
 }
 
 /// Returns the file of a new scenario: in the folder of scenarios if the working folder is a repository, else in the
@@ -52,9 +64,11 @@ pub fn repository_files(folder: &Path, installation: Installation<'_>) -> Vec<(P
         (folder.join(".github/workflows/closecall.yml"), installed(GITHUB)),
         (folder.join(".gitlab-ci.yml"), installed(GITLAB)),
         (folder.join(".gitignore"), IGNORED.to_owned()),
+        (folder.join(SCHEMA), format!("{:#}\n", strict_schema())),
     ];
     if !has_scenario(&scenarios) {
-        files.push((scenarios.join(format!("{FIRST_SCENARIO}.toml")), scenario_template(FIRST_SCENARIO)));
+        let text = schema_line() + &scenario_template(FIRST_SCENARIO, None);
+        files.push((scenarios.join(format!("{FIRST_SCENARIO}.toml")), text));
     }
     files
 }
@@ -88,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_template_is_valid() {
-        let file = ScenarioFile::parse(Path::new("mine.toml"), &scenario_template("mine"), &[]).unwrap();
+        let file = ScenarioFile::parse(Path::new("mine.toml"), &scenario_template("mine", None), &[]).unwrap();
         file.check().unwrap();
         assert_eq!(file.config().name, "mine");
     }
@@ -106,11 +120,11 @@ mod tests {
     fn the_first_scenario_is_written_only_into_an_empty_repository() {
         let folder = tempfile::tempdir().unwrap();
         let files = || repository_files(folder.path(), Installation { url: "URL", rev: "REV" });
-        assert_eq!(files().len(), 5);
+        assert_eq!(files().len(), 6);
         let ignored = IGNORED.lines().map(|line| line.trim_matches('/'));
         assert!(ignored.eq([crate::results::RESULTS, crate::results::PREVIOUS]));
         assert!(files().iter().all(|(_, text)| !text.contains("@URL@") && !text.contains("@REV@")));
         create(&folder.path().join(SCENARIOS).join("mine.toml"), "").unwrap();
-        assert_eq!(files().len(), 4);
+        assert_eq!(files().len(), 5);
     }
 }

@@ -24,6 +24,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// libraries and FMUs in processes of its own.
 #[pyfunction]
 pub(crate) fn set_program(path: PathBuf, words: Vec<String>) {
+    closecall::cli::name_commit();
     closecall_campaign::manifest::set_program(path);
     closecall_simulation::controller::native::set_program(words);
 }

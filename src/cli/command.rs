@@ -16,6 +16,7 @@ use super::backend::choose_backend;
 use super::groups::{Study, Tool, Traffic};
 use super::help::heading;
 use super::output::{announce, print_error, print_failure};
+use super::version::{BUILD, name_commit};
 use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
 use crate::exit_code::ExitCode;
 
@@ -25,7 +26,7 @@ use crate::exit_code::ExitCode;
 /// sensors, controller and world, and reports with numbers, pictures and an exit code whether the margin increase
 /// system (MIS) prevents collisions or causes them.
 #[derive(Debug, Parser)]
-#[command(name = "closecall", version, long_version = closecall_campaign::manifest::BUILD, after_help = AFTER_HELP)]
+#[command(name = "closecall", version, long_version = BUILD, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -145,6 +146,7 @@ fn parse(arguments: &[std::ffi::OsString]) -> Result<Cli, clap::Error> {
 
 /// Runs the program with these arguments. The first is the program's name.
 pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
+    name_commit();
     set_arguments(arguments);
     // Messages name their causes themselves. Lines are not wrapped, so that paths can be copied.
     let handler = |_: &_| -> Box<dyn miette::ReportHandler> {

@@ -43,6 +43,7 @@ mod statistics;
 mod study;
 mod terminal;
 mod trajectories;
+mod version;
 mod view;
 mod viewer;
 mod watch;
@@ -50,3 +51,4 @@ mod watching;
 
 pub use command::{call, command, main};
 pub use error::CliError;
+pub use version::name_commit;

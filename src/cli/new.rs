@@ -12,6 +12,7 @@ use closecall_scenarios::source::SCENARIOS;
 use super::CliError;
 use super::help::{examples, heading};
 use super::output::outln;
+use super::version::commit;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall new`.
@@ -44,17 +45,18 @@ pub(super) struct InitArgs {
     /// Folder of the repository
     #[arg(default_value = ".")]
     dir: PathBuf,
-    /// Git URL from which the CI job installs Closecall
-    #[arg(long, value_name = "URL", default_value = "https://example.org/closecall.git", help_heading = heading::CI)]
-    url: String,
-    /// Commit or tag that the CI job installs
-    #[arg(long, value_name = "REV", default_value = concat!("v", env!("CARGO_PKG_VERSION")), help_heading = heading::CI)]
-    rev: String,
+    /// Git URL from which the CI job installs Closecall [default: to be filled in]
+    #[arg(long, value_name = "URL", help_heading = heading::CI)]
+    url: Option<String>,
+    /// Commit or tag that the CI job installs [default: the commit of this program; to be filled in if it has none]
+    #[arg(long, value_name = "REV", help_heading = heading::CI)]
+    rev: Option<String>,
 }
 
 pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
     let text = match &args.from {
-        None => scenario_template(&args.name),
+        // Where `scenario_path` puts it, the schema lies in the folder above.
+        None => scenario_template(&args.name, args.output.is_none().then_some(Path::new("."))),
         Some(from) => copy_of(from, &args.name)?,
     };
     let path = args.output.clone().unwrap_or_else(|| scenario_path(&args.name));
@@ -70,11 +72,23 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
+/// What stands in a CI job for a value that is not known.
+const TO_FILL_IN: &str = "FILL-IN";
+
 pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
-    for (path, text) in repository_files(&args.dir, Installation { url: &args.url, rev: &args.rev }) {
+    let url = args.url.as_deref().unwrap_or(TO_FILL_IN);
+    let rev = args.rev.as_deref().or(commit()).unwrap_or(TO_FILL_IN);
+    for (path, text) in repository_files(&args.dir, Installation { url, rev }) {
         let is_new = create(&path, &text)?;
         let advice = if is_new { String::new() } else { advice(&path, &text) };
         outln!("{}: {}{advice}", if is_new { "written" } else { "kept" }, path.display());
+    }
+    let missing: Vec<&str> = [("CLOSECALL_URL", url), ("CLOSECALL_REV", rev)]
+        .into_iter()
+        .filter_map(|(name, value)| (value == TO_FILL_IN).then_some(name))
+        .collect();
+    if !missing.is_empty() {
+        outln!("fill in: {} in .github/workflows/closecall.yml and .gitlab-ci.yml", missing.join(" and "));
     }
     let scenarios = args.dir.join(SCENARIOS);
     outln!("next: closecall check {0}, closecall campaign {0} -n 200 --paired", scenarios.display());

@@ -104,3 +104,43 @@ fn the_action_carries_a_quoted_gate() {
     assert!(words.contains("<--controller><exec:python3 my.py>"), "{words}");
     assert!(words.ends_with("<--gate><max(contacts) < 1><--max-induced><0><$(touch x)>"), "{words}");
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_action_takes_a_release_with_the_right_checksum_and_no_other() {
+    let yaml = text(".github/actions/campaign/action.yml");
+    let run = yaml.split_once("TAG: ${{ github.action_ref }}\n      run: |\n").unwrap().1;
+    let script: Vec<&str> = run.lines().map_while(|line| line.strip_prefix("        ")).collect();
+    // A server of releases that is a folder.
+    let curl = "#!/bin/sh\nwhile [ $# -gt 2 ]; do [ \"$1\" = -o ] && to=$2; shift; done\ncp \"$2\" \"$to\"\n";
+    for (case, expected, is_there) in [("right", Some(0), "true"), ("none", Some(0), "false"), ("wrong", Some(1), "")] {
+        let (home, tools, server) = (folder(), folder(), folder());
+        write_executable(&tools.path().join("curl"), curl);
+        let name = format!("closecall-v1-{}-unknown-linux-gnu", std::env::consts::ARCH);
+        let release = server.path().join("v1");
+        fs::create_dir_all(release.join(&name)).unwrap();
+        write_executable(&release.join(&name).join("closecall"), "#!/bin/sh\n");
+        if case != "none" {
+            let pack = format!(
+                "cd {} && tar -czf {name}.tar.gz {name} && sha256sum {name}.tar.gz > SHA256SUMS",
+                release.display()
+            );
+            assert!(Command::new("sh").args(["-c", &pack]).status().unwrap().success());
+        }
+        if case == "wrong" {
+            fs::write(release.join("SHA256SUMS"), format!("{}  {name}.tar.gz\n", "0".repeat(64))).unwrap();
+        }
+        let path = format!("{}:{}", tools.path().display(), std::env::var("PATH").unwrap());
+        let job = Command::new("bash")
+            .args(["-e", "-c", &script.join("\n")])
+            .envs([("HOME", home.path()), ("RUNNER_TEMP", home.path()), ("RELEASES", server.path())])
+            .envs([("TAG", "v1"), ("PATH", &path)])
+            .env("GITHUB_OUTPUT", home.path().join("output"))
+            .output()
+            .unwrap();
+        assert_eq!(job.status.code(), expected, "{case}: {job:?}");
+        let output = fs::read_to_string(home.path().join("output")).unwrap_or_default();
+        assert!(is_there.is_empty() || output == format!("is-there={is_there}\n"), "{case}: {output}");
+        assert_eq!(home.path().join(".closecall/bin/closecall").exists(), case == "right", "{case}");
+    }
+}

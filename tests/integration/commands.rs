@@ -20,13 +20,18 @@ fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
     let folder = folder();
     let written = stdout(&run_in(folder.path(), &["init"]), 0);
     let files = [".github/workflows/closecall.yml", ".gitlab-ci.yml", ".gitignore", "scenarios/late-overtake.toml"];
-    for path in files.into_iter().chain(["closecall.toml"]) {
+    for path in files.into_iter().chain(["closecall.toml", "scenario.schema.json"]) {
         assert!(written.contains(&format!("written: ./{path}")), "{written}");
         assert!(folder.path().join(path).is_file(), "{path}");
     }
     assert!(!std::fs::read_to_string(folder.path().join(".gitlab-ci.yml")).unwrap().contains('@'));
+    assert!(written.contains("fill in: CLOSECALL_URL"), "{written}");
     let written = stdout(&run_in(folder.path(), &["new", "mine"]), 0);
     assert!(written.starts_with("written: scenarios/mine.toml\n"), "{written}");
+    for name in ["mine", "late-overtake"] {
+        let text = std::fs::read_to_string(folder.path().join(format!("scenarios/{name}.toml"))).unwrap();
+        assert!(text.starts_with("#:schema ../scenario.schema.json\n"), "{text}");
+    }
     let args = ["campaign", "mine", "-n", "4", "--format", "json"];
     let output = run_in(folder.path(), &args);
     assert!([0, 1, 4].contains(&code(&output)), "{}", stderr(&output));

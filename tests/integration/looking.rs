@@ -100,3 +100,37 @@ fn the_table_of_the_page_names_what_a_recording_holds() {
     }
     assert!(count > 15, "{count} columns");
 }
+
+/// The folder of the code that draws runs.
+const DRAWING: &str = "report/src/run";
+
+/// Returns the files of a folder and of its folders, by their paths below the repository.
+fn files_below(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(Path::new(ROOT).join(folder)).unwrap();
+    let mut files = Vec::new();
+    for entry in entries.map(Result::unwrap) {
+        let path = folder.join(entry.file_name());
+        if entry.path().is_dir() { files.extend(files_below(&path)) } else { files.push(path) }
+    }
+    files
+}
+
+#[test]
+fn the_pictures_are_not_older_than_the_code_that_draws_them() {
+    let mut files = files_below(Path::new(DRAWING));
+    files.retain(|file| file.extension().is_some_and(|end| end == "rs") && !file.ends_with("tests.rs"));
+    files.sort_by_key(|file| file.display().to_string());
+    assert!(files.len() > 20, "{files:?}");
+    let mut sum = flate2::Crc::new();
+    for file in files {
+        let text = std::fs::read_to_string(Path::new(ROOT).join(file)).unwrap();
+        let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
+        lines.for_each(|line| sum.update(line.as_bytes()));
+    }
+    let drawn_by = std::fs::read_to_string(Path::new(ROOT).join("docs/how-to/looking/drawn-by.txt")).unwrap();
+    assert_eq!(
+        drawn_by.trim(),
+        format!("{:08x}", sum.sum()),
+        "the code that draws is newer than the pictures: `just pictures` draws them"
+    );
+}

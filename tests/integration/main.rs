@@ -32,6 +32,7 @@ mod faulty_controllers;
 mod fitted;
 mod fmu_controllers;
 mod foreign_folders;
+mod fuzz;
 mod gate;
 mod hidden_lead;
 mod inputs;

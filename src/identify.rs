@@ -1,12 +1,10 @@
-//! Names the sources that the program is built from: the commit, its date, and whether they differ from it.
-//!
-//! Results state it, and two programs of one commit resume each other's campaigns.
+//! Names the sources that the program is built from: the commit, its date, and whether they differ from it. Cargo runs it
+//! before it builds the package.
 
-use std::path::Path;
 use std::process::Command;
 
 /// What the outcome of a sample follows from.
-const SOURCES: [&str; 9] = [
+const SOURCES: [&str; 10] = [
     "traffic",
     "recorded",
     "scenarios",
@@ -14,20 +12,21 @@ const SOURCES: [&str; 9] = [
     "controllers",
     "simulation",
     "campaign",
+    "src",
     "Cargo.lock",
     "Cargo.toml",
 ];
 
 fn main() {
     for source in SOURCES {
-        println!("cargo::rerun-if-changed=../{source}");
+        println!("cargo::rerun-if-changed={source}");
     }
     // It grows with each commit and each change of the branch.
-    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new("..").join(log).exists()) {
-        println!("cargo::rerun-if-changed={}", Path::new("..").join(log).display());
+    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| std::path::Path::new(log).exists()) {
+        println!("cargo::rerun-if-changed={log}");
     }
     // An archive of the sources may lie in a repository of something else.
-    let is_repository = git(&["ls-files", "--error-unmatch", "campaign/identify.rs"]).is_some();
+    let is_repository = git(&["ls-files", "--error-unmatch", "src/identify.rs"]).is_some();
     let commit = git(&["rev-parse", "--short=12", "HEAD"]).filter(|_| is_repository).unwrap_or_default();
     let date = git(&["show", "--no-patch", "--format=%cs", "HEAD"]).filter(|_| is_repository).unwrap_or_default();
     let changes = git(&[&["status", "--porcelain", "--"], &SOURCES[..]].concat());
@@ -37,14 +36,14 @@ fn main() {
         (commit, "") => format!("{commit} of {date}"),
         (commit, _) => format!("{commit} of {date}, modified"),
     };
-    println!("cargo::rustc-env=CLOSECALL_COMMIT={commit}");
+    let unmodified = if modified.is_empty() { commit.as_str() } else { "" };
+    println!("cargo::rustc-env=CLOSECALL_COMMIT={unmodified}");
     println!("cargo::rustc-env=CLOSECALL_SOURCES={sources}");
-    println!("cargo::rustc-env=CLOSECALL_MODIFIED={modified}");
     println!("cargo::rustc-env=CLOSECALL_TARGET={}", std::env::var("TARGET").unwrap_or_default());
 }
 
 /// Returns what Git prints in the folder of the repository, or `None` if it fails.
 fn git(args: &[&str]) -> Option<String> {
-    let output = Command::new("git").arg("-C").arg("..").args(args).output().ok()?;
+    let output = Command::new("git").args(args).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
