@@ -8,9 +8,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use crate::action::{Action, CommandFor, Replay, Resume, SavedSample};
 use crate::execution::End;
 use crate::record::Record;
-use crate::resume_command::{quoted, resume_command};
 use crate::summary::Summary;
 
 /// When a campaign ends before its last sample.
@@ -71,12 +71,15 @@ pub struct EndedEarly<'a> {
     pub summary: &'a Summary,
     /// The campaign's folder, and the command line that started it.
     pub kept: Option<(&'a Path, Vec<String>)>,
+    /// The commands to go on.
+    pub command_for: CommandFor,
 }
 
 impl EndedEarly<'_> {
     fn resume(&self) -> Option<String> {
-        let retries = matches!(self.ending, Some(EarlyEnd::Errors { .. }));
-        self.kept.as_ref().map(|(_, command)| resume_command(command.iter().cloned(), retries))
+        let retries_errors = matches!(self.ending, Some(EarlyEnd::Errors { .. }));
+        let (_, command) = self.kept.as_ref()?;
+        Some((self.command_for)(&Action::Resume(Resume { command, retries_errors, moved_to: None })))
     }
 
     /// Returns the end as JSON.
@@ -101,11 +104,13 @@ impl fmt::Display for EndedEarly<'_> {
             writeln!(f, "  {scenario}: {failure}")?;
         }
         let (Some(resume), Some((out, _))) = (self.resume(), &self.kept) else {
-            return writeln!(f, "nothing was kept: a campaign with --out can be resumed");
+            return writeln!(f, "nothing was kept: only a campaign with a folder can be resumed");
         };
         if let Some(EarlyEnd::Failure { scenario, sample, .. }) = self.ending {
-            let out = quoted(&out.display().to_string());
-            writeln!(f, "look:   closecall replay {out} {sample} --scenario {scenario} --record failure.rrd")?;
+            let folder = out.display().to_string();
+            let of = SavedSample { folder: &folder, sample: *sample, scenario: Some(scenario) };
+            let replay = Replay { recording: Some("failure.rrd"), ..Replay::new(of) };
+            writeln!(f, "look:   {}", (self.command_for)(&Action::Replay(replay)))?;
         }
         writeln!(f, "resume: {resume}")
     }

@@ -85,7 +85,7 @@ pub enum CampaignError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// Results cannot be written.
-    #[error("{0}\nthe results written so far are kept: when there is room again, resume with --resume")]
+    #[error("{0}\nthe results written so far are kept: when there is room again, the campaign can be resumed")]
     Write(#[from] WriteError),
     /// The worker threads could not be started.
     #[error(transparent)]

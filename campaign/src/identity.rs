@@ -119,7 +119,9 @@ impl JournalPlan {
     pub(crate) fn check(&mut self, record: &Record) -> Result<(), String> {
         if self.is_last(record) {
             let (sample, scenario) = (record.sample, &record.scenario);
-            return Err(format!("sample {sample} of `{scenario}` is there twice; --resume removes a repeated line"));
+            return Err(format!(
+                "sample {sample} of `{scenario}` is there twice; a campaign that is resumed removes a repeated line"
+            ));
         }
         let out_of_order =
             || format!("sample {} of `{}` is not the next sample of the campaign", record.sample, record.scenario);

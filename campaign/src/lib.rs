@@ -15,6 +15,7 @@
 //! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
 //! not the frequency of collisions on a road.
 
+pub mod action;
 pub mod arguments;
 pub mod arm_pairs;
 pub mod baseline;
@@ -51,7 +52,6 @@ mod repair;
 mod repeats;
 pub mod repository;
 pub mod results;
-pub mod resume_command;
 pub mod robustness;
 pub mod runner;
 pub mod saved;

@@ -21,7 +21,7 @@ pub enum SavedError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The campaign has several scenarios, and none was named.
-    #[error("the campaign has several scenarios; name one with --scenario: {}", known.join(", "))]
+    #[error("the campaign has several scenarios; name one of {}", known.join(", "))]
     ScenarioNotNamed {
         /// The names to choose from.
         known: Vec<String>,
@@ -52,8 +52,8 @@ pub enum SavedError {
     },
     /// The folder was written on another machine or by another user, and names code that would run.
     #[error(
-        "{} was written by another user or on another machine, and its controllers would run with your rights:\n  {}\nthey run only with \
-         --trust-folder",
+        "{} was written by another user or on another machine, and its controllers would run with your rights:\n  {}\nthey run only \
+         if you trust the folder",
         path.display(),
         commands.join("\n  ")
     )]

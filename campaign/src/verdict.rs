@@ -202,7 +202,7 @@ impl FlakyGate {
 impl fmt::Display for FlakyGate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { flaky, max } = self;
-        write!(f, "flaky samples: {flaky}, at most {max} allowed (--max-flaky)")
+        write!(f, "flaky samples: {flaky}, at most {max} allowed")
     }
 }
 
@@ -226,7 +226,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         let what = weakened.join("; ");
         found.add(
             Decision::Overridden,
-            format!("OVERRIDDEN: {name}: --set weakened what the scenario is judged by: {what}"),
+            format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {what}"),
         );
     }
     let probabilities = judge_probabilities(summary, judge, &mut found);
@@ -256,7 +256,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         Decision::first_of(&found.decisions).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
-            let what = "no gate was set and no requirement was checked: set a gate, or measure without a verdict with --no-gate";
+            let what = "no gate was set and no requirement was checked: set a gate, or measure without a verdict";
             found.add(Decision::NotJudged, what.to_owned());
         }
         Decision::first_of(&found.decisions).unwrap_or(Decision::Pass)
@@ -304,8 +304,8 @@ fn judge_flaky(flaky: u64, max: Option<u64>, found: &mut Found) -> Option<FlakyG
 fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, found: &mut Found) {
     if checks.not_checked > 0 {
         let sentence = format!(
-            "not checked: {} of {} runs that were chosen for the validity checks, because a check took too long (--retry-errors runs \
-             them again)",
+            "not checked: {} of {} runs that were chosen for the validity checks, because a check took too long (a campaign that is resumed \
+             and repeats errors runs them again)",
             checks.not_checked,
             checks.not_checked + checks.runs
         );

@@ -92,7 +92,7 @@ pub enum ScenarioError {
         name: ParameterName,
     },
     /// A setting (`--set`) cannot be applied.
-    #[error("failed to apply --set to {}: {source}", path.display())]
+    #[error("failed to apply a setting to {}: {source}", path.display())]
     Set {
         /// The file.
         path: PathBuf,

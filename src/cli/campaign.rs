@@ -34,6 +34,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::Value;
 
 use super::CliError;
+use super::actions::command_for;
+use super::advice::after_verdict;
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::{check_backend, check_cameras};
@@ -342,7 +344,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let mut judged = tally.judgement();
     judged.add_invalid(watch.finish());
-    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
+    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
     match planned.format {
         Format::Json => {
             let mut value = json::campaign_report(&report, Some(wall_s));
@@ -360,6 +362,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: campaign.works.len() }));
+            out!("{}", after_verdict(&judged));
             if planned.has_drawn_seed {
                 outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
             }

@@ -22,6 +22,8 @@ use closecall_studies::minimize::{MinimizedText, minimize_sample, output_files, 
 use serde_json::json;
 
 use super::CliError;
+use super::actions::command_for;
+use super::advice::to_provide;
 use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_written};
@@ -59,7 +61,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
     let saved = args.saved.open(&args.dir)?;
     saved.check_trust()?;
     let (found, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
-    match write_causes(&saved, &failures) {
+    match write_causes(&saved, &failures, command_for) {
         Ok(paths) => paths.iter().for_each(|path| print_written(path)),
         // The explanation does not depend on it.
         Err(error) => print_error(format_args!("warning: the explanation is not kept: {error}\n")),
@@ -70,7 +72,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
             for explanation in &found {
-                outln!("{}", for_terminal(&ExplanationText { explanation, folder: &args.dir }));
+                outln!("{}", for_terminal(&ExplanationText { explanation, folder: &args.dir, command_for }));
             }
         }
     }
@@ -103,10 +105,10 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     let paths = output_files(&case, args.output.as_deref())?;
     protect(&of_campaign(&args.of.dir), &paths.each_ref().map(|path| ("--output", Some(path.as_path()))))?;
     let found = minimize_sample(&saved, &case)?;
-    let files = write_files(&case, &found, &paths)?;
+    let files = write_files(&case, &found, &paths, command_for)?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!({ "minimized": found, "files": files }), Some(found.seed), None)),
-        Format::Human => outln!("{}", MinimizedText { found: &found, files: &files }),
+        Format::Human => outln!("{}", MinimizedText { found: &found, files: &files, command_for }),
     }
     Ok(ExitCode::Pass)
 }
@@ -207,6 +209,7 @@ pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(json!({ "exposure": found, "cost": cost }), None, None)),
         Format::Human => {
             outln!("{}", ExposureText(&found));
+            found.missing.iter().for_each(|missing| outln!("  {}", to_provide(*missing)));
             cost.iter().for_each(|cost| outln!("{}", CostText(cost)));
         }
     }

@@ -11,6 +11,7 @@ use closecall_campaign::session;
 use closecall_campaign::summary::Summary;
 use closecall_report::campaign::CountsText;
 
+use super::actions::command_for;
 use super::args::Format;
 use super::help::heading;
 use super::output::{out, outln};
@@ -72,6 +73,7 @@ impl Ending {
             errors: summary.total().errors(),
             summary,
             kept: out.map(|out| (out, session::arguments())),
+            command_for,
         };
         match format {
             Format::Json => outln!("{:#}", ended.json()),

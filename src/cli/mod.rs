@@ -1,5 +1,7 @@
 //! The command line: arguments, calls, printed results, and exit codes.
 
+mod actions;
+mod advice;
 mod args;
 mod arms;
 mod backend;

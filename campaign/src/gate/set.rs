@@ -35,7 +35,7 @@ impl fmt::Display for GateSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CommandLine => f.write_str("command line"),
-            Self::Preset(name) => write!(f, "--preset {name}"),
+            Self::Preset(name) => write!(f, "preset {name}"),
             Self::ProjectFile(path) => write!(f, "{}", path.display()),
             Self::Scenario => f.write_str("scenario file"),
             Self::Requirement(mark) => write!(f, "requirement {mark}"),

@@ -214,13 +214,11 @@ impl World for OperatingSystem {
 
 /// Starts a worker process, and gives it its task.
 fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String), ExecError> {
-    let library = match inference_backend() {
+    let onnxruntime = match inference_backend() {
         Backend::Tract => None,
-        Backend::OnnxRuntime(library) => Some(library.display().to_string()),
+        Backend::OnnxRuntime(library) => Some(library.clone()),
     };
-    let backend = library.iter().flat_map(|library| ["--onnxruntime", library.as_str()]);
-    let arguments: Vec<&str> = std::iter::once("samples").chain(backend).collect();
-    let child = Child::start(&isolated.process(&arguments), None)?;
+    let child = Child::start(&isolated.process(&["samples"]), None)?;
     let task = line(&Task {
         version: version(),
         path: work.file.path().to_owned(),
@@ -229,6 +227,7 @@ fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String)
         checks: work.checks,
         controller: isolated.clone(),
         sensors: work.arms[arm].sensors,
+        onnxruntime,
     });
     let identity = task_identity(task.strip_suffix(b"\n").unwrap_or(&task));
     child.send(task);

@@ -12,6 +12,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use closecall_campaign::action::CommandFor;
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::{Folder, FolderError, RECORDINGS, RECORDINGS_PAGE, REPORT};
 use closecall_campaign::integrity::Integrity;
@@ -118,6 +119,8 @@ pub struct CampaignReport<'a> {
     pub tally: &'a Tally,
     /// The verdict.
     pub judged: &'a Judgement,
+    /// The commands for readers to copy.
+    pub command_for: CommandFor,
 }
 
 impl CampaignReport<'_> {
@@ -145,7 +148,7 @@ impl CampaignReport<'_> {
             written.note("arm_pairs.parquet", write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary));
         }
         self.write_pages(folder, (&none, &[], &slowest), &mut written);
-        let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection) {
+        let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection, self.command_for) {
             Ok(recorded) => recorded,
             Err(error) => {
                 written.note::<(), _>("the recordings", Err(error));
@@ -247,6 +250,7 @@ impl CampaignReport<'_> {
             gallery: has_gallery.then_some(gallery.as_str()),
             folder,
             slowest,
+            command_for: self.command_for,
         })
     }
 
@@ -263,9 +267,9 @@ impl CampaignReport<'_> {
 }
 
 /// Looks at a campaign's folder: its manifest, its journal, and whether the table of outcomes is the one that the journal makes.
-pub fn check_folder(folder: &Folder) -> Integrity {
+pub fn check_folder(folder: &Folder, command_for: CommandFor) -> Integrity {
     const TABLE: &str = "outcomes.parquet";
-    let mut found = Integrity::of(folder);
+    let mut found = Integrity::of(folder, command_for);
     if !found.is_sound() {
         return found;
     }
@@ -273,9 +277,9 @@ pub fn check_folder(folder: &Folder) -> Integrity {
         Ok(true) => {}
         Ok(false) => {
             let message = "it is not the table of this journal".to_owned();
-            found.add(TABLE, None, message, "resume the campaign with --resume, which writes it again".to_owned());
+            found.add_resumable(TABLE, None, message);
         }
-        Err(error) => found.add(TABLE, None, error.to_string(), "resume the campaign with --resume".to_owned()),
+        Err(error) => found.add_resumable(TABLE, None, error.to_string()),
     }
     found
 }

@@ -267,6 +267,6 @@ mod tests {
     #[test]
     fn without_onnx_runtime_the_error_says_how_to_get_it() {
         let error = InstanceDetector::shipped(&Backend::Tract).unwrap_err().to_string();
-        assert!(error.contains("pip install onnxruntime") && error.contains("--onnxruntime PATH"), "{error}");
+        assert!(error.contains("pip install onnxruntime"), "{error}");
     }
 }

@@ -243,7 +243,7 @@ impl NativeFactory {
         }
         Err(format!(
             "the controller's file {} has changed since the start: run a new campaign, or put the earlier file back and resume \
-             with --resume",
+             this one",
             self.settings.path
         ))
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use closecall_campaign::resume_command::quoted;
+use closecall_campaign::action::CommandFor;
 
 use super::{Minimized, MinimizedFiles};
 
@@ -14,11 +14,13 @@ pub struct MinimizedText<'a> {
     pub found: &'a Minimized,
     /// Its files.
     pub files: &'a MinimizedFiles,
+    /// The commands that run them.
+    pub command_for: CommandFor,
 }
 
 impl fmt::Display for MinimizedText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { found, files } = self;
+        let Self { found, files, command_for } = self;
         writeln!(
             f,
             "{} sample {} ({}, {} sensors): {} of {} parameters must be off their nominal values",
@@ -36,7 +38,7 @@ impl fmt::Display for MinimizedText<'_> {
             writeln!(f, "  {why}")?;
         }
         writeln!(f, "{}", found.sentence)?;
-        let command = |path: &Path| format!("closecall run {}{}", quoted(&path.display().to_string()), found.option());
+        let command = |path: &Path| found.run_command(&path.display().to_string(), *command_for);
         writeln!(f, "fails:  {}", command(&files.failing))?;
         match (&found.twin, &files.twin) {
             (Some(twin), Some(path)) => {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use closecall_campaign::action::CommandFor;
 use closecall_scenarios::{ScenarioFile, Setting, SettingError};
 use closecall_traffic::atomic::write_file;
 use serde::Serialize;
@@ -46,14 +47,19 @@ pub fn output_files(case: &Case, output: Option<&Path>) -> Result<[PathBuf; 2], 
 ///
 /// # Errors
 /// [`CausesError`] if a case is no valid scenario, or a file cannot be written.
-pub fn write_files(case: &Case, found: &Minimized, [path, twin]: &[PathBuf; 2]) -> Result<MinimizedFiles, CausesError> {
+pub fn write_files(
+    case: &Case,
+    found: &Minimized,
+    [path, twin]: &[PathBuf; 2],
+    command_for: CommandFor,
+) -> Result<MinimizedFiles, CausesError> {
     let stem = path.file_stem().map_or_else(|| "minimized".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let name = named(&stem);
-    let failing = concrete(case, &found.settings, &Text { name: &name, found, is_twin: false })?;
+    let failing = concrete(case, &found.settings, &Text { name: &name, found, is_twin: false, command_for })?;
     let passing = match &found.twin {
         Some(twin) => {
             let name = format!("{name}-passes");
-            Some(concrete(case, &twin.settings, &Text { name: &name, found, is_twin: true })?)
+            Some(concrete(case, &twin.settings, &Text { name: &name, found, is_twin: true, command_for })?)
         }
         None => None,
     };
@@ -70,6 +76,7 @@ struct Text<'a> {
     name: &'a str,
     found: &'a Minimized,
     is_twin: bool,
+    command_for: CommandFor,
 }
 
 /// Returns a name of a scenario that is made of the name of a file.
@@ -147,12 +154,12 @@ fn sentence(text: &Text<'_>) -> String {
 fn heading(text: &Text<'_>) -> String {
     let found = text.found;
     format!(
-        "{MADE} from sample {} of `{}`, seed {}.\n# {}\n# Run: closecall run FILE{}\n",
+        "{MADE} from sample {} of `{}`, seed {}.\n# {}\n# Run: {}\n",
         found.sample,
         found.scenario,
         found.seed,
         sentence(text),
-        found.option(),
+        found.run_command("FILE", text.command_for),
     )
 }
 

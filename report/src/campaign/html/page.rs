@@ -37,7 +37,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
         (verdict::requirements(findings))
         (ledger::validity(findings))
         @if let Some(folder) = findings.folder {
-            details { summary { "Causes of the failures" } (causes::table(folder)) }
+            details { summary { "Causes of the failures" } (causes::table(folder, findings.command_for)) }
         }
         @for overview in &findings.overview.scenarios { (scenario::section(findings, overview)?) }
         details { summary { "Slowest samples" } (samples::slowest(findings)) }

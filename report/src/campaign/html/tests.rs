@@ -57,6 +57,7 @@ fn page() -> String {
         gallery: Some("recordings/index.html"),
         folder: None,
         slowest: &[Timing { scenario, sample: 1, controller, wall_s: 0.25 }],
+        command_for: |action| format!("closecall {action:?}"),
     };
     campaign(&findings).unwrap().into_string()
 }
