@@ -9,8 +9,8 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::action::{Action, CommandFor, Replay, Resume, SavedSample};
-use crate::execution::End;
 use crate::record::Record;
+use crate::stop::End;
 use crate::summary::Summary;
 
 /// When a campaign ends before its last sample.

@@ -3,23 +3,24 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use closecall_traffic::atomic::WriteError;
-
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
 use super::host::{Refusal, refusal};
-use super::identity::of_work;
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
-use super::remote::RemoteError;
 use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
 use super::stop::StopFlag;
 use super::summary::Summary;
 use super::verdict::{self, Judgement};
 use super::wall_times::WallTime;
-use super::workers::{Finished, SampleRunner, Workers, WorkersError};
+use super::workers::{Finished, SampleRunner, Workers};
+use closecall_traffic::atomic::WriteError;
+
+pub use super::stop::End;
+
+pub use super::campaign_error::CampaignError;
 
 /// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order of their numbers.
 #[derive(Clone)]
@@ -76,40 +77,6 @@ impl ResumeReport {
         let added = (self.added > 0).then(|| format!("{} samples were added to earlier scenarios", self.added));
         damaged.chain(retried).chain(doubled).chain(added).chain(torn).collect()
     }
-}
-
-/// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from it.
-#[derive(Debug, thiserror::Error)]
-pub enum CampaignError {
-    /// The folder cannot be used.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// Results cannot be written.
-    #[error("{0}\nthe results written so far are kept: when there is room again, the campaign can be resumed")]
-    Write(#[from] WriteError),
-    /// The worker threads could not be started.
-    #[error(transparent)]
-    Workers(#[from] WorkersError),
-    /// A worker process has found another controller, cannot read it, or is another version of this program.
-    #[error("failed to go on: {reason}")]
-    Refused {
-        /// The reason.
-        reason: String,
-        /// True if something is another one than at the start, false if the controller cannot be read.
-        has_changed: bool,
-    },
-    /// The samples cannot run on other machines.
-    #[error(transparent)]
-    Remote(#[from] RemoteError),
-}
-
-/// What a caller of [`Campaign::run`] ends after a record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// The scenario of the record. The next scenario begins.
-    Scenario,
-    /// The whole campaign.
-    Campaign,
 }
 
 /// A record that [`Campaign::run`] passes on, in the order of the plan.
@@ -259,7 +226,7 @@ impl Campaign {
                         if position.is_over || !is_next {
                             return Err(out_of_order());
                         }
-                        of_work(work).check(record, sample)?;
+                        work.identity().check(record, sample)?;
                         position.done += 1;
                         position.total += 1;
                         let next = NextRecord { work: position.work, record, is_new: false, spent_s: [0.0; 2] };

@@ -45,28 +45,28 @@ pub struct Integrity {
 impl Integrity {
     /// Looks at the folder of a campaign. The repairs name commands of the calling program.
     pub fn of(folder: &Folder, command_for: CommandFor) -> Self {
-        let mut found = Self::default();
+        let mut integrity = Self::default();
         let manifest = match folder.manifest() {
             Ok(manifest) => manifest,
             Err(error) => {
-                found.add_error(MANIFEST, &error, "put a copy of the folder in its place");
-                return found;
+                integrity.add_error(MANIFEST, &error, "put a copy of the folder in its place");
+                return integrity;
             }
         };
         let resumed = Resume { command: &manifest.command, retries_errors: false, moved_to: None };
-        found.resumption = format!("resume the campaign: {}", command_for(&Action::Resume(resumed)));
-        if let Err(error) = found.read_journal(folder) {
-            let repair = found.resumption.clone();
-            found.add_error(JOURNAL, &error, &repair);
-            return found;
+        integrity.resumption = format!("resume the campaign: {}", command_for(&Action::Resume(resumed)));
+        if let Err(error) = integrity.read_journal(folder) {
+            let repair = integrity.resumption.clone();
+            integrity.add_error(JOURNAL, &error, &repair);
+            return integrity;
         }
         let is_paired = manifest.arms.len() > 1;
         for file in DERIVED_FILES {
-            if found.missing == 0 && !folder.file(file).is_file() && (is_paired || file != "arm_pairs.parquet") {
-                found.add_resumable(file, None, "it is missing".to_owned());
+            if integrity.missing == 0 && !folder.file(file).is_file() && (is_paired || file != "arm_pairs.parquet") {
+                integrity.add_resumable(file, None, "it is missing".to_owned());
             }
         }
-        found
+        integrity
     }
 
     /// Returns true if nothing is wrong.

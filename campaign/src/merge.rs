@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use closecall_traffic::atomic::WriteError;
 
-use super::execution::CampaignError;
+use super::campaign_error::CampaignError;
 use super::folder::{Folder, FolderError, LockedFolder};
 use super::manifest::Manifest;
 use super::partition::Partition;

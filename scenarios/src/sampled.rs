@@ -178,10 +178,10 @@ fn built(
     lane_change: (f64, f64),
 ) -> Result<ScenarioConfig, String> {
     let base = config(encounter, RearDriver::Recorded)?;
-    let own = &encounter.vehicles[REAR_INDEX];
-    let own_start = start_of(&own.trajectory).ok_or("the vehicle that changes lanes appears after the start")?;
-    let mut actors = vec![lane_changer(encounter, own, own_start, lane_change)?];
-    let mut kept: Vec<&Participant> = vec![own];
+    let changer = &encounter.vehicles[REAR_INDEX];
+    let own_start = start_of(&changer.trajectory).ok_or("the vehicle that changes lanes appears after the start")?;
+    let mut actors = vec![lane_changer(encounter, changer, own_start, lane_change)?];
+    let mut kept: Vec<&Participant> = vec![changer];
     for (index, vehicle) in encounter.vehicles.iter().enumerate().filter(|(index, _)| *index != REAR_INDEX) {
         let Some(start) = start_of(&vehicle.trajectory) else { continue };
         let is_opponent = index == EGO_INDEX || Some(index) == opp2;
@@ -200,10 +200,10 @@ fn built(
     }
     actors.push(ego(encounter, &kept)?);
     Ok(ScenarioConfig {
-        name: format!("sampled-track-{}", own.trajectory.track_id),
+        name: format!("sampled-track-{}", changer.trajectory.track_id),
         description: format!(
             "The lane change of track {} past track {} in {}, from {:.1} s on",
-            own.trajectory.track_id,
+            changer.trajectory.track_id,
             encounter.vehicles[EGO_INDEX].trajectory.track_id,
             encounter.data_name,
             encounter.start.s()
@@ -217,12 +217,12 @@ fn built(
 /// Returns the vehicle that changes lanes: it follows by Wiedemann's model, and changes lanes when the recorded one does.
 fn lane_changer(
     encounter: &RecordedEncounter,
-    own: &Participant,
+    changer: &Participant,
     start: &TrajectoryPoint,
     (at_s, duration_s): (f64, f64),
 ) -> Result<ActorConfig, String> {
     let driver = DriverConfig::Wiedemann99(Wiedemann99Config {
-        desired_speed_mps: Some(rounded(max_speed_mps([&own.trajectory]))),
+        desired_speed_mps: Some(rounded(max_speed_mps([&changer.trajectory]))),
         ..Wiedemann99Config::default()
     });
     let change = EventConfig {
@@ -233,7 +233,7 @@ fn lane_changer(
             duration_s: Num::Fixed(duration_s),
         }),
     };
-    Ok(ActorConfig { events: vec![change], ..actor(LANE_CHANGER, own, start, driver)? })
+    Ok(ActorConfig { events: vec![change], ..actor(LANE_CHANGER, changer, start, driver)? })
 }
 
 /// Returns the ego, which is behind all other vehicles and as slow as the slowest of them.
@@ -269,10 +269,12 @@ fn ego(encounter: &RecordedEncounter, others: &[&Participant]) -> Result<ActorCo
 /// Returns whether a vehicle is behind the lane changer at the crossing, or at the end of its track before it, in one of the
 /// two lanes of the lane change.
 fn is_behind(encounter: &RecordedEncounter, vehicle: &Participant) -> bool {
-    let own = encounter.ego_lead_rear()[REAR_INDEX];
+    let changer = encounter.ego_lead_rear()[REAR_INDEX];
     let until = vehicle.trajectory.span().map_or(Time::ZERO, |(_, last)| last.min(encounter.crossing));
-    let pair = at_or_before(own, until).zip(at_or_before(&vehicle.trajectory, until));
-    pair.is_none_or(|(own, other)| [encounter.home, encounter.target].contains(&other.lane) && other.s_m <= own.s_m)
+    let pair = at_or_before(changer, until).zip(at_or_before(&vehicle.trajectory, until));
+    pair.is_none_or(|(changer, other)| {
+        [encounter.home, encounter.target].contains(&other.lane) && other.s_m <= changer.s_m
+    })
 }
 
 /// Returns whether all lane changes of a vehicle that starts in lane `start` lead to a lane of the road.

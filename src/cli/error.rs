@@ -35,7 +35,7 @@ use closecall_studies::CausesError;
 use closecall_studies::perception::StudyError;
 use closecall_traffic::atomic::WriteError;
 
-use super::view::ViewError;
+use super::view_error::ViewError;
 use crate::exit_code::ExitCode;
 
 /// The reason for which a command has no result.

@@ -2,9 +2,9 @@
 
 use clap::Args;
 use closecall_campaign::arguments::{confidence, positive, probability, share};
+use closecall_campaign::gate::MAX_FLIP_RATE;
 use closecall_campaign::gate::{GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec};
 use closecall_campaign::probability::ProbabilityGate;
-use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
 

@@ -46,6 +46,7 @@ mod study;
 mod terminal;
 mod trajectories;
 mod view;
+mod view_error;
 mod viewer;
 mod watch;
 mod watching;

@@ -124,7 +124,7 @@ const LIBRARIES: [&str; 9] =
     ["traffic", "recorded", "scenarios", "sensors", "controllers", "simulation", "campaign", "studies", "report"];
 
 /// Returns the source files below a folder, without those of tests.
-fn sources(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -140,7 +140,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Returns the code of a file up to its unit tests, without comments that have lines of their own.
-fn code_of(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub(crate) fn code_of(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let until_tests = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
     until_tests.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
 }

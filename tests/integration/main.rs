@@ -12,6 +12,7 @@ mod campaign_example;
 mod causes;
 mod chain;
 mod changed_controller;
+mod circles;
 mod commands;
 mod comparison;
 mod determinism;

@@ -14,7 +14,6 @@ use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::criteria::Expression;
 
 use crate::probability::ProbabilityGate;
-use crate::verdict::MAX_FLIP_RATE;
 
 /// Where a gate comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -143,3 +142,6 @@ impl GateSet {
         self.probability.clone().or_else(of_file)
     }
 }
+
+/// Default of the share of checked verdicts that may flip at half the time step (-).
+pub const MAX_FLIP_RATE: f64 = 0.05;

@@ -11,7 +11,6 @@ use closecall_simulation::controller::exec::{Child, ExecError};
 use closecall_simulation::controller::isolated::Isolated;
 
 use super::{Answer, Question, Refusal, Task, task_identity};
-use crate::identity::of_work;
 use crate::manifest::version;
 use crate::record::{ArmRecord, Flaky, SampleFailure};
 use crate::runner::{ArmRun, Work};
@@ -186,7 +185,7 @@ pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answ
     if answer.record.controller != name {
         return Err(wrong(format!("it is of the controller `{}`, asked was `{name}`", answer.record.controller)));
     }
-    of_work(work).check_arm(&answer.record, question.sample, &mut None).map_err(wrong)?;
+    work.identity().check_arm(&answer.record, question.sample, &mut None).map_err(wrong)?;
     match (&answer.record.result, answer.is_last) {
         // It hangs in a call, and ends after this answer.
         (Err(failure), true) => Err(Trouble::Crash(failure.clone())),

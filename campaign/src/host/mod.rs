@@ -37,7 +37,7 @@ use closecall_simulation::controller::isolated::Isolated;
 use serde::{Deserialize, Serialize};
 
 use super::record::{ArmRecord, Record, SampleFailure};
-use super::runner::Sampling;
+use super::sampling::Sampling;
 use super::validity::CheckPlan;
 
 /// The kind of the failure of a sample that a worker process has refused to run, because the program or a file is another one

@@ -13,17 +13,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use closecall_campaign::action::CommandFor;
-use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::{Folder, FolderError, RECORDINGS, RECORDINGS_PAGE, REPORT};
 use closecall_campaign::integrity::Integrity;
 use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::record::{ArmRecord, Record};
 use closecall_campaign::runner::Work;
-use closecall_campaign::saved::{SavedCampaign, SavedError};
+use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::ScenarioFile;
-use closecall_simulation::SampleError;
 use closecall_traffic::atomic::WriteError;
 
 use super::arm_pairs::write_arm_pairs;
@@ -34,52 +32,15 @@ use super::markdown::{markdown, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
 use super::recordings::{Recorded, RecordedSample, Still, record};
+use super::report_error::ReportError;
 use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
-use crate::run::rerun::RecordingError;
 
 /// Number of samples that are listed as the slowest.
 const SLOWEST: usize = 10;
 /// The environment variable with the path of the file that GitHub's runners show as the summary of a step.
 const STEP_SUMMARY: &str = "GITHUB_STEP_SUMMARY";
-
-/// A report that cannot be made. The journal stays as it is.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The folder cannot be read.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// The saved campaign cannot be read back.
-    #[error(transparent)]
-    Saved(#[from] SavedError),
-    /// A file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// A recording cannot be written.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A sample that had an outcome has none when it is run again for its recording.
-    #[error("failed to run sample {sample}: {source}")]
-    Sample {
-        /// The sample's number.
-        sample: u64,
-        /// Why it has no outcome.
-        source: SampleError,
-    },
-}
-
-impl ReportError {
-    /// Returns the kind of the error.
-    pub fn kind(&self) -> FailureKind {
-        match self {
-            Self::Folder(error) => FailureKind::from(error),
-            Self::Saved(error) => FailureKind::from(error),
-            Self::Write(_) | Self::Recording(_) => FailureKind::Io,
-            Self::Sample { .. } => FailureKind::Sample,
-        }
-    }
-}
 
 /// A file that a campaign could not write. The verdict stands, and so do all other files.
 #[derive(Debug, thiserror::Error)]
@@ -269,19 +230,19 @@ impl CampaignReport<'_> {
 /// Looks at a campaign's folder: its manifest, its journal, and whether the table of outcomes is the one that the journal makes.
 pub fn check_folder(folder: &Folder, command_for: CommandFor) -> Integrity {
     const TABLE: &str = "outcomes.parquet";
-    let mut found = Integrity::of(folder, command_for);
-    if !found.is_sound() {
-        return found;
+    let mut integrity = Integrity::of(folder, command_for);
+    if !integrity.is_sound() {
+        return integrity;
     }
     match is_table_of_journal(folder, TABLE) {
         Ok(true) => {}
         Ok(false) => {
             let message = "it is not the table of this journal".to_owned();
-            found.add_resumable(TABLE, None, message);
+            integrity.add_resumable(TABLE, None, message);
         }
-        Err(error) => found.add_resumable(TABLE, None, error.to_string()),
+        Err(error) => integrity.add_resumable(TABLE, None, error.to_string()),
     }
-    found
+    integrity
 }
 
 /// Returns true if the table has the bytes that the journal makes. Another release may write other bytes.

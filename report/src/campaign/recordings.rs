@@ -10,10 +10,10 @@ use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::atomic::{WriteError, write_file};
 
-use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
 use super::origins::ORIGINS;
+use super::report_error::ReportError;
 use crate::run::figure::{card, scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording_of;
