@@ -1,7 +1,8 @@
 //! What a reader of a text can do next.
 //!
-//! A library knows what can be done, such as to run a sample again. The program that calls the library knows how its user asks for it, and passes
-//! a [`CommandFor`]. So no library names an option of the command line.
+//! A library knows what can be done, such as to run a sample again. The program that calls the
+//! library knows how its user asks for it, and passes a [`CommandFor`]. So no library names an
+//! option of the command line.
 
 /// Returns the command by which the user of a program does something.
 pub type CommandFor = fn(&Action<'_>) -> String;

@@ -14,7 +14,7 @@ use super::runner::Work;
 use super::stop::StopFlag;
 use super::summary::Summary;
 use super::verdict::{self, Judgement};
-use super::wall_times::WallTime;
+use super::wall_times::{SpentTime, WallTime};
 use super::workers::{Finished, SampleRunner, Workers};
 use closecall_traffic::atomic::WriteError;
 
@@ -88,8 +88,8 @@ pub struct NextRecord<'a> {
     pub record: &'a Record,
     /// True if the sample has just been run, false if the record was read from the journal.
     pub is_new: bool,
-    /// Wall time of the runs and of their validity checks (s); 0 if the record was read from the journal.
-    pub spent_s: [f64; 2],
+    /// The wall times of the sample; 0 if the record was read from the journal.
+    pub spent: SpentTime,
 }
 
 impl Campaign {
@@ -179,7 +179,9 @@ impl Campaign {
             // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
                 let Some((work, _)) = key_of(self, &record) else { break };
-                if on_record(NextRecord { work, record: &record, is_new: false, spent_s: [0.0; 2] }).is_break() {
+                if on_record(NextRecord { work, record: &record, is_new: false, spent: SpentTime::default() })
+                    .is_break()
+                {
                     break;
                 }
             }
@@ -229,7 +231,8 @@ impl Campaign {
                         work.identity().check(record, sample)?;
                         position.done += 1;
                         position.total += 1;
-                        let next = NextRecord { work: position.work, record, is_new: false, spent_s: [0.0; 2] };
+                        let next =
+                            NextRecord { work: position.work, record, is_new: false, spent: SpentTime::default() };
                         let end = on_record(next).break_value();
                         position.is_over = end == Some(End::Campaign);
                         if end == Some(End::Scenario) {
@@ -260,8 +263,8 @@ impl Campaign {
             self.run_samples((number, work), samples, |finished: Finished| {
                 kept.write(|files| append(files, index, &finished))?;
                 index += 1;
-                let spent_s = [finished.wall_s.iter().sum(), finished.check_s];
-                let next = NextRecord { work: number, record: &finished.record, is_new: true, spent_s };
+                let spent = SpentTime { runs_s: finished.wall_s.iter().sum(), checks_s: finished.check_s };
+                let next = NextRecord { work: number, record: &finished.record, is_new: true, spent };
                 let end = on_record(next).break_value();
                 is_over = end == Some(End::Campaign);
                 Ok(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })

@@ -20,10 +20,19 @@ pub(crate) struct JournalPlan {
     sampling: Sampling,
     partition: Option<Partition>,
     inference: Inference,
-    /// Index of the current scenario, and the next number that may be in the plan.
-    next: (usize, u64),
+    /// The next sample that may be in the plan.
+    next: Position,
     /// The last record: its scenario and sample.
     last: Option<(String, u64)>,
+}
+
+/// A sample of the plan.
+#[derive(Clone, Copy, Debug, Default)]
+struct Position {
+    /// The index of its scenario.
+    work: usize,
+    /// Its number.
+    sample: u64,
 }
 
 impl JournalPlan {
@@ -38,7 +47,7 @@ impl JournalPlan {
             sampling: manifest.sampling,
             partition: manifest.partition,
             inference: manifest.inference,
-            next: (0, 0),
+            next: Position::default(),
             last: None,
         })
     }
@@ -58,21 +67,21 @@ impl JournalPlan {
             || format!("sample {} of `{}` is not the next sample of the campaign", record.sample, record.scenario);
         let mut expected = self.expected();
         // The outcomes may have ended the scenario before its last sample.
-        if let Some((work, _)) = expected
+        if let Some(Position { work, .. }) = expected
             && self.inference == Inference::Sequential
             && self.files[work].config().name != record.scenario
-            && self.next.1 > 0
+            && self.next.sample > 0
         {
-            self.next = (work + 1, 0);
+            self.next = Position { work: work + 1, sample: 0 };
             expected = self.expected();
         }
-        let (work, sample) = expected.ok_or_else(out_of_order)?;
+        let Position { work, sample } = expected.ok_or_else(out_of_order)?;
         if (&self.files[work].config().name, sample) != (&record.scenario, record.sample) {
             return Err(out_of_order());
         }
         let names = self.names.iter().map(String::as_str);
         Identity { file: &self.files[work], sampling: self.sampling, arms: names }.check(record, sample)?;
-        self.next = (work, sample + 1);
+        self.next = Position { work, sample: sample + 1 };
         self.last = Some((record.scenario.clone(), record.sample));
         Ok(())
     }
@@ -82,15 +91,15 @@ impl JournalPlan {
         self.last.as_ref().is_some_and(|(scenario, sample)| (scenario, *sample) == (&record.scenario, record.sample))
     }
 
-    /// Returns the next sample of the plan: the index of its scenario, and its number.
-    fn expected(&self) -> Option<(usize, u64)> {
-        let (mut work, mut first) = self.next;
+    /// Returns the next sample of the plan.
+    fn expected(&self) -> Option<Position> {
+        let Position { mut work, sample: mut first } = self.next;
         loop {
             let file = self.files.get(work)?;
             let count = file.space().samples(self.sampling.design, self.sampling.samples);
             let mut numbers = first..count;
             match numbers.find(|&sample| self.partition.is_none_or(|part| part.contains(sample))) {
-                Some(sample) => return Some((work, sample)),
+                Some(sample) => return Some(Position { work, sample }),
                 None => (work, first) = (work + 1, 0),
             }
         }
@@ -102,7 +111,7 @@ impl JournalPlan {
         if self.inference == Inference::Sequential && self.last.is_some() {
             return 0;
         }
-        let (current, first) = self.next;
+        let Position { work: current, sample: first } = self.next;
         let rest = self.files.iter().enumerate().skip(current).map(|(work, file)| {
             let count = file.space().samples(self.sampling.design, self.sampling.samples);
             let numbers = (if work == current { first } else { 0 })..count;

@@ -172,7 +172,8 @@ impl ScenarioFile {
 
     /// Parses the text of a scenario that has no base.
     fn parse_whole(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
-        // The text is read once. With settings the unchanged text comes first, so that errors in the file have the line numbers of the file.
+        // The text is read once. With settings the unchanged text comes first, so that errors in
+        // the file have the line numbers of the file.
         let mut config = deserialize(path, text)?;
         let parameters = config.parameters.0.len() as u64;
         if parameters > MOST_PARAMETERS {

@@ -14,8 +14,9 @@ use super::{ScenarioConfig, ScenarioError, locate};
 /// The key of the file, and the key that its contents become.
 const KEYS: [&str; 2] = ["pattern-file", "pattern"];
 
-/// Puts the contents of each pattern file in place of its name, in the contents of a scenario file and in its text. Returns the text, or
-/// `None` if no pattern file is named. `path` is the path of the scenario file.
+/// Puts the contents of each pattern file in place of its name, in the contents of a scenario file
+/// and in its text. Returns the text, or `None` if no pattern file is named. `path` is the path of
+/// the scenario file.
 ///
 /// # Errors
 /// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong key.

@@ -43,8 +43,8 @@ pub(super) enum RecordedError {
     },
 }
 
-/// Replaces every `recorded` by its speed profile, in the contents of a file and in its text. Returns the text, or `None` if there is no
-/// `recorded`. `path` is the path of the scenario file.
+/// Replaces every `recorded` by its speed profile, in the contents of a file and in its text.
+/// Returns the text, or `None` if there is no `recorded`. `path` is the path of the scenario file.
 pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, RecordedError> {
     let mut document: Option<DocumentMut> = None;
     for (index, actor) in config.actors.iter_mut().enumerate() {

@@ -78,8 +78,8 @@ pub fn sampled(
     let in_set = |source_error| ScenarioError::Set { path: source.to_owned(), source: source_error };
     let settings = [settings, &[step.setting().map_err(in_set)?]].concat();
     let recorded_opp2 = opp2_of(encounter);
-    let (at_s, duration_s) = lane_change_of(encounter);
-    let built = built(encounter, recorded_opp2, (at_s, duration_s));
+    let lane_change = lane_change_of(encounter);
+    let built = built(encounter, recorded_opp2, lane_change);
     let index_of =
         |config: &ScenarioConfig, name: &str| config.actors.iter().position(|actor| actor.id.as_str() == name);
     let file = written(built, (source, &settings))?;
@@ -91,7 +91,7 @@ pub fn sampled(
         opp1: opp1.unwrap_or_default(),
         opp2,
         recorded_opp2,
-        lane_change_s: [at_s, at_s + duration_s],
+        lane_change_s: [lane_change.at_s, lane_change.at_s + lane_change.duration_s],
     })
 }
 
@@ -161,21 +161,30 @@ fn at_or_before(track: &Trajectory, time: Time) -> Option<&TrajectoryPoint> {
     (after < track.points.len() || point.time == time).then_some(point)
 }
 
-/// Returns the start and the duration of the lane change (s), which crosses the marking when the recorded one does.
-fn lane_change_of(encounter: &RecordedEncounter) -> (f64, f64) {
+/// When a lane change takes place.
+#[derive(Clone, Copy)]
+struct LaneChangeTimes {
+    /// Its start (s).
+    at_s: f64,
+    /// Its duration (s).
+    duration_s: f64,
+}
+
+/// Returns the times of the lane change, which crosses the marking when the recorded one does.
+fn lane_change_of(encounter: &RecordedEncounter) -> LaneChangeTimes {
     let [start_s, end_s] =
         [encounter.change.start_s, encounter.change.end_s].map(|time_s| encounter.time_of(time_s).s());
     let rear = encounter.ego_lead_rear()[REAR_INDEX];
     let as_recorded = (start_s.max(0.0), (end_s - start_s.max(0.0)).clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S));
     let (at_s, duration_s) = lane_change_across(rear, [start_s, encounter.crossing.s()], 0.0).unwrap_or(as_recorded);
-    (to_steps(at_s), to_steps(duration_s))
+    LaneChangeTimes { at_s: to_steps(at_s), duration_s: to_steps(duration_s) }
 }
 
 /// Returns the contents of the scenario file before a value is varied.
 fn built(
     encounter: &RecordedEncounter,
     opp2: Option<usize>,
-    lane_change: (f64, f64),
+    lane_change: LaneChangeTimes,
 ) -> Result<ScenarioConfig, String> {
     let base = config(encounter, RearDriver::Recorded)?;
     let changer = &encounter.vehicles[REAR_INDEX];
@@ -219,7 +228,7 @@ fn lane_changer(
     encounter: &RecordedEncounter,
     changer: &Participant,
     start: &TrajectoryPoint,
-    (at_s, duration_s): (f64, f64),
+    LaneChangeTimes { at_s, duration_s }: LaneChangeTimes,
 ) -> Result<ActorConfig, String> {
     let driver = DriverConfig::Wiedemann99(Wiedemann99Config {
         desired_speed_mps: Some(rounded(max_speed_mps([&changer.trajectory]))),

@@ -43,8 +43,8 @@ fn replay_command(replay: &Replay<'_>) -> String {
     )
 }
 
-/// Returns the command that resumes a campaign: the command that started it, without the options that would end it at the same
-/// sample again.
+/// Returns the command that resumes a campaign: the command that started it, without the options
+/// that would end it at the same sample again.
 fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> String {
     let is_kept = |word: &&String| !matches!(word.as_str(), "--fail-fast" | "--resume");
     let words = command.iter().filter(is_kept).map(String::as_str);

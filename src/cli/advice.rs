@@ -1,5 +1,5 @@
-//! What the user can do after an error or a result without a verdict. The libraries say what is wrong; the options that help are those of this
-//! program.
+//! What the user can do after an error or a result without a verdict. The libraries say what is
+//! wrong; the options that help are those of this program.
 
 use std::fmt::Display;
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use clap::Args;
-use closecall_campaign::end_rule::{EarlyEnd, EndRule, EndedEarly};
+use closecall_campaign::end_rule::{EarlyEnd, EndRule, EndedEarly, Kept};
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::session;
@@ -69,10 +69,11 @@ impl Ending {
         let ended = EndedEarly {
             message: self.message(),
             ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
-            samples: [summary.total().samples, campaign.len()],
+            done: summary.total().samples,
+            all: campaign.len(),
             errors: summary.total().errors(),
             summary,
-            kept: out.map(|out| (out, session::arguments())),
+            kept: out.map(|folder| Kept { folder, command: session::arguments() }),
             command_for,
         };
         match format {

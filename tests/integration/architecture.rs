@@ -1,5 +1,5 @@
-//! The table of crates in `ARCHITECTURE.md` is the one of the workspace: `cargo metadata` has the same crates, folders and imports. No library
-//! names an option of the command line.
+//! The table of crates in `ARCHITECTURE.md` is the one of the workspace: `cargo metadata` has the
+//! same crates, folders and imports. No library names an option of the command line.
 
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
@@ -145,7 +145,8 @@ pub(crate) fn code_of(text: &str) -> impl Iterator<Item = (usize, &str)> {
     until_tests.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
 }
 
-/// Returns whether a line of code names an option such as `--resume`. A variable of a style sheet, `--key:`, is none.
+/// Returns whether a line of code names an option such as `--resume`. A variable of a style sheet,
+/// `--key:`, is none.
 fn names_option(line: &str) -> bool {
     line.match_indices("--").any(|(at, _)| {
         let (before, after) = (&line[..at], &line[at + 2..]);

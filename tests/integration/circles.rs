@@ -1,11 +1,12 @@
 //! No circle of imports runs over more than four files of a crate.
 //!
 //! ```text
-//!  files of a crate ─▶ paths in them: `use crate::a::B`, `super::c::d()` ─▶ file that declares the name ─▶ files that reach each other
+//! files of a crate ─▶ paths in them: `use crate::a::B`, `super::c::d()` ─▶ file that declares the
+//! name ─▶ files that reach each other
 //! ```
 //!
-//! A file that only passes a name on is not what its user depends on: a path through a re-export leads to the file that declares
-//! the name.
+//! A file that only passes a name on is not what its user depends on: a path through a re-export
+//! leads to the file that declares the name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -69,7 +70,8 @@ fn expanded(tree: &str) -> Vec<String> {
     parts.flat_map(|part| expanded(&format!("{}{}", before.trim(), part.trim()))).collect()
 }
 
-/// Returns the names of a path such as `crate::a::B`, as it reads from the root of the crate; `None` if it leads elsewhere.
+/// Returns the names of a path such as `crate::a::B`, as it reads from the root of the crate;
+/// `None` if it leads elsewhere.
 fn absolute(module: &[String], path: &str, has_child: impl Fn(&str) -> bool) -> Option<Names> {
     let mut segments: Vec<&str> = path.split("::").map(str::trim).collect();
     let first = *segments.first()?;
@@ -178,7 +180,8 @@ impl Crate {
         }
     }
 
-    /// Returns the modules whose names a module uses. What it passes on to others counts only if it uses that itself.
+    /// Returns the modules whose names a module uses. What it passes on to others counts only if it
+    /// uses that itself.
     fn used_by(&self, module: &Names) -> BTreeSet<Names> {
         let file = &self.0[module];
         let has_child = |child: &str| self.0.contains_key(&[&module[..], &[child.to_owned()]].concat());
@@ -201,7 +204,8 @@ impl Crate {
         used.filter(|other| other != module).collect()
     }
 
-    /// Returns the groups of more than [`MOST_FILES`] files in which each one uses every other one, directly or through others.
+    /// Returns the groups of more than [`MOST_FILES`] files in which each one uses every other one,
+    /// directly or through others.
     fn circles(&self) -> Vec<Vec<String>> {
         let used: BTreeMap<&Names, BTreeSet<Names>> =
             self.0.keys().map(|module| (module, self.used_by(module))).collect();

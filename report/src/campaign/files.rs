@@ -84,15 +84,27 @@ pub struct CampaignReport<'a> {
     pub command_for: CommandFor,
 }
 
+/// What reports show of single samples.
+#[derive(Clone, Copy)]
+struct Looks<'a> {
+    /// The recordings.
+    recordings: &'a Recordings,
+    /// Pictures of recorded samples.
+    stills: &'a [Still],
+    /// The samples with the longest wall times.
+    slowest: &'a [Timing],
+}
+
 impl CampaignReport<'_> {
     /// Writes every file into the folder, with recordings of the selected samples. A file that cannot be written costs no other.
     pub fn write(&self, folder: &Folder, selection: Selection) -> Written {
         let mut written = Written::default();
-        let (files, none) = (self.scenario_files(), Recordings::new());
+        let files = self.scenario_files();
         let (slowest, wall_s) = written.note("the wall times", self.wall_times(folder, &files)).unwrap_or_default();
-        let junit = self.with_findings((&files, Some(folder)), (&none, &[]), &slowest, |findings| {
-            write_junit(&folder.file("junit.xml"), findings, &wall_s)
-        });
+        let none = Recordings::new();
+        let without = Looks { recordings: &none, stills: &[], slowest: &slowest };
+        let junit = self
+            .with_findings(Some(folder), without, |findings| write_junit(&folder.file("junit.xml"), findings, &wall_s));
         written.note("junit.xml", junit);
         written.note(&step_summary_name(), self.append_step_summary(Some(folder)));
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
@@ -108,7 +120,7 @@ impl CampaignReport<'_> {
         if self.tally.summary.is_paired() {
             written.note("arm_pairs.parquet", write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary));
         }
-        self.write_pages(folder, (&none, &[], &slowest), &mut written);
+        self.write_pages(folder, without, &mut written);
         let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection, self.command_for) {
             Ok(recorded) => recorded,
             Err(error) => {
@@ -122,8 +134,9 @@ impl CampaignReport<'_> {
         }
         if !paths.is_empty() {
             // Once more, with links to the recordings.
-            self.write_pages(folder, (&paths, &stills, &slowest), &mut written);
-            let junit = self.with_findings((&files, Some(folder)), (&paths, &stills), &slowest, |findings| {
+            let with = Looks { recordings: &paths, stills: &stills, slowest: &slowest };
+            self.write_pages(folder, with, &mut written);
+            let junit = self.with_findings(Some(folder), with, |findings| {
                 write_junit(&folder.file("junit.xml"), findings, &wall_s)
             });
             written.note("junit.xml", junit);
@@ -133,13 +146,8 @@ impl CampaignReport<'_> {
     }
 
     /// Writes the reports for human readers, with links to the recordings.
-    fn write_pages(
-        &self,
-        folder: &Folder,
-        (recordings, stills, slowest): (&Recordings, &[Still], &[Timing]),
-        written: &mut Written,
-    ) {
-        self.with_findings((&self.scenario_files(), Some(folder)), (recordings, stills), slowest, |findings| {
+    fn write_pages(&self, folder: &Folder, looks: Looks<'_>, written: &mut Written) {
+        self.with_findings(Some(folder), looks, |findings| {
             written.note(REPORT, write_html(&folder.file(REPORT), findings));
             written.note("summary.md", write_markdown(&folder.file("summary.md"), findings));
         });
@@ -192,9 +200,8 @@ impl CampaignReport<'_> {
 
     fn with_findings<T>(
         &self,
-        (files, folder): (&[&ScenarioFile], Option<&Folder>),
-        (recordings, stills): (&Recordings, &[Still]),
-        slowest: &[Timing],
+        folder: Option<&Folder>,
+        Looks { recordings, stills, slowest }: Looks<'_>,
         write: impl FnOnce(&Findings<'_>) -> T,
     ) -> T {
         let summary = &self.tally.summary;
@@ -202,7 +209,7 @@ impl CampaignReport<'_> {
         let has_gallery = folder.is_some_and(|folder| folder.file(&gallery).exists());
         write(&Findings {
             manifest: self.manifest,
-            files,
+            files: &self.scenario_files(),
             summary,
             judged: self.judged,
             overview: &self.tally.overview,
@@ -220,7 +227,8 @@ impl CampaignReport<'_> {
         let Some(path) = std::env::var_os(STEP_SUMMARY).filter(|path| !path.is_empty()).map(PathBuf::from) else {
             return Ok(());
         };
-        let text = self.with_findings((&self.scenario_files(), folder), (&Recordings::new(), &[]), &[], markdown);
+        let without = Looks { recordings: &Recordings::new(), stills: &[], slowest: &[] };
+        let text = self.with_findings(folder, without, markdown);
         let opened = OpenOptions::new().create(true).append(true).open(&path);
         let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)

@@ -10,8 +10,9 @@
 //!
 //! The failures are the failed gates and requirement checks, and nothing else. Samples stand in `samples.xml`.
 //!
-//! Both files are valid by the schema of Jenkins' plugin xUnit (`junit-10.xsd`). The library `quick-junit` does not write them: version 0.8.0
-//! adds `skipped` to `testsuites`, which that schema refuses, and holds all cases of a file in memory.
+//! Both files are valid by the schema of Jenkins' plugin xUnit (`junit-10.xsd`). The library
+//! `quick-junit` does not write them: version 0.8.0 adds `skipped` to `testsuites`, which that
+//! schema refuses, and holds all cases of a file in memory.
 
 use std::io::{self, Write};
 use std::path::Path;

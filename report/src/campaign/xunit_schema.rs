@@ -1,4 +1,5 @@
-//! The schema `junit-10.xsd` of Jenkins' plugin xUnit (github.com/jenkinsci/xunit-plugin), for tests.
+//! The schema `junit-10.xsd` of Jenkins' plugin xUnit (github.com/jenkinsci/xunit-plugin), for
+//! tests.
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
