@@ -8,9 +8,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::execution::End;
+use crate::action::{Action, CommandFor, Replay, Resume, SavedSample};
 use crate::record::Record;
-use crate::resume_command::{quoted, resume_command};
+use crate::stop::End;
 use crate::summary::Summary;
 
 /// When a campaign ends before its last sample.
@@ -63,29 +63,42 @@ pub struct EndedEarly<'a> {
     pub message: String,
     /// The sample or the samples that ended it; `None` if a signal did.
     pub ending: Option<&'a EarlyEnd>,
-    /// Samples that are done, and samples of the whole campaign.
-    pub samples: [u64; 2],
+    /// Samples that are done.
+    pub done: u64,
+    /// Samples of the whole campaign.
+    pub all: u64,
     /// Samples that ended in an error.
     pub errors: u64,
     /// Why they did: the counts with their failures.
     pub summary: &'a Summary,
-    /// The campaign's folder, and the command line that started it.
-    pub kept: Option<(&'a Path, Vec<String>)>,
+    /// What is kept of the campaign; `None` if it has no folder.
+    pub kept: Option<Kept<'a>>,
+    /// The commands to go on.
+    pub command_for: CommandFor,
+}
+
+/// What is kept of a campaign that has ended early.
+#[derive(Clone, Debug)]
+pub struct Kept<'a> {
+    /// Its folder.
+    pub folder: &'a Path,
+    /// The command line that started it.
+    pub command: Vec<String>,
 }
 
 impl EndedEarly<'_> {
     fn resume(&self) -> Option<String> {
-        let retries = matches!(self.ending, Some(EarlyEnd::Errors { .. }));
-        self.kept.as_ref().map(|(_, command)| resume_command(command.iter().cloned(), retries))
+        let retries_errors = matches!(self.ending, Some(EarlyEnd::Errors { .. }));
+        let Kept { command, .. } = self.kept.as_ref()?;
+        Some((self.command_for)(&Action::Resume(Resume { command, retries_errors, moved_to: None })))
     }
 
     /// Returns the end as JSON.
     pub fn json(&self) -> Value {
-        let [done, of] = self.samples;
         json!({
             "ended_early": self.message,
-            "samples": done,
-            "of": of,
+            "samples": self.done,
+            "of": self.all,
             "errors": self.errors,
             "failures": self.summary.failures_json(),
             "resume": self.resume(),
@@ -95,17 +108,19 @@ impl EndedEarly<'_> {
 
 impl fmt::Display for EndedEarly<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [done, of] = self.samples;
-        writeln!(f, "ENDED EARLY, without a verdict: {}; {done} of {of} samples are done", self.message)?;
+        let Self { done, all, message, .. } = self;
+        writeln!(f, "ENDED EARLY, without a verdict: {message}; {done} of {all} samples are done")?;
         for (scenario, failure) in self.summary.failures() {
             writeln!(f, "  {scenario}: {failure}")?;
         }
-        let (Some(resume), Some((out, _))) = (self.resume(), &self.kept) else {
-            return writeln!(f, "nothing was kept: a campaign with --out can be resumed");
+        let (Some(resume), Some(Kept { folder, .. })) = (self.resume(), &self.kept) else {
+            return writeln!(f, "nothing was kept: only a campaign with a folder can be resumed");
         };
         if let Some(EarlyEnd::Failure { scenario, sample, .. }) = self.ending {
-            let out = quoted(&out.display().to_string());
-            writeln!(f, "look:   closecall replay {out} {sample} --scenario {scenario} --record failure.rrd")?;
+            let folder = folder.display().to_string();
+            let of = SavedSample { folder: &folder, sample: *sample, scenario: Some(scenario) };
+            let replay = Replay { recording: Some("failure.rrd"), ..Replay::new(of) };
+            writeln!(f, "look:   {}", (self.command_for)(&Action::Replay(replay)))?;
         }
         writeln!(f, "resume: {resume}")
     }

@@ -3,23 +3,24 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use closecall_traffic::atomic::WriteError;
-
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
 use super::host::{Refusal, refusal};
-use super::identity::of_work;
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
-use super::remote::RemoteError;
 use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
 use super::stop::StopFlag;
 use super::summary::Summary;
 use super::verdict::{self, Judgement};
-use super::wall_times::WallTime;
-use super::workers::{Finished, SampleRunner, Workers, WorkersError};
+use super::wall_times::{SpentTime, WallTime};
+use super::workers::{Finished, SampleRunner, Workers};
+use closecall_traffic::atomic::WriteError;
+
+pub use super::stop::End;
+
+pub use super::campaign_error::CampaignError;
 
 /// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order of their numbers.
 #[derive(Clone)]
@@ -78,40 +79,6 @@ impl ResumeReport {
     }
 }
 
-/// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from it.
-#[derive(Debug, thiserror::Error)]
-pub enum CampaignError {
-    /// The folder cannot be used.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// Results cannot be written.
-    #[error("{0}\nthe results written so far are kept: when there is room again, resume with --resume")]
-    Write(#[from] WriteError),
-    /// The worker threads could not be started.
-    #[error(transparent)]
-    Workers(#[from] WorkersError),
-    /// A worker process has found another controller, cannot read it, or is another version of this program.
-    #[error("failed to go on: {reason}")]
-    Refused {
-        /// The reason.
-        reason: String,
-        /// True if something is another one than at the start, false if the controller cannot be read.
-        has_changed: bool,
-    },
-    /// The samples cannot run on other machines.
-    #[error(transparent)]
-    Remote(#[from] RemoteError),
-}
-
-/// What a caller of [`Campaign::run`] ends after a record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// The scenario of the record. The next scenario begins.
-    Scenario,
-    /// The whole campaign.
-    Campaign,
-}
-
 /// A record that [`Campaign::run`] passes on, in the order of the plan.
 #[derive(Clone, Copy, Debug)]
 pub struct NextRecord<'a> {
@@ -121,8 +88,8 @@ pub struct NextRecord<'a> {
     pub record: &'a Record,
     /// True if the sample has just been run, false if the record was read from the journal.
     pub is_new: bool,
-    /// Wall time of the runs and of their validity checks (s); 0 if the record was read from the journal.
-    pub spent_s: [f64; 2],
+    /// The wall times of the sample; 0 if the record was read from the journal.
+    pub spent: SpentTime,
 }
 
 impl Campaign {
@@ -212,7 +179,9 @@ impl Campaign {
             // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
                 let Some((work, _)) = key_of(self, &record) else { break };
-                if on_record(NextRecord { work, record: &record, is_new: false, spent_s: [0.0; 2] }).is_break() {
+                if on_record(NextRecord { work, record: &record, is_new: false, spent: SpentTime::default() })
+                    .is_break()
+                {
                     break;
                 }
             }
@@ -259,10 +228,11 @@ impl Campaign {
                         if position.is_over || !is_next {
                             return Err(out_of_order());
                         }
-                        of_work(work).check(record, sample)?;
+                        work.identity().check(record, sample)?;
                         position.done += 1;
                         position.total += 1;
-                        let next = NextRecord { work: position.work, record, is_new: false, spent_s: [0.0; 2] };
+                        let next =
+                            NextRecord { work: position.work, record, is_new: false, spent: SpentTime::default() };
                         let end = on_record(next).break_value();
                         position.is_over = end == Some(End::Campaign);
                         if end == Some(End::Scenario) {
@@ -293,8 +263,8 @@ impl Campaign {
             self.run_samples((number, work), samples, |finished: Finished| {
                 kept.write(|files| append(files, index, &finished))?;
                 index += 1;
-                let spent_s = [finished.wall_s.iter().sum(), finished.check_s];
-                let next = NextRecord { work: number, record: &finished.record, is_new: true, spent_s };
+                let spent = SpentTime { runs_s: finished.wall_s.iter().sum(), checks_s: finished.check_s };
+                let next = NextRecord { work: number, record: &finished.record, is_new: true, spent };
                 let end = on_record(next).break_value();
                 is_over = end == Some(End::Campaign);
                 Ok(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })

@@ -3,11 +3,11 @@
 use closecall_scenarios::ScenarioError;
 use closecall_simulation::controller::native::NativeError;
 
+use super::campaign_error::CampaignError;
 use super::compare::CompareError;
-use super::execution::CampaignError;
 use super::folder::FolderError;
 use super::merge::MergeError;
-use super::saved::SavedError;
+use super::saved_error::SavedError;
 
 /// The kind of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

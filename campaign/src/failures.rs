@@ -8,7 +8,6 @@ use std::fmt;
 use serde::Serialize;
 
 use super::record::Record;
-use super::resume_command::quoted;
 
 /// Largest number of kinds of one scenario that are told apart by their messages.
 const MOST_KINDS: usize = 16;
@@ -103,12 +102,6 @@ fn shape(message: &str) -> impl Iterator<Item = char> {
             (false, _) => Some(c),
         }
     })
-}
-
-/// Returns the command that runs a failed sample of a campaign in `folder` again.
-pub fn replay_command(folder: &str, scenario: &str, failure: &FailureKindCount) -> String {
-    let (sample, controller) = (failure.first_sample, quoted(&failure.controller));
-    format!("closecall replay {} {sample} --scenario {scenario} --controller {controller}", quoted(folder))
 }
 
 #[cfg(test)]

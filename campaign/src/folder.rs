@@ -20,12 +20,12 @@ use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
 use closecall_traffic::input::read_text;
 
-use super::identity::JournalPlan;
 use super::journal::{self, Entry, Journal};
+use super::journal_plan::JournalPlan;
 use super::lock::{LOCK, Lock};
 use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::record::Record;
-use super::saved::SavedError;
+use super::saved_error::SavedError;
 use super::trust;
 use super::wall_times::{self, WallTime, WallTimes};
 

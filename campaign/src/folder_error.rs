@@ -21,7 +21,7 @@ pub enum FolderError {
     },
     /// The folder already holds this campaign, and it is not to be resumed.
     #[error(
-        "failed to use {}: it already holds this campaign, and nothing is overwritten; resume it with --resume, name another folder, or delete this one",
+        "failed to use {}: it already holds this campaign, and nothing is overwritten; resume it, name another folder, or delete this one",
         path.display()
     )]
     AlreadyThere {
@@ -64,8 +64,8 @@ pub enum FolderError {
     },
     /// Samples of the plan are missing in the journal.
     #[error(
-        "failed to use {}: it has {has} of the {of} samples of its campaign, and a part of them says nothing about all; complete it with \
-         --resume",
+        "failed to use {}: it has {has} of the {of} samples of its campaign, and a part of them says nothing about all; \
+         resume it first",
         path.display()
     )]
     Incomplete {

@@ -11,9 +11,9 @@
 
 use serde::Serialize;
 
+use crate::action::{Action, CommandFor, Resume};
 use crate::folder::{DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST};
 use crate::journal::{self, Entry};
-use crate::resume_command::resume_command;
 
 /// Something that is wrong with a folder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -37,31 +37,36 @@ pub struct Integrity {
     pub missing: u64,
     /// What is wrong.
     pub problems: Vec<Problem>,
+    /// The repair of what a campaign writes again that is resumed.
+    #[serde(skip)]
+    resumption: String,
 }
 
 impl Integrity {
-    /// Looks at the folder of a campaign.
-    pub fn of(folder: &Folder) -> Self {
-        let mut found = Self::default();
+    /// Looks at the folder of a campaign. The repairs name commands of the calling program.
+    pub fn of(folder: &Folder, command_for: CommandFor) -> Self {
+        let mut integrity = Self::default();
         let manifest = match folder.manifest() {
             Ok(manifest) => manifest,
             Err(error) => {
-                found.add_error(MANIFEST, &error, "put a copy of the folder in its place");
-                return found;
+                integrity.add_error(MANIFEST, &error, "put a copy of the folder in its place");
+                return integrity;
             }
         };
-        let resume = resume_command(manifest.command.iter().cloned(), false);
-        if let Err(error) = found.read_journal(folder, &resume) {
-            found.add_error(JOURNAL, &error, &format!("resume the campaign: {resume}"));
-            return found;
+        let resumed = Resume { command: &manifest.command, retries_errors: false, moved_to: None };
+        integrity.resumption = format!("resume the campaign: {}", command_for(&Action::Resume(resumed)));
+        if let Err(error) = integrity.read_journal(folder) {
+            let repair = integrity.resumption.clone();
+            integrity.add_error(JOURNAL, &error, &repair);
+            return integrity;
         }
         let is_paired = manifest.arms.len() > 1;
         for file in DERIVED_FILES {
-            if found.missing == 0 && !folder.file(file).is_file() && (is_paired || file != "arm_pairs.parquet") {
-                found.add(file, None, "it is missing".to_owned(), format!("resume the campaign: {resume}"));
+            if integrity.missing == 0 && !folder.file(file).is_file() && (is_paired || file != "arm_pairs.parquet") {
+                integrity.add_resumable(file, None, "it is missing".to_owned());
             }
         }
-        found
+        integrity
     }
 
     /// Returns true if nothing is wrong.
@@ -74,19 +79,23 @@ impl Integrity {
         self.problems.push(Problem { file: file.to_owned(), line, message, repair });
     }
 
+    /// Adds a problem that a campaign repairs if it is resumed.
+    pub fn add_resumable(&mut self, file: &str, line: Option<usize>, message: String) {
+        self.add(file, line, message, self.resumption.clone());
+    }
+
     fn add_error(&mut self, file: &str, error: &FolderError, repair: &str) {
         self.add(file, None, error.to_string(), repair.to_owned());
     }
 
-    fn read_journal(&mut self, folder: &Folder, resume: &str) -> Result<(), FolderError> {
+    fn read_journal(&mut self, folder: &Folder) -> Result<(), FolderError> {
         let path = folder.file(JOURNAL);
         let mut plan = folder.plan()?;
-        let repair = || format!("resume the campaign: {resume}");
         let entries = journal::read(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
         for (index, entry) in entries.enumerate() {
             match entry.map_err(|source| FolderError::Read { path: path.clone(), source })? {
                 Entry::Record { record, .. } if plan.is_last(&record) => {
-                    self.add(JOURNAL, Some(index + 1), "it repeats the line before".to_owned(), repair());
+                    self.add_resumable(JOURNAL, Some(index + 1), "it repeats the line before".to_owned());
                 }
                 Entry::Record { record, .. } => match plan.check(&record) {
                     Ok(()) => self.records += 1,
@@ -98,7 +107,7 @@ impl Integrity {
                     }
                 },
                 Entry::Torn { line, reason, .. } => {
-                    self.add(JOURNAL, Some(line), reason, repair());
+                    self.add_resumable(JOURNAL, Some(line), reason);
                     return Ok(());
                 }
             }
@@ -106,7 +115,7 @@ impl Integrity {
         self.missing = plan.missing();
         if self.missing > 0 {
             let of = self.records + self.missing;
-            self.add(JOURNAL, None, format!("it has {} of the {of} samples", self.records), repair());
+            self.add_resumable(JOURNAL, None, format!("it has {} of the {of} samples", self.records));
         }
         Ok(())
     }

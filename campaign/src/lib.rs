@@ -15,9 +15,11 @@
 //! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
 //! not the frequency of collisions on a road.
 
+pub mod action;
 pub mod arguments;
 pub mod arm_pairs;
 pub mod baseline;
+mod campaign_error;
 pub mod compare;
 pub mod controller_watch;
 pub mod drift;
@@ -37,6 +39,7 @@ pub mod inputs;
 pub mod integrity;
 pub mod interrupt;
 pub mod journal;
+mod journal_plan;
 pub mod ledger;
 pub mod lock;
 pub mod manifest;
@@ -44,6 +47,7 @@ pub mod margins;
 pub mod merge;
 pub mod partition;
 pub mod plan;
+mod plan_error;
 pub mod probability;
 pub mod record;
 pub mod remote;
@@ -51,10 +55,11 @@ mod repair;
 mod repeats;
 pub mod repository;
 pub mod results;
-pub mod resume_command;
 pub mod robustness;
 pub mod runner;
+mod sampling;
 pub mod saved;
+mod saved_error;
 pub mod selection;
 pub mod sensitivity;
 pub mod session;

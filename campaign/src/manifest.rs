@@ -17,7 +17,7 @@ use serde_json::Value;
 use super::fingerprint::{self, Fingerprint};
 use super::ledger::Inference;
 use super::partition::Partition;
-use super::runner::Sampling;
+use super::sampling::Sampling;
 use super::validity::CheckPlan;
 
 /// The version of the layout of a campaign's folder.

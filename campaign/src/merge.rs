@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use closecall_traffic::atomic::WriteError;
 
-use super::execution::CampaignError;
+use super::campaign_error::CampaignError;
 use super::folder::{Folder, FolderError, LockedFolder};
 use super::manifest::Manifest;
 use super::partition::Partition;
@@ -21,7 +21,7 @@ pub enum MergeError {
     #[error(transparent)]
     Campaign(#[from] CampaignError),
     /// A folder holds a whole campaign.
-    #[error("failed to merge: {} holds a whole campaign, not a part of one; only folders that were made with --partition are merged", path.display())]
+    #[error("failed to merge: {} holds a whole campaign, not a part of one; only the folders of parts are merged", path.display())]
     NotAPart {
         /// The folder.
         path: PathBuf,
@@ -55,7 +55,7 @@ pub enum MergeError {
         parts: Vec<String>,
     },
     /// A part has not run to its end.
-    #[error("failed to merge: {} has {has} of its {of} samples; complete it with --resume first", path.display())]
+    #[error("failed to merge: {} has {has} of its {of} samples; resume it first", path.display())]
     Incomplete {
         /// The folder.
         path: PathBuf,

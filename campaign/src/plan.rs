@@ -6,7 +6,7 @@
 //!  controllers    ┘        └─▶ Manifest (stores it)
 //! ```
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use closecall_controllers::DriverConfig;
@@ -14,7 +14,6 @@ use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
-use closecall_simulation::controller::native::NativeError;
 use closecall_simulation::controller::{BuiltIn, ControllerChoice};
 
 use crate::execution::Campaign;
@@ -23,49 +22,13 @@ use crate::folder::FolderError;
 use crate::ledger::Inference;
 use crate::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario, file_hash, version};
 use crate::partition::Partition;
-use crate::runner::{Sampling, Work};
+use crate::runner::Work;
+use crate::sampling::Sampling;
 use crate::stop::StopFlag;
 use crate::validity::CheckPlan;
 use crate::workers::Workers;
 
-/// The reason for which scenarios cannot form a campaign.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlanError {
-    /// Two scenarios have the same name, by which results are filed.
-    #[error("{} and {} have the same name `{name}`", first.display(), second.display())]
-    SameName {
-        /// One file.
-        first: PathBuf,
-        /// The other file.
-        second: PathBuf,
-        /// The name of both.
-        name: String,
-    },
-    /// A controller does not fit a scenario.
-    #[error("{scenario}: {source}")]
-    Controller {
-        /// The scenario.
-        scenario: String,
-        /// What is wrong.
-        source: NativeError,
-    },
-    /// A margin increase system is to drive an ego stack that has none.
-    #[error(
-        "{scenario}: `{controller}` needs a margin increase system, and the ego stack has none: add `mis` to its `ego-stack`, or name another controller"
-    )]
-    WithoutMis {
-        /// The scenario.
-        scenario: String,
-        /// The controller.
-        controller: String,
-    },
-    /// Two arms have the same controller, so that they would have the same outcomes.
-    #[error("`{controller}` is named twice: every arm needs a controller of its own")]
-    SameArm {
-        /// The controller.
-        controller: String,
-    },
-}
+pub use crate::plan_error::PlanError;
 
 /// The plan of a campaign.
 #[derive(Clone, Debug)]

@@ -13,7 +13,8 @@ use std::path::Path;
 use closecall_traffic::atomic::write_file;
 use closecall_traffic::input;
 
-use super::execution::{Campaign, CampaignError};
+use super::campaign_error::CampaignError;
+use super::execution::Campaign;
 use super::folder::{FolderError, LockedFolder, TornLine};
 use super::journal;
 use super::ledger::Inference;

@@ -26,7 +26,6 @@ use crate::folder::{FILES, Folder, LockedFolder, MANIFEST, RECORDINGS, RECORDING
 use crate::folder_error::FolderError;
 use crate::lock::Lock;
 use crate::manifest::Manifest;
-use crate::resume_command::resume_command;
 
 /// The folder of the last campaign, in the working folder.
 pub const RESULTS: &str = "closecall-results";
@@ -52,8 +51,8 @@ pub struct Taken {
 pub struct Moved {
     /// The folder in which they are.
     pub to: PathBuf,
-    /// The command that resumes the campaign; `None` if it has come to its end.
-    pub resume: Option<String>,
+    /// The command line that started the campaign; `None` if it has come to its end.
+    pub interrupted: Option<Vec<String>>,
     /// True if older results were removed.
     pub has_removed: bool,
 }
@@ -136,12 +135,8 @@ fn set_aside(path: &Path, previous: &Path) -> Result<Option<Moved>, FolderError>
     let has_removed = remove(previous)?;
     fs::rename(path, previous).map_err(|source| WriteError::new(previous, source))?;
     drop(lock);
-    let resume = (!kept.is_finished).then(|| {
-        let named = kept.command.into_iter().filter(|word| word != "--resume");
-        let out = ["--out".to_owned(), previous.display().to_string()];
-        resume_command(named.chain(out), false)
-    });
-    Ok(Some(Moved { to: previous.to_owned(), resume, has_removed }))
+    let interrupted = (!kept.is_finished).then_some(kept.command);
+    Ok(Some(Moved { to: previous.to_owned(), interrupted, has_removed }))
 }
 
 /// Removes earlier results. Returns false if there are none.

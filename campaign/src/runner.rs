@@ -5,41 +5,18 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use closecall_scenarios::outcome::Outcome;
-use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
 use closecall_traffic::Check;
 
 use super::host;
+use super::identity::Identity;
 use super::partition::Partition;
 use super::record::{ArmRecord, SampleFailure};
 use super::validity::{ArmChecks, CheckPlan, CheckedRun};
 use super::workers::Samples;
 
-/// How the samples of a campaign are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Sampling {
-    /// The campaign's seed.
-    pub seed: u64,
-    /// The sampling design, which lays out the values of the parameters.
-    #[serde(with = "design_by_name")]
-    pub design: Design,
-    /// Number of samples of each scenario.
-    pub samples: u64,
-}
-
-mod design_by_name {
-    use closecall_scenarios::sampling::Design;
-    use serde::{Deserialize, Deserializer, Serializer, de};
-
-    pub(super) fn serialize<S: Serializer>(design: &Design, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(design.name())
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Design, D::Error> {
-        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
-    }
-}
+pub use super::sampling::Sampling;
 
 /// A scenario with all that its runs need: how its samples are drawn, and the arms in which each sample runs.
 #[derive(Clone)]
@@ -67,6 +44,12 @@ impl fmt::Debug for Work {
 }
 
 impl Work {
+    /// Returns what the records of the scenario with its arms must be.
+    pub(crate) fn identity(&self) -> Identity<'_, impl Iterator<Item = &str> + Clone> {
+        let arms = self.arms.iter().map(|arm| arm.controller.name());
+        Identity { file: &self.file, sampling: self.sampling, arms }
+    }
+
     /// Returns the number of samples of the design. A grid may have another number than was requested.
     pub fn count(&self) -> u64 {
         self.file.space().samples(self.sampling.design, self.sampling.samples)

@@ -1,77 +1,17 @@
 //! A campaign that is saved in a folder: its plan, read back from the manifest.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting};
-use closecall_simulation::{Arm, RunKey, SampleError};
+use closecall_scenarios::{Scenario, ScenarioFile, Setting};
+use closecall_simulation::{Arm, RunKey};
 
 use crate::folder::{Folder, FolderError};
 use crate::manifest::{Manifest, ManifestScenario};
-use crate::runner::{Work, concrete};
-use crate::trust;
 
-/// The reason for which a saved campaign cannot provide what was requested.
-#[derive(Debug, thiserror::Error)]
-pub enum SavedError {
-    /// The folder cannot be used.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// A scenario of the manifest cannot be used.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// The campaign has several scenarios, and none was named.
-    #[error("the campaign has several scenarios; name one with --scenario: {}", known.join(", "))]
-    ScenarioNotNamed {
-        /// The names to choose from.
-        known: Vec<String>,
-    },
-    /// The campaign has no scenario of that name.
-    #[error("the campaign has no scenario `{name}`, only {}", known.join(", "))]
-    UnknownScenario {
-        /// The requested name.
-        name: String,
-        /// The names to choose from.
-        known: Vec<String>,
-    },
-    /// The campaign has no sample with that number.
-    #[error("there is no sample {sample}: the campaign has samples 0 to {last}")]
-    UnknownSample {
-        /// The requested number.
-        sample: u64,
-        /// The largest number.
-        last: u64,
-    },
-    /// The campaign was not run with that controller.
-    #[error("the campaign was not run with `{name}`, only with {}", known.join(", "))]
-    UnknownArm {
-        /// The requested name.
-        name: String,
-        /// The names to choose from.
-        known: Vec<String>,
-    },
-    /// The folder was written on another machine or by another user, and names code that would run.
-    #[error(
-        "{} was written by another user or on another machine, and its controllers would run with your rights:\n  {}\nthey run only with \
-         --trust-folder",
-        path.display(),
-        commands.join("\n  ")
-    )]
-    NotTrusted {
-        /// The folder.
-        path: PathBuf,
-        /// The commands, libraries and FMUs, and the folder in which they run.
-        commands: Vec<String>,
-    },
-    /// The sampled values of a sample contradict each other.
-    #[error("failed to run sample {sample}: {source}")]
-    Sample {
-        /// The sample.
-        sample: u64,
-        /// Why it has no concrete scenario.
-        source: SampleError,
-    },
-}
+use crate::runner::{Work, concrete};
+pub use crate::saved_error::SavedError;
+use crate::trust;
 
 /// A campaign's folder with its manifest.
 #[derive(Clone, Debug)]

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::execution::End;
 use crate::ledger::ArmCounts;
 use crate::probability::ProbabilityGate;
 
@@ -100,6 +99,15 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     let time = number.parse().ok().filter(|value: &f64| *value > 0.0);
     time.and_then(|value| Duration::try_from_secs_f64(value * unit_s).ok())
         .ok_or_else(|| format!("`{text}` is not a time above 0 such as 90s, 15m or 8h"))
+}
+
+/// What a caller of [`Campaign::run`] ends after a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The scenario of the record. The next scenario begins.
+    Scenario,
+    /// The whole campaign.
+    Campaign,
 }
 
 #[cfg(test)]

@@ -19,13 +19,11 @@ use std::fmt;
 use closecall_traffic::statistics::format::percent;
 use serde::Serialize;
 
+use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
 use super::probability::{Answer, Finding};
 use super::summary::Summary;
 use super::validity::CheckCounts;
-
-/// Default of the share of checked verdicts that may flip at half the time step (-).
-pub const MAX_FLIP_RATE: f64 = 0.05;
 
 /// Share of the outcomes in which the system under test may not be available for some time, and the campaign still says what the
 /// system does (-). An assumption: with more, the usual run is one in which the system cannot act as it was built to.
@@ -104,8 +102,8 @@ impl Decision {
     pub const PRECEDENCE: [Self; 6] =
         [Self::SampleError, Self::Invalid, Self::Fail, Self::Inconclusive, Self::NotJudged, Self::Overridden];
 
-    fn first_of(found: &[Self]) -> Option<Self> {
-        Self::PRECEDENCE.into_iter().find(|decision| found.contains(decision))
+    fn first_of(findings: &[Self]) -> Option<Self> {
+        Self::PRECEDENCE.into_iter().find(|decision| findings.contains(decision))
     }
 
     /// Returns the verdict, or `None` for a measurement.
@@ -202,66 +200,66 @@ impl FlakyGate {
 impl fmt::Display for FlakyGate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { flaky, max } = self;
-        write!(f, "flaky samples: {flaky}, at most {max} allowed (--max-flaky)")
+        write!(f, "flaky samples: {flaky}, at most {max} allowed")
     }
 }
 
 /// Judges a campaign by the evidence that a judge has gathered.
 pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
-    let mut found = Found::default();
+    let mut findings = Findings::default();
     let total = summary.total();
     if total.errors() > 0 {
-        found.add(Decision::SampleError, format!("{} ended in an error", samples(total.errors())));
-        summary.failures().for_each(|(scenario, failure)| found.note(format!("{scenario}: {failure}")));
+        findings.add(Decision::SampleError, format!("{} ended in an error", samples(total.errors())));
+        summary.failures().for_each(|(scenario, failure)| findings.note(format!("{scenario}: {failure}")));
     }
     if summary.is_unchecked {
-        found.note("the validity of the simulator was not checked: the checks were switched off".to_owned());
+        findings.note("the validity of the simulator was not checked: the checks were switched off".to_owned());
     }
-    let flaky = judge_flaky(total.flaky(), allowed.max_flaky, &mut found);
-    judge_validity(&total.checks, allowed.max_flip_rate, &mut found);
-    let expectations = judge_expectations(judge, &mut found);
-    judge_samples(summary, judge, &mut found);
-    judge_action(judge, &mut found);
+    let flaky = judge_flaky(total.flaky(), allowed.max_flaky, &mut findings);
+    judge_validity(&total.checks, allowed.max_flip_rate, &mut findings);
+    let expectations = judge_expectations(judge, &mut findings);
+    judge_samples(summary, judge, &mut findings);
+    judge_action(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
         let what = weakened.join("; ");
-        found.add(
+        findings.add(
             Decision::Overridden,
-            format!("OVERRIDDEN: {name}: --set weakened what the scenario is judged by: {what}"),
+            format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {what}"),
         );
     }
-    let probabilities = judge_probabilities(summary, judge, &mut found);
+    let probabilities = judge_probabilities(summary, judge, &mut findings);
     let gates = judge.gates();
     for gate in &gates {
         match gate.standing() {
-            Standing::Pass | Standing::NotChecked => found.note(gate.to_string()),
-            Standing::Inconclusive => found.add(Decision::Inconclusive, gate.to_string()),
-            Standing::Fail => found.add(Decision::Fail, gate.to_string()),
+            Standing::Pass | Standing::NotChecked => findings.note(gate.to_string()),
+            Standing::Inconclusive => findings.add(Decision::Inconclusive, gate.to_string()),
+            Standing::Fail => findings.add(Decision::Fail, gate.to_string()),
         }
     }
     for subject in undecidable(&gates) {
         let reason = format!("{subject} has no value in any scenario, so that the gate on it says nothing");
-        found.add(Decision::Inconclusive, reason);
+        findings.add(Decision::Inconclusive, reason);
     }
     let requirements = judge.requirements(&gates);
     let has_criteria = |requirement: &RequirementResult| {
         gates.iter().any(|gate| gate.scenario == requirement.scenario && gate.is_of(&requirement.mark))
     };
     for requirement in requirements.iter().filter(|requirement| !has_criteria(requirement)) {
-        found.note(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));
+        findings.note(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));
     }
     let is_judged = !probabilities.is_empty() || is_judged(&gates);
     let decision = if judge.is_measurement() {
         // Errors, and a simulator that cannot be believed, spoil a measurement, too.
         let spoils = |decision: &Decision| matches!(decision, Decision::SampleError | Decision::Invalid);
-        Decision::first_of(&found.decisions).filter(spoils).unwrap_or(Decision::Measured)
+        Decision::first_of(&findings.decisions).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
-            let what = "no gate was set and no requirement was checked: set a gate, or measure without a verdict with --no-gate";
-            found.add(Decision::NotJudged, what.to_owned());
+            let what = "no gate was set and no requirement was checked: set a gate, or measure without a verdict";
+            findings.add(Decision::NotJudged, what.to_owned());
         }
-        Decision::first_of(&found.decisions).unwrap_or(Decision::Pass)
+        Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)
     };
-    Judgement { decision, reasons: found.reasons, gates, requirements, expectations, probabilities, flaky }
+    Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, flaky }
 }
 
 /// Returns the subjects of the gates that somebody set and that no scenario decides: there is no sample in which they have a
@@ -283,36 +281,36 @@ fn is_judged(gates: &[GateResult]) -> bool {
         || (!checks.is_empty() && checks.iter().all(|gate| gate.standing() != Standing::NotChecked))
 }
 
-fn judge_flaky(flaky: u64, max: Option<u64>, found: &mut Found) -> Option<FlakyGate> {
+fn judge_flaky(flaky: u64, max: Option<u64>, findings: &mut Findings) -> Option<FlakyGate> {
     let Some(gate) = max.map(|max| FlakyGate { flaky, max }) else {
         if flaky > 0 {
-            found.note(format!("flaky: {} succeeded only in another process", samples(flaky)));
+            findings.note(format!("flaky: {} succeeded only in another process", samples(flaky)));
         }
         return None;
     };
     if gate.is_met() {
         // Nothing was run again: there is nothing to say.
         if flaky > 0 {
-            found.note(gate.to_string());
+            findings.note(gate.to_string());
         }
     } else {
-        found.add(Decision::Fail, gate.to_string());
+        findings.add(Decision::Fail, gate.to_string());
     }
     Some(gate)
 }
 
-fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, found: &mut Found) {
+fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, findings: &mut Findings) {
     if checks.not_checked > 0 {
         let sentence = format!(
-            "not checked: {} of {} runs that were chosen for the validity checks, because a check took too long (--retry-errors runs \
-             them again)",
+            "not checked: {} of {} runs that were chosen for the validity checks, because a check took too long (a campaign that is resumed \
+             and repeats errors runs them again)",
             checks.not_checked,
             checks.not_checked + checks.runs
         );
-        if checks.runs == 0 { found.add(Decision::Inconclusive, sentence) } else { found.note(sentence) }
+        if checks.runs == 0 { findings.add(Decision::Inconclusive, sentence) } else { findings.note(sentence) }
     }
     for (check, count) in checks.broken() {
-        found.add(Decision::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
+        findings.add(Decision::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
     }
     if checks.flips == 0 {
         return;
@@ -324,16 +322,16 @@ fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, found: &mut Found) {
         checks.runs,
         percent(max_flip_rate)
     );
-    if checks.flips > allowed { found.add(Decision::Invalid, sentence) } else { found.note(sentence) }
+    if checks.flips > allowed { findings.add(Decision::Invalid, sentence) } else { findings.note(sentence) }
 }
 
-fn judge_expectations(judge: &Judge, found: &mut Found) -> Vec<ExpectationResult> {
+fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<ExpectationResult> {
     let expectations = judge.expectations();
     for expectation in &expectations {
         if expectation.is_met() {
-            found.note(format!("happened as expected: {expectation}"));
+            findings.note(format!("happened as expected: {expectation}"));
         } else if expectation.samples > 0 {
-            found.add(Decision::Invalid, format!("what the scenario is about did not happen: {expectation}"));
+            findings.add(Decision::Invalid, format!("what the scenario is about did not happen: {expectation}"));
         }
     }
     expectations
@@ -341,7 +339,7 @@ fn judge_expectations(judge: &Judge, found: &mut Found) -> Vec<ExpectationResult
 
 /// Says in how many samples the system under test was not available for some time. If those are more than
 /// [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it engages before its sensors fail.
-fn judge_availability(summary: &Summary, found: &mut Found) {
+fn judge_availability(summary: &Summary, findings: &mut Findings) {
     for (name, counts) in &summary.scenarios {
         let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
         let sentence = format!(
@@ -355,39 +353,39 @@ fn judge_availability(summary: &Summary, found: &mut Found) {
                 percent(MAX_UNAVAILABLE_SHARE),
                 samples(tested.engagements)
             );
-            found.add(Decision::NotJudged, reason);
+            findings.add(Decision::NotJudged, reason);
         } else {
-            found.note(sentence);
+            findings.note(sentence);
         }
     }
 }
 
 /// A system that never slowed the ego for a vehicle behind was not tested by a scenario that asks what it prevents.
-fn judge_action(judge: &Judge, found: &mut Found) {
+fn judge_action(judge: &Judge, findings: &mut Findings) {
     for (name, count) in judge.without_action() {
         let reason = format!(
             "{name}: the system under test never slowed the ego for a vehicle behind in {}, so that they do not decide what it does",
             samples(count)
         );
-        found.add(Decision::NotJudged, reason);
+        findings.add(Decision::NotJudged, reason);
     }
 }
 
 /// Judges whether there are samples at all.
-fn judge_samples(summary: &Summary, judge: &Judge, found: &mut Found) {
+fn judge_samples(summary: &Summary, judge: &Judge, findings: &mut Findings) {
     let outcomes = |tested: Option<u64>| tested.unwrap_or_default();
     if outcomes(summary.total().arms.last().map(|tested| tested.outcomes)) == 0 {
-        found.add(Decision::Inconclusive, "no sample has an outcome".to_owned());
+        findings.add(Decision::Inconclusive, "no sample has an outcome".to_owned());
         return;
     }
-    judge_availability(summary, found);
+    judge_availability(summary, findings);
     for (name, counts) in &summary.scenarios {
         if counts.samples == 0 {
-            found.add(Decision::Inconclusive, format!("{name}: no sample was run"));
+            findings.add(Decision::Inconclusive, format!("{name}: no sample was run"));
         }
         let repeated = judge.repeated(name);
         if repeated > 0 {
-            found.note(format!(
+            findings.note(format!(
                 "{name}: {} have the parameters or the outcome of an earlier one and do not count",
                 samples(repeated)
             ));
@@ -395,36 +393,36 @@ fn judge_samples(summary: &Summary, judge: &Judge, found: &mut Found) {
     }
 }
 
-fn judge_probabilities(summary: &Summary, judge: &Judge, found: &mut Found) -> Vec<(String, Finding)> {
+fn judge_probabilities(summary: &Summary, judge: &Judge, findings: &mut Findings) -> Vec<(String, Finding)> {
     let specs: Vec<_> = judge.probabilities().collect();
-    let mut findings = Vec::new();
+    let mut probabilities = Vec::new();
     for (name, spec) in &specs {
         let Some(counts) = summary.tested(name) else { continue };
         if !judge.is_varied(name) {
             let sentence = format!("{name}: no parameter varies enough, so that no probability can be bounded");
-            found.add(Decision::Inconclusive, sentence);
+            findings.add(Decision::Inconclusive, sentence);
             continue;
         }
         let finding = spec.gate.judge(counts, specs.len(), summary.inference);
         let sentence = format!("{name}: {} (from {})", finding.sentence(counts), spec.source);
         match finding.answer {
-            Answer::Below => found.note(sentence),
-            Answer::Above => found.add(Decision::Fail, sentence),
-            Answer::Open => found.add(Decision::Inconclusive, sentence),
+            Answer::Below => findings.note(sentence),
+            Answer::Above => findings.add(Decision::Fail, sentence),
+            Answer::Open => findings.add(Decision::Inconclusive, sentence),
         }
-        findings.push(((*name).to_owned(), finding));
+        probabilities.push(((*name).to_owned(), finding));
     }
-    findings
+    probabilities
 }
 
 /// Reasons and what they decide, as they are found.
 #[derive(Default)]
-struct Found {
+struct Findings {
     reasons: Vec<String>,
     decisions: Vec<Decision>,
 }
 
-impl Found {
+impl Findings {
     fn note(&mut self, reason: String) {
         self.reasons.push(reason);
     }

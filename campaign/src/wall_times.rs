@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, Read as _, Seek, SeekFrom, Write};
+use std::ops::AddAssign;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -124,11 +125,29 @@ fn lines(mut reader: impl BufRead) -> impl Iterator<Item = (WallTime, u64)> {
     })
 }
 
-/// Returns what share of the wall time of runs and of their validity checks (s) the checks have taken, in brackets; nothing if there
-/// were none.
-pub fn check_share([run_s, check_s]: [f64; 2]) -> String {
-    let share = 100.0 * check_s / (run_s + check_s);
-    if check_s > 0.0 { format!(" ({share:.0} % of their time for validity checks)") } else { String::new() }
+/// The wall times of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpentTime {
+    /// That of the runs (s).
+    pub runs_s: f64,
+    /// That of their validity checks (s).
+    pub checks_s: f64,
+}
+
+impl AddAssign for SpentTime {
+    fn add_assign(&mut self, other: Self) {
+        self.runs_s += other.runs_s;
+        self.checks_s += other.checks_s;
+    }
+}
+
+impl SpentTime {
+    /// Returns what share of the time the validity checks have taken, in brackets; nothing if there were none.
+    pub fn check_share(self) -> String {
+        let Self { runs_s, checks_s } = self;
+        let share = 100.0 * checks_s / (runs_s + checks_s);
+        if checks_s > 0.0 { format!(" ({share:.0} % of their time for validity checks)") } else { String::new() }
+    }
 }
 
 #[cfg(test)]

@@ -21,10 +21,12 @@ use std::time::{Duration, Instant};
 
 use closecall_simulation::{Arm, SampleError};
 
-use super::execution::CampaignError;
+use super::campaign_error::CampaignError;
 use super::record::{ArmRecord, Record, SampleFailure};
 use super::runner::{ArmRun, OnOutcome, Work};
 use super::stop::StopFlag;
+
+pub use super::campaign_error::WorkersError;
 
 /// Number of runs, for each worker, that may be ahead of the last result returned.
 const WINDOW_PER_WORKER: usize = 128;
@@ -59,16 +61,6 @@ impl Workers {
         let default = Self::default();
         Self { jobs: jobs.and_then(|jobs| NonZeroUsize::new(jobs.into())).unwrap_or(default.jobs), ..default }
     }
-}
-
-/// The worker threads could not be started.
-#[derive(Debug, thiserror::Error)]
-#[error("failed to start {jobs} worker threads: {source}")]
-pub struct WorkersError {
-    /// Number of threads that were requested.
-    pub jobs: usize,
-    /// The error of the operating system.
-    pub source: std::io::Error,
 }
 
 /// The result of one sample with its wall times.

@@ -130,7 +130,7 @@ pub fn json(calibration: &Calibration, data: &FollowingData) -> Value {
 
 /// Returns a member of a driver ensemble with the pooled parameters, as the text of its file. It leaves headway and desired
 /// speed to the scenario: they are those of the recorded traffic.
-pub fn member(calibration: &Calibration, data: &FollowingData) -> String {
+pub fn member(calibration: &Calibration, data: &FollowingData, command: &str) -> String {
     let model = calibration.model.name();
     let files: Vec<String> = data
         .files
@@ -141,7 +141,7 @@ pub fn member(calibration: &Calibration, data: &FollowingData) -> String {
         })
         .collect();
     let source = format!(
-        "closecall traffic calibrate --model {model}: {} pairs of {}, RMSE of the gap {:.2} m, on {} held-out pairs {}",
+        "{command}: {} pairs of {}, RMSE of the gap {:.2} m, on {} held-out pairs {}",
         calibration.pairs.len(),
         files.join(", "),
         calibration.errors_of_pooled.rmse_m,
@@ -192,7 +192,7 @@ mod tests {
             predictive: None,
         };
         let data = FollowingData::default();
-        let member = Member::parse("m.toml".as_ref(), &member(&calibration, &data)).unwrap();
+        let member = Member::parse("m.toml".as_ref(), &member(&calibration, &data, "closecall")).unwrap();
         assert_eq!(member.name(), "calibrated-idm");
         let sets: Vec<String> = member.values().into_iter().map(|(set, _)| set).collect();
         assert_eq!(sets, ["follow = idm", "acceleration-mps2 = 1.1", "comfortable-braking-mps2 = 1.8"]);

@@ -10,35 +10,17 @@ use closecall_traffic::{
 
 use crate::grip::lateral_grip_mps2;
 
+use crate::run_key::RunKey;
+
+use super::actor::Actor;
 use super::config::{ActorConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
-use super::events::{self, Event};
+use super::events::{self};
 use super::fleet::FleetOf;
 use super::intervention::Interventions;
 use super::{inert_fault, placement, traffic};
 
 /// Largest probability or confidence that a gate may ask for: the largest number below 1 (-).
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
-
-/// One vehicle of a concrete scenario.
-#[derive(Clone, Debug)]
-pub struct Actor {
-    /// Its name.
-    pub id: ActorId,
-    /// Its class, size and mass.
-    pub vehicle: Vehicle,
-    /// Its state at time zero.
-    pub start: VehicleState,
-    /// Its driver: a human driver, or the ego stack.
-    pub driver: CheckedDriver,
-    /// How its driver weaves in the lane, or `None` if the driver keeps the lane exactly.
-    pub lane_keeping: Option<LaneKeeping>,
-    /// How the desired speed of its driver varies, or `None` if it is constant.
-    pub speed_keeping: Option<SpeedKeeping>,
-    /// What happens to it.
-    pub events: Vec<Event>,
-    /// The fleet that its look is drawn from in each run; see [`Scenario::vehicle`].
-    pub(crate) fleet: Option<FleetOf>,
-}
 
 /// A concrete scenario: every value is a number, and every number has been checked.
 #[derive(Clone, Debug)]
@@ -73,6 +55,13 @@ impl Scenario {
     /// Returns the ego's name.
     pub fn ego_id(&self) -> &ActorId {
         &self.actors[self.ego].id
+    }
+
+    /// Returns the vehicle of the actor with this index as it looks in a run: with what is drawn from its fleet, if it names one.
+    pub fn vehicle(&self, actor: usize, key: RunKey) -> Vehicle {
+        let key = self.random_numbers.map_or(key, |of| RunKey { seed: of.seed, sample: of.sample });
+        let Actor { id, vehicle, fleet, .. } = &self.actors[actor];
+        fleet.as_ref().map_or(*vehicle, |fleet| fleet.vehicle_in_run(*vehicle, id, key))
     }
 }
 
@@ -213,7 +202,8 @@ impl ScenarioConfig {
             road,
             parameters,
         )?;
-        let start = events::Start { actors: &self.actors, vehicles: &vehicles, states: &states };
+        let ids: Vec<&ActorId> = self.actors.iter().map(|actor| &actor.id).collect();
+        let start = events::Start { ids: &ids, vehicles: &vehicles, states: &states };
         let mut checked = Vec::with_capacity(self.actors.len());
         for ((index, actor), driver) in self.actors.iter().enumerate().zip(drivers) {
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;

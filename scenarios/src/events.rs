@@ -8,8 +8,7 @@ use closecall_traffic::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::config::ActorConfig;
-use super::placement::find_actor;
+use super::actor::find_actor;
 
 /// An event of a scenario file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -167,7 +166,7 @@ const SLOWEST_APPROACH_MPS: f64 = 0.1;
 
 /// The actors at the start of a run, to which a trigger may refer. All slices are in the order of the actors.
 pub(super) struct Start<'a> {
-    pub(super) actors: &'a [ActorConfig],
+    pub(super) ids: &'a [&'a ActorId],
     pub(super) vehicles: &'a [Vehicle],
     pub(super) states: &'a [VehicleState],
 }
@@ -202,8 +201,8 @@ impl TriggerConfig {
 
 fn thw_below(config: &ThwBelowConfig, start: &Start<'_>, parameters: &Parameters) -> Result<Trigger, ConfigError> {
     Ok(Trigger::ThwBelow {
-        from: find_actor(start.actors, &config.from, "from")?,
-        to: find_actor(start.actors, &config.to, "to")?,
+        from: find_actor(start.ids, &config.from, "from")?,
+        to: find_actor(start.ids, &config.to, "to")?,
         thw_s: parameters.number(&config.thw_s, "thw-s", Range::above(0.0, 60.0))?,
     })
 }
@@ -213,7 +212,7 @@ fn cut_out(config: &CutOutStartedConfig, start: &Start<'_>, parameters: &Paramet
         Some(delay) => parameters.number(delay, "delay-s", Range::closed(0.0, 60.0))?,
         None => 0.0,
     };
-    let actor = find_actor(start.actors, &config.actor, "actor")?;
+    let actor = find_actor(start.ids, &config.actor, "actor")?;
     Ok(Trigger::CutOutStarted { actor, delay: Time::from_s(delay_s) })
 }
 
@@ -222,8 +221,8 @@ fn nominal_time(
     start: &Start<'_>,
     parameters: &Parameters,
 ) -> Result<Trigger, ConfigError> {
-    let from = find_actor(start.actors, &config.from, "from")?;
-    let to = find_actor(start.actors, &config.to, "to")?;
+    let from = find_actor(start.ids, &config.from, "from")?;
+    let to = find_actor(start.ids, &config.to, "to")?;
     let phase = parameters.number(&config.phase, "phase", Range::UNIT)?;
     let closing_mps = start.states[from].speed_mps - start.states[to].speed_mps;
     // A vehicle that does not approach has no nominal encounter.

@@ -92,7 +92,7 @@ pub enum ScenarioError {
         name: ParameterName,
     },
     /// A setting (`--set`) cannot be applied.
-    #[error("failed to apply --set to {}: {source}", path.display())]
+    #[error("failed to apply a setting to {}: {source}", path.display())]
     Set {
         /// The file.
         path: PathBuf,
@@ -172,7 +172,8 @@ impl ScenarioFile {
 
     /// Parses the text of a scenario that has no base.
     fn parse_whole(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
-        // The unchanged text is parsed first, so that errors in the file have the line numbers of the file.
+        // The text is read once. With settings the unchanged text comes first, so that errors in
+        // the file have the line numbers of the file.
         let mut config = deserialize(path, text)?;
         let parameters = config.parameters.0.len() as u64;
         if parameters > MOST_PARAMETERS {
@@ -195,19 +196,17 @@ impl ScenarioFile {
             let weakened = overridden::weakened(&before, &config);
             if weakened != config.overridden {
                 text = with_overridden(&text, &weakened);
-                config = deserialize(path, &text)?;
+                config.overridden = weakened;
             }
         }
         let trajectory_files = recorded::files(path, &config);
         if let Some(inlined) =
-            recorded::inline(path, &text, &config).map_err(|error| recorded_error(path, &text, &error))?
+            recorded::inline(path, &text, &mut config).map_err(|error| recorded_error(path, &text, &error))?
         {
             text = inlined;
-            config = deserialize(path, &text)?;
         }
-        if let Some(inlined) = lidar_file::inline(path, &text, &config)? {
+        if let Some(inlined) = lidar_file::inline(path, &text, &mut config)? {
             text = inlined;
-            config = deserialize(path, &text)?;
         }
         let space = config.parameters.check().map_err(|error| {
             let source = error.within("parameters");

@@ -12,11 +12,12 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use closecall_traffic::{BodyShape, ConfigError, Plate, Problem, Stream, Vehicle, VehicleClass, VehicleConfig, stream};
+use closecall_traffic::{
+    ActorId, BodyShape, ConfigError, Plate, Problem, Stream, Vehicle, VehicleClass, VehicleConfig, stream,
+};
 use rand::RngExt;
 use serde::Deserialize;
 
-use super::Scenario;
 use crate::run_key::RunKey;
 
 /// Name of the random stream.
@@ -106,6 +107,11 @@ impl FleetOf {
     pub(super) fn of_name(name: &str) -> Result<Self, ConfigError> {
         let [has_paint, has_colour, has_shape, has_height, has_plate] = [false; 5];
         Ok(Self { fleet: Fleet::named(name)?, has_paint, has_colour, has_shape, has_height, has_plate })
+    }
+
+    /// Returns the vehicle of the actor `id` as it looks in the run `key`.
+    pub(crate) fn vehicle_in_run(&self, vehicle: Vehicle, id: &ActorId, key: RunKey) -> Vehicle {
+        self.draw(vehicle, &mut stream(key.seed, key.sample, id, CHANNEL))
     }
 
     /// Returns a vehicle with a look drawn from its fleet. It always draws four numbers.
@@ -248,16 +254,6 @@ fn check_source(key: &str, source: &str) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("{key}: `{source}` is no source; more than {MIN_SOURCE_LEN} characters are needed"))
-}
-
-impl Scenario {
-    /// Returns the vehicle of the actor with this index as it looks in a run: with what is drawn from its fleet, if it names one.
-    pub fn vehicle(&self, actor: usize, key: RunKey) -> Vehicle {
-        let key = self.random_numbers.map_or(key, |of| RunKey { seed: of.seed, sample: of.sample });
-        let of = &self.actors[actor];
-        let draw = |fleet: FleetOf| fleet.draw(of.vehicle, &mut stream(key.seed, key.sample, &of.id, CHANNEL));
-        of.fleet.map_or(of.vehicle, draw)
-    }
 }
 
 #[cfg(test)]

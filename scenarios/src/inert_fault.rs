@@ -4,11 +4,10 @@ use closecall_sensors::camera::Pipeline;
 use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_traffic::{Check, ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road, maths};
+use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road, maths};
 
 use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
 use super::intervention::FaultConfig;
-use super::{ScenarioError, ScenarioFile};
 
 /// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, those of a front radar that a
 /// LiDAR replaces and of a front LiDAR that does not exist, blocked sectors outside of the field of view, mirror images without guard rails,
@@ -16,7 +15,7 @@ use super::{ScenarioError, ScenarioFile};
 ///
 /// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes, and so is one with
 /// faults both of the LiDAR and of the radar that look ahead. A mode that the
-/// command line gives is checked by [`ScenarioFile::check_faults_in`].
+/// command line gives is checked by [`ScenarioFile::check_faults_in`](crate::ScenarioFile::check_faults_in).
 pub(super) fn refuse(
     fault: &FaultConfig,
     (sensors, road, environment): (&Sensors, &Road, &Environment),
@@ -118,24 +117,8 @@ fn refuse_glare(
     Ok(())
 }
 
-impl ScenarioFile {
-    /// Refuses a mode of the sensors, given instead of the file's, in which a fault of the file could not act: the runs would pass
-    /// for runs with the fault.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Value`] with the fault.
-    pub fn check_faults_in(&self, mode: SensorMode) -> Result<(), ScenarioError> {
-        let parameters = self.space().nominal();
-        let at = format!(" (with the mode `{}`, which is given instead of the file's)", mode.name());
-        let checked = self.config().sensors.check(&parameters).map_err(|error| error.within("sensors"));
-        checked
-            .and_then(|sensors| refuse_absent(&self.config().fault, &sensors.with_mode(mode)))
-            .map_err(|error| self.located(error, at))
-    }
-}
-
 /// Refuses faults of sensors that do not exist.
-fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigError> {
+pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigError> {
     const MODE: &str = "sensors.mode";
     let mode = sensors.mode();
     let (has_lidar, has_camera) = (!fault.rear_lidar.is_empty(), !fault.rear_camera.is_empty());

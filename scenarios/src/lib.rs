@@ -13,6 +13,8 @@
 //! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
 //! * [`criteria`]: what a file asks of the outcomes
 
+mod actor;
+mod asked_mode;
 mod base;
 pub mod causal;
 mod checked;
@@ -50,7 +52,8 @@ mod step_value;
 mod traffic;
 mod variation;
 
-pub use checked::{Actor, Scenario};
+pub use actor::Actor;
+pub use checked::Scenario;
 pub use config::{
     AbsoluteStartConfig, ActorConfig, RandomNumbersConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig,
     StartConfig,

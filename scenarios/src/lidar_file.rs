@@ -14,17 +14,18 @@ use super::{ScenarioConfig, ScenarioError, locate};
 /// The key of the file, and the key that its contents become.
 const KEYS: [&str; 2] = ["pattern-file", "pattern"];
 
-/// Returns the text with the contents of each pattern file in place of its name, or `None` if there is none. `path` is the path of
+/// Puts the contents of each pattern file in place of its name, in the contents of a scenario file
+/// and in its text. Returns the text, or `None` if no pattern file is named. `path` is the path of
 /// the scenario file.
 ///
 /// # Errors
 /// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong key.
-pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result<Option<String>, ScenarioError> {
+pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, ScenarioError> {
     let mut document: Option<DocumentMut> = None;
     for ((key, index), lidar) in lidars(config) {
         let Some(name) = &lidar.pattern_file else { continue };
         let element = index.map_or_else(String::new, |index| format!("[{index}]"));
-        let pattern = read(&path.with_file_name(name), &format!("sensors.{key}{element}.{}", KEYS[0]))?;
+        let (kind, pattern) = read(&path.with_file_name(name), &format!("sensors.{key}{element}.{}", KEYS[0]))?;
         let syntax = |message: &str| {
             let line = text.lines().position(|line| line.contains(KEYS[0])).map_or(1, |index| index + 1);
             ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`{}`: {message}", KEYS[0]) }
@@ -44,16 +45,18 @@ pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result
         let table = table.ok_or_else(|| syntax("the sensor must be written as a table"))?;
         table.remove(KEYS[0]);
         table.insert(KEYS[1], Item::Value(Value::InlineTable(pattern)));
+        lidar.pattern = Some(kind);
+        lidar.pattern_file = None;
     }
     Ok(document.map(|document| document.to_string()))
 }
 
 /// Returns the LiDARs of a scenario with their keys, and their indices if the key is that of a list.
-fn lidars(config: &ScenarioConfig) -> impl Iterator<Item = ((&'static str, Option<usize>), &LidarConfig)> {
-    let front = config.sensors.front_lidar.as_ref().map(|lidar| (("front-lidar", None), lidar));
-    let further = config.sensors.additional_rear_lidars.iter().enumerate();
+fn lidars(config: &mut ScenarioConfig) -> impl Iterator<Item = ((&'static str, Option<usize>), &mut LidarConfig)> {
+    let front = config.sensors.front_lidar.as_mut().map(|lidar| (("front-lidar", None), lidar));
+    let further = config.sensors.additional_rear_lidars.iter_mut().enumerate();
     let further = further.map(|(index, lidar)| (("additional-rear-lidars", Some(index)), lidar));
-    std::iter::once((("rear-lidar", None), &config.sensors.rear_lidar)).chain(front).chain(further)
+    std::iter::once((("rear-lidar", None), &mut config.sensors.rear_lidar)).chain(front).chain(further)
 }
 
 /// Returns the table at `index` of a list of tables, in either of the two forms of TOML.
@@ -68,7 +71,7 @@ fn element_of(list: &mut Item, index: usize) -> Option<&mut dyn TableLike> {
 }
 
 /// Reads and checks a pattern file, which the key `key` names.
-fn read(path: &Path, key: &str) -> Result<toml_edit::InlineTable, ScenarioError> {
+fn read(path: &Path, key: &str) -> Result<(LidarKindConfig, toml_edit::InlineTable), ScenarioError> {
     let text = read_text(path).map_err(|source| {
         let source = std::io::Error::new(source.kind(), format!("`{key}` names this file: {source}"));
         ScenarioError::Read { path: path.to_owned(), source }
@@ -84,7 +87,7 @@ fn read(path: &Path, key: &str) -> Result<toml_edit::InlineTable, ScenarioError>
     })?;
     let plain = toml::to_string(&config).map_err(|error| syntax(1, error.to_string()))?;
     let document: DocumentMut = plain.parse().map_err(|error: toml_edit::TomlError| syntax(1, error.to_string()))?;
-    Ok(document.as_table().clone().into_inline_table())
+    Ok((config, document.as_table().clone().into_inline_table()))
 }
 
 #[cfg(test)]

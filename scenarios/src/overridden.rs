@@ -49,7 +49,7 @@ mod tests {
         let file = ScenarioFile::parse(Path::new("a.toml"), &text, &settings).unwrap();
         // What a saved campaign reads is the text.
         let again = ScenarioFile::parse(Path::new("a.toml"), file.text(), &[]).unwrap();
-        assert_eq!(again.config().overridden, file.config().overridden);
+        assert_eq!(again.config(), file.config());
         file.config().overridden.clone()
     }
 

@@ -4,6 +4,7 @@ use closecall_controllers::CheckedDriver;
 use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{ActorId, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState};
 
+use super::actor::find_actor;
 use super::config::{ActorConfig, RelativeStartConfig, StartConfig};
 
 const SPEED_RANGE_MPS: Range = Range::closed(0.0, 80.0);
@@ -185,7 +186,8 @@ impl Placement<'_> {
     }
 
     fn find(&self, id: &ActorId) -> Result<usize, ConfigError> {
-        find_actor(self.actors, id, "of")
+        let ids: Vec<&ActorId> = self.actors.iter().map(|actor| &actor.id).collect();
+        find_actor(&ids, id, "of")
     }
 
     fn lane_centre_m(&self, lane: Lane) -> Result<f64, ConfigError> {
@@ -196,14 +198,6 @@ impl Placement<'_> {
             Err(ConfigError::new("lane", problem))
         }
     }
-}
-
-/// Returns the index of the actor `id`. `key` is the key of the scenario file that names it.
-pub(super) fn find_actor(actors: &[ActorConfig], id: &ActorId, key: &str) -> Result<usize, ConfigError> {
-    actors.iter().position(|actor| actor.id == *id).ok_or_else(|| {
-        let known = actors.iter().map(|actor| format!("`{}`", actor.id)).collect::<Vec<_>>().join(", ");
-        ConfigError::new(key, Problem::UnknownActor { value: id.to_string(), known })
-    })
 }
 
 /// One of two keys. Exactly one must be given.

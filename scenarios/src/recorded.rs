@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_controllers::{DriverConfig, RecordedConfig};
 use closecall_recorded::trajectory_data::{ReadOptions, open};
-use closecall_traffic::Trajectory;
+use closecall_traffic::{Num, Trajectory, TrajectoryPoint};
 use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 use super::ScenarioConfig;
@@ -43,12 +43,12 @@ pub(super) enum RecordedError {
     },
 }
 
-/// Returns the text with every `recorded` replaced by its speed profile, or `None` if there is no `recorded`. `path` is the
-/// path of the scenario file.
-pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result<Option<String>, RecordedError> {
+/// Replaces every `recorded` by its speed profile, in the contents of a file and in its text.
+/// Returns the text, or `None` if there is no `recorded`. `path` is the path of the scenario file.
+pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, RecordedError> {
     let mut document: Option<DocumentMut> = None;
-    for (index, actor) in config.actors.iter().enumerate() {
-        let DriverConfig::Prescribed(prescribed) = &actor.driver else { continue };
+    for (index, actor) in config.actors.iter_mut().enumerate() {
+        let DriverConfig::Prescribed(prescribed) = &mut actor.driver else { continue };
         let Some(recorded) = &prescribed.recorded else { continue };
         let profile = speed_profile(path, actor.id.as_str(), recorded)?;
         let form = || RecordedError::Form { actor: actor.id.to_string() };
@@ -57,7 +57,9 @@ pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result
         }
         let table = document.as_mut().and_then(|document| prescribed_table(document, index)).ok_or_else(form)?;
         table.remove("recorded");
-        table.insert("profile", Item::Value(Value::Array(profile)));
+        table.insert("profile", Item::Value(Value::Array(profile.iter().copied().map(Array::from_iter).collect())));
+        prescribed.profile = Some(profile.iter().map(|pair| pair.map(Num::Fixed)).collect());
+        prescribed.recorded = None;
     }
     Ok(document.map(|document| document.to_string()))
 }
@@ -77,16 +79,12 @@ fn prescribed_table(document: &mut DocumentMut, index: usize) -> Option<&mut dyn
 }
 
 /// Returns pairs of a time of the run (s) and the recorded speed (m/s).
-fn speed_profile(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Array, RecordedError> {
+fn speed_profile(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Vec<[f64; 2]>, RecordedError> {
     let trajectory = read_track(scenario, actor, recorded)?;
     let begin = trajectory.points.first().map(|point| point.time).unwrap_or_default();
     let from_s = recorded.from_s.unwrap_or(0.0);
-    let mut profile = Array::new();
-    for point in &trajectory.points {
-        let pair = [from_s + (point.time - begin).s(), point.speed_mps.max(0.0)];
-        profile.push(Array::from_iter(pair));
-    }
-    Ok(profile)
+    let pair = |point: &TrajectoryPoint| [from_s + (point.time - begin).s(), point.speed_mps.max(0.0)];
+    Ok(trajectory.points.iter().map(pair).collect())
 }
 
 /// Reads the track that `recorded` names.

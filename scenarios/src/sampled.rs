@@ -78,8 +78,8 @@ pub fn sampled(
     let in_set = |source_error| ScenarioError::Set { path: source.to_owned(), source: source_error };
     let settings = [settings, &[step.setting().map_err(in_set)?]].concat();
     let recorded_opp2 = opp2_of(encounter);
-    let (at_s, duration_s) = lane_change_of(encounter);
-    let built = built(encounter, recorded_opp2, (at_s, duration_s));
+    let lane_change = lane_change_of(encounter);
+    let built = built(encounter, recorded_opp2, lane_change);
     let index_of =
         |config: &ScenarioConfig, name: &str| config.actors.iter().position(|actor| actor.id.as_str() == name);
     let file = written(built, (source, &settings))?;
@@ -91,7 +91,7 @@ pub fn sampled(
         opp1: opp1.unwrap_or_default(),
         opp2,
         recorded_opp2,
-        lane_change_s: [at_s, at_s + duration_s],
+        lane_change_s: [lane_change.at_s, lane_change.at_s + lane_change.duration_s],
     })
 }
 
@@ -161,27 +161,36 @@ fn at_or_before(track: &Trajectory, time: Time) -> Option<&TrajectoryPoint> {
     (after < track.points.len() || point.time == time).then_some(point)
 }
 
-/// Returns the start and the duration of the lane change (s), which crosses the marking when the recorded one does.
-fn lane_change_of(encounter: &RecordedEncounter) -> (f64, f64) {
+/// When a lane change takes place.
+#[derive(Clone, Copy)]
+struct LaneChangeTimes {
+    /// Its start (s).
+    at_s: f64,
+    /// Its duration (s).
+    duration_s: f64,
+}
+
+/// Returns the times of the lane change, which crosses the marking when the recorded one does.
+fn lane_change_of(encounter: &RecordedEncounter) -> LaneChangeTimes {
     let [start_s, end_s] =
         [encounter.change.start_s, encounter.change.end_s].map(|time_s| encounter.time_of(time_s).s());
     let rear = encounter.ego_lead_rear()[REAR_INDEX];
     let as_recorded = (start_s.max(0.0), (end_s - start_s.max(0.0)).clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S));
     let (at_s, duration_s) = lane_change_across(rear, [start_s, encounter.crossing.s()], 0.0).unwrap_or(as_recorded);
-    (to_steps(at_s), to_steps(duration_s))
+    LaneChangeTimes { at_s: to_steps(at_s), duration_s: to_steps(duration_s) }
 }
 
 /// Returns the contents of the scenario file before a value is varied.
 fn built(
     encounter: &RecordedEncounter,
     opp2: Option<usize>,
-    lane_change: (f64, f64),
+    lane_change: LaneChangeTimes,
 ) -> Result<ScenarioConfig, String> {
     let base = config(encounter, RearDriver::Recorded)?;
-    let own = &encounter.vehicles[REAR_INDEX];
-    let own_start = start_of(&own.trajectory).ok_or("the vehicle that changes lanes appears after the start")?;
-    let mut actors = vec![lane_changer(encounter, own, own_start, lane_change)?];
-    let mut kept: Vec<&Participant> = vec![own];
+    let changer = &encounter.vehicles[REAR_INDEX];
+    let own_start = start_of(&changer.trajectory).ok_or("the vehicle that changes lanes appears after the start")?;
+    let mut actors = vec![lane_changer(encounter, changer, own_start, lane_change)?];
+    let mut kept: Vec<&Participant> = vec![changer];
     for (index, vehicle) in encounter.vehicles.iter().enumerate().filter(|(index, _)| *index != REAR_INDEX) {
         let Some(start) = start_of(&vehicle.trajectory) else { continue };
         let is_opponent = index == EGO_INDEX || Some(index) == opp2;
@@ -200,10 +209,10 @@ fn built(
     }
     actors.push(ego(encounter, &kept)?);
     Ok(ScenarioConfig {
-        name: format!("sampled-track-{}", own.trajectory.track_id),
+        name: format!("sampled-track-{}", changer.trajectory.track_id),
         description: format!(
             "The lane change of track {} past track {} in {}, from {:.1} s on",
-            own.trajectory.track_id,
+            changer.trajectory.track_id,
             encounter.vehicles[EGO_INDEX].trajectory.track_id,
             encounter.data_name,
             encounter.start.s()
@@ -217,12 +226,12 @@ fn built(
 /// Returns the vehicle that changes lanes: it follows by Wiedemann's model, and changes lanes when the recorded one does.
 fn lane_changer(
     encounter: &RecordedEncounter,
-    own: &Participant,
+    changer: &Participant,
     start: &TrajectoryPoint,
-    (at_s, duration_s): (f64, f64),
+    LaneChangeTimes { at_s, duration_s }: LaneChangeTimes,
 ) -> Result<ActorConfig, String> {
     let driver = DriverConfig::Wiedemann99(Wiedemann99Config {
-        desired_speed_mps: Some(rounded(max_speed_mps([&own.trajectory]))),
+        desired_speed_mps: Some(rounded(max_speed_mps([&changer.trajectory]))),
         ..Wiedemann99Config::default()
     });
     let change = EventConfig {
@@ -233,7 +242,7 @@ fn lane_changer(
             duration_s: Num::Fixed(duration_s),
         }),
     };
-    Ok(ActorConfig { events: vec![change], ..actor(LANE_CHANGER, own, start, driver)? })
+    Ok(ActorConfig { events: vec![change], ..actor(LANE_CHANGER, changer, start, driver)? })
 }
 
 /// Returns the ego, which is behind all other vehicles and as slow as the slowest of them.
@@ -269,10 +278,12 @@ fn ego(encounter: &RecordedEncounter, others: &[&Participant]) -> Result<ActorCo
 /// Returns whether a vehicle is behind the lane changer at the crossing, or at the end of its track before it, in one of the
 /// two lanes of the lane change.
 fn is_behind(encounter: &RecordedEncounter, vehicle: &Participant) -> bool {
-    let own = encounter.ego_lead_rear()[REAR_INDEX];
+    let changer = encounter.ego_lead_rear()[REAR_INDEX];
     let until = vehicle.trajectory.span().map_or(Time::ZERO, |(_, last)| last.min(encounter.crossing));
-    let pair = at_or_before(own, until).zip(at_or_before(&vehicle.trajectory, until));
-    pair.is_none_or(|(own, other)| [encounter.home, encounter.target].contains(&other.lane) && other.s_m <= own.s_m)
+    let pair = at_or_before(changer, until).zip(at_or_before(&vehicle.trajectory, until));
+    pair.is_none_or(|(changer, other)| {
+        [encounter.home, encounter.target].contains(&other.lane) && other.s_m <= changer.s_m
+    })
 }
 
 /// Returns whether all lane changes of a vehicle that starts in lane `start` lead to a lane of the road.

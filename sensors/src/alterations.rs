@@ -2,8 +2,8 @@
 
 use closecall_traffic::{CONTROL_STEP, ClassScores};
 
+use crate::detection_classifier::DetectionClassifier;
 use crate::faults::Faults;
-use crate::full::DetectionClassifier;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Detection, Extent, Scene, SensorError};
 

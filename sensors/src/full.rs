@@ -5,38 +5,16 @@
 use crate::tracking::{TrackList, TrackerModel};
 use closecall_traffic::Track;
 
+use crate::detection_classifier::DetectionClassifier;
 use crate::faults::{Belief, Faults};
 use crate::front_lidar::FrontLidar;
 use crate::lidar::Lidar;
+use crate::lidar_chain::MAX_ADDITIONAL_LIDARS;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
 use crate::perception::{FieldOfView, MountedLidar};
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::{Alterations, Detection, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
-
-/// A classifier that assigns class scores to detections from the measurements of another sensor.
-pub trait DetectionClassifier: Send {
-    /// Replaces the class scores of each detection of the scan that ended at the scene's time.
-    ///
-    /// # Errors
-    /// Returns [`SensorError::Classifier`] if the classifier cannot be run.
-    fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError>;
-
-    /// Returns what that sensor alone has seen, as of the latest scan. Usually nothing.
-    fn seen_alone(&self) -> &[Detection] {
-        &[]
-    }
-
-    /// Returns the latest image that a network has evaluated as a whole. Usually none.
-    fn rear_image(&self) -> Option<&RearImage> {
-        None
-    }
-
-    /// Returns the health of that sensor.
-    fn health(&self) -> Health {
-        Health::Ok
-    }
-}
+use crate::{Alterations, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
 
 /// The sensor and tracker models of the full chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,9 +32,6 @@ pub struct FullModel {
     /// The tracker that processes the boxes of the rear LiDAR.
     pub tracker: TrackerModel,
 }
-
-/// Maximum number of rear LiDARs besides the first.
-pub const MAX_ADDITIONAL_LIDARS: usize = 3;
 
 impl FullModel {
     /// Returns all rear LiDARs.

@@ -16,8 +16,8 @@ use std::collections::VecDeque;
 use crate::camera::{Camera, CameraFault, ExposureKey, WholeImageDetector, fuse};
 use closecall_traffic::{Stream, Time};
 
+use crate::detection_classifier::DetectionClassifier;
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
-use crate::full::DetectionClassifier;
 use crate::image_evidence::{Evidence, Exposed, ImageResult, associate, moved};
 use crate::worker_classifier::{CHANNEL, HeldImage, inference_backend};
 use crate::{Detection, Extent, Health, NoiseKey, RearImage, Scene, SensorError};

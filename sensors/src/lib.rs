@@ -12,6 +12,8 @@ mod audit;
 pub mod camera;
 mod config;
 pub mod datasets;
+mod detection_classifier;
+mod error;
 pub mod faults;
 mod front_lidar;
 mod full;
@@ -36,11 +38,14 @@ pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
-pub use full::{DetectionClassifier, FullModel, FullPerception, MAX_ADDITIONAL_LIDARS};
+pub use detection_classifier::DetectionClassifier;
+pub use error::SensorError;
+pub use full::{FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
+pub use lidar_chain::MAX_ADDITIONAL_LIDARS;
 pub use object::{
     ByClass, Chain, ErrorGrid, ErrorGrids, FitError, FittedErrors, NamedGrid, NoiseKey, ObjectPerception,
     ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
-pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorError, SensorHealth};
+pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

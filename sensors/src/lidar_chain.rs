@@ -21,7 +21,8 @@ use closecall_traffic::Time;
 use closecall_traffic::ego_frame::EgoFrame;
 
 use crate::faults::{FaultList, LidarFault};
-use crate::full::{DetectionClassifier, MAX_ADDITIONAL_LIDARS};
+
+use crate::detection_classifier::DetectionClassifier;
 use crate::lidar::Lidar;
 use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar};
@@ -207,3 +208,6 @@ impl LidarChain {
         health::of_all(&self.sensors)
     }
 }
+
+/// Maximum number of rear LiDARs besides the first.
+pub const MAX_ADDITIONAL_LIDARS: usize = 3;

@@ -10,8 +10,8 @@ use closecall_traffic::{Environment, Road, Stream, Time};
 
 use crate::camera::CameraFault;
 use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
+use crate::detection_classifier::DetectionClassifier;
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
-use crate::full::DetectionClassifier;
 use crate::{Detection, Health, NoiseKey, Scene, SceneVehicle, SensorError};
 
 /// Name of the camera's random stream.

@@ -105,7 +105,7 @@ impl ComparisonArgs {
                 tested => Ok(vec![tested]),
             };
         }
-        let arms = ArmList::joined(&self.arms).map_err(|error| CliError::usage(error.to_string()))?;
+        let arms = ArmList::joined(&self.arms)?;
         tested.limited(&arms)
     }
 

@@ -51,7 +51,9 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
     };
     let result = fit(model, &data).ok_or_else(|| CliError::Usage { message: calibration::no_pair(&data) })?;
     if let Some(path) = &args.output {
-        write_file(path, |file| file.write_all(calibration::member(&result, &data).as_bytes()))?;
+        let command = format!("closecall traffic calibrate --model {}", model.name());
+        let member = calibration::member(&result, &data, &command);
+        write_file(path, |file| file.write_all(member.as_bytes()))?;
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(calibration::json(&result, &data), None, None)),

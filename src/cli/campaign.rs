@@ -22,7 +22,7 @@ use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::summary::Summary;
-use closecall_campaign::wall_times::check_share;
+use closecall_campaign::wall_times::SpentTime;
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
 use closecall_report::heartbeat::{Heartbeat, rate_text};
@@ -34,6 +34,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::Value;
 
 use super::CliError;
+use super::actions::command_for;
+use super::advice::after_verdict;
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::{check_backend, check_cameras};
@@ -205,8 +207,10 @@ pub(super) struct Planned<'a> {
     pub(super) format: Format,
     /// The cluster that runs the samples, if this machine does not.
     pub(super) ray: Option<&'a str>,
-    /// Whether the samples stop as soon as they are certain, and after which wall time.
-    pub(super) stop: (bool, Option<Duration>),
+    /// Whether the samples stop as soon as they are certain.
+    pub(super) until_certain: bool,
+    /// The wall time after which they stop.
+    pub(super) time_budget: Option<Duration>,
     /// Whether the seed was drawn for this campaign.
     pub(super) has_drawn_seed: bool,
 }
@@ -288,7 +292,8 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         record: args.record,
         format: args.format,
         ray: args.ray.as_deref(),
-        stop: (args.plan.until_certain, args.plan.time_budget),
+        until_certain: args.plan.until_certain,
+        time_budget: args.plan.time_budget,
         has_drawn_seed: args.draws_seed(),
     };
     carry_out(&planned, &mut Alone)
@@ -312,10 +317,9 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
     campaign.retry_errors = planned.end.retry_errors;
     session::stop_on_request(&mut campaign.stop);
     let started = Instant::now();
-    let (until_certain, time_budget) = planned.stop;
     let stop = StopRule {
-        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| until_certain),
-        time_budget,
+        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| planned.until_certain),
+        time_budget: planned.time_budget,
         scenarios: campaign.works.len(),
     };
     let mut progress = Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
@@ -342,7 +346,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let mut judged = tally.judgement();
     judged.add_invalid(watch.finish());
-    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
+    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
     match planned.format {
         Format::Json => {
             let mut value = json::campaign_report(&report, Some(wall_s));
@@ -354,12 +358,13 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
         Format::Human => {
             out!("{}", for_terminal(&CountsText(&tally.summary)));
             let (simulated_s, place) = (tally.summary.total().simulated_s, campaign.place());
-            let checks = check_share(progress.spent_s);
+            let checks = progress.spent.check_share();
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
             out!("{}", companion.text(&tally.summary));
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: campaign.works.len() }));
+            out!("{}", after_verdict(&judged));
             if planned.has_drawn_seed {
                 outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
             }
@@ -384,8 +389,8 @@ struct Progress {
     stop: StopMonitor,
     end: EndMonitor,
     bar: ProgressBar,
-    /// Wall time of the runs and of their validity checks (s).
-    spent_s: [f64; 2],
+    /// The wall times of all samples that have just been run.
+    spent: SpentTime,
     _heartbeat: Option<Heartbeat>,
 }
 
@@ -400,14 +405,14 @@ impl Progress {
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
         let tally = Tally::new(campaign, gates);
-        Self { names, tally, stop, end, spent_s: [0.0; 2], _heartbeat: heartbeat(&bar), bar }
+        Self { names, tally, stop, end, spent: SpentTime::default(), _heartbeat: heartbeat(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
         self.tally.push(next.record);
         self.bar.inc(1);
         session::report(self.bar.position(), self.bar.length().unwrap_or_default());
-        self.spent_s = [0, 1].map(|index| self.spent_s[index] + next.spent_s[index]);
+        self.spent += next.spent;
         if !next.is_new {
             // Records read from the journal say nothing about how long the rest will take.
             self.bar.reset_eta();

@@ -22,6 +22,8 @@ use closecall_studies::minimize::{MinimizedText, minimize_sample, output_files, 
 use serde_json::json;
 
 use super::CliError;
+use super::actions::command_for;
+use super::advice::to_provide;
 use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_written};
@@ -58,19 +60,19 @@ pub(super) struct ExplainArgs {
 pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
     let saved = args.saved.open(&args.dir)?;
     saved.check_trust()?;
-    let (found, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
-    match write_causes(&saved, &failures) {
+    let (explanations, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
+    match write_causes(&saved, &failures, command_for) {
         Ok(paths) => paths.iter().for_each(|path| print_written(path)),
         // The explanation does not depend on it.
         Err(error) => print_error(format_args!("warning: the explanation is not kept: {error}\n")),
     }
-    match (args.format, args.sample, &found[..]) {
+    match (args.format, args.sample, &explanations[..]) {
         (Format::Json, Some(_), [one]) => outln!("{:#}", stamped(json!(one), Some(one.seed), None)),
-        (Format::Json, ..) => outln!("{:#}", stamped(json!(found), None, None)),
+        (Format::Json, ..) => outln!("{:#}", stamped(json!(explanations), None, None)),
         (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
-            for explanation in &found {
-                outln!("{}", for_terminal(&ExplanationText { explanation, folder: &args.dir }));
+            for explanation in &explanations {
+                outln!("{}", for_terminal(&ExplanationText { explanation, folder: &args.dir, command_for }));
             }
         }
     }
@@ -102,11 +104,13 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     let case = case.map_err(CausesError::from)?;
     let paths = output_files(&case, args.output.as_deref())?;
     protect(&of_campaign(&args.of.dir), &paths.each_ref().map(|path| ("--output", Some(path.as_path()))))?;
-    let found = minimize_sample(&saved, &case)?;
-    let files = write_files(&case, &found, &paths)?;
+    let minimized = minimize_sample(&saved, &case)?;
+    let files = write_files(&case, &minimized, &paths, command_for)?;
     match args.format {
-        Format::Json => outln!("{:#}", stamped(json!({ "minimized": found, "files": files }), Some(found.seed), None)),
-        Format::Human => outln!("{}", MinimizedText { found: &found, files: &files }),
+        Format::Json => {
+            outln!("{:#}", stamped(json!({ "minimized": minimized, "files": files }), Some(minimized.seed), None))
+        }
+        Format::Human => outln!("{}", MinimizedText { minimized: &minimized, files: &files, command_for }),
     }
     Ok(ExitCode::Pass)
 }
@@ -148,13 +152,13 @@ pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
     let MapArgs { speed_mps, closing_kmh, detection_m, front_thw_s, .. } = args;
     let (closing_kmh, detection_m, front_thw_s) = (closing_kmh.clone(), detection_m.clone(), front_thw_s.clone());
     let grid = MapGrid { speed_mps: *speed_mps, closing_kmh, detection_m, front_thw_s };
-    let found = compute_map(&grid, &args.controller, &args.set.settings).map_err(CausesError::from)?;
+    let points = compute_map(&grid, &args.controller, &args.set.settings).map_err(CausesError::from)?;
     if let Some(out) = &args.out {
-        write_map(out, &found)?.iter().for_each(|path| print_written(path));
+        write_map(out, &points)?.iter().for_each(|path| print_written(path));
     }
     match args.format {
-        Format::Json => outln!("{:#}", stamped(json!(found), None, None)),
-        Format::Human => outln!("{}", MapText(&found)),
+        Format::Json => outln!("{:#}", stamped(json!(points), None, None)),
+        Format::Human => outln!("{}", MapText(&points)),
     }
     Ok(ExitCode::Pass)
 }
@@ -202,13 +206,14 @@ pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
     let saved = args.campaign.as_deref().map(SavedCampaign::open).transpose()?;
     let shares = saved.as_ref().map(|saved| shares_of(saved, args.scenario.as_deref())).transpose()?;
     let cost = saved.as_ref().map(cost_of).transpose()?;
-    let found = compute_exposure(rule, observed, args.per_million_km.map(|range| range.0), shares);
+    let exposure = compute_exposure(rule, observed, args.per_million_km.map(|range| range.0), shares);
     match args.format {
-        Format::Json => outln!("{:#}", stamped(json!({ "exposure": found, "cost": cost }), None, None)),
+        Format::Json => outln!("{:#}", stamped(json!({ "exposure": exposure, "cost": cost }), None, None)),
         Format::Human => {
-            outln!("{}", ExposureText(&found));
+            outln!("{}", ExposureText(&exposure));
+            exposure.missing.iter().for_each(|missing| outln!("  {}", to_provide(*missing)));
             cost.iter().for_each(|cost| outln!("{}", CostText(cost)));
         }
     }
-    Ok(if found.effect.is_some() { ExitCode::Pass } else { ExitCode::Inconclusive })
+    Ok(if exposure.effect.is_some() { ExitCode::Pass } else { ExitCode::Inconclusive })
 }

@@ -163,7 +163,8 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
         record: Some(args.record.unwrap_or(recorded)),
         format: args.format,
         ray: None,
-        stop: (false, None),
+        until_certain: false,
+        time_budget: None,
         has_drawn_seed: false,
     };
     carry_out(&planned, &mut chain)

@@ -12,6 +12,7 @@ use closecall_scenarios::{ScenarioError, ScenarioFile};
 use serde_json::{Value, json};
 
 use super::CliError;
+use super::actions::command_for;
 use super::args::{FittedArgs, Format, SetArgs};
 use super::help::{examples, heading};
 use super::output::{outln, print_failure};
@@ -81,7 +82,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
 
 /// Checks whether folders of campaigns are whole.
 fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
-    let checked: Vec<_> = paths.iter().map(|path| (path, check_folder(&Folder::open(path)))).collect();
+    let checked: Vec<_> = paths.iter().map(|path| (path, check_folder(&Folder::open(path), command_for))).collect();
     let is_sound = checked.iter().all(|(_, found)| found.is_sound());
     match format {
         Format::Json => {

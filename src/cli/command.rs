@@ -180,7 +180,10 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         print_failure(CliError::usage(message));
         return ExitCode::Usage;
     }
-    choose_backend(cli.onnxruntime.as_deref());
+    // A worker process has the backend of its task.
+    if !matches!(cli.command, Command::Host { .. }) {
+        choose_backend(cli.onnxruntime.as_deref());
+    }
     let result = dispatch(cli.command);
     end_all();
     remove_unpacked();

@@ -4,13 +4,14 @@
 use std::path::Path;
 
 use clap::Args;
-use closecall_campaign::end_rule::{EarlyEnd, EndRule, EndedEarly};
+use closecall_campaign::end_rule::{EarlyEnd, EndRule, EndedEarly, Kept};
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::session;
 use closecall_campaign::summary::Summary;
 use closecall_report::campaign::CountsText;
 
+use super::actions::command_for;
 use super::args::Format;
 use super::help::heading;
 use super::output::{out, outln};
@@ -68,10 +69,12 @@ impl Ending {
         let ended = EndedEarly {
             message: self.message(),
             ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
-            samples: [summary.total().samples, campaign.len()],
+            done: summary.total().samples,
+            all: campaign.len(),
             errors: summary.total().errors(),
             summary,
-            kept: out.map(|out| (out, session::arguments())),
+            kept: out.map(|folder| Kept { folder, command: session::arguments() }),
+            command_for,
         };
         match format {
             Format::Json => outln!("{:#}", ended.json()),

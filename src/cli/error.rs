@@ -5,13 +5,13 @@ use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::FolderError;
-use closecall_campaign::gate::ProjectError;
+use closecall_campaign::gate::{AssemblyError, ProjectError};
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_recorded::aerial::AerialError;
-use closecall_recorded::encounter::{NoEncounter, track_suggestion};
+use closecall_recorded::encounter::NoEncounter;
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
 use closecall_recorded::trajectory_data::{
@@ -29,17 +29,17 @@ use closecall_scenarios::source::SourceError;
 use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::datasets::DatasetError;
 use closecall_simulation::SampleError;
+use closecall_simulation::controller::ArmsError;
 use closecall_simulation::controller::native::NativeError;
 use closecall_studies::CausesError;
 use closecall_studies::perception::StudyError;
 use closecall_traffic::atomic::WriteError;
-use miette::Diagnostic;
 
-use super::view::ViewError;
+use super::view_error::ViewError;
 use crate::exit_code::ExitCode;
 
 /// The reason for which a command has no result.
-#[derive(Debug, thiserror::Error, Diagnostic)]
+#[derive(Debug, thiserror::Error)]
 pub enum CliError {
     /// The project file cannot be used.
     #[error(transparent)]
@@ -70,13 +70,11 @@ pub enum CliError {
     Folder(#[from] FolderError),
     /// The default folder of a campaign's results cannot be used.
     #[error(transparent)]
-    #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
     Results(FolderError),
     /// The default folder of a campaign's results holds only the first of them.
     #[error(
         "{0}\nthe campaign went on without its folder: the verdict counts every sample, and --resume runs those again that are not kept"
     )]
-    #[diagnostic(help("name a folder with --out DIR, or keep no results with --no-out"))]
     ResultsCut(WriteError),
     /// A file cannot be written.
     #[error(transparent)]
@@ -128,11 +126,16 @@ pub enum CliError {
     },
     /// The arguments are wrong in a way that clap does not detect.
     #[error("{message}")]
-    #[diagnostic(help("see `closecall --help`"))]
     Usage {
         /// What is wrong, and what is allowed.
         message: String,
     },
+    /// The gates do not fit the campaign.
+    #[error(transparent)]
+    Gates(AssemblyError),
+    /// The controllers cannot be compared.
+    #[error(transparent)]
+    Arms(#[from] ArmsError),
     /// A campaign has ended early.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
@@ -141,22 +144,18 @@ pub enum CliError {
     Merge(#[from] MergeError),
     /// The scenarios cannot form a campaign.
     #[error(transparent)]
-    #[diagnostic(help("see `closecall --help`"))]
     Plan(#[from] PlanError),
     /// A sensitivity study cannot be planned.
     #[error(transparent)]
-    #[diagnostic(help("see `closecall study sensitivity --help`"))]
     Sensitivity(#[from] PlanFailure),
     /// A saved campaign cannot provide what was requested.
     #[error(transparent)]
-    #[diagnostic(help("see `closecall --help`"))]
     Saved(#[from] SavedError),
     /// The reports of a campaign cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
     /// A cause cannot be found.
     #[error(transparent)]
-    #[diagnostic(help("see `closecall --help`"))]
     Causes(#[from] CausesError),
     /// The sensors cannot be studied.
     #[error(transparent)]
@@ -199,6 +198,30 @@ fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
         TrajectoryFileProblem::LanesAgainstPosition { .. } => "; --lanes-from-right turns the lanes",
         problem if problem.affects_one_row() => "; --drop-bad-rows skips such rows, and counts them",
         _ => "",
+    }
+}
+
+/// Largest number of tracks that a message suggests.
+const MAX_SUGGESTED: usize = 10;
+
+/// Returns the tracks that `--track` can name, as the end of a message.
+fn track_suggestion(possible: &[u64]) -> String {
+    let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
+    match possible.len() {
+        0 => String::new(),
+        count if count > MAX_SUGGESTED => {
+            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
+        }
+        _ => format!("; --track can name {}", named.join(", ")),
+    }
+}
+
+impl From<AssemblyError> for CliError {
+    fn from(error: AssemblyError) -> Self {
+        match error {
+            AssemblyError::Project(error) => Self::Project(error),
+            error => Self::Gates(error),
+        }
     }
 }
 
@@ -247,7 +270,11 @@ impl From<&CliError> for ExitCode {
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
             CliError::Plan(PlanError::Controller { .. } | PlanError::WithoutMis { .. }) => Self::InvalidInput,
-            CliError::Usage { .. } | CliError::Plan(_) | CliError::Baseline(_) => Self::Usage,
+            CliError::Usage { .. }
+            | CliError::Gates(_)
+            | CliError::Arms(_)
+            | CliError::Plan(_)
+            | CliError::Baseline(_) => Self::Usage,
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use clap::Args;
 use closecall_campaign::arguments::{confidence, positive, probability, share};
-use closecall_campaign::gate::{AssemblyError, GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec};
+use closecall_campaign::gate::MAX_FLIP_RATE;
+use closecall_campaign::gate::{GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec};
 use closecall_campaign::probability::ProbabilityGate;
-use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
 
@@ -84,10 +84,7 @@ impl GateArgs {
             ..GateSet::default()
         };
         set.probability = self.probability()?.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
-        set.assemble(self.criteria()?, preset, is_paired, design).map_err(|error| match error {
-            AssemblyError::Project(error) => error.into(),
-            error => CliError::usage(error.to_string()),
-        })?;
+        set.assemble(self.criteria()?, preset, is_paired, design)?;
         set.notes.iter().for_each(|note| print_error(format_args!("note: {note}\n")));
         Ok(set)
     }

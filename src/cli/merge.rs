@@ -11,6 +11,8 @@ use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, V
 use closecall_report::json;
 
 use super::CliError;
+use super::actions::command_for;
+use super::advice::after_verdict;
 use super::args::Format;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
@@ -78,7 +80,8 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let saved = SavedCampaign::of(merged.folder.clone())?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let judged = tally.judgement();
-    let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged };
+    let report =
+        CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged, command_for };
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
@@ -86,6 +89,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
             out!("{}", ensemble_text(&tally.summary, saved.manifest()));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: works.len() }));
+            out!("{}", after_verdict(&judged));
         }
     }
     let written = report.write(saved.folder(), selection);

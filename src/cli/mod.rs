@@ -1,5 +1,7 @@
 //! The command line: arguments, calls, printed results, and exit codes.
 
+mod actions;
+mod advice;
 mod args;
 mod arms;
 mod backend;
@@ -45,6 +47,7 @@ mod terminal;
 mod trajectories;
 mod version;
 mod view;
+mod view_error;
 mod viewer;
 mod watch;
 mod watching;

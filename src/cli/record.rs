@@ -68,7 +68,8 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let truth = ground_truth_path(&args.output);
     let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
-    let chosen = recorded_actor(file.config(), actor).map_err(|message| CliError::Usage { message })?;
+    let chosen = recorded_actor(file.config(), actor)
+        .map_err(|message| CliError::Usage { message: format!("{message}, with --in-car=ACTOR") })?;
     let mut recorder = InCarRecorder::new(&chosen);
     each_sample(args, &file, &mut recorder, InCarRecorder::begin)?;
     let (log, changes) = recorder.finish();

@@ -7,11 +7,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::folder::{Folder, FolderError, LockedFolder, REPORT};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
-use closecall_campaign::resume_command::quoted;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
@@ -20,6 +20,7 @@ use closecall_report::run::rerun::is_recording_enabled;
 use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
+use super::actions::{command_for, quoted};
 use super::help::heading;
 use super::output::{print_error, print_report_files};
 use super::protect::{of_controller, of_scenario};
@@ -199,10 +200,13 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
         return resume(working_folder, manifest);
     }
     let taken = take(working_folder, manifest)?;
-    if let Some(Moved { to, resume, has_removed }) = taken.moved {
+    if let Some(Moved { to, interrupted, has_removed }) = taken.moved {
         let removed = if has_removed { ", in place of older ones" } else { "" };
         print_error(format_args!("the last results are now in {}{removed}\n", to.display()));
-        if let Some(resume) = resume {
+        if let Some(command) = interrupted {
+            let folder = to.display().to_string();
+            let resumed = Resume { command: &command, retries_errors: false, moved_to: Some(&folder) };
+            let resume = command_for(&Action::Resume(resumed));
             print_error(format_args!("their campaign has not come to its end; it is resumed by: {resume}\n"));
         }
     }

@@ -161,6 +161,9 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
     for warning in tracks.continuity().warnings().into_iter().chain(basis.warnings()).chain(unknown) {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
     }
+    if basis.lacks_recorded_crossings() {
+        print_error(format_args!("help: `--lanes none` takes no lane as recorded\n"));
+    }
     match (args.format, scored) {
         (Format::Json, scored) => outln!("{:#}", stamped(json::lane_changes(&changes, scored.as_ref()), None, None)),
         (Format::Human, scored) => {

@@ -9,7 +9,6 @@
 //! Closecall serves nothing itself. The command ends when the viewer ends.
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,7 +19,8 @@ use super::CliError;
 use super::help::{examples, heading};
 use super::output::{outln, print_error};
 use super::results::last_results;
-use super::viewer::{INSTALL, Viewer, ViewerError};
+use super::view_error::ViewError;
+use super::viewer::{INSTALL, Viewer};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall view`.
@@ -46,44 +46,6 @@ pub(super) struct ViewArgs {
     /// Program of the Rerun viewer
     #[arg(long, value_name = "PATH", env = "CLOSECALL_RERUN", hide_env_values = true, default_value = "rerun", help_heading = heading::VIEWER)]
     viewer: PathBuf,
-}
-
-/// The reason why nothing can be shown.
-#[derive(Debug, thiserror::Error)]
-pub enum ViewError {
-    /// The path has no recording.
-    #[error("failed to find a recording in {path}: name a file .rrd, or a folder that has such files")]
-    Nothing {
-        /// The path.
-        path: PathBuf,
-    },
-    /// The file has the name of a recording, but is none.
-    #[error("failed to open {path}: the file is no recording: {reason}")]
-    Foreign {
-        /// The path.
-        path: PathBuf,
-        /// What the library says of it.
-        reason: String,
-    },
-    /// The path cannot be read.
-    #[error("failed to read {path}: {source}")]
-    Read {
-        /// The path.
-        path: PathBuf,
-        /// The reason.
-        source: io::Error,
-    },
-    /// The viewer shows nothing.
-    #[error(transparent)]
-    Viewer(#[from] ViewerError),
-    /// The report cannot be opened in the browser.
-    #[error("failed to open {path} in the browser: {source}")]
-    Browser {
-        /// The path of the report.
-        path: PathBuf,
-        /// The reason.
-        source: opener::OpenError,
-    },
 }
 
 /// A recording, and the version of Rerun that it was written by.

@@ -66,7 +66,7 @@ pub enum CausesError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// A file that another program or a person has written would be overwritten.
-    #[error("{} exists, and `closecall minimize` has not written it: name another file with --output", path.display())]
+    #[error("{} exists, and `closecall minimize` has not written it: name another file", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,

@@ -1,8 +1,9 @@
-//! The table of crates in `ARCHITECTURE.md` is the one of the workspace: `cargo metadata` has the same crates, folders and imports.
+//! The table of crates in `ARCHITECTURE.md` is the one of the workspace: `cargo metadata` has the
+//! same crates, folders and imports. No library names an option of the command line.
 
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
@@ -116,4 +117,66 @@ fn a_wrong_table_of_crates_is_found() {
     // A crate that the page lacks, one that does not exist, and one in another folder.
     assert_eq!(problems("| studies |", "| foreign |").len(), 3 + 2);
     assert_eq!(problems("| `studies` |", "| `campaign/studies` |").len(), 1);
+}
+
+/// The libraries. The command line, `src`, maps what they say to its options.
+const LIBRARIES: [&str; 9] =
+    ["traffic", "recorded", "scenarios", "sensors", "controllers", "simulation", "campaign", "studies", "report"];
+
+/// Returns the source files below a folder, without those of tests.
+pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let is_test = path.file_stem().is_some_and(|stem| stem == "tests" || stem == "simulated_world");
+        if path.is_dir() && !is_test {
+            files.extend(sources(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") && !is_test {
+            files.push(path);
+        }
+    }
+    files.sort();
+    files
+}
+
+/// Returns the code of a file up to its unit tests, without comments that have lines of their own.
+pub(crate) fn code_of(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let until_tests = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+    until_tests.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
+}
+
+/// Returns whether a line of code names an option such as `--resume`. A variable of a style sheet,
+/// `--key:`, is none.
+fn names_option(line: &str) -> bool {
+    line.match_indices("--").any(|(at, _)| {
+        let (before, after) = (&line[..at], &line[at + 2..]);
+        let word = after.split(|c: char| !(c.is_ascii_lowercase() || c == '-')).next().unwrap_or_default();
+        let begins = !before.ends_with(|c: char| c.is_alphanumeric() || c == '-');
+        begins && word.starts_with(|c: char| c.is_ascii_lowercase()) && !after[word.len()..].starts_with(':')
+    })
+}
+
+#[test]
+fn no_library_names_an_option_of_the_command_line() {
+    let mut named = Vec::new();
+    for path in LIBRARIES.iter().flat_map(|library| sources(&Path::new(ROOT).join(library).join("src"))) {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines = code_of(&text).filter(|(_, line)| names_option(line));
+        named.extend(lines.map(|(number, line)| format!("{}:{}: {}", path.display(), number + 1, line.trim())));
+    }
+    assert!(
+        named.is_empty(),
+        "advice belongs in src/cli/advice.rs, commands in src/cli/actions.rs:\n{}",
+        named.join("\n")
+    );
+}
+
+#[test]
+fn an_option_in_a_text_is_found() {
+    for line in [r#"    "resume it with --resume","#, r#"write!(f, "(--max-flaky)")"#, r#"["--out".to_owned()]"#] {
+        assert!(names_option(line), "{line}");
+    }
+    for line in [r#"style={ "--key:" (colour) }"#, "a -- b", "\"# ----- \"", "i--j", "\"x --> y\""] {
+        assert!(!names_option(line), "{line}");
+    }
 }

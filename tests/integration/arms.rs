@@ -185,7 +185,7 @@ fn two_processes_have_names_of_their_own() {
 fn arms_that_cannot_be_compared_are_refused() {
     let cases: [(&[&str], &str); 6] = [
         (&["--arms", "mis"], "is only one"),
-        (&["--arms", "acc,mis,acc"], "--arms names `acc` twice"),
+        (&["--arms", "acc,mis,acc"], "`acc` is named twice"),
         (&["--arms", "acc,miss"], "did you mean `mis`?"),
         (&["--arms", "acc,gap-9"], "0.8 to 2.5 s in steps of 0.1 s"),
         (&["--arms", "acc,mis", "--paired"], "cannot be used with '--paired'"),

@@ -145,7 +145,7 @@ fn a_weakened_check_gives_overridden_and_exit_code_4() {
     let weaker = "checks.MIS-6=['max(max_speed_deficit_mps) <= 100', 'p95(max_deceleration_mps2) <= 2']";
     let text = stdout(&run(weaker, "human"), 4);
     assert!(
-        text.contains("\nOVERRIDDEN: overtake-without-brake: --set weakened")
+        text.contains("\nOVERRIDDEN: overtake-without-brake: a setting weakened")
             && text.contains("MIS-6: max(max_speed_deficit_mps) <= 10"),
         "{text}"
     );
@@ -331,7 +331,7 @@ fn the_points_of_a_design_bound_no_probability() {
         }
         assert!(value["paired"]["mcnemar_p"].is_null(), "{design}");
         let text = stdout(&campaign(&path, &more), 4);
-        assert!(text.contains("--design sobol and grid are not independent") && !text.contains("(95 %"), "{text}");
+        assert!(text.contains("the designs sobol and grid are not independent") && !text.contains("(95 %"), "{text}");
     }
     let message = message(&campaign(&library("low-thw-overtake"), &["--design", "grid", "--time-budget", "1s"]));
     assert!(message.contains("--design random"), "{message}");

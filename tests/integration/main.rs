@@ -13,6 +13,7 @@ mod causes;
 mod chain;
 mod changed_controller;
 mod ci_templates;
+mod circles;
 mod commands;
 mod comparison;
 mod determinism;

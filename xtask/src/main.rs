@@ -13,6 +13,7 @@ mod make_trajectory_file;
 mod plot_regimes;
 mod render_aerial;
 mod render_dataset;
+mod root;
 mod throughput;
 mod validate_aerial;
 mod validate_camera;
@@ -34,9 +35,7 @@ mod write_references;
 use std::process::{ExitCode, Termination};
 
 use clap::Parser;
-
-/// The root folder of the repository.
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+use root::ROOT;
 
 /// Writes, validates and measures what the repository states.
 #[derive(Parser)]

@@ -11,12 +11,14 @@ use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::{Arm, NoObserver, RunKey};
 
 use super::result::{Frontier, Point};
+use crate::campaign_error::WorkersError;
 use crate::ledger::Tally;
 use crate::record::{ArmRecord, SampleFailure};
-use crate::runner::{ArmRun, OnOutcome, Sampling, concrete, guarded, run_guarded};
+use crate::runner::{ArmRun, OnOutcome, concrete, guarded, run_guarded};
+use crate::sampling::Sampling;
 use crate::sensitivity::RunErrors;
 use crate::stop::StopFlag;
-use crate::workers::{Samples, Workers, WorkersError};
+use crate::workers::{Samples, Workers};
 
 /// The part of a key that belongs to the margin increase system, which the baseline does not have.
 const OF_SYSTEM: &str = ".driver.ego-stack.mis.";

@@ -18,13 +18,15 @@ pub struct PresetGates {
 #[derive(Debug, thiserror::Error)]
 pub enum AssemblyError {
     /// A criterion needs a baseline, and there is none.
-    #[error("`{expression}` compares with a baseline: it needs --paired")]
+    #[error("`{expression}` compares with a baseline: it needs a paired campaign")]
     NoBaseline {
         /// The criterion.
         expression: Expression,
     },
     /// A gate on a probability needs independent samples.
-    #[error("--max-probability needs independent samples, and those of --design {design} are not: use --design random")]
+    #[error(
+        "a gate on the probability of a collision needs independent samples, and those of the design `{design}` are not: use the design `random`"
+    )]
     DependentSamples {
         /// The sampling design.
         design: Design,

@@ -45,9 +45,9 @@ impl OpenReason {
         match self {
             Self::TooFewSamples => "too few samples to decide",
             Self::NoSamples => "no sample has this value",
-            Self::NotPaired => "it needs --paired",
+            Self::NotPaired => "it needs a paired campaign",
             Self::DependentSamples => {
-                "the samples of --design sobol and grid are not independent, so that no probability can be bounded"
+                "the samples of the designs sobol and grid are not independent, so that no probability can be bounded"
             }
             Self::NothingVaries => "no parameter varies enough, so that no probability can be bounded",
             Self::SelfReported => {

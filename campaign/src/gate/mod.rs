@@ -18,4 +18,4 @@ pub use judge::Judge;
 pub use options::GateOptions;
 pub use project::{ProjectError, ProjectFile};
 pub use result::{ExpectationResult, GateResult, RequirementResult, Standing};
-pub use set::{GateSet, GateSource, GateSpec, ProbabilitySpec};
+pub use set::{GateSet, GateSource, GateSpec, MAX_FLIP_RATE, ProbabilitySpec};

@@ -14,7 +14,6 @@ use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::criteria::Expression;
 
 use crate::probability::ProbabilityGate;
-use crate::verdict::MAX_FLIP_RATE;
 
 /// Where a gate comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,7 +34,7 @@ impl fmt::Display for GateSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CommandLine => f.write_str("command line"),
-            Self::Preset(name) => write!(f, "--preset {name}"),
+            Self::Preset(name) => write!(f, "preset {name}"),
             Self::ProjectFile(path) => write!(f, "{}", path.display()),
             Self::Scenario => f.write_str("scenario file"),
             Self::Requirement(mark) => write!(f, "requirement {mark}"),
@@ -143,3 +142,6 @@ impl GateSet {
         self.probability.clone().or_else(of_file)
     }
 }
+
+/// Default of the share of checked verdicts that may flip at half the time step (-).
+pub const MAX_FLIP_RATE: f64 = 0.05;

@@ -11,7 +11,6 @@ use closecall_simulation::controller::exec::{Child, ExecError};
 use closecall_simulation::controller::isolated::Isolated;
 
 use super::{Answer, Question, Refusal, Task, task_identity};
-use crate::identity::of_work;
 use crate::manifest::version;
 use crate::record::{ArmRecord, Flaky, SampleFailure};
 use crate::runner::{ArmRun, Work};
@@ -186,7 +185,7 @@ pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answ
     if answer.record.controller != name {
         return Err(wrong(format!("it is of the controller `{}`, asked was `{name}`", answer.record.controller)));
     }
-    of_work(work).check_arm(&answer.record, question.sample, &mut None).map_err(wrong)?;
+    work.identity().check_arm(&answer.record, question.sample, &mut None).map_err(wrong)?;
     match (&answer.record.result, answer.is_last) {
         // It hangs in a call, and ends after this answer.
         (Err(failure), true) => Err(Trouble::Crash(failure.clone())),
@@ -214,13 +213,11 @@ impl World for OperatingSystem {
 
 /// Starts a worker process, and gives it its task.
 fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String), ExecError> {
-    let library = match inference_backend() {
+    let onnxruntime = match inference_backend() {
         Backend::Tract => None,
-        Backend::OnnxRuntime(library) => Some(library.display().to_string()),
+        Backend::OnnxRuntime(library) => Some(library.clone()),
     };
-    let backend = library.iter().flat_map(|library| ["--onnxruntime", library.as_str()]);
-    let arguments: Vec<&str> = std::iter::once("samples").chain(backend).collect();
-    let child = Child::start(&isolated.process(&arguments), None)?;
+    let child = Child::start(&isolated.process(&["samples"]), None)?;
     let task = line(&Task {
         version: version(),
         path: work.file.path().to_owned(),
@@ -229,6 +226,7 @@ fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String)
         checks: work.checks,
         controller: isolated.clone(),
         sensors: work.arms[arm].sensors,
+        onnxruntime,
     });
     let identity = task_identity(task.strip_suffix(b"\n").unwrap_or(&task));
     child.send(task);

@@ -10,7 +10,7 @@
 //!
 //! A thread keeps its process for all its samples, so that a control step costs a function call. A process that crashes, ends,
 //! hangs or outgrows its memory costs the sample that it runs: the record says how, and the next sample starts a new process.
-//! Only if the campaign asks for it (`--retry-crashed`) is such a sample run again, and its record then says that it is flaky.
+//! Only if the campaign asks for it is such a sample run again, and its record then says that it is flaky.
 //!
 //! An answer repeats its question. Foreign code can copy its process (`fork`) and so answer twice: an answer to another question, an
 //! answer of a copy, and a line that is left over before the next question each end the process and the sample with an error.
@@ -37,7 +37,7 @@ use closecall_simulation::controller::isolated::Isolated;
 use serde::{Deserialize, Serialize};
 
 use super::record::{ArmRecord, Record, SampleFailure};
-use super::runner::Sampling;
+use super::sampling::Sampling;
 use super::validity::CheckPlan;
 
 /// The kind of the failure of a sample that a worker process has refused to run, because the program or a file is another one
@@ -81,6 +81,8 @@ struct Task {
     checks: CheckPlan,
     controller: Isolated,
     sensors: Option<SensorMode>,
+    /// The library of ONNX Runtime that runs the networks, if it does.
+    onnxruntime: Option<PathBuf>,
 }
 
 /// Returns the identity of a task: a hash of its line, which holds the scenario, the seed, the checks and the controller.

@@ -13,6 +13,7 @@ use closecall_controllers::external::{
 };
 use closecall_scenarios::ScenarioFile;
 use closecall_sensors::camera::{Backend, Classifier};
+use closecall_sensors::set_inference_backend;
 use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::{Probe, UNPACKED};
 use closecall_simulation::{Arm, SampleError};
@@ -123,6 +124,7 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
         return refuse(answers, lines.next(), (CHANGED, reason));
     }
     let task: Task = read(&first)?;
+    set_inference_backend(Backend::choose(task.onnxruntime.as_deref(), None));
     let identity = task_identity(first.as_bytes());
     let timeout_ms = task.controller.timeout_ms();
     let kind = if task.controller.native().is_some() { CHANGED } else { UNREADABLE };

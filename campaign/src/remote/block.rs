@@ -12,16 +12,18 @@ use closecall_sensors::set_inference_backend;
 use tempfile::TempDir;
 
 use super::answer;
-use super::engine::RemoteError;
+use super::error::RemoteError;
 use super::shipment::Shipment;
+use crate::campaign_error::WorkersError;
 use crate::folder::FolderError;
 use crate::host::{Refusal, refusal};
 use crate::manifest::{Manifest, version};
 use crate::plan::Plan;
 use crate::runner::Work;
-use crate::saved::{SavedError, works};
+use crate::saved::works;
+use crate::saved_error::SavedError;
 use crate::stop::StopFlag;
-use crate::workers::{Finished, WorkerPool, Workers, WorkersError};
+use crate::workers::{Finished, WorkerPool, Workers};
 
 /// The variable that names the library of ONNX Runtime, as for the command line.
 const BACKEND_VARIABLE: &str = "ORT_DYLIB_PATH";

@@ -22,10 +22,13 @@
 mod answer;
 mod block;
 mod engine;
+mod error;
 mod shipment;
 mod workers;
 
 pub use block::BlockRunner;
-pub use engine::{Cluster, Engine, EngineError, RemoteError, connect, set_engine};
+pub use engine::{Cluster, Engine, connect, set_engine};
+pub use error::EngineError;
+pub use error::RemoteError;
 pub use shipment::{Shipment, ShippedFile};
 pub use workers::RemoteWorkers;

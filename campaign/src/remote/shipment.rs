@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use closecall_simulation::controller::ControllerChoice;
 use tempfile::TempDir;
 
-use super::engine::RemoteError;
+use super::error::RemoteError;
 use crate::fingerprint::named_files;
 use crate::manifest::Manifest;
 

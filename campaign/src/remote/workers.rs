@@ -10,8 +10,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::answer::Expected;
-use super::engine::{Cluster, RemoteError};
-use crate::execution::CampaignError;
+use super::engine::Cluster;
+use super::error::RemoteError;
+use crate::campaign_error::CampaignError;
 use crate::manifest::Manifest;
 use crate::runner::Work;
 use crate::stop::StopFlag;

@@ -124,7 +124,7 @@ impl FromStr for FactorRange {
         if !(low < high && low.is_finite() && high.is_finite()) {
             return Err(RangeError::Bounds { text: text.to_owned() });
         }
-        Ok(Self { key, low, high, kind: FactorKind::Named, source: "--factor".to_owned() })
+        Ok(Self { key, low, high, kind: FactorKind::Named, source: "named by the user".to_owned() })
     }
 }
 

@@ -16,7 +16,8 @@ use closecall_traffic::statistics::sensitivity::saltelli::MAX_FACTORS;
 use super::defaults::{LeftOut, factors_of};
 use super::factor::{CHANCE, Factor, FactorKind, FactorRange};
 use super::runs::Cube;
-use crate::workers::{Workers, WorkersError};
+use crate::campaign_error::WorkersError;
+use crate::workers::Workers;
 
 /// The stages of a study.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

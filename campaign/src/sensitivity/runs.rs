@@ -13,10 +13,11 @@ use closecall_traffic::Check;
 
 use super::factor::FactorRange;
 use super::output::values;
+use crate::campaign_error::WorkersError;
 use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, OnOutcome, guarded, run_guarded};
 use crate::stop::StopFlag;
-use crate::workers::{Samples, Workers, WorkersError};
+use crate::workers::{Samples, Workers};
 
 /// Number of random numbers that the factor `chance` distinguishes: those of the designs have no more bits.
 const CHANCES: f64 = (1_u64 << 24) as f64;

@@ -5,7 +5,8 @@ use closecall_traffic::Time;
 
 use crate::external::exchange::{Answer, Input, Setup};
 use crate::external::fmu::VariableTable;
-use crate::external::loaded::{Loaded, Run};
+use crate::external::identity::Run;
+use crate::external::loaded::Loaded;
 use crate::external::watch::Call;
 
 /// A controller of a library or an FMU in this process. It is created at the first step.

@@ -14,7 +14,7 @@ use crate::external::abi::{
 use crate::external::arithmetic::Arithmetic;
 use crate::external::error::LoadError;
 use crate::external::exchange::{Answer, Input, Setup};
-use crate::external::loaded::{Identity, Run};
+use crate::external::identity::{Identity, Run};
 use crate::external::platform;
 
 /// The functions that a library must export.

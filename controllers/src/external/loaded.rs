@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::external::error::LoadError;
-use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::exchange::Setup;
 use crate::external::fmu::{self, Fmu, VariableTable};
+use crate::external::identity::{Identity, Run};
 use crate::external::library::Library;
 
 /// The kind of a controller that is a file.
@@ -42,15 +43,6 @@ impl fmt::Display for Kind {
     }
 }
 
-/// What a controller states about itself.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    /// Its name.
-    pub name: Option<String>,
-    /// Its version.
-    pub version: Option<String>,
-}
-
 /// What a scenario says of the variables of an FMU.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Variables {
@@ -58,12 +50,6 @@ pub struct Variables {
     pub table: VariableTable,
     /// The settings of the ego stack.
     pub settings: Value,
-}
-
-/// A controller that drives one run.
-pub(crate) trait Run: Send {
-    /// Returns the answer to a control step, or why there is none.
-    fn step(&mut self, input: &Input) -> Result<Answer, String>;
 }
 
 /// A library or an FMU that this process has loaded.

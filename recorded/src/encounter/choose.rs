@@ -47,18 +47,3 @@ pub fn choose(
     });
     Err(ChoiceError::NoEncounter { source, possible })
 }
-
-/// Largest number of tracks that a message suggests.
-const MAX_SUGGESTED: usize = 10;
-
-/// Returns the tracks that `--track` can name, as the end of a message.
-pub fn track_suggestion(possible: &[u64]) -> String {
-    let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
-    match possible.len() {
-        0 => String::new(),
-        count if count > MAX_SUGGESTED => {
-            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
-        }
-        _ => format!("; --track can name {}", named.join(", ")),
-    }
-}

@@ -37,7 +37,7 @@ mod relevance;
 mod tests;
 
 pub use approach::{Approach, ApproachValues, NoApproach, Party, approach};
-pub use choose::{ChoiceError, choose, track_suggestion};
+pub use choose::{ChoiceError, choose};
 pub use find::encounter;
 pub use recorded::{
     EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, REAR_INDEX,

@@ -169,18 +169,18 @@ fn observe_lane_change(data: &SmoothedTrajectoryData, change: &LaneChange, sampl
     }
     let crossing = Time::from_s(change.crossing_s);
     let Some(lead) = lead_in(data, change.track_id, Lane(change.from_lane), crossing) else { return };
-    let Ok(thw_s) = time_headway_s(lead.gap_m, lead.own.speed_mps) else { return };
+    let Ok(thw_s) = time_headway_s(lead.gap_m, lead.follower.speed_mps) else { return };
     if thw_s > FOLLOWING_THW_S {
         return;
     }
     samples.push_headway(Quantity::CriticalCutOutThw, thw_s);
     // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are first recorded.
-    let own = &data.tracks[lead.own_index].trajectory;
+    let follower = &data.tracks[lead.follower_index].trajectory;
     let other = &data.tracks[lead.lead_index].trajectory;
-    let Some((earliest, _)) = own.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
+    let Some((earliest, _)) = follower.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
     let start = Time::from_s(change.start_s).max(earliest).min(crossing);
-    if let Some((own, other)) = own.at(start).zip(other.at(start)) {
-        let closing_mps = own.speed_mps - other.speed_mps;
+    if let Some((follower, other)) = follower.at(start).zip(other.at(start)) {
+        let closing_mps = follower.speed_mps - other.speed_mps;
         if closing_mps > 0.0 {
             samples.push(Quantity::Closing, closing_mps);
         }
@@ -189,8 +189,8 @@ fn observe_lane_change(data: &SmoothedTrajectoryData, change: &LaneChange, sampl
 
 /// A vehicle and its lead vehicle at one instant.
 struct LeadPair<'a> {
-    own: &'a TrajectoryPoint,
-    own_index: usize,
+    follower: &'a TrajectoryPoint,
+    follower_index: usize,
     lead_index: usize,
     /// Gap bumper to bumper (m).
     gap_m: f64,
@@ -199,15 +199,15 @@ struct LeadPair<'a> {
 /// Returns track `track_id` and the nearest vehicle in `lane` that is entirely ahead of it at `time`.
 fn lead_in(data: &SmoothedTrajectoryData, track_id: u64, lane: Lane, time: Time) -> Option<LeadPair<'_>> {
     let present = data.present_at(time);
-    let own = present.iter().find(|presence| data.look_up(**presence).0.track_id == track_id)?;
-    let (own_track, own_point) = data.look_up(*own);
-    let ahead = present.iter().filter(|presence| presence.track_index != own.track_index).filter_map(|presence| {
+    let follower = present.iter().find(|presence| data.look_up(**presence).0.track_id == track_id)?;
+    let (own_track, own_point) = data.look_up(*follower);
+    let ahead = present.iter().filter(|presence| presence.track_index != follower.track_index).filter_map(|presence| {
         let (track, point) = data.look_up(*presence);
         let gap_m = gap_m((own_track, own_point), (track, point));
         (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.track_index))
     });
     let (gap_m, lead_index) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(LeadPair { own: own_point, own_index: own.track_index, lead_index, gap_m })
+    Some(LeadPair { follower: own_point, follower_index: follower.track_index, lead_index, gap_m })
 }
 
 /// Returns the gap between two vehicles, bumper to bumper (m).
@@ -222,7 +222,7 @@ fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
     let Some((mut time, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return };
     while time <= last {
         for following in following_at(data, time) {
-            let instants = pairs.entry((following.own_index, following.lead_index)).or_default();
+            let instants = pairs.entry((following.follower_index, following.lead_index)).or_default();
             instants.push((following.thw_s, following.speed_mps));
         }
         time += PERIOD;
@@ -240,7 +240,7 @@ fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
 
 /// A vehicle that follows another one at one instant.
 struct Following {
-    own_index: usize,
+    follower_index: usize,
     lead_index: usize,
     /// Time headway (s).
     thw_s: f64,
@@ -260,8 +260,8 @@ fn following_at(data: &SmoothedTrajectoryData, time: Time) -> Vec<Following> {
         let gap_m = gap_m(rear, front);
         let thw_s = time_headway_s(gap_m, rear.1.speed_mps).ok()?;
         let counts = rear.1.lane == front.1.lane && gap_m >= 0.0 && thw_s <= FOLLOWING_THW_S;
-        let [own_index, lead_index] = [pair[0].track_index, pair[1].track_index];
-        counts.then_some(Following { own_index, lead_index, thw_s, speed_mps: rear.1.speed_mps })
+        let [follower_index, lead_index] = [pair[0].track_index, pair[1].track_index];
+        counts.then_some(Following { follower_index, lead_index, thw_s, speed_mps: rear.1.speed_mps })
     });
     follows.collect()
 }
@@ -274,9 +274,9 @@ mod tests {
 
     /// A vehicle at 30 m/s changes lanes to the left behind a lead vehicle at 26 m/s.
     fn overtaking() -> Samples {
-        let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
+        let follower = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let lead = straight_track(2, 40.0, 26.0, -5.25, 110);
-        observe(&smooth(&trajectory_data_of(vec![own, lead])))
+        observe(&smooth(&trajectory_data_of(vec![follower, lead])))
     }
 
     #[test]

@@ -50,14 +50,18 @@ impl DetectionBasis {
         !self.is_measured && !self.recorded_lanes.iter().any(|&lane| self.markings.right_edge_m(Lane(lane)).is_some())
     }
 
+    /// Returns true if lane changes are searched by the recorded lanes, and no vehicle changes its recorded lane.
+    pub fn lacks_recorded_crossings(&self) -> bool {
+        (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable) && self.recorded_crossings == 0
+    }
+
     /// Returns the reasons for which lane changes may be missing, or their quantities may be wrong.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.markings.ignored().iter().map(ToString::to_string).collect();
-        let by_recorded_lane = (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
-        if by_recorded_lane && self.recorded_crossings == 0 {
+        if self.lacks_recorded_crossings() {
             warnings.push(
-                "no vehicle changes its recorded lane, so that nothing can be found by it; `--lanes none` goes by the lateral \
-                 shift alone"
+                "no vehicle changes its recorded lane, so that nothing can be found by it; a search that takes no lane as \
+                 recorded goes by the lateral shift alone"
                     .to_owned(),
             );
         }
@@ -123,7 +127,7 @@ mod tests {
     fn a_file_without_lanes_is_a_warning_and_never_silence() {
         let alone = || vec![straight_track(1, 0.0, 30.0, -1.75, 100)];
         let by_lane = basis(Criterion::Peak, LaneReliability::Reliable, alone());
-        assert!(by_lane.warnings()[0].contains("--lanes none"), "{:?}", by_lane.warnings());
+        assert!(by_lane.warnings()[0].contains("goes by the lateral shift alone"), "{:?}", by_lane.warnings());
         let by_shift = basis(Criterion::Peak, LaneReliability::Unreliable, alone());
         assert!(by_shift.warnings().is_empty() && by_shift.to_string().contains("lanes: none"), "{by_shift}");
         let by_distance = basis(Criterion::Distance, LaneReliability::Reliable, alone());

@@ -9,6 +9,7 @@ use super::distance::by_distance;
 use super::double::{RoadLanes, mark_doubles};
 use super::geometry::LaneGrid;
 use super::gradient;
+use super::lane_reliability::LaneReliability;
 use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres, quintic_width_share, sweeps};
 use crate::filters::{PERIOD, SmoothedTrack, SmoothedTrajectoryData, smooth_track, stays_of};
 use crate::trajectory_data::{LaneMarkings, MarkingDistances};
@@ -41,16 +42,6 @@ impl Criterion {
             Self::Gradient => "gradient",
         }
     }
-}
-
-/// Whether the recorded lane of a vehicle is reliable.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LaneReliability {
-    /// Reliable: the peak criterion requires a change of the recorded lane.
-    #[default]
-    Reliable,
-    /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the recorded lane.
-    Unreliable,
 }
 
 /// Detects the lane changes of one track at a time.

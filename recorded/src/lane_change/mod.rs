@@ -84,14 +84,16 @@ mod double;
 mod find;
 mod geometry;
 mod gradient;
+mod lane_reliability;
 mod manoeuvre;
 mod peaks;
 mod score;
 
 pub use basis::DetectionBasis;
 pub use change::LaneChange;
-pub use detect::{Criterion, LaneChangeDetector, LaneReliability, detect};
+pub use detect::{Criterion, LaneChangeDetector, detect};
 pub use find::{FoundLaneChanges, find};
+pub use lane_reliability::LaneReliability;
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};
 pub use peaks::{Peak, Width, find_peaks, peak_width};
 pub use score::{HitRate, ReferenceChange, ReferenceError, Score, TrackSpans, listed_for, read_references, score};

@@ -15,8 +15,9 @@ use std::io::BufRead;
 use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::fields::{Bounds, FieldError, integer, number};
+use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
 use super::plain::allowed;
 use super::reference_line::Point;

@@ -3,47 +3,12 @@
 use std::path::PathBuf;
 
 use closecall_traffic::{Time, Trajectory};
-use serde::Serialize;
 
 use super::class_names::UnknownClass;
 use super::continuity::Continuity;
+use super::file_layout::Layout;
 use super::markings::LaneMarkings;
 use crate::lane_change::LaneReliability;
-
-/// The layout of a trajectory file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Layout {
-    /// CSV in metres.
-    Plain,
-    /// NGSIM's 18 columns in feet.
-    Ngsim18,
-    /// The 25 columns of NGSIM's catalogue export.
-    Ngsim25,
-    /// The three files of a highD data set.
-    Highd,
-    /// The three files of an exiD data set.
-    Exid,
-    /// CommonRoad XML.
-    Commonroad,
-    /// A log of one vehicle that sees the lane markings.
-    InCar,
-}
-
-impl Layout {
-    /// Returns the name of the layout, as it appears in JSON.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Plain => "plain",
-            Self::Ngsim18 => "ngsim18",
-            Self::Ngsim25 => "ngsim25",
-            Self::Highd => "highd",
-            Self::Exid => "exid",
-            Self::Commonroad => "commonroad",
-            Self::InCar => "in-car",
-        }
-    }
-}
 
 /// Distances to the markings of the vehicle's own lane, as its camera measures them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use super::data::Layout;
+use super::file_layout::Layout;
 
 /// An error while reading a trajectory file. None of the file's data is used.
 #[derive(Debug, thiserror::Error)]

@@ -23,9 +23,10 @@ use std::path::Path;
 use closecall_traffic::{Lane, Time, maths};
 
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::file_layout::Layout;
 use super::file_set::{Meta, RecordingMeta, VehicleMeta};
 use super::header::Header;
 use super::highd::{SPEED_MPS, check_row_counts};

@@ -27,9 +27,10 @@ use std::collections::BTreeMap;
 use closecall_traffic::{Lane, Time};
 
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::file_layout::Layout;
 use super::file_set::{Meta, RecordingMeta, VehicleMeta};
 use super::header::Header;
 use super::markings::LaneMarkings;

@@ -34,9 +34,10 @@
 use closecall_traffic::{Time, VehicleClass};
 
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, optional_number};
+use super::file_layout::Layout;
 use super::header::Header;
 use super::plain::{allowed, class_named};
 use super::rows::Fields;

@@ -3,9 +3,10 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::file_layout::Layout;
 use super::header::Header;
 use super::plain::allowed;
 use super::rows::Fields;

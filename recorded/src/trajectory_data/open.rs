@@ -141,7 +141,7 @@ fn reader_for<'a>(
         return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
     }
     if text.starts_with(b"<") && text.windows(SUMO.len()).any(|window| window == SUMO) {
-        let what = "floating car data of SUMO (`--fcd-output`)";
+        let what = "floating car data (FCD) of SUMO";
         return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
     }
     let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {

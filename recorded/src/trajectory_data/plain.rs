@@ -3,9 +3,10 @@
 use closecall_traffic::{Time, VehicleClass};
 
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, optional_number};
+use super::file_layout::Layout;
 use super::header::Header;
 use super::rows::Fields;
 use super::source::{Clock, FileInfo, Row};

@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::continuity::FrameClock;
-use super::data::Layout;
 use super::error::TrajectoryFileProblem;
+use super::file_layout::Layout;
 use super::source::{ReadError, Row};
 
 /// Minimum speed of a vehicle for its steps to count (m/s). At lower speeds, position noise hides a wrong unit.

@@ -12,9 +12,10 @@
 use closecall_traffic::{Time, VehicleClass};
 
 use super::class_names::UnknownClass;
-use super::data::{Layout, MarkingDistances};
+use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::FieldError;
+use super::file_layout::Layout;
 use super::markings::LaneMarkings;
 
 /// States whether frame numbers may restart within one file.

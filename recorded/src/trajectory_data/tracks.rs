@@ -9,8 +9,9 @@ use super::axes::{self, Axes, AxisOptions};
 use super::builder::TrackBuilder;
 use super::class_names::UnknownClass;
 use super::continuity::{Continuity, FrameClock};
-use super::data::{Layout, RecordedTrack, TrajectoryData};
+use super::data::{RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
+use super::file_layout::Layout;
 use super::input::Digest;
 use super::markings::LaneMarkings;
 use super::ngsim;
@@ -344,11 +345,18 @@ impl Iterator for Tracks<'_> {
     }
 }
 
-/// The extent of one vehicle's rows: their number, and the time and frame of the first and the last.
+/// The time and the frame of a row.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Instant {
+    time: Time,
+    frame: i64,
+}
+
+/// The extent of one vehicle's rows: their number, the first and the last.
 struct Extent {
     rows: usize,
-    first: (Time, i64),
-    last: (Time, i64),
+    first: Instant,
+    last: Instant,
 }
 
 /// Returns the mean time step of the vehicle with the most rows. Returns NGSIM's period if no vehicle has two frames,
@@ -356,7 +364,7 @@ struct Extent {
 fn period(rows: &[Row]) -> Time {
     let mut extents: BTreeMap<(u64, Time), Extent> = BTreeMap::new();
     for row in rows {
-        let at = (row.time, row.frame);
+        let at = Instant { time: row.time, frame: row.frame };
         let extent = extents.entry((row.number, row.origin)).or_insert(Extent { rows: 0, first: at, last: at });
         extent.rows += 1;
         extent.first = extent.first.min(at);
@@ -364,8 +372,8 @@ fn period(rows: &[Row]) -> Time {
     }
     let longest = extents.values().rev().max_by_key(|extent| extent.rows);
     let Some(Extent { first, last, .. }) = longest else { return ngsim::PERIOD };
-    let frames = last.1 - first.1;
-    let step_ns = if frames > 0 { (last.0 - first.0).ns() / frames } else { 0 };
+    let frames = last.frame - first.frame;
+    let step_ns = if frames > 0 { (last.time - first.time).ns() / frames } else { 0 };
     let may_restart = rows.first().is_some_and(|row| row.clock == Clock::MayRestart);
     if may_restart || step_ns <= 0 { ngsim::PERIOD } else { Time::from_ns(step_ns) }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use closecall_campaign::action::CommandFor;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_studies::cost::{cost, section as cost_section};
@@ -16,14 +17,18 @@ const REPORT: &str = "report.html";
 ///
 /// # Errors
 /// [`WriteError`] if a file cannot be written. Existing files then stay as they are.
-pub fn write_causes(saved: &SavedCampaign, failures: &Failures) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write_causes(
+    saved: &SavedCampaign,
+    failures: &Failures,
+    command_for: CommandFor,
+) -> Result<Vec<PathBuf>, WriteError> {
     let folder = saved.folder();
     write_rows(folder, &failures.rows)?;
     let mut written = vec![folder.file(CAUSES)];
     let path = folder.file(REPORT);
     let page = std::fs::read_to_string(&path).unwrap_or_default();
     if let Some([before, old, after]) = without_section(&page) {
-        let table = section(failures, saved.manifest().scenarios.len() > 1).into_string();
+        let table = section(failures, saved.manifest().scenarios.len() > 1, command_for).into_string();
         // The heading keeps the name by which the list of contents refers to it.
         let heading = old.find("<h2").and_then(|begin| old[begin..].split_inclusive('>').next());
         let table = table.replacen("<h2>", heading.unwrap_or("<h2>"), 1);
@@ -34,10 +39,10 @@ pub fn write_causes(saved: &SavedCampaign, failures: &Failures) -> Result<Vec<Pa
 }
 
 /// Returns the table of causes of a campaign, and its cost where nothing happens. A folder that cannot be read again has none.
-pub(super) fn table(folder: &Folder) -> Markup {
+pub(super) fn table(folder: &Folder, command_for: CommandFor) -> Markup {
     let saved = SavedCampaign::of(folder.clone()).ok();
     let found = saved.as_ref().and_then(|saved| campaign_failures(saved).ok()).unwrap_or_default();
     let cost = saved.as_ref().and_then(|saved| cost(saved).ok());
     let is_named = saved.is_some_and(|saved| saved.manifest().scenarios.len() > 1);
-    html! { (section(&found, is_named)) (cost.map_or_else(Markup::default, |cost| cost_section(&cost))) }
+    html! { (section(&found, is_named, command_for)) (cost.map_or_else(Markup::default, |cost| cost_section(&cost))) }
 }

@@ -12,17 +12,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use closecall_campaign::failure::FailureKind;
+use closecall_campaign::action::CommandFor;
 use closecall_campaign::folder::{Folder, FolderError, RECORDINGS, RECORDINGS_PAGE, REPORT};
 use closecall_campaign::integrity::Integrity;
 use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::record::{ArmRecord, Record};
 use closecall_campaign::runner::Work;
-use closecall_campaign::saved::{SavedCampaign, SavedError};
+use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::ScenarioFile;
-use closecall_simulation::SampleError;
 use closecall_traffic::atomic::WriteError;
 
 use super::arm_pairs::write_arm_pairs;
@@ -33,52 +32,15 @@ use super::markdown::{markdown, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
 use super::recordings::{Recorded, RecordedSample, Still, record};
+use super::report_error::ReportError;
 use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
-use crate::run::rerun::RecordingError;
 
 /// Number of samples that are listed as the slowest.
 const SLOWEST: usize = 10;
 /// The environment variable with the path of the file that GitHub's runners show as the summary of a step.
 const STEP_SUMMARY: &str = "GITHUB_STEP_SUMMARY";
-
-/// A report that cannot be made. The journal stays as it is.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The folder cannot be read.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// The saved campaign cannot be read back.
-    #[error(transparent)]
-    Saved(#[from] SavedError),
-    /// A file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// A recording cannot be written.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A sample that had an outcome has none when it is run again for its recording.
-    #[error("failed to run sample {sample}: {source}")]
-    Sample {
-        /// The sample's number.
-        sample: u64,
-        /// Why it has no outcome.
-        source: SampleError,
-    },
-}
-
-impl ReportError {
-    /// Returns the kind of the error.
-    pub fn kind(&self) -> FailureKind {
-        match self {
-            Self::Folder(error) => FailureKind::from(error),
-            Self::Saved(error) => FailureKind::from(error),
-            Self::Write(_) | Self::Recording(_) => FailureKind::Io,
-            Self::Sample { .. } => FailureKind::Sample,
-        }
-    }
-}
 
 /// A file that a campaign could not write. The verdict stands, and so do all other files.
 #[derive(Debug, thiserror::Error)]
@@ -118,17 +80,31 @@ pub struct CampaignReport<'a> {
     pub tally: &'a Tally,
     /// The verdict.
     pub judged: &'a Judgement,
+    /// The commands for readers to copy.
+    pub command_for: CommandFor,
+}
+
+/// What reports show of single samples.
+#[derive(Clone, Copy)]
+struct Looks<'a> {
+    /// The recordings.
+    recordings: &'a Recordings,
+    /// Pictures of recorded samples.
+    stills: &'a [Still],
+    /// The samples with the longest wall times.
+    slowest: &'a [Timing],
 }
 
 impl CampaignReport<'_> {
     /// Writes every file into the folder, with recordings of the selected samples. A file that cannot be written costs no other.
     pub fn write(&self, folder: &Folder, selection: Selection) -> Written {
         let mut written = Written::default();
-        let (files, none) = (self.scenario_files(), Recordings::new());
+        let files = self.scenario_files();
         let (slowest, wall_s) = written.note("the wall times", self.wall_times(folder, &files)).unwrap_or_default();
-        let junit = self.with_findings((&files, Some(folder)), (&none, &[]), &slowest, |findings| {
-            write_junit(&folder.file("junit.xml"), findings, &wall_s)
-        });
+        let none = Recordings::new();
+        let without = Looks { recordings: &none, stills: &[], slowest: &slowest };
+        let junit = self
+            .with_findings(Some(folder), without, |findings| write_junit(&folder.file("junit.xml"), findings, &wall_s));
         written.note("junit.xml", junit);
         written.note(&step_summary_name(), self.append_step_summary(Some(folder)));
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
@@ -144,8 +120,8 @@ impl CampaignReport<'_> {
         if self.tally.summary.is_paired() {
             written.note("arm_pairs.parquet", write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary));
         }
-        self.write_pages(folder, (&none, &[], &slowest), &mut written);
-        let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection) {
+        self.write_pages(folder, without, &mut written);
+        let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection, self.command_for) {
             Ok(recorded) => recorded,
             Err(error) => {
                 written.note::<(), _>("the recordings", Err(error));
@@ -158,8 +134,9 @@ impl CampaignReport<'_> {
         }
         if !paths.is_empty() {
             // Once more, with links to the recordings.
-            self.write_pages(folder, (&paths, &stills, &slowest), &mut written);
-            let junit = self.with_findings((&files, Some(folder)), (&paths, &stills), &slowest, |findings| {
+            let with = Looks { recordings: &paths, stills: &stills, slowest: &slowest };
+            self.write_pages(folder, with, &mut written);
+            let junit = self.with_findings(Some(folder), with, |findings| {
                 write_junit(&folder.file("junit.xml"), findings, &wall_s)
             });
             written.note("junit.xml", junit);
@@ -169,13 +146,8 @@ impl CampaignReport<'_> {
     }
 
     /// Writes the reports for human readers, with links to the recordings.
-    fn write_pages(
-        &self,
-        folder: &Folder,
-        (recordings, stills, slowest): (&Recordings, &[Still], &[Timing]),
-        written: &mut Written,
-    ) {
-        self.with_findings((&self.scenario_files(), Some(folder)), (recordings, stills), slowest, |findings| {
+    fn write_pages(&self, folder: &Folder, looks: Looks<'_>, written: &mut Written) {
+        self.with_findings(Some(folder), looks, |findings| {
             written.note(REPORT, write_html(&folder.file(REPORT), findings));
             written.note("summary.md", write_markdown(&folder.file("summary.md"), findings));
         });
@@ -228,9 +200,8 @@ impl CampaignReport<'_> {
 
     fn with_findings<T>(
         &self,
-        (files, folder): (&[&ScenarioFile], Option<&Folder>),
-        (recordings, stills): (&Recordings, &[Still]),
-        slowest: &[Timing],
+        folder: Option<&Folder>,
+        Looks { recordings, stills, slowest }: Looks<'_>,
         write: impl FnOnce(&Findings<'_>) -> T,
     ) -> T {
         let summary = &self.tally.summary;
@@ -238,7 +209,7 @@ impl CampaignReport<'_> {
         let has_gallery = folder.is_some_and(|folder| folder.file(&gallery).exists());
         write(&Findings {
             manifest: self.manifest,
-            files,
+            files: &self.scenario_files(),
             summary,
             judged: self.judged,
             overview: &self.tally.overview,
@@ -247,6 +218,7 @@ impl CampaignReport<'_> {
             gallery: has_gallery.then_some(gallery.as_str()),
             folder,
             slowest,
+            command_for: self.command_for,
         })
     }
 
@@ -255,7 +227,8 @@ impl CampaignReport<'_> {
         let Some(path) = std::env::var_os(STEP_SUMMARY).filter(|path| !path.is_empty()).map(PathBuf::from) else {
             return Ok(());
         };
-        let text = self.with_findings((&self.scenario_files(), folder), (&Recordings::new(), &[]), &[], markdown);
+        let without = Looks { recordings: &Recordings::new(), stills: &[], slowest: &[] };
+        let text = self.with_findings(folder, without, markdown);
         let opened = OpenOptions::new().create(true).append(true).open(&path);
         let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)
@@ -263,21 +236,21 @@ impl CampaignReport<'_> {
 }
 
 /// Looks at a campaign's folder: its manifest, its journal, and whether the table of outcomes is the one that the journal makes.
-pub fn check_folder(folder: &Folder) -> Integrity {
+pub fn check_folder(folder: &Folder, command_for: CommandFor) -> Integrity {
     const TABLE: &str = "outcomes.parquet";
-    let mut found = Integrity::of(folder);
-    if !found.is_sound() {
-        return found;
+    let mut integrity = Integrity::of(folder, command_for);
+    if !integrity.is_sound() {
+        return integrity;
     }
     match is_table_of_journal(folder, TABLE) {
         Ok(true) => {}
         Ok(false) => {
             let message = "it is not the table of this journal".to_owned();
-            found.add(TABLE, None, message, "resume the campaign with --resume, which writes it again".to_owned());
+            integrity.add_resumable(TABLE, None, message);
         }
-        Err(error) => found.add(TABLE, None, error.to_string(), "resume the campaign with --resume".to_owned()),
+        Err(error) => integrity.add_resumable(TABLE, None, error.to_string()),
     }
-    found
+    integrity
 }
 
 /// Returns true if the table has the bytes that the journal makes. Another release may write other bytes.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::overview::Overview;
 use super::recordings::Still;
 use super::timings::Timing;
+use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
 use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::summary::Summary;
@@ -38,6 +39,8 @@ pub struct Findings<'a> {
     pub folder: Option<&'a Folder>,
     /// The samples with the longest wall times, in falling order.
     pub slowest: &'a [Timing],
+    /// The commands for readers to copy.
+    pub command_for: CommandFor,
 }
 
 /// Largest number of pictures in a report.
@@ -66,7 +69,8 @@ impl<'a> Findings<'a> {
 
     /// Returns the command that runs a sample again, from within the campaign's folder.
     pub(super) fn replay(&self, scenario: &str, sample: u64) -> String {
-        let named = if self.files.len() > 1 { format!(" --scenario {scenario}") } else { String::new() };
-        format!("closecall replay . {sample}{named} --record ../sample-{sample}.rrd")
+        let of = SavedSample { folder: ".", sample, scenario: (self.files.len() > 1).then_some(scenario) };
+        let recording = format!("../sample-{sample}.rrd");
+        (self.command_for)(&Action::Replay(Replay { recording: Some(&recording), ..Replay::new(of) }))
     }
 }

@@ -55,7 +55,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         .manifest
         .settings()
         .iter()
-        .map(|setting| format!(", <code>--set {}</code>", in_line(&setting.to_string())))
+        .map(|setting| format!(", with <code>{}</code>", in_line(&setting.to_string())))
         .collect();
     text.push_str(&format!(
         "<sub>Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design{settings}, \

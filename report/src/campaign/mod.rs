@@ -20,16 +20,20 @@ pub mod outcomes;
 pub mod overview;
 mod pareto;
 mod recordings;
+mod report_error;
 pub mod samples_xml;
 mod tally;
 mod text;
 pub mod timings;
 pub(crate) mod words;
+#[cfg(test)]
+mod xunit_schema;
 
 pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};
 pub use ensemble::{ensemble_json, ensemble_text};
-pub use files::{ArtifactError, CampaignReport, ReportError, Written, check_folder};
+pub use files::{ArtifactError, CampaignReport, Written, check_folder};
 pub use recordings::{RecordedSample, Still};
+pub use report_error::ReportError;
 pub use tally::Tally;
 pub use text::{CountsText, FlakyText, VerdictText};

@@ -3,16 +3,17 @@
 use std::fs;
 use std::path::PathBuf;
 
+use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
 use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::atomic::{WriteError, write_file};
 
-use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
 use super::origins::ORIGINS;
+use super::report_error::ReportError;
 use crate::run::figure::{card, scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording_of;
@@ -82,6 +83,7 @@ pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
     selection: Selection,
+    command_for: CommandFor,
 ) -> Result<Recorded, ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
@@ -92,7 +94,7 @@ pub(super) fn record(
     let (mut recorded, mut entries) = (Recorded::default(), Vec::new());
     for (name, chosen) in choose(&saved, scenarios, selection)? {
         fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
-        let entry = match record_one(&saved, name, &chosen) {
+        let entry = match record_one(&saved, name, &chosen, command_for) {
             Ok(entry) => entry,
             Err(error) => {
                 recorded.failures.push((format!("the recording of sample {} of {name}", chosen.sample), error));
@@ -116,7 +118,7 @@ pub(super) fn record(
         entries.push(entry);
     }
     if !entries.is_empty()
-        && let Err(error) = write_index(&path.join(RECORDINGS_PAGE), &entries)
+        && let Err(error) = write_index(&path.join(RECORDINGS_PAGE), &entries, command_for)
     {
         recorded.failures.push((format!("{RECORDINGS}/{RECORDINGS_PAGE}"), error.into()));
     }
@@ -158,7 +160,12 @@ fn choose<'a>(
     Ok(all)
 }
 
-fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<IndexEntry, ReportError> {
+fn record_one(
+    saved: &SavedCampaign,
+    scenario: &str,
+    chosen: &Chosen,
+    command_for: CommandFor,
+) -> Result<IndexEntry, ReportError> {
     let sample = chosen.sample;
     let (concrete, key) = saved.sample(Some(scenario), sample)?;
     let films = film_arms(&concrete, key, &saved.manifest().arms(), Level::Full)
@@ -167,9 +174,13 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
     let films: Vec<Film> = films.into_iter().map(named).collect();
     let file = format!("{scenario}-{sample}.rrd");
-    let paired = if films.len() > 1 { " --paired" } else { "" };
-    // The folder may be moved: the command names it from the page's folder.
-    let replay = format!("closecall replay .. {sample} --scenario {scenario}{paired} --record {file}");
+    let is_paired = films.len() > 1;
+    // The folder may be moved: the command names it from the folder of the page.
+    let replay_from = |folder| {
+        let of = SavedSample { folder, sample, scenario: Some(scenario) };
+        command_for(&Action::Replay(Replay { is_paired, recording: Some(&file), ..Replay::new(of) }))
+    };
+    let replay = replay_from("..");
     let story = films.iter().flat_map(|film| {
         let arm = film.arm_label();
         [Some(film.headline()), film.mis_summary()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
@@ -187,7 +198,7 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
         sentence: films.last().and_then(Film::sentence_text).unwrap_or_default(),
         outcomes: films.iter().filter_map(|film| film.outcome().cloned()).collect(),
     };
-    let in_folder = format!("closecall replay . {sample} --scenario {scenario}{paired} --record {file}");
+    let in_folder = replay_from(".");
     let card_path = saved.folder().file(&card_beside(&format!("{RECORDINGS}/{file}")));
     write_file(&card_path, |card_file| card_file.write_all(card(&films, &in_folder).as_bytes()))?;
     write_recording_of(&saved.folder().file(&format!("{RECORDINGS}/{file}")), films)?;

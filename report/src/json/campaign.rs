@@ -182,7 +182,7 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
 }
 
 /// Why the samples of a design have no interval and no test.
-const DEPENDENT: &str = "the samples of --design sobol and grid are not independent";
+const DEPENDENT: &str = "the samples of the designs sobol and grid are not independent";
 
 fn paired(pairs: &Pairs, inference: Inference) -> Value {
     let mut object = json!({

@@ -26,8 +26,8 @@ pub fn sensitivity(study: &Sensitivity) -> Value {
         "greatest": study.greatest().map(|factor| &study.factors[factor].name),
         "factors": study.factors.iter().map(factor).collect::<Vec<_>>(),
         "left_out": left_out,
-        "screening": study.screening.as_ref().map(|found| screening(study, found)),
-        "decomposition": study.decomposition.as_ref().map(|found| decomposition(study, found)),
+        "screening": study.screening.as_ref().map(|results| screening(study, results)),
+        "decomposition": study.decomposition.as_ref().map(|results| decomposition(study, results)),
         "errors": run_errors(&study.errors()),
     })
 }
@@ -48,7 +48,7 @@ pub(super) fn insert(object: &mut Map<String, Value>, key: &str, estimate: Optio
     }
 }
 
-fn screening(study: &Sensitivity, found: &Screening) -> Value {
+fn screening(study: &Sensitivity, results: &Screening) -> Value {
     let effects = |OutputEffects { output, of_factors }: &OutputEffects| {
         let of_factor = |(factor, effects): (&Factor, &Effects)| {
             let Effects { mu, mu_star, sigma, effects, missing } = effects;
@@ -65,16 +65,17 @@ fn screening(study: &Sensitivity, found: &Screening) -> Value {
         json!({ "output": output.name(), "effects": effects })
     };
     json!({
-        "trajectories": found.trajectories,
-        "points": found.points,
-        "errors": found.errors.points,
-        "outputs": found.effects.iter().map(effects).collect::<Vec<_>>(),
+        "trajectories": results.trajectories,
+        "points": results.points,
+        "errors": results.errors.points,
+        "outputs": results.effects.iter().map(effects).collect::<Vec<_>>(),
     })
 }
 
-fn decomposition(study: &Sensitivity, found: &Decomposition) -> Value {
+fn decomposition(study: &Sensitivity, results: &Decomposition) -> Value {
     let of_output = |output: &OutputIndices| {
-        let groups: Vec<Value> = output.order().into_iter().map(|group| indices(study, found, output, group)).collect();
+        let groups: Vec<Value> =
+            output.order().into_iter().map(|group| indices(study, results, output, group)).collect();
         let effect = |factor: usize| {
             let MainEffect { index, means } = output.main_effects[factor]?;
             Some(json!({
@@ -89,15 +90,15 @@ fn decomposition(study: &Sensitivity, found: &Decomposition) -> Value {
         json!({ "output": output.output.name(), "mean": output.mean, "main_effects": effects, "indices": groups })
     };
     json!({
-        "rows": found.rows,
-        "points": found.points,
-        "errors": found.errors.points,
-        "outputs": found.indices.iter().map(of_output).collect::<Vec<_>>(),
+        "rows": results.rows,
+        "points": results.points,
+        "errors": results.errors.points,
+        "outputs": results.indices.iter().map(of_output).collect::<Vec<_>>(),
     })
 }
 
-fn indices(study: &Sensitivity, found: &Decomposition, output: &OutputIndices, group: usize) -> Value {
-    let (of_group, indices) = (&found.groups[group], &output.of_groups[group]);
+fn indices(study: &Sensitivity, results: &Decomposition, output: &OutputIndices, group: usize) -> Value {
+    let (of_group, indices) = (&results.groups[group], &output.of_groups[group]);
     let names: Vec<&str> = of_group.factors.iter().map(|factor| study.factors[*factor].name.as_str()).collect();
     let mut object = Map::new();
     object.insert("factors".to_owned(), json!(names));

@@ -94,7 +94,7 @@ fn head(title: &str, settings: &[String], line: &str) -> Markup {
             div {
                 h1 { (title) }
                 p.what { (line) }
-                @for setting in settings { p.note { code { "--set " (setting) } } }
+                @for setting in settings { p.note { "with " code { (setting) } } }
             }
         }
     }

@@ -59,7 +59,7 @@ impl ScanWriter {
     pub fn new(path: &Path, mode: SensorMode) -> Result<Self, WriteError> {
         let fail = |error| WriteError::new(path, error);
         if mode != SensorMode::Full {
-            let message = "the run has no LiDAR, which only sensors of mode `full` have (--sensors full)";
+            let message = "the run has no LiDAR, which only sensors of mode `full` have";
             return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
         }
         let sink = match path.extension().and_then(|extension| extension.to_str()) {

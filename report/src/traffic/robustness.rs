@@ -15,34 +15,34 @@ pub struct RobustnessText<'a>(pub &'a Robustness);
 
 impl fmt::Display for RobustnessText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let found = self.0;
-        let reference = match found.reference_kind {
+        let study = self.0;
+        let reference = match study.reference_kind {
             ReferenceKind::Gradient => "jumps of the distances to the markings",
             ReferenceKind::RecordedLanes => "recorded lanes",
             ReferenceKind::LateralShift => "lateral shift",
         };
-        let Setup { repetitions, seed, .. } = found.setup;
-        writeln!(f, "{} lane changes, by {reference}; each criterion without noise and offset:", found.reference)?;
-        for ((criterion, known), confirmed) in found.criteria.iter().zip(&found.undisturbed).zip(&found.confirmed) {
+        let Setup { repetitions, seed, .. } = study.setup;
+        writeln!(f, "{} lane changes, by {reference}; each criterion without noise and offset:", study.reference)?;
+        for ((criterion, known), confirmed) in study.criteria.iter().zip(&study.undisturbed).zip(&study.confirmed) {
             writeln!(f, "  {:<9} finds {known}; {confirmed} of them are among these", criterion.name())?;
         }
         writeln!(f, "\nfound again / false ones, compared with the criterion without noise and offset")?;
         writeln!(f, "noise: mean [least, most] of {repetitions} draws, seed {seed}")?;
-        let names: Vec<String> = found.criteria.iter().map(|criterion| format!("{:<40}", criterion.name())).collect();
+        let names: Vec<String> = study.criteria.iter().map(|criterion| format!("{:<40}", criterion.name())).collect();
         writeln!(f, "\nBrownian noise  {}", names.concat())?;
-        let means = found.mean_noise();
-        for ((level, cells), draws) in found.setup.noise_m_per_sqrt_s.iter().zip(&means).zip(&found.noise) {
-            writeln!(f, "{level:>8.2} m/√s   {}", row(found, cells, draws))?;
+        let means = study.mean_noise();
+        for ((level, cells), draws) in study.setup.noise_m_per_sqrt_s.iter().zip(&means).zip(&study.noise) {
+            writeln!(f, "{level:>8.2} m/√s   {}", row(study, cells, draws))?;
         }
         writeln!(f, "\nlateral offset  {}", names.concat())?;
-        for (level, cells) in found.setup.offset_m.iter().zip(&found.offset) {
-            writeln!(f, "{level:>8.2} m      {}", row(found, cells, &[]))?;
+        for (level, cells) in study.setup.offset_m.iter().zip(&study.offset) {
+            writeln!(f, "{level:>8.2} m      {}", row(study, cells, &[]))?;
         }
         writeln!(
             f,
             "\n!: the criterion loses more than 5 % of what it finds without noise and offset, or as many are false"
         )?;
-        for line in failures(found) {
+        for line in failures(study) {
             writeln!(f, "{line}")?;
         }
         Ok(())
@@ -50,7 +50,7 @@ impl fmt::Display for RobustnessText<'_> {
 }
 
 /// Returns the counts of each criterion, with their range over the draws of the noise if there are several.
-fn row(found: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCounts>]) -> String {
+fn row(study: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCounts>]) -> String {
     let count = |criterion: usize, value: fn(&CriterionCounts) -> f64| {
         let mean = value(&cells[criterion]);
         if draws.len() < 2 {
@@ -61,7 +61,7 @@ fn row(found: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCoun
         format!("{mean:>6.1} [{least}, {most}]")
     };
     let cell = |criterion: usize| {
-        let mark = if found.fails(criterion, &cells[criterion]) { "!" } else { " " };
+        let mark = if study.fails(criterion, &cells[criterion]) { "!" } else { " " };
         let (again, invented) = (count(criterion, |cell| cell.again), count(criterion, |cell| cell.invented));
         format!("{:<40}", format!("{again} /{invented} {mark}"))
     };
@@ -69,17 +69,17 @@ fn row(found: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCoun
 }
 
 /// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that level.
-fn failures(found: &Robustness) -> Vec<String> {
+fn failures(study: &Robustness) -> Vec<String> {
     let or_never = |level: Option<f64>| level.unwrap_or(f64::INFINITY);
     let mut columns: Vec<(usize, Option<f64>)> =
-        (0..found.criteria.len()).map(|column| (column, found.failing_noise_m_per_sqrt_s(column))).collect();
+        (0..study.criteria.len()).map(|column| (column, study.failing_noise_m_per_sqrt_s(column))).collect();
     columns.sort_by(|a, b| or_never(a.1).total_cmp(&or_never(b.1)));
     let line = |(column, first): (usize, Option<f64>)| {
-        let name = found.criteria[column].name();
-        if found.undisturbed[column] == 0 {
+        let name = study.criteria[column].name();
+        if study.undisturbed[column] == 0 {
             return format!("{name} is not judged: it finds nothing even without noise");
         }
-        let draws: Vec<f64> = found.failing_noise_by_repetition(column).into_iter().map(or_never).collect();
+        let draws: Vec<f64> = study.failing_noise_by_repetition(column).into_iter().map(or_never).collect();
         let shown = |level: f64| if level.is_finite() { format!("{level} m/√s") } else { "no level".to_owned() };
         let (least, most) =
             (draws.iter().copied().fold(f64::INFINITY, f64::min), draws.into_iter().fold(0.0, f64::max));
@@ -98,31 +98,31 @@ fn failures(found: &Robustness) -> Vec<String> {
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
-pub fn robustness_charts(found: &Robustness) -> Result<[String; 2], ChartError> {
-    let levels = &found.setup;
-    let means = found.mean_noise();
-    let least = |column: usize| found.failing_noise_m_per_sqrt_s(column).into_iter().collect();
+pub fn robustness_charts(study: &Robustness) -> Result<[String; 2], ChartError> {
+    let levels = &study.setup;
+    let means = study.mean_noise();
+    let least = |column: usize| study.failing_noise_m_per_sqrt_s(column).into_iter().collect();
     let noise = Axis {
         name: "Brownian noise [m/√s]",
         levels: &levels.noise_m_per_sqrt_s,
         rows: &means,
-        draws: &found.noise,
-        failing: (0..found.criteria.len()).map(least).collect(),
+        draws: &study.noise,
+        failing: (0..study.criteria.len()).map(least).collect(),
     };
     let offset = Axis {
         name: "Lateral offset [m]",
         levels: &levels.offset_m,
-        rows: &found.offset,
+        rows: &study.offset,
         draws: &[],
-        failing: (0..found.criteria.len()).map(|column| failing_offsets_m(found, column)).collect(),
+        failing: (0..study.criteria.len()).map(|column| failing_offsets_m(study, column)).collect(),
     };
-    Ok([chart(found, &noise).svg()?, chart(found, &offset).svg()?])
+    Ok([chart(study, &noise).svg()?, chart(study, &offset).svg()?])
 }
 
 /// Returns the offsets to either side, nearest to zero, at which a criterion fails (m).
-fn failing_offsets_m(found: &Robustness, column: usize) -> Vec<f64> {
+fn failing_offsets_m(study: &Robustness, column: usize) -> Vec<f64> {
     let failing =
-        found.setup.offset_m.iter().zip(&found.offset).filter(|(_, cells)| found.fails(column, &cells[column]));
+        study.setup.offset_m.iter().zip(&study.offset).filter(|(_, cells)| study.fails(column, &cells[column]));
     let (left, right): (Vec<f64>, Vec<f64>) = failing.map(|(level, _)| *level).partition(|level| *level < 0.0);
     left.into_iter().max_by(f64::total_cmp).into_iter().chain(right.into_iter().min_by(f64::total_cmp)).collect()
 }
@@ -144,7 +144,7 @@ const MOST: f64 = 1.5;
 /// Number of levels that are shown beyond that at which the last criterion fails.
 const LEVELS_BEYOND: usize = 3;
 
-fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
+fn chart(study: &Robustness, axis: &Axis<'_>) -> LineChart {
     // Far beyond the level at which the last criterion fails, nothing is to be seen.
     let fails_at = axis.failing.iter().map(|levels| levels.iter().copied().fold(f64::NEG_INFINITY, f64::max));
     let last = fails_at.fold(f64::NEG_INFINITY, f64::max);
@@ -155,7 +155,7 @@ fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
         let levels = axis.levels.iter().zip(axis.rows).take(shown);
         levels.map(|(level, cells)| (*level, value(&cells[column]))).collect()
     };
-    let lines = found.criteria.iter().enumerate().flat_map(|(column, criterion)| {
+    let lines = study.criteria.iter().enumerate().flat_map(|(column, criterion)| {
         let name = criterion.name();
         let again = points(column, |cell| cell.again);
         let invented = points(column, |cell| cell.invented);
@@ -179,7 +179,7 @@ fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
         colour: column,
     };
     let marks = axis.failing.iter().enumerate().flat_map(|(column, levels)| {
-        let name = found.criteria[column].name();
+        let name = study.criteria[column].name();
         levels.iter().enumerate().map(move |(number, level)| Mark {
             name: if number == 0 { format!("{name} fails") } else { String::new() },
             x: *level,
@@ -190,15 +190,15 @@ fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
         0 | 1 => String::new(),
         draws => format!(": mean and range of {draws} draws"),
     };
-    let most = found.undisturbed.iter().copied().max().unwrap_or(0).max(found.reference);
+    let most = study.undisturbed.iter().copied().max().unwrap_or(0).max(study.reference);
     LineChart {
         title: format!("Lane changes found, by criterion{spread}"),
         x_name: axis.name.to_owned(),
         y_name: "lane changes".to_owned(),
         lines: lines.collect(),
-        level: Some(("reference".to_owned(), found.reference as f64)),
+        level: Some(("reference".to_owned(), study.reference as f64)),
         legend: Legend::Right,
-        bands: if axis.draws.is_empty() { Vec::new() } else { (0..found.criteria.len()).map(band).collect() },
+        bands: if axis.draws.is_empty() { Vec::new() } else { (0..study.criteria.len()).map(band).collect() },
         marks: marks.collect(),
         most: Some((MOST * most as f64).max(1.0)),
     }

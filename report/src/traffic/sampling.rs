@@ -186,17 +186,20 @@ pub enum StepError {
 pub struct Sampled {
     /// Name of the trajectory data, and the track that changes lanes.
     pub title: String,
-    /// Tracks of Opp₁, and of Opp₂ if there is one.
-    pub opponents: (u64, Option<u64>),
+    /// Track of Opp₁.
+    pub opp1: u64,
+    /// Track of Opp₂, if there is one.
+    pub opp2: Option<u64>,
     /// The recorded lane change, then the runs.
     pub runs: Vec<SampledRun>,
 }
 
 impl fmt::Display for Sampled {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (opp1, opp2) = self.opponents;
-        let opp2 = opp2.map_or("no vehicle is ahead in the other lane".to_owned(), |track| format!("track {track}"));
-        writeln!(f, "{}; Opp1: track {opp1}; Opp2: {opp2}", self.title)?;
+        let Self { title, opp1, .. } = self;
+        let opp2 =
+            self.opp2.map_or("no vehicle is ahead in the other lane".to_owned(), |track| format!("track {track}"));
+        writeln!(f, "{title}; Opp1: track {opp1}; Opp2: {opp2}")?;
         writeln!(f, "                        crosses   smallest THW [s] to   THW [s] then to")?;
         writeln!(f, "                         at [s]      Opp1      Opp2     Opp1      Opp2")?;
         for run in &self.runs {
@@ -227,15 +230,16 @@ impl Sampled {
         let title = format!("{}: lane change of track {own}", encounter.data_name);
         Self {
             title,
-            opponents: (opp1, opp2_of(encounter).map(|index| encounter.vehicles[index].trajectory.track_id)),
+            opp1,
+            opp2: opp2_of(encounter).map(|index| encounter.vehicles[index].trajectory.track_id),
             runs: Vec::new(),
         }
     }
 
     /// Returns the runs as JSON.
     pub fn json(&self) -> serde_json::Value {
-        let (opp1, opp2) = self.opponents;
-        serde_json::json!({ "title": self.title, "opp1_track_id": opp1, "opp2_track_id": opp2, "runs": self.runs })
+        let Self { title, opp1, opp2, runs } = self;
+        serde_json::json!({ "title": title, "opp1_track_id": opp1, "opp2_track_id": opp2, "runs": runs })
     }
 
     /// Draws the paths and the two headways of all runs as one figure (SVG).

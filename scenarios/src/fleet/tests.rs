@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::*;
-use crate::{ScenarioFile, library};
+use crate::{Scenario, ScenarioFile, library};
 
 const SAMPLES: u64 = 4_000;
 

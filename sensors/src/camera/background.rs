@@ -7,7 +7,7 @@ use wide::f32x4;
 
 use super::Frame;
 use super::body::MOMENTS;
-use super::draw::GROUND_TO_M;
+use super::ground::GROUND_TO_M;
 use super::ground::{GroundLight, GroundNoiseLanes, GroundRow};
 use super::lanes::{mean, through_air};
 use super::mesh::Vec3;

@@ -74,7 +74,7 @@ pub enum ClassifierError {
     },
     /// The network needs ONNX Runtime, and this process has none.
     #[error(
-        "failed to load the Mask R-CNN: it needs ONNX Runtime, because tract has no RoiAlign; `pip install onnxruntime` installs it, and `--onnxruntime PATH` names its libonnxruntime.so"
+        "failed to load the Mask R-CNN: it needs ONNX Runtime, because tract has no RoiAlign; `pip install onnxruntime` installs it"
     )]
     NeedsOnnxRuntime,
     /// The network has other inputs or outputs.

@@ -13,15 +13,15 @@
 //! alone in place of the image (`closecall.takes-sampled`: `yes`), it is given that, which saves the reading of 12 MB. It may also name
 //! its labels (`closecall.labels`: `1=car 2=truck 3=motorcycle`).
 
-use closecall_traffic::VehicleClass;
 use ort::session::{Session, SessionOutputs};
 use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
 
 use super::classifier::{Backend, ClassifierError, environment, open_session};
 use super::image::{CHANNELS, Image};
 use super::instance::{Instance, Mask};
+use super::labels::LabelMap;
 use super::mask_rcnn_config::MaskRcnnInput;
-use super::pinhole::{HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 use super::sampling::Sampling;
 use super::vector_registers::clear_upper_parts;
 
@@ -34,32 +34,6 @@ const WANTED: &str = "an input float [3, 800, 1280] or [1, 3, 800, 1280] (sides 
                       [n, 4], labels int64 [n], scores float [n], masks float [n, 1, height, width]";
 /// Rows and columns of the image.
 const IMAGE: [usize; 2] = [HEIGHT_PX as usize, WIDTH_PX as usize];
-
-/// The classes of a network's labels.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LabelMap(Vec<(i64, VehicleClass)>);
-
-impl LabelMap {
-    /// Reads labels and classes such as `1=car 2=truck 3=motorcycle`. Labels that are not named are ignored in the output.
-    ///
-    /// # Errors
-    /// The word that cannot be read.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let pair = |word: &str| {
-            let (label, name) = word.split_once('=')?;
-            let class = VehicleClass::ALL.into_iter().find(|class| class.name() == name)?;
-            Some((label.parse().ok()?, class))
-        };
-        let pairs: Result<Vec<_>, String> =
-            text.split_whitespace().map(|word| pair(word).ok_or_else(|| word.to_owned())).collect();
-        pairs.and_then(|pairs| if pairs.is_empty() { Err(text.to_owned()) } else { Ok(Self(pairs)) })
-    }
-
-    /// Returns the class of a label, or `None` if it is none of a vehicle's.
-    fn class(&self, label: i64) -> Option<VehicleClass> {
-        self.0.iter().find(|(own, _)| *own == label).map(|(_, class)| *class)
-    }
-}
 
 /// A network, loaded into one inference session.
 #[derive(Debug)]
@@ -253,6 +227,7 @@ fn fits(shape: &[i64], sides: &[i64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use closecall_traffic::VehicleClass;
 
     #[test]
     fn labels_are_read_and_wrong_ones_are_named() {
@@ -267,6 +242,6 @@ mod tests {
     #[test]
     fn without_onnx_runtime_the_error_says_how_to_get_it() {
         let error = InstanceDetector::shipped(&Backend::Tract).unwrap_err().to_string();
-        assert!(error.contains("pip install onnxruntime") && error.contains("--onnxruntime PATH"), "{error}");
+        assert!(error.contains("pip install onnxruntime"), "{error}");
     }
 }

@@ -7,43 +7,19 @@ use wide::f32x4;
 use super::Frame;
 use super::background::Background;
 use super::body::{MOMENTS, texture_factor};
-use super::frame::{Bounds, touches};
-use super::glow::{self, Glow};
-use super::ground::{GroundLight, Patch};
+use super::bounds::{Bounds, touches};
+use super::effects::keep;
+use super::glow::{self};
+use super::ground::GROUND_TO_M;
+use super::ground::GroundLight;
 use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
 use super::lanes::{mean, through_air};
 use super::line::Line;
 use super::mesh::{Texture, Vec3, dot, each};
-use super::pinhole::{HEIGHT_PX, PixelRect, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
+use super::pinhole::PixelRect;
 use super::raster::Lattice;
 use super::sky;
-use super::spray::Cloud;
-
-/// Distance at which the ground ends in woods (m).
-pub(super) const GROUND_TO_M: f32 = 350.0;
-
-/// The shadows, beams, spray clouds and glows that can affect the pixels that are being rendered, with their bounds in the image.
-#[derive(Default)]
-pub(super) struct Effects {
-    patches: Vec<(Bounds, Patch)>,
-    clouds: Vec<(Bounds, Cloud)>,
-    glows: Vec<(Bounds, Glow)>,
-}
-
-impl Effects {
-    /// Keeps those of `all` that touch these pixels.
-    pub(super) fn select(&mut self, all: &Self, pixels: &Bounds) {
-        keep(&mut self.patches, &all.patches, pixels);
-        keep(&mut self.clouds, &all.clouds, pixels);
-        keep(&mut self.glows, &all.glows, pixels);
-    }
-}
-
-/// Replaces `kept` by those of `all` that touch these pixels.
-fn keep<T: Copy>(kept: &mut Vec<(Bounds, T)>, all: &[(Bounds, T)], pixels: &Bounds) {
-    kept.clear();
-    kept.extend(all.iter().filter(|(own, _)| touches(own, pixels)));
-}
 
 impl Frame {
     /// Renders the whole image with the instance number of each pixel.

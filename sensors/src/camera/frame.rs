@@ -13,12 +13,13 @@
 use closecall_traffic::{Indicator, Time, maths};
 
 use super::body::{Corner, MOMENTS, Placement, Shade, Shading, add_body, moment_offset};
-use super::draw::Effects;
+use super::bounds::{Bounds, touches};
+use super::effects::Effects;
 use super::glow::Glow;
 use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
 use super::hash::{mix, normal3};
 use super::light::Illumination;
-use super::line::LineMemory;
+use super::line_memory::LineMemory;
 use super::mesh::{Emission, Mesh, Vec3};
 use super::pinhole::{GroundBox, Lens, PixelRect};
 use super::raster::{SUBPIXEL_STEPS, ScreenTriangle, Visibility};
@@ -41,9 +42,6 @@ const MAX_SHAKE_PX: f64 = 6.0;
 const DROP_PATTERN_PERIOD: Time = Time::from_ms(400);
 /// Period of a blinking indicator, which shines during the first half.
 const BLINK_PERIOD: Time = Time::from_ms(700);
-
-/// Bounds in the image, `[left, top, right, bottom]` (px).
-pub(super) type Bounds = [f32; 4];
 
 /// The triangles of one body.
 pub(super) struct Object {
@@ -375,10 +373,6 @@ fn widened([left, top, right, bottom]: [f64; 4]) -> Bounds {
 fn bounds_of_rect(rect: &PixelRect) -> Bounds {
     let (right, bottom) = (i64::from(rect.left) + i64::from(rect.width), i64::from(rect.top) + i64::from(rect.height));
     [rect.left as f32, rect.top as f32, right as f32, bottom as f32]
-}
-
-pub(super) fn touches(a: &Bounds, b: &Bounds) -> bool {
-    a[0] <= b[2] && b[0] <= a[2] && a[1] <= b[3] && b[1] <= a[3]
 }
 
 /// Returns whether the left and the right indicator shine at this time.

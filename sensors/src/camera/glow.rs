@@ -6,7 +6,7 @@
 
 use super::light::Illumination;
 use super::mesh::{Vec3, dot};
-use super::pinhole::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
 
 /// Cosine of the angle to the sun within which glare is visible: about 53°.
 const GLARE_FROM_COSINE: f32 = 0.6;

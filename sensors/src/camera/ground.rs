@@ -5,7 +5,7 @@
 
 use closecall_traffic::{Road, maths};
 
-use super::frame::Bounds;
+use super::bounds::Bounds;
 use super::hash::{PlaneNoise, split};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
@@ -273,6 +273,9 @@ fn headlamp_beam(ahead: f32, left: f32) -> f32 {
     let along = (1.0 - ahead / far) * (1.0 - ahead / far) * ahead / (ahead + 3.0);
     along * across * across
 }
+
+/// Distance at which the ground ends in woods (m).
+pub(super) const GROUND_TO_M: f32 = 350.0;
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use closecall_traffic::VehicleClass;
 
-use super::pinhole::{HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 
 /// Probability from which a pixel counts as a part of an instance, as in torchvision and in the paper of Mask R-CNN (K. He et al., 2017).
 pub const MASK_THRESHOLD: f32 = 0.5;

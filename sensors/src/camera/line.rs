@@ -8,21 +8,16 @@ use wide::f32x4;
 use super::Frame;
 use super::background::{Background, BackgroundNoise};
 use super::body::MOMENTS;
-use super::draw::{Effects, GROUND_TO_M};
+use super::effects::Effects;
+use super::ground::GROUND_TO_M;
 use super::ground::GroundNoise;
-use super::pinhole::{HEIGHT_PX, WIDTH_PX};
+use super::line_memory::LineMemory;
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 use super::raster::SUBPIXEL_STEPS;
 use super::sky::SkyNoise;
 
 /// Offset within the pixel of its middle (1/256 px).
 const MIDDLE: i32 = SUBPIXEL_STEPS / 2;
-
-/// Memory of a row, which the next rendering can reuse.
-#[derive(Default)]
-pub(super) struct LineMemory {
-    effects: Effects,
-    x: Vec<[f32; MOMENTS + 1]>,
-}
 
 /// A row of the pixels that are being rendered.
 pub(super) struct Line<'a> {

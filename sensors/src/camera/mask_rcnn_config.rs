@@ -7,9 +7,9 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::detector::LabelMap;
 use super::image::CHANNELS;
-use super::pinhole::WIDTH_PX;
+use super::labels::LabelMap;
+use super::picture::WIDTH_PX;
 
 /// Share of the vehicles from [`SHIPPED_MIN_SHOWN_PX`] on that the shipped network misses at a score of 0.5, on the held-out renders of all
 /// lights and weathers (`models/MASK_RCNN_CARD.md`).

@@ -8,7 +8,7 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::pinhole::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
 
 /// Tangent of the angle to the axis up to which the polynomial of the distortion holds: just beyond the corners of the
 /// image, which lie at 0.68. Farther out the distortion continues linearly.

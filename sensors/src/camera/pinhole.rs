@@ -15,15 +15,8 @@ use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::Camera;
 use super::optics::Optics;
+use super::picture::{FIELD_OF_VIEW_RAD, HEIGHT_PX, WIDTH_PX};
 
-/// Width of the image (px).
-pub const WIDTH_PX: u16 = 1280;
-/// Height of the image (px).
-pub const HEIGHT_PX: u16 = 800;
-/// Horizontal field of view (rad): 60°.
-const FIELD_OF_VIEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
-/// Focal length (px): half of the width over the tangent of half of the field of view, 1 / √3.
-pub const FOCAL_PX: f64 = WIDTH_PX as f64 / 2.0 * 1.732_050_807_568_877_2;
 /// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body lies there.
 pub(crate) const NEAR_M: f64 = 0.3;
 
@@ -210,6 +203,7 @@ mod tests {
 
     use super::*;
     use crate::camera::CameraConfig;
+    use crate::camera::FOCAL_PX;
     use closecall_traffic::{Check, Parameters};
 
     fn lens(pitch_rad: f64) -> Lens {

@@ -7,7 +7,8 @@
 use super::body::MOMENTS;
 use super::mesh::Vec3;
 use super::optics::Optics;
-use super::pinhole::{HEIGHT_PX, NEAR_M, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
+use super::pinhole::NEAR_M;
 
 /// Number of steps of the fixed-point grid per pixel.
 pub(crate) const SUBPIXEL_STEPS: i32 = 256;

@@ -1,7 +1,6 @@
 //! The public interface of the rear camera: it projects boxes to windows and renders scenes to images and crops.
 
-use rand::RngExt;
-
+use super::exposure::ExposureKey;
 use super::image::{Crop, LabelledImage};
 use super::pinhole::{GroundBox, Lens, NEAR_M, PixelRect};
 use super::{Camera, Frame};
@@ -16,17 +15,6 @@ const MIN_WINDOW_WIDTH_M: f64 = 2.2;
 const MAX_WINDOW_WIDTH_PX: f64 = 2_400.0;
 /// A box has a window only if part of it lies deeper than this along the optical axis (m).
 const MIN_DEPTH_M: f64 = 1.5;
-
-/// The key of the noise of one exposure: the same scene and key give the same pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ExposureKey(pub u64);
-
-impl ExposureKey {
-    /// Draws the key of the next exposure.
-    pub fn draw(rng: &mut impl rand::Rng) -> Self {
-        Self(rng.random())
-    }
-}
 
 /// The rear camera of the ego vehicle.
 #[derive(Clone, Debug)]
@@ -91,7 +79,7 @@ mod tests {
 
     use super::super::CameraConfig;
     use super::super::image::{CROP_PX, sample_positions};
-    use super::super::pinhole::WIDTH_PX;
+    use super::super::picture::WIDTH_PX;
     use super::*;
 
     fn rear_camera() -> RearCamera {

@@ -3,7 +3,7 @@
 //! A network need not read every pixel. Objects far away are small and lie near the horizon, and near ones are large, so
 //! that few pixels say as much as all. What is not read need not be rendered.
 
-use super::pinhole::{HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 
 /// The columns and rows of the image that a network reads, in ascending order.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,11 +5,13 @@ use crate::tracking::Detection;
 use closecall_traffic::{Check, Parameters, Scene, SceneVehicle, maths};
 
 use super::classifier::{Backend, ClassifierError};
-use super::detector::{InstanceDetector, LabelMap, SHIPPED_MASK_RCNN};
+use super::detector::{InstanceDetector, SHIPPED_MASK_RCNN};
 use super::fault::CameraFault;
 use super::instance::Instance;
+use super::labels::LabelMap;
 use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
-use super::pinhole::{FOCAL_PX, HEIGHT_PX, Lens, WIDTH_PX};
+use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+use super::pinhole::Lens;
 use super::pipeline::ground_box;
 use super::{Camera, CameraConfig, ExposureKey, Frame, FrameBuffers, PixelRect, RearCamera};
 

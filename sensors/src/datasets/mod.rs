@@ -13,12 +13,13 @@
 mod coco;
 mod crops;
 mod files;
+mod options;
 mod render;
 mod sampled;
 mod scenes;
+mod summary;
 
-pub use render::{
-    CameraLooks, Content, DatasetError, DatasetOptions, DatasetSummary, MAX_VEHICLES, Set, USUAL_VEHICLES,
-    render_dataset,
-};
+pub use options::{CameraLooks, Content, DatasetOptions, MAX_VEHICLES, Set, USUAL_VEHICLES};
+pub use render::render_dataset;
 pub use sampled::render_sampled;
+pub use summary::{DatasetError, DatasetSummary};

@@ -1,115 +1,13 @@
 //! Renders a data set.
 
 use super::files::Output;
+use super::options::{CameraLooks, Content, DatasetOptions, Set};
 use super::scenes::RandomScene;
+use super::summary::{DatasetError, DatasetSummary};
 use super::{coco, crops};
-use crate::camera::{Camera, Optics};
-use closecall_traffic::{ActorId, ConfigError, Stream, stream};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::camera::Camera;
+use closecall_traffic::{ActorId, Stream, stream};
 use std::path::Path;
-
-/// One of the two disjoint data sets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Set {
-    /// The set for training, with its own shapes and paints.
-    Training,
-    /// The set for evaluation, with the held-out shapes and paints.
-    HeldOut,
-}
-
-/// The kind of content that is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Content {
-    /// Whole images with COCO annotations.
-    Images,
-    /// Crops in the format of the classifier's input.
-    Crops,
-}
-
-/// How the cameras of a data set differ from the ideal one. The default is the ideal camera, with which the network was trained.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CameraLooks {
-    /// The lens.
-    pub optics: Optics,
-    /// Time from the reading of the first row of an image to that of the last (s).
-    pub readout_s: f64,
-    /// Brightness of the night sky, relative to the sky over a town (0 to 1).
-    pub night_sky: f64,
-}
-
-impl Default for CameraLooks {
-    fn default() -> Self {
-        Self { optics: Optics::default(), readout_s: 0.0, night_sky: 1.0 }
-    }
-}
-
-/// The options of a data set to be rendered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DatasetOptions {
-    /// The set to render, training or held-out.
-    pub set: Set,
-    /// The content to render, images or crops.
-    pub content: Content,
-    /// Number of random scenes.
-    pub scenes: u32,
-    /// Seed of the scenes. 0 is a seed like any other.
-    pub seed: u64,
-    /// How the cameras differ from the ideal one. The scenes are the same for all of them.
-    pub looks: CameraLooks,
-    /// Least and largest number of vehicles in a scene: [`USUAL_VEHICLES`], or what an empty or a crowded road has. A scene without room
-    /// has fewer.
-    pub vehicles: [usize; 2],
-}
-
-/// Least and largest number of vehicles that a scene usually has.
-pub const USUAL_VEHICLES: [usize; 2] = [1, 5];
-/// Largest number of vehicles that may be asked for.
-pub const MAX_VEHICLES: usize = 40;
-
-/// The summary of a written data set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct DatasetSummary {
-    /// Number of random scenes.
-    pub scenes: u32,
-    /// Number of images or crops.
-    pub pictures: usize,
-    /// Number of labels of each class: car, truck, motorcycle, background.
-    pub labels: [usize; 4],
-}
-
-/// The reason why a data set cannot be written. Every file in the folder is complete, from this run or from an earlier
-/// one, except that a temporary file may remain.
-#[derive(Debug, thiserror::Error)]
-pub enum DatasetError {
-    /// A file could not be written.
-    #[error("failed to write {path}: {source}")]
-    Write {
-        /// The file.
-        path: std::path::PathBuf,
-        /// The reason that the system gives.
-        source: std::io::Error,
-    },
-    /// An image could not be encoded.
-    #[error("failed to encode {path}: {source}")]
-    Encode {
-        /// The file.
-        path: std::path::PathBuf,
-        /// The reason that the encoder gives.
-        source: png::EncodingError,
-    },
-    /// The annotations could not be encoded.
-    #[error("failed to encode the annotations: {0}")]
-    Annotations(#[from] serde_json::Error),
-    /// A random scene fails the checks that also apply to scenario files.
-    #[error("failed to set up a random scene: {0}")]
-    Scene(#[from] ConfigError),
-    /// The fixed name of the random streams is invalid.
-    #[error("failed to name the random stream: {0}")]
-    Stream(#[from] closecall_traffic::InvalidActorId),
-}
 
 /// Renders a data set into `folder`, which is created if it does not exist. Each file is written atomically.
 ///
@@ -148,18 +46,6 @@ pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<Dataset
     Ok(summary)
 }
 
-impl Set {
-    /// Returns the channel of the random stream for this set and purpose. The two sets use separate streams.
-    fn channel(self, purpose: &str) -> &'static str {
-        match (self, purpose == "crops") {
-            (Self::Training, true) => "training-crops",
-            (Self::Training, false) => "training-scenes",
-            (Self::HeldOut, true) => "held-out-crops",
-            (Self::HeldOut, false) => "held-out-scenes",
-        }
-    }
-}
-
 /// Returns the random stream of a scene.
 pub(super) fn scene_rng(set: Set, seed: u64, index: u32) -> Result<Stream, DatasetError> {
     Ok(stream(seed, u64::from(index), &ActorId::new("ego")?, set.channel("scenes")))
@@ -177,6 +63,7 @@ fn random_scene(options: &DatasetOptions, index: u32) -> Result<RandomScene, Dat
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::datasets::USUAL_VEHICLES;
 
     fn folder(name: &str) -> std::path::PathBuf {
         std::env::temp_dir().join(format!("closecall-dataset-{name}-{}", std::process::id()))

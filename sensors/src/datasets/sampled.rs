@@ -8,8 +8,10 @@ use std::path::Path;
 use crate::camera::{ExposureKey, Frame, PixelRect, Sampling, mix};
 
 use super::files::Output;
-use super::render::{DatasetError, USUAL_VEHICLES, scene_rng};
+use super::options::USUAL_VEHICLES;
+use super::render::scene_rng;
 use super::scenes::RandomScene;
+use super::summary::DatasetError;
 use super::{DatasetSummary, Set};
 
 /// One of so many scenes is empty, and the next one is crowded.

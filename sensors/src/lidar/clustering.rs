@@ -30,8 +30,8 @@ use ndarray::{Array1, ArrayView2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::candidate::Candidate;
 use super::dbscan::Dbscan as GridDbscan;
-use super::ground::Candidate;
 use super::neighbours::GridSearch;
 use crate::SensorError;
 

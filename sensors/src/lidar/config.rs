@@ -1,13 +1,12 @@
 //! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it becomes.
 
-use std::sync::{Mutex, PoisonError};
-
 use closecall_traffic::{ActorId, Check, Choice, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::REACH_M;
 use super::kind::NOMINAL_RANGE_M;
+use super::material::{DIRTY_PLATE, PLATE};
+use super::names::intern_name;
 use super::{ClusteringCheck, ClusteringMethod, LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
 
@@ -22,14 +21,6 @@ pub enum Plates {
     /// Not mounted at the front, as some states and vehicles allow: the paint is seen in its place.
     None,
 }
-
-/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates have some
-/// tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
-const PLATE: f64 = std::f64::consts::PI * 20.0;
-/// Share of a plate's reflectivity that remains under dirt (assumption).
-const DIRTY_SHARE: f64 = 0.2;
-/// Equivalent Lambertian reflectivity of a dirty plate.
-pub(super) const DIRTY_PLATE: f64 = DIRTY_SHARE * PLATE;
 
 impl Plates {
     /// Returns the equivalent Lambertian reflectivity; `None` if there is no plate.
@@ -292,20 +283,6 @@ impl LidarConfig {
     }
 }
 
-/// Returns the one reference to a name. A process sees few names, so that they are never released.
-pub(crate) fn intern_name(name: &str) -> &'static str {
-    static NAMES: Mutex<Vec<&'static str>> = Mutex::new(Vec::new());
-    let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
-    match names.iter().find(|known| **known == name) {
-        Some(known) => known,
-        None => {
-            let name: &'static str = Box::leak(name.into());
-            names.push(name);
-            name
-        }
-    }
-}
-
 impl Check for LidarConfig {
     type Checked = Lidar;
 
@@ -339,6 +316,9 @@ impl Default for Lidar {
         }
     }
 }
+
+/// Distance behind the sensor beyond which points are not used (m).
+pub(crate) const REACH_M: f32 = 200.0;
 
 #[cfg(test)]
 mod tests {

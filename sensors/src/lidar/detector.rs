@@ -4,9 +4,10 @@ use closecall_traffic::{ClassScores, Time, VehicleClass, maths};
 
 use super::across::across;
 use super::boxes::BoxFit;
+use super::candidate::Candidate;
 use super::classify::{class_scores, typical_size_m};
 use super::clustering::{ClusteredPoints, Clustering, ClusteringCheck, ClusteringMethod, NOISE};
-use super::ground::{Candidate, select_candidates};
+use super::ground::select_candidates;
 use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
 use crate::tracking::SIDE_PROTRUSION_M;

@@ -9,6 +9,8 @@ use crate::tracking::MAX_SIDE_AZIMUTH_RAD;
 use closecall_traffic::{Environment, Time, maths};
 
 use super::bare_road::farthest_road_return_m;
+use super::candidate::Candidate;
+use super::config::REACH_M;
 use super::material::asphalt;
 use super::noise::MAX_NORMAL;
 use super::power::LinkBudget;
@@ -24,8 +26,6 @@ pub(crate) const GROUND_M: f32 = 0.10;
 /// Increase of that height per metre of distance (rad). It covers three standard deviations of the levelling error, and
 /// the footprint, whose near edge returns more light than its far edge.
 pub(crate) const GROUND_SLOPE: f32 = 0.005;
-/// Distance behind the sensor beyond which points are not used (m).
-pub(crate) const REACH_M: f32 = 200.0;
 /// Intensity below which a near return is taken for a droplet. A tyre at 60° still has 0.025. The method is
 /// low-intensity outlier removal after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point
 /// clouds".
@@ -47,17 +47,6 @@ pub(crate) fn ground_reach_m(lidar: &Lidar) -> f32 {
     let strength_m = asphalt(&Environment::CLEAR_DAY) * lidar.mount_height_m;
     let farthest_m = farthest_road_return_m(&link, strength_m as f32) + MAX_NORMAL * link.range_sd_m(1.0);
     (farthest_m + GROUND_MARGIN_M).ceil().max(MIN_GROUND_REACH_M)
-}
-
-/// A point that may belong to a vehicle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Candidate {
-    /// Index of the point in the scan.
-    pub(crate) index: u32,
-    /// Distance behind the sensor along the ego's axis (m).
-    pub(crate) back_m: f32,
-    /// Lateral offset from the ego's path, positive to the left (m).
-    pub(crate) left_m: f32,
 }
 
 /// Writes the points that may belong to vehicles into `candidates`.

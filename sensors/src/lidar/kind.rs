@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::pattern::{GROUPS, mirror_bounds_deg};
-use super::power::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
+
 use super::{LidarModel, MirrorSide};
 
 /// Height of a sensor if nothing else is said (m): in the bumper.
@@ -390,6 +390,15 @@ fn intern(kind: LidarKind) -> &'static LidarKind {
         }
     }
 }
+
+/// Ratio T of the detection threshold to the standard deviation of the receiver's noise.
+///
+/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time: a rate of 3·10⁻⁵ in each
+/// beam. Makers state 10⁻⁴, and that is the rate of `false-alarm-rate`.
+pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
+
+/// Reflectivity of the target that defines the nominal range.
+pub(crate) const NOMINAL_REFLECTIVITY: f64 = 0.5;
 
 #[cfg(test)]
 mod tests;

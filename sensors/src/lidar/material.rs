@@ -6,8 +6,6 @@
 
 use closecall_traffic::{Appearance, Environment, Plate};
 
-use super::config::DIRTY_PLATE;
-
 /// The material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Material {
@@ -106,3 +104,13 @@ pub(crate) fn asphalt(environment: &Environment) -> f64 {
     let wetness = (environment.water_film_mm / WET_FILM_MM).clamp(0.0, 1.0);
     ASPHALT * (1.0 - (1.0 - WET_SHARE) * wetness)
 }
+
+/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates have some
+/// tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
+pub(super) const PLATE: f64 = std::f64::consts::PI * 20.0;
+
+/// Share of a plate's reflectivity that remains under dirt (assumption).
+const DIRTY_SHARE: f64 = 0.2;
+
+/// Equivalent Lambertian reflectivity of a dirty plate.
+pub(super) const DIRTY_PLATE: f64 = DIRTY_SHARE * PLATE;

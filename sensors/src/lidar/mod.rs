@@ -12,6 +12,7 @@
 mod across;
 mod bare_road;
 mod boxes;
+mod candidate;
 mod cast;
 mod classify;
 mod clustering;
@@ -25,6 +26,7 @@ mod ground;
 mod kind;
 mod material;
 mod model;
+mod names;
 mod neighbours;
 mod noise;
 mod parts;
@@ -52,7 +54,7 @@ pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
 pub use crate::tracking::LaneGeometry;
 pub use clustering::{ClusteredPoints, ClusteringCheck, ClusteringMethod};
-pub(crate) use config::{FRONT_NAME, REAR_NAME, intern_name};
+pub(crate) use config::{FRONT_NAME, REAR_NAME};
 pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;
 #[cfg(test)]
@@ -61,6 +63,7 @@ pub(crate) use kind::MAX_HALF_FIELD_DEG;
 pub use kind::{LidarKind, LidarKindConfig};
 pub use material::Material;
 pub use model::LidarModel;
+pub(crate) use names::intern_name;
 pub(crate) use pattern::HALF_FIELD_DEG;
 pub use pattern::Pattern;
 pub(crate) use power::extinction_per_m;

@@ -19,17 +19,11 @@
 use closecall_traffic::{Environment, KOSCHMIEDER, maths, rain_db_per_km};
 
 use super::Lidar;
+use super::kind::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
 
-/// Ratio T of the detection threshold to the standard deviation of the receiver's noise.
-///
-/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time: a rate of 3·10⁻⁵ in each
-/// beam. Makers state 10⁻⁴, and that is the rate of `false-alarm-rate`.
-pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
 /// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations, and cannot raise the
 /// return above the threshold.
 pub(crate) const MIN_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
-/// Reflectivity of the target that defines the nominal range.
-pub(crate) const NOMINAL_REFLECTIVITY: f64 = 0.5;
 /// Extinction in dB/km that corresponds to an extinction of 1/m: decibels per neper of power, times metres per
 /// kilometre.
 const DB_PER_KM_OVER_PER_M: f64 = 4_342.944_819;

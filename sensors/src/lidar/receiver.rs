@@ -7,9 +7,10 @@ use fearless_simd::Simd;
 
 use super::cast::ColumnHits;
 use super::echo::{Echo, Echoes};
+use super::kind::THRESHOLD_OVER_NOISE;
 use super::noise::{Noise, Purpose};
 use super::pattern::{Column, Elevation};
-use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE};
+use super::power::{LinkBudget, MIN_POWER};
 use super::soft::{self, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m, turned_axes};

@@ -32,13 +32,13 @@ impl FromStr for ArmList {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ArmsError {
     /// There is only one.
-    #[error("--arms compares controllers, and `{controller}` is only one: name at least two, or use --controller")]
+    #[error("a comparison needs at least two controllers, and `{controller}` is only one")]
     One {
         /// The controller.
         controller: String,
     },
     /// One is named twice.
-    #[error("--arms names `{controller}` twice: every arm needs a controller of its own")]
+    #[error("`{controller}` is named twice: every arm needs a controller of its own")]
     Twice {
         /// The controller.
         controller: String,

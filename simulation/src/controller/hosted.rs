@@ -14,12 +14,11 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
-use serde::{Deserialize, Serialize};
 
-use super::exec::ExecSettings;
 use super::isolated::Isolated;
-use super::native::COMMAND;
 use crate::run::ControllerFactory;
+
+pub use super::hosted_process::HostedProcess;
 
 /// The prefix of the names.
 pub const PREFIX: &str = "python";
@@ -39,39 +38,16 @@ pub fn refuse(name: &str, reason: String) {
     REFUSED.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), reason);
 }
 
-/// A controller of a program that worker processes run, with what starts one. The process registers the controller under its
-/// name, and then runs the hidden command that serves samples.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HostedProcess {
-    /// The name with its version, under which the process registers the controller.
-    pub id: String,
-    /// The name in reports.
-    pub name: String,
-    /// The words that start the process, to which the hidden command is added.
-    pub words: Vec<String>,
-    /// Time limit of each answer (ms).
-    pub timeout_ms: u64,
-    /// Largest resident memory of the process (MiB).
-    pub memory_mib: u64,
-}
-
-impl HostedProcess {
-    /// Returns the settings of a process with these arguments of the hidden command.
-    pub(super) fn process(&self, arguments: &[&str]) -> ExecSettings {
-        let words = self.words.iter().map(String::as_str).chain([COMMAND]).chain(arguments.iter().copied());
-        // A word with a NUL character, which cannot be quoted, starts nothing.
-        let command = shlex::try_join(words).unwrap_or_default();
-        ExecSettings { command, timeout_ms: self.timeout_ms, memory_mib: self.memory_mib }
-    }
-
-    /// Returns the factory in the worker process.
-    pub(super) fn in_this_process(self) -> Result<Arc<dyn ControllerFactory>, String> {
-        let refused = REFUSED.lock().unwrap_or_else(PoisonError::into_inner).get(&self.id).cloned();
-        match (refused, registry().get(&self.id).cloned()) {
-            (Some(reason), _) => Err(reason),
-            (None, Some(factory)) => Ok(Arc::new(Named { name: self.name, factory })),
-            (None, None) => Err(format!("the process of the controller does not have `{}`: {}", self.id, known())),
-        }
+/// Returns the factory of a controller in its worker process.
+///
+/// # Errors
+/// The reason for which this process cannot load it.
+pub(super) fn in_worker(process: HostedProcess) -> Result<Arc<dyn ControllerFactory>, String> {
+    let refused = REFUSED.lock().unwrap_or_else(PoisonError::into_inner).get(&process.id).cloned();
+    match (refused, registry().get(&process.id).cloned()) {
+        (Some(reason), _) => Err(reason),
+        (None, Some(factory)) => Ok(Arc::new(Named { name: process.name, factory })),
+        (None, None) => Err(format!("the process of the controller does not have `{}`: {}", process.id, known())),
     }
 }
 

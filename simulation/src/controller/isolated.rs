@@ -1,12 +1,11 @@
 //! Controllers that a worker process runs, together with whole samples: whatever they do costs one sample.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::exec::ExecSettings;
-use super::hosted::HostedProcess;
+use super::hosted_process::HostedProcess;
 use super::native::{NativeError, NativeFactory};
 use crate::run::ControllerFactory;
 use closecall_scenarios::Scenario;
@@ -58,19 +57,5 @@ impl Isolated {
     /// [`NativeError`] if one has none.
     pub fn check_variables(&self, scenario: &Scenario, folder: Option<&Path>) -> Result<(), NativeError> {
         self.native().map_or(Ok(()), |native| native.settings().check_variables(scenario, folder))
-    }
-
-    /// Returns the factory in a worker process.
-    ///
-    /// # Errors
-    /// The reason for which this process cannot run the controller that was named: its file has changed, or it cannot be loaded here.
-    pub fn in_this_process(self) -> Result<Arc<dyn ControllerFactory>, String> {
-        match self {
-            Self::Native(native) => {
-                native.check_unchanged()?;
-                Ok(Arc::new(native.in_this_process()))
-            }
-            Self::Hosted(hosted) => hosted.in_this_process(),
-        }
     }
 }

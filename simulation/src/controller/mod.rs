@@ -22,6 +22,8 @@ mod built_in;
 mod choice;
 pub mod exec;
 pub mod hosted;
+mod hosted_process;
+mod in_worker;
 pub mod isolated;
 pub mod native;
 mod time_gap;

@@ -20,6 +20,7 @@ use closecall_controllers::{CheckedDriver, ControllerError, EgoCommand, EgoContr
 use serde::{Deserialize, Serialize};
 
 use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecError, ExecFactory, ExecSettings};
+use super::hosted_process::COMMAND;
 use super::isolated::Isolated;
 use crate::run::ControllerFactory;
 use closecall_scenarios::Scenario;
@@ -27,9 +28,6 @@ use closecall_traffic::Time;
 
 /// The word of the hidden command before the folder of an unpacked FMU.
 pub const UNPACKED: &str = "unpacked";
-
-/// The hidden command that serves libraries and FMUs.
-pub const COMMAND: &str = "host";
 
 /// Time limit for loading a library or an FMU, at least. It may first have to read its files or to start an interpreter.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(10);
@@ -243,7 +241,7 @@ impl NativeFactory {
         }
         Err(format!(
             "the controller's file {} has changed since the start: run a new campaign, or put the earlier file back and resume \
-             with --resume",
+             this one",
             self.settings.path
         ))
     }

@@ -29,8 +29,8 @@ pub fn recorded_actor(scenario: &ScenarioConfig, requested: Option<&str>) -> Res
         Some(name) => actors.iter().find(|actor| actor.id.to_string() == name),
     };
     found.map(|actor| actor.id.to_string()).ok_or_else(|| match requested {
-        None => format!("no actor has an overtaking driver: name an actor with --in-car=ACTOR, one of {}", all()),
-        Some(name) => format!("there is no actor `{name}`: --in-car must name one of {}", all()),
+        None => format!("no actor has an overtaking driver: name one of {}", all()),
+        Some(name) => format!("there is no actor `{name}`: name one of {}", all()),
     })
 }
 

@@ -66,7 +66,7 @@ impl ContactSearch {
         boxes: StepBoxes<'_>,
         by_name: &[usize],
         known: &[[usize; 2]],
-        found: &mut Vec<Touch>,
+        touches: &mut Vec<Touch>,
     ) {
         self.sort(boxes, by_name);
         self.ranks.clear();
@@ -94,8 +94,8 @@ impl ContactSearch {
         self.ranks.sort_by(|(one_ranks, one), (other_ranks, other)| {
             one.fraction.total_cmp(&other.fraction).then(one_ranks.cmp(other_ranks))
         });
-        found.clear();
-        found.extend(self.ranks.iter().map(|(_, touch)| *touch));
+        touches.clear();
+        touches.extend(self.ranks.iter().map(|(_, touch)| *touch));
     }
 
     /// Sorts the vehicles by the lower bounds of their positions.
@@ -203,16 +203,16 @@ mod tests {
     /// Compares every pair of vehicles, in the order of the names.
     fn by_brute_force(boxes: StepBoxes<'_>, by_name: &[usize], known: &[[usize; 2]]) -> Vec<Touch> {
         let StepBoxes { before, after } = boxes;
-        let mut found = Vec::new();
+        let mut touches = Vec::new();
         for (rank, &first) in by_name.iter().enumerate() {
             for &second in by_name[rank + 1..].iter().filter(|&&second| !known.contains(&[first, second])) {
                 if let Some(at) = first_contact(&before[first], &after[first], &before[second], &after[second]) {
-                    found.push(Touch { pair: [first, second], fraction: at.fraction, struck_side: at.sides });
+                    touches.push(Touch { pair: [first, second], fraction: at.fraction, struck_side: at.sides });
                 }
             }
         }
-        found.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
-        found
+        touches.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
+        touches
     }
 
     fn moving_box() -> impl Strategy<Value = (OrientedBox, OrientedBox)> {
@@ -236,14 +236,14 @@ mod tests {
             };
             let mut search = ContactSearch::default();
             let by_name: Vec<usize> = (0..moving.len()).rev().collect();
-            let mut found = Vec::new();
+            let mut touches = Vec::new();
             for moving in [&earlier[..moving.len()], &moving] {
                 let [before, after] = boxes(moving);
                 let boxes = StepBoxes { before: &before, after: &after };
                 let known: &[[usize; 2]] = &[[3, 1]];
-                search.find(boxes, &by_name, known, &mut found);
+                search.find(boxes, &by_name, known, &mut touches);
                 let expected = by_brute_force(boxes, &by_name, known);
-                prop_assert_eq!(&found, &expected);
+                prop_assert_eq!(&touches, &expected);
             }
         }
     }

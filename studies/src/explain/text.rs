@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use closecall_campaign::resume_command::quoted;
+use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
 use closecall_scenarios::MisState;
 
 use super::{Cause, Explanation, MisEffect, StageRun};
@@ -15,6 +15,8 @@ pub struct ExplanationText<'a> {
     pub explanation: &'a Explanation,
     /// The folder of the campaign, for the commands that confirm the explanation.
     pub folder: &'a Path,
+    /// These commands.
+    pub command_for: CommandFor,
 }
 
 impl Explanation {
@@ -73,9 +75,12 @@ fn induced_words(mis: &MisEffect) -> String {
 
 impl fmt::Display for ExplanationText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { explanation, folder } = self;
-        let folder = quoted(&folder.display().to_string());
-        let replay = format!("closecall replay {folder} {} --scenario {}", explanation.sample, explanation.scenario);
+        let Self { explanation, folder, command_for } = self;
+        let folder = folder.display().to_string();
+        let replay = |settings: &[String]| {
+            let of = SavedSample { folder: &folder, sample: explanation.sample, scenario: Some(&explanation.scenario) };
+            command_for(&Action::Replay(Replay { settings, ..Replay::new(of) }))
+        };
         let collision = &explanation.collision;
         writeln!(
             f,
@@ -101,11 +106,11 @@ impl fmt::Display for ExplanationText<'_> {
             writeln!(f, "  without the system while {}: {result}", off.join(", "))?;
         }
         if let Some(run) = explanation.confirmation() {
-            let set: Vec<String> = run.settings.iter().map(|setting| format!(" --set {setting}")).collect();
-            writeln!(f, "\nto confirm: {replay}{}", set.concat())?;
+            writeln!(f, "\nto confirm: {}", replay(&run.settings))?;
         }
         if let Some(run) = explanation.mis.iter().flat_map(|mis| &mis.runs).find(|run| run.prevents) {
-            writeln!(f, "to confirm what the system did: {replay} --set '{}'", run.setting)?;
+            let command = replay(std::slice::from_ref(&run.setting));
+            writeln!(f, "to confirm what the system did: {command}")?;
         }
         Ok(())
     }

@@ -81,9 +81,9 @@ impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Rate => {
-                "how often the lead vehicle brakes while a rear vehicle is near: trajectory files, or a range by --per-million-km"
+                "how often the lead vehicle brakes while a rear vehicle is near: trajectory files, or a stated range of the rate"
             }
-            Self::Campaign => "what the system prevents and induces, given such an encounter: a paired campaign by --campaign",
+            Self::Campaign => "what the system prevents and induces, given such an encounter: a paired campaign",
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
 use maud::{Markup, PreEscaped, html};
 
 use super::{FailureRow, Failures};
@@ -15,8 +16,8 @@ const END: &str = "<!-- end of causes -->";
 const MOST_LISTED: usize = 100;
 
 /// Returns the section of the report. `is_named` says whether a command must name the scenario. Without failures there is none.
-pub fn section(failures: &Failures, is_named: bool) -> Markup {
-    let body = if failures.rows.is_empty() { Markup::default() } else { body(failures, is_named) };
+pub fn section(failures: &Failures, is_named: bool, command_for: CommandFor) -> Markup {
+    let body = if failures.rows.is_empty() { Markup::default() } else { body(failures, is_named, command_for) };
     html! { (PreEscaped(BEGIN)) (body) (PreEscaped(END)) }
 }
 
@@ -27,7 +28,7 @@ pub fn without_section(page: &str) -> Option<[&str; 3]> {
     Some([before, section, after])
 }
 
-fn body(failures: &Failures, is_named: bool) -> Markup {
+fn body(failures: &Failures, is_named: bool, command_for: CommandFor) -> Markup {
     let rows = &failures.rows;
     html! {
         h2 { "Causes" }
@@ -42,7 +43,7 @@ fn body(failures: &Failures, is_named: bool) -> Markup {
         @if failures.without_attribution > 0 {
             p.note {
                 (failures.without_attribution) " of " (rows.len()) " failures are not attributed yet: they are many, or their sensors are "
-                "slow. " code { "closecall explain ." } " does it."
+                "slow. " code { (command_for(&Action::ExplainAll("."))) } " does it."
             }
         }
         div.wide tabindex="0" {
@@ -51,7 +52,7 @@ fn body(failures: &Failures, is_named: bool) -> Markup {
                     th.number { "sample" } th { "strikes" } th { "phase" } th { "induced" } th.number { "harm" } th { "avoidable by" }
                     th { "due to" } th { "commands" }
                 } }
-                tbody { @for row in rows.iter().take(MOST_LISTED) { (line(row, is_named)) } }
+                tbody { @for row in rows.iter().take(MOST_LISTED) { (line(row, is_named, command_for)) } }
             }
         }
         @if rows.len() > MOST_LISTED { p.note { "The first " (MOST_LISTED) " of " (rows.len()) " failures." } }
@@ -76,8 +77,9 @@ fn counts(rows: &[FailureRow]) -> Markup {
     }
 }
 
-fn line(row: &FailureRow, is_named: bool) -> Markup {
-    let named = if is_named { format!(" --scenario {}", row.scenario) } else { String::new() };
+fn line(row: &FailureRow, is_named: bool, command_for: CommandFor) -> Markup {
+    let of = SavedSample { folder: ".", sample: row.sample, scenario: is_named.then_some(&row.scenario) };
+    let commands = [Action::Replay(Replay::new(of)), Action::Explain(of), Action::Minimize(of)];
     let phase = match (&row.attribution, row.is_after_lead_braking) {
         (Some(found), _) => found.phase_words(),
         (None, is_after) => braking_words(row.phase, is_after),
@@ -92,7 +94,7 @@ fn line(row: &FailureRow, is_named: bool) -> Markup {
             td.number { (format!("{:.3}", row.harm)) }
             td { (row.attribution.as_ref().map_or("", |found| found.avoidable.words())) }
             td title=(row.sentence.clone().unwrap_or_default()) { (due_to(row)) }
-            td { @for command in ["replay", "explain", "minimize"] { code { "closecall " (command) " . " (row.sample) (named) } br; } }
+            td { @for action in &commands { code { (command_for(action)) } br; } }
         }
     }
 }

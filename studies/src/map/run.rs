@@ -24,14 +24,8 @@ const SCENARIO: &str = include_str!("scenario.toml");
 const KMH_PER_MPS: f64 = 3.6;
 /// Time for which the rear vehicle approaches before it can be detected (s), so that the run starts in balance.
 const BEFORE_DETECTION_S: f64 = 1.0;
-/// The parameters of the grid, and the options that set them.
-const OF_GRID: [(&str, &str); 5] = [
-    ("speed-mps", "--speed-mps"),
-    ("closing-mps", "--closing-kmh"),
-    ("detection-m", "--detection-m"),
-    ("start-gap-m", "--detection-m and --closing-kmh, from which it follows"),
-    ("front-thw-s", "--front-thw-s"),
-];
+/// The parameters that the grid sets. The gap at the start follows from the detection distance and the speed difference.
+const GRID_PARAMETERS: [&str; 5] = ["speed-mps", "closing-mps", "detection-m", "start-gap-m", "front-thw-s"];
 
 /// A map that cannot be computed.
 #[derive(Debug, thiserror::Error)]
@@ -46,14 +40,12 @@ pub enum MapError {
         controller: String,
     },
     /// A setting changes a parameter of the grid.
-    #[error("`--set {setting}`: the grid has the values of `{parameter}`, by {option}")]
+    #[error("`{setting}`: the grid has the values of `{parameter}`")]
     OfGrid {
         /// The setting.
         setting: String,
         /// The parameter.
         parameter: &'static str,
-        /// The option that sets it.
-        option: &'static str,
     },
     /// The settings ask for tracks that are not true.
     #[error(
@@ -161,8 +153,8 @@ fn leaves_grid(setting: &Setting) -> Result<(), MapError> {
     let key = setting.split('=').next().unwrap_or_default();
     let mut parts = key.strip_prefix("parameters.").unwrap_or(key).split('.');
     let first = parts.next().unwrap_or_default();
-    match OF_GRID.into_iter().find(|(parameter, _)| *parameter == first) {
-        Some((parameter, option)) => Err(MapError::OfGrid { setting, parameter, option }),
+    match GRID_PARAMETERS.into_iter().find(|parameter| *parameter == first) {
+        Some(parameter) => Err(MapError::OfGrid { setting, parameter }),
         None => Ok(()),
     }
 }
@@ -329,10 +321,10 @@ mod tests {
     fn what_the_map_sets_cannot_be_set_and_lists_are_sorted() {
         let refused =
             |text: &str| map(&grid(), &ControllerChoice::MIS, &[text.parse().unwrap()]).unwrap_err().to_string();
-        for (parameter, option) in OF_GRID {
+        for parameter in GRID_PARAMETERS {
             for key in [parameter.to_owned(), format!("parameters.{parameter}.fixed")] {
                 let message = refused(&format!("{key}=3"));
-                assert!(message.contains(&format!("`{parameter}`")) && message.contains(option), "{message}");
+                assert!(message.contains(&format!("the grid has the values of `{parameter}`")), "{message}");
             }
         }
         assert!(refused("sensors.mode=object").contains("may only be `ground-truth`"));

@@ -1,6 +1,6 @@
 //! Minimizes a failing sample.
 
-use closecall_campaign::resume_command::quoted;
+use closecall_campaign::action::{Action, CommandFor};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_traffic::{ParameterName, Parameters, Value};
@@ -69,9 +69,9 @@ impl Minimized {
         self.choice == ControllerChoice::MIS.name()
     }
 
-    /// Returns the option that names the controller, with a space before it; nothing for the one that needs no option.
-    pub(super) fn option(&self) -> String {
-        if self.is_default() { String::new() } else { format!(" --controller {}", quoted(&self.choice)) }
+    /// Returns the command that runs a file of this case.
+    pub(super) fn run_command(&self, file: &str, command_for: CommandFor) -> String {
+        command_for(&Action::Run { file, controller: (!self.is_default()).then_some(&self.choice) })
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use closecall_campaign::resume_command::quoted;
+use closecall_campaign::action::CommandFor;
 
 use super::{Minimized, MinimizedFiles};
 
@@ -11,34 +11,36 @@ use super::{Minimized, MinimizedFiles};
 #[derive(Clone, Copy, Debug)]
 pub struct MinimizedText<'a> {
     /// The case.
-    pub found: &'a Minimized,
+    pub minimized: &'a Minimized,
     /// Its files.
     pub files: &'a MinimizedFiles,
+    /// The commands that run them.
+    pub command_for: CommandFor,
 }
 
 impl fmt::Display for MinimizedText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { found, files } = self;
+        let Self { minimized, files, command_for } = self;
         writeln!(
             f,
             "{} sample {} ({}, {} sensors): {} of {} parameters must be off their nominal values",
-            found.scenario,
-            found.sample,
-            found.controller,
-            found.sensors,
-            found.off_nominal.len(),
-            found.sampled_off_nominal,
+            minimized.scenario,
+            minimized.sample,
+            minimized.controller,
+            minimized.sensors,
+            minimized.off_nominal.len(),
+            minimized.sampled_off_nominal,
         )?;
-        for offset in &found.off_nominal {
+        for offset in &minimized.off_nominal {
             writeln!(f, "  {} (sample: {})", offset.words, offset.sampled)?;
         }
-        if let Some(why) = &found.why_more_than_three {
+        if let Some(why) = &minimized.why_more_than_three {
             writeln!(f, "  {why}")?;
         }
-        writeln!(f, "{}", found.sentence)?;
-        let command = |path: &Path| format!("closecall run {}{}", quoted(&path.display().to_string()), found.option());
+        writeln!(f, "{}", minimized.sentence)?;
+        let command = |path: &Path| minimized.run_command(&path.display().to_string(), *command_for);
         writeln!(f, "fails:  {}", command(&files.failing))?;
-        match (&found.twin, &files.twin) {
+        match (&minimized.twin, &files.twin) {
             (Some(twin), Some(path)) => {
                 writeln!(f, "passes when {}", twin.words)?;
                 write!(f, "passes: {}", command(path))

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use closecall_campaign::action::CommandFor;
 use closecall_scenarios::{ScenarioFile, Setting, SettingError};
 use closecall_traffic::atomic::write_file;
 use serde::Serialize;
@@ -46,14 +47,19 @@ pub fn output_files(case: &Case, output: Option<&Path>) -> Result<[PathBuf; 2], 
 ///
 /// # Errors
 /// [`CausesError`] if a case is no valid scenario, or a file cannot be written.
-pub fn write_files(case: &Case, found: &Minimized, [path, twin]: &[PathBuf; 2]) -> Result<MinimizedFiles, CausesError> {
+pub fn write_files(
+    case: &Case,
+    minimized: &Minimized,
+    [path, twin]: &[PathBuf; 2],
+    command_for: CommandFor,
+) -> Result<MinimizedFiles, CausesError> {
     let stem = path.file_stem().map_or_else(|| "minimized".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let name = named(&stem);
-    let failing = concrete(case, &found.settings, &Text { name: &name, found, is_twin: false })?;
-    let passing = match &found.twin {
+    let failing = concrete(case, &minimized.settings, &Text { name: &name, minimized, is_twin: false, command_for })?;
+    let passing = match &minimized.twin {
         Some(twin) => {
             let name = format!("{name}-passes");
-            Some(concrete(case, &twin.settings, &Text { name: &name, found, is_twin: true })?)
+            Some(concrete(case, &twin.settings, &Text { name: &name, minimized, is_twin: true, command_for })?)
         }
         None => None,
     };
@@ -68,8 +74,9 @@ pub fn write_files(case: &Case, found: &Minimized, [path, twin]: &[PathBuf; 2]) 
 /// What a file says about its case.
 struct Text<'a> {
     name: &'a str,
-    found: &'a Minimized,
+    minimized: &'a Minimized,
     is_twin: bool,
+    command_for: CommandFor,
 }
 
 /// Returns a name of a scenario that is made of the name of a file.
@@ -94,18 +101,18 @@ fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String,
             closecall_traffic::Value::Label(label) => Value::from(label.as_str()),
         })
     });
-    let found = text.found;
+    let minimized = text.minimized;
     document.insert("name", Item::Value(text.name.into()));
     document.insert("description", Item::Value(sentence(text).into()));
     let kind = if text.is_twin { "passes" } else { "fails" };
     document.insert("tags", Item::Value(Value::Array(Array::from_iter(["regression", kind]))));
-    let random = InlineTable::from_iter([("seed", number(found.seed)), ("sample", number(found.sample))]);
+    let random = InlineTable::from_iter([("seed", number(minimized.seed)), ("sample", number(minimized.sample))]);
     document.insert("random-numbers", Item::Value(Value::InlineTable(random)));
     if let Some(sensors) = document.entry("sensors").or_insert(Item::Table(Table::new())).as_table_like_mut() {
-        sensors.insert("mode", Item::Value(found.sensors.as_str().into()));
+        sensors.insert("mode", Item::Value(minimized.sensors.as_str().into()));
     }
     // A campaign that names no controller judges by the gate. It drives with another controller than this case needs, if not so.
-    if found.is_default() {
+    if minimized.is_default() {
         document.insert("gate", Item::Table(gate(case, text)));
     }
     let written = format!("{}{document}", heading(text));
@@ -116,7 +123,7 @@ fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String,
 
 /// Returns the gate that holds a case to its outcome.
 fn gate(case: &Case, text: &Text<'_>) -> Table {
-    let collision = &text.found.collision;
+    let collision = &text.minimized.collision;
     let (ego, least) = if text.is_twin {
         ("count(ego_collided) <= 0", "count(others_collided) <= 0")
     } else {
@@ -137,22 +144,22 @@ fn number(value: u64) -> Value {
 }
 
 fn sentence(text: &Text<'_>) -> String {
-    let twin = text.found.twin.as_ref();
+    let twin = text.minimized.twin.as_ref();
     match (text.is_twin, twin) {
-        (true, Some(twin)) => format!("Passes when {}. Otherwise: {}", twin.words, text.found.sentence),
-        _ => text.found.sentence.clone(),
+        (true, Some(twin)) => format!("Passes when {}. Otherwise: {}", twin.words, text.minimized.sentence),
+        _ => text.minimized.sentence.clone(),
     }
 }
 
 fn heading(text: &Text<'_>) -> String {
-    let found = text.found;
+    let minimized = text.minimized;
     format!(
-        "{MADE} from sample {} of `{}`, seed {}.\n# {}\n# Run: closecall run FILE{}\n",
-        found.sample,
-        found.scenario,
-        found.seed,
+        "{MADE} from sample {} of `{}`, seed {}.\n# {}\n# Run: {}\n",
+        minimized.sample,
+        minimized.scenario,
+        minimized.seed,
         sentence(text),
-        found.option(),
+        minimized.run_command("FILE", text.command_for),
     )
 }
 
@@ -171,9 +178,9 @@ fn inline(table: &mut dyn TableLike, value: &dyn Fn(&str) -> Option<Value>) {
 fn inline_value(item: &mut Value, value: &dyn Fn(&str) -> Option<Value>) {
     match item {
         Value::String(text) => {
-            if let Some(found) = text.value().strip_prefix('$').and_then(value) {
+            if let Some(minimized) = text.value().strip_prefix('$').and_then(value) {
                 let decor = item.decor().clone();
-                *item = found;
+                *item = minimized;
                 *item.decor_mut() = decor;
             }
         }

@@ -8,7 +8,7 @@ use closecall_simulation::controller::exec::ExecError;
 
 use super::process::{Process, State, Truth, lock};
 use super::schedule::Violation;
-use crate::execution::CampaignError;
+use crate::campaign_error::CampaignError;
 use crate::host::client::{Client, Trouble, World, read};
 use crate::host::{Answer, Question};
 use crate::record::{Record, SampleFailure};

@@ -15,14 +15,16 @@ use rand::{RngExt, SeedableRng};
 
 use super::machine::{Machine, Reader};
 use super::process::{State, Truth};
-use crate::execution::{Campaign, CampaignError, End};
+use crate::campaign_error::CampaignError;
+use crate::execution::Campaign;
 use crate::folder::{Folder, FolderError, JOURNAL};
 use crate::gate::{GateSet, Judge};
 use crate::journal::{self, Entry};
 use crate::manifest::Manifest;
 use crate::plan::Plan;
 use crate::record::Record;
-use crate::runner::Sampling;
+use crate::sampling::Sampling;
+use crate::stop::End;
 use crate::validity::CheckPlan;
 use crate::verdict::{self, Verdict};
 use crate::workers::Samples;

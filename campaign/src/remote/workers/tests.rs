@@ -8,13 +8,14 @@ use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 
-use super::super::engine::EngineError;
 use super::super::{BlockRunner, Shipment};
 use super::*;
-use crate::execution::{Campaign, End};
+use crate::execution::Campaign;
 use crate::folder::Folder;
 use crate::plan::Plan;
-use crate::runner::Sampling;
+use crate::remote::error::EngineError;
+use crate::sampling::Sampling;
+use crate::stop::End;
 
 const SAMPLES: u64 = 30;
 

@@ -13,8 +13,8 @@ use super::{fmi2, fmi3};
 use crate::external::arithmetic::Arithmetic;
 use crate::external::error::LoadError;
 use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::identity::{Identity, Run};
 use crate::external::library::open;
-use crate::external::loaded::{Identity, Run};
 use crate::external::platform;
 
 /// An instance of an FMU, of either version. The messages name the function and what the FMU says.

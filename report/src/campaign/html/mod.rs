@@ -21,6 +21,7 @@ mod ledger;
 pub(crate) mod page;
 mod provenance;
 mod recordings;
+mod report;
 mod samples;
 mod scenario;
 mod verdict;
@@ -28,5 +29,6 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
-pub(super) use page::{number, number_heads, table, text_heads, write_html};
+pub(super) use page::{number, number_heads, table, text_heads};
 pub(super) use recordings::{IndexEntry, write_index};
+pub(super) use report::write_html;

@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use closecall_campaign::action::{Action, CommandFor};
 use closecall_traffic::Measured;
 use maud::{Markup, PreEscaped, html};
 
@@ -44,12 +45,17 @@ pub(in crate::campaign) struct IndexEntry {
 ///
 /// # Errors
 /// [`WriteError`] if the page cannot be written.
-pub(in crate::campaign) fn write_index(path: &Path, entries: &[IndexEntry]) -> Result<(), WriteError> {
-    let page = page(entries).into_string();
+pub(in crate::campaign) fn write_index(
+    path: &Path,
+    entries: &[IndexEntry],
+    command_for: CommandFor,
+) -> Result<(), WriteError> {
+    let page = page(entries, command_for).into_string();
     write_file(path, |file| file.write_all(shown(&page).as_bytes()))
 }
 
-fn page(entries: &[IndexEntry]) -> Markup {
+fn page(entries: &[IndexEntry], command_for: CommandFor) -> Markup {
+    let view = |is_in_browser| command_for(&Action::View { folder: "DIR", is_in_browser });
     let body = html! {
         h1 { "Recordings" }
         p {
@@ -59,8 +65,8 @@ fn page(entries: &[IndexEntry]) -> Markup {
         }
         pre.command tabindex="0" { "pip install rerun-sdk==0.36.3" }
         p {
-            "All of them: " code { "closecall view DIR" } ", with the campaign's folder. "
-            code { "closecall view --web DIR" } " opens them in the browser."
+            "All of them: " code { (view(false)) } ", with the campaign's folder. "
+            code { (view(true)) } " opens them in the browser."
         }
         (filters(entries))
         @for entry in entries { (section(entry)) }

@@ -7,7 +7,8 @@ use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{Axis, ScenarioOverview, WorstSample};
 use crate::units::labelled;
-use closecall_campaign::failures::replay_command;
+use closecall_campaign::action::{Action, Replay, SavedSample};
+use closecall_campaign::failures::FailureKindCount;
 use closecall_scenarios::outcome::Phase;
 
 /// Returns the worst samples of a scenario, with the command that runs the first of them again.
@@ -87,6 +88,13 @@ fn measured(value: Measured) -> Markup {
 }
 
 /// Returns why samples of a scenario have no outcome; empty if all have one.
+/// Returns the command that runs a failed sample again, from within the campaign's folder.
+fn replay_failure(findings: &Findings<'_>, scenario: &str, failure: &FailureKindCount) -> String {
+    let of = SavedSample { folder: ".", sample: failure.first_sample, scenario: Some(scenario) };
+    let replay = Replay { controller: Some(&failure.controller), ..Replay::new(of) };
+    (findings.command_for)(&Action::Replay(replay))
+}
+
 pub(super) fn errors(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Markup {
     let counts = findings.summary.scenarios.iter().find(|(name, _)| *name == scenario.name);
     let Some((_, counts)) = counts.filter(|(_, counts)| !counts.failures.is_empty()) else {
@@ -106,7 +114,7 @@ pub(super) fn errors(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Ma
                 (number(failure.samples))
                 (number(failure.first_sample))
                 td { code { (failure.first_message) } }
-                td { code { (replay_command(".", &scenario.name, failure)) } }
+                td { code { (replay_failure(findings, &scenario.name, failure)) } }
             }
         }
     };

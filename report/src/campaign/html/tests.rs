@@ -12,13 +12,20 @@ use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 
-use super::page::campaign;
+use super::report::campaign;
 use crate::campaign::findings::{Findings, Recordings};
+use crate::campaign::junit::write_junit;
 use crate::campaign::timings::Timing;
+use crate::campaign::xunit_schema::against_schema;
 use crate::campaign::{Still, Tally};
 
 /// Returns the page of 30 samples with and without the margin increase system.
 fn page() -> String {
+    reported(|findings| campaign(findings).unwrap().into_string())
+}
+
+/// Returns what a report makes of 30 samples with and without the margin increase system.
+fn reported(report: impl FnOnce(&Findings<'_>) -> String) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
     let file = ScenarioFile::load(&path, &[]).unwrap();
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 30 };
@@ -57,8 +64,21 @@ fn page() -> String {
         gallery: Some("recordings/index.html"),
         folder: None,
         slowest: &[Timing { scenario, sample: 1, controller, wall_s: 0.25 }],
+        command_for: |action| format!("closecall {action:?}"),
     };
-    campaign(&findings).unwrap().into_string()
+    report(&findings)
+}
+
+#[test]
+fn the_verdict_for_ci_servers_is_valid_by_the_schema_of_xunit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("junit.xml");
+    let xml = reported(|findings| {
+        write_junit(&path, findings, &[("low-thw-overtake".to_owned(), 1.25)]).unwrap();
+        std::fs::read_to_string(&path).unwrap()
+    });
+    assert_eq!(against_schema(&xml), Vec::<String>::new(), "{xml}");
+    assert!(xml.contains("<testsuite name=\"low-thw-overtake\"") && xml.contains("time=\"1.250\""), "{xml}");
 }
 
 #[test]

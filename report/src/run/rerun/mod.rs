@@ -16,6 +16,7 @@ mod blueprint;
 mod bodies;
 mod camera;
 mod collisions;
+mod error;
 mod fog;
 mod ghosts;
 mod log;
@@ -34,8 +35,7 @@ mod vehicles;
 mod version;
 mod write;
 
+pub use error::RecordingError;
 pub use version::{RerunVersion, VersionError};
 pub(crate) use write::write_recording_of;
-pub use write::{
-    RecordingError, check_recording_possible, is_recording_enabled, write_recording, write_recording_unchecked,
-};
+pub use write::{check_recording_possible, is_recording_enabled, write_recording, write_recording_unchecked};

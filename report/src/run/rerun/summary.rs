@@ -103,7 +103,7 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
 fn conditions(film: &Film) -> String {
     let mut text = film.weather().map_or(String::new(), |weather| format!(" · {weather}"));
     for setting in &film.settings {
-        let _ = write!(text, " · `--set {setting}`");
+        let _ = write!(text, " · with `{setting}`");
     }
     text
 }

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use closecall_traffic::Time;
-use rerun::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
+use rerun::{MediaType, TextDocument, ViewCoordinates};
 
 use super::blueprint::{self, FilmContents};
+use super::error::RecordingError;
 use super::parts::EncodeError;
 use super::plots::Role;
 use super::recording::{self, Recording};
@@ -16,33 +17,6 @@ use super::{
 };
 use crate::run::film::{Film, Level};
 use closecall_traffic::atomic::{WriteError, check_writable, write_atomically};
-
-/// The reason why a recording cannot be written. A file of that name is then unchanged.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordingError {
-    /// The environment switches recording off. The library would then write no file and report no error.
-    #[error("failed to record: the environment variable RERUN switches recording off; unset it")]
-    Disabled,
-    /// The library reports an error.
-    #[error("failed to record: {0}")]
-    Stream(#[from] RecordingStreamError),
-    /// The messages cannot be encoded.
-    #[error("failed to encode the recording: {reason}")]
-    Encode {
-        /// The reason that the library gives.
-        reason: String,
-    },
-    /// The file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-}
-
-impl RecordingError {
-    /// Returns the error for a reason that the library gives while encoding.
-    pub(super) fn encode(reason: impl std::fmt::Display) -> Self {
-        Self::Encode { reason: reason.to_string() }
-    }
-}
 
 /// Returns false if the environment (`RERUN=off`) switches recordings off.
 pub fn is_recording_enabled() -> bool {

@@ -1,5 +1,6 @@
 //! Pixels whose moments are computed at once have the bits of moments that are computed one by one.
 
+use crate::camera::effects::Effects;
 use closecall_traffic::{
     Check, Environment, Light, Parameters, Road, Scene, SceneVehicle, Time, Vehicle, VehicleClass, VehicleState,
 };
@@ -39,7 +40,7 @@ fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize;
     let mut rgb = vec![0; columns.len() * CHANNELS];
     for row in (0..800).step_by(3) {
         frame.draw(&columns, &[row], &mut rgb);
-        let mut line = Line::new(&frame, &columns, super::super::line::LineMemory::default());
+        let mut line = Line::new(&frame, &columns, crate::camera::line_memory::LineMemory::default());
         line.begin(&frame, row, &effects);
         for (place, column) in columns.iter().enumerate() {
             let (_, length) = line.centre(&frame, place);

@@ -184,11 +184,6 @@ impl Child {
         }
     }
 
-    /// Returns the process's number.
-    pub fn process_id(&self) -> u32 {
-        self.process.id()
-    }
-
     /// Returns the files that the process has mapped or opened, if the system tells.
     pub fn open_files(&self) -> Vec<PathBuf> {
         let of_process = PathBuf::from(format!("/proc/{}", self.process.id()));

@@ -1,0 +1,44 @@
+//! Scenarios and controllers that cannot form a campaign.
+
+use std::path::PathBuf;
+
+use closecall_simulation::controller::native::NativeError;
+
+/// The reason for which scenarios cannot form a campaign.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// Two scenarios have the same name, by which results are filed.
+    #[error("{} and {} have the same name `{name}`", first.display(), second.display())]
+    SameName {
+        /// One file.
+        first: PathBuf,
+        /// The other file.
+        second: PathBuf,
+        /// The name of both.
+        name: String,
+    },
+    /// A controller does not fit a scenario.
+    #[error("{scenario}: {source}")]
+    Controller {
+        /// The scenario.
+        scenario: String,
+        /// What is wrong.
+        source: NativeError,
+    },
+    /// A margin increase system is to drive an ego stack that has none.
+    #[error(
+        "{scenario}: `{controller}` needs a margin increase system, and the ego stack has none: add `mis` to its `ego-stack`, or name another controller"
+    )]
+    WithoutMis {
+        /// The scenario.
+        scenario: String,
+        /// The controller.
+        controller: String,
+    },
+    /// Two arms have the same controller, so that they would have the same outcomes.
+    #[error("`{controller}` is named twice: every arm needs a controller of its own")]
+    SameArm {
+        /// The controller.
+        controller: String,
+    },
+}

@@ -1,0 +1,20 @@
+//! What a loaded controller states about itself, and what drives one run.
+
+use serde::{Deserialize, Serialize};
+
+use crate::external::exchange::{Answer, Input};
+
+/// What a controller states about itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Its name.
+    pub name: Option<String>,
+    /// Its version.
+    pub version: Option<String>,
+}
+
+/// A controller that drives one run.
+pub(crate) trait Run: Send {
+    /// Returns the answer to a control step, or why there is none.
+    fn step(&mut self, input: &Input) -> Result<Answer, String>;
+}

@@ -1,0 +1,76 @@
+//! The page of a campaign.
+
+use std::io;
+use std::path::Path;
+
+use maud::{Markup, PreEscaped, html};
+
+use super::page::document;
+use super::{ledger, provenance, samples, scenario, verdict};
+use crate::campaign::causes;
+use crate::campaign::ensemble::ensemble_html;
+use crate::campaign::findings::Findings;
+use crate::campaign::origins;
+use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::shown::shown;
+
+/// Writes the page of a campaign.
+///
+/// # Errors
+/// [`WriteError`] if a chart cannot be drawn or the file cannot be written. An existing file then stays as it is.
+pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> Result<(), WriteError> {
+    write_file(path, |file| file.write_all(shown(&campaign(findings)?.into_string()).as_bytes()))
+}
+
+/// Returns the page of a campaign.
+pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
+    let title = format!("{}: {}", findings.judged.word(), findings.scenario_names());
+    let body = html! {
+        (origins::section(findings))
+        (verdict::gates(findings))
+        (ledger::collisions(findings)?)
+        (scenario::evidence(findings)?)
+        (ensemble_html(findings.summary, findings.manifest))
+        (verdict::requirements(findings))
+        (ledger::validity(findings))
+        @if let Some(folder) = findings.folder {
+            details { summary { "Causes of the failures" } (causes::table(folder, findings.command_for)) }
+        }
+        @for overview in &findings.overview.scenarios { (scenario::section(findings, overview)?) }
+        details { summary { "Slowest samples" } (samples::slowest(findings)) }
+        (provenance::provenance(findings))
+    };
+    let (contents, body) = with_contents(&body.into_string());
+    Ok(document(&title, &html! { (verdict::header(findings)) (contents) (body) }))
+}
+
+/// Returns a list of contents, and the page whose headings it names.
+fn with_contents(body: &str) -> (Markup, PreEscaped<String>) {
+    const HEADING: &str = "<h2>";
+    let mut parts = body.split(HEADING);
+    let mut page = parts.next().unwrap_or_default().to_owned();
+    let mut titles = Vec::new();
+    for (number, part) in parts.enumerate() {
+        titles.push(PreEscaped(part.split("</h2>").next().unwrap_or_default()));
+        page.push_str(&format!("<h2 id=\"part-{number}\">{part}"));
+    }
+    let contents = html! {
+        nav aria-label="Contents" {
+            @for (number, title) in titles.iter().enumerate() { a href={ "#part-" (number) } { (title) } }
+        }
+    };
+    (contents, PreEscaped(page))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_contents_name_every_heading() {
+        let (contents, page) = with_contents("<p>0</p><h2>One</h2><p>1</p><h2>a &lt; b</h2>");
+        assert_eq!(page.0, "<p>0</p><h2 id=\"part-0\">One</h2><p>1</p><h2 id=\"part-1\">a &lt; b</h2>");
+        let contents = contents.into_string();
+        assert!(contents.contains("<a href=\"#part-0\">One</a><a href=\"#part-1\">a &lt; b</a>"), "{contents}");
+    }
+}

@@ -1,0 +1,36 @@
+//! The vehicles of a concrete scenario.
+
+use closecall_controllers::{CheckedDriver, LaneKeeping, SpeedKeeping};
+use closecall_traffic::{ActorId, ConfigError, Problem, Vehicle, VehicleState};
+
+use super::events::Event;
+use super::fleet::FleetOf;
+
+/// One vehicle of a concrete scenario.
+#[derive(Clone, Debug)]
+pub struct Actor {
+    /// Its name.
+    pub id: ActorId,
+    /// Its class, size and mass.
+    pub vehicle: Vehicle,
+    /// Its state at time zero.
+    pub start: VehicleState,
+    /// Its driver: a human driver, or the ego stack.
+    pub driver: CheckedDriver,
+    /// How its driver weaves in the lane, or `None` if the driver keeps the lane exactly.
+    pub lane_keeping: Option<LaneKeeping>,
+    /// How the desired speed of its driver varies, or `None` if it is constant.
+    pub speed_keeping: Option<SpeedKeeping>,
+    /// What happens to it.
+    pub events: Vec<Event>,
+    /// The fleet that its look is drawn from in each run; see [`Scenario::vehicle`].
+    pub(crate) fleet: Option<FleetOf>,
+}
+
+/// Returns the index of the actor `id` among all of them. `key` is the key of the scenario file that names it.
+pub(super) fn find_actor(ids: &[&ActorId], id: &ActorId, key: &str) -> Result<usize, ConfigError> {
+    ids.iter().position(|known| *known == id).ok_or_else(|| {
+        let known = ids.iter().map(|id| format!("`{id}`")).collect::<Vec<_>>().join(", ");
+        ConfigError::new(key, Problem::UnknownActor { value: id.to_string(), known })
+    })
+}

@@ -1,0 +1,27 @@
+//! Sensors that classify what others have detected.
+
+use crate::{Detection, Health, RearImage, Scene, SensorError};
+
+/// A classifier that assigns class scores to detections from the measurements of another sensor.
+pub trait DetectionClassifier: Send {
+    /// Replaces the class scores of each detection of the scan that ended at the scene's time.
+    ///
+    /// # Errors
+    /// Returns [`SensorError::Classifier`] if the classifier cannot be run.
+    fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError>;
+
+    /// Returns what that sensor alone has seen, as of the latest scan. Usually nothing.
+    fn seen_alone(&self) -> &[Detection] {
+        &[]
+    }
+
+    /// Returns the latest image that a network has evaluated as a whole. Usually none.
+    fn rear_image(&self) -> Option<&RearImage> {
+        None
+    }
+
+    /// Returns the health of that sensor.
+    fn health(&self) -> Health {
+        Health::Ok
+    }
+}

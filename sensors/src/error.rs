@@ -1,0 +1,33 @@
+//! The failure of a sensor model.
+
+use closecall_traffic::Time;
+
+/// The failure of a sensor model. It leaves the sensors in an undefined state and ends the run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SensorError {
+    /// A quantity that must be finite is not.
+    #[error("failed to measure: {what} is not finite at {time}")]
+    NotFinite {
+        /// The quantity.
+        what: &'static str,
+        /// The scene's time.
+        time: Time,
+    },
+    /// Two implementations of DBSCAN give different clusters, in a run that compares them. The
+    /// boxes of that scan are not used.
+    #[error("{different} of {points} clustered points have another label by linfa-clustering at {time}")]
+    Clusterings {
+        /// Number of points whose labels differ.
+        different: usize,
+        /// Number of points.
+        points: usize,
+        /// End of the scan.
+        time: Time,
+    },
+    /// The classifier could not be loaded or run.
+    #[error("failed to classify: {reason}")]
+    Classifier {
+        /// The classifier's message.
+        reason: String,
+    },
+}

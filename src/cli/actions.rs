@@ -1,0 +1,94 @@
+//! The commands by which a user does what a text proposes.
+
+use closecall_campaign::action::{Action, Replay, Resume, SavedSample};
+
+/// Returns a word as a shell reads it, with quotes if it needs them.
+pub(super) fn quoted(word: &str) -> String {
+    shlex::try_quote(word).map_or_else(|_| word.to_owned(), |quoted| quoted.into_owned())
+}
+
+/// Returns the command of this program that does something.
+pub(super) fn command_for(action: &Action<'_>) -> String {
+    match *action {
+        Action::Replay(replay) => replay_command(&replay),
+        Action::Explain(sample) => sample_command("explain", sample),
+        Action::ExplainAll(folder) => format!("closecall explain {}", quoted(folder)),
+        Action::Minimize(sample) => sample_command("minimize", sample),
+        Action::Run { file, controller } => {
+            format!("closecall run {}{}", quoted(file), option("--controller", controller))
+        }
+        Action::Resume(resume) => resume_command(resume),
+        Action::View { folder, is_in_browser: false } => format!("closecall view {}", quoted(folder)),
+        Action::View { folder, is_in_browser: true } => format!("closecall view --web {}", quoted(folder)),
+    }
+}
+
+/// Returns an option with its value, with a space before it; nothing without a value.
+fn option(name: &str, value: Option<&str>) -> String {
+    value.map_or_else(String::new, |value| format!(" {name} {}", quoted(value)))
+}
+
+fn sample_command(command: &str, SavedSample { folder, sample, scenario }: SavedSample<'_>) -> String {
+    format!("closecall {command} {} {sample}{}", quoted(folder), option("--scenario", scenario))
+}
+
+fn replay_command(replay: &Replay<'_>) -> String {
+    let settings: String = replay.settings.iter().map(|setting| option("--set", Some(setting))).collect();
+    let paired = if replay.is_paired { " --paired" } else { "" };
+    let controller = option("--controller", replay.controller);
+    format!(
+        "{}{paired}{controller}{settings}{}",
+        sample_command("replay", replay.of),
+        option("--record", replay.recording)
+    )
+}
+
+/// Returns the command that resumes a campaign: the command that started it, without the options
+/// that would end it at the same sample again.
+fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> String {
+    let is_kept = |word: &&String| !matches!(word.as_str(), "--fail-fast" | "--resume");
+    let words = command.iter().filter(is_kept).map(String::as_str);
+    let folder = moved_to.iter().flat_map(|folder| ["--out", folder]);
+    let is_retried = retries_errors && !command.iter().any(|word| word == "--retry-errors");
+    let resumed = std::iter::once("--resume").chain(is_retried.then_some("--retry-errors"));
+    words.chain(folder).chain(resumed).map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_resume_command_is_the_command_with_quotes_and_resume() {
+        let resumed = |text: &str, retries_errors, moved_to| {
+            let command = shlex::split(text).unwrap_or_default();
+            command_for(&Action::Resume(Resume { command: &command, retries_errors, moved_to }))
+        };
+        assert_eq!(
+            resumed("closecall campaign 'a b.toml' --out x --fail-fast", false, None),
+            "closecall campaign 'a b.toml' --out x --resume"
+        );
+        assert_eq!(resumed("c campaign --resume --out x", true, None), "c campaign --out x --resume --retry-errors");
+        assert_eq!(resumed("c campaign x --resume", false, Some("a b")), "c campaign x --out 'a b' --resume");
+    }
+
+    #[test]
+    fn a_replay_names_what_differs_from_a_plain_run() {
+        let of = SavedSample { folder: "a b", sample: 7, scenario: Some("s") };
+        let plain = Replay::new(of);
+        assert_eq!(command_for(&Action::Replay(plain)), "closecall replay 'a b' 7 --scenario s");
+        let settings = ["mis.disabled=[\"holding\"]".to_owned()];
+        let full = Replay {
+            is_paired: true,
+            controller: Some("exec:./a b"),
+            settings: &settings,
+            recording: Some("x.rrd"),
+            ..plain
+        };
+        assert_eq!(
+            command_for(&Action::Replay(full)),
+            "closecall replay 'a b' 7 --scenario s --paired --controller 'exec:./a b' --set 'mis.disabled=[\"holding\"]' \
+             --record x.rrd"
+        );
+    }
+}

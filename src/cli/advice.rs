@@ -1,0 +1,102 @@
+//! What the user can do after an error or a result without a verdict. The libraries say what is
+//! wrong; the options that help are those of this program.
+
+use std::fmt::Display;
+
+use closecall_campaign::execution::CampaignError;
+use closecall_campaign::folder::FolderError;
+use closecall_campaign::gate::AssemblyError;
+use closecall_campaign::merge::MergeError;
+use closecall_campaign::saved::SavedError;
+use closecall_campaign::verdict::{Decision, Judgement};
+use closecall_report::campaign::ReportError;
+use closecall_sensors::camera::ClassifierError;
+use closecall_simulation::controller::ArmsError;
+use closecall_studies::CausesError;
+use closecall_studies::exposure::Missing;
+use closecall_studies::map::MapError;
+use miette::Diagnostic;
+
+use super::CliError;
+
+const ALL_OPTIONS: &str = "see `closecall --help`";
+const OTHER_FOLDER: &str = "name a folder with --out DIR, or keep no results with --no-out";
+const RESUME: &str = "the same command with --resume goes on with the campaign";
+
+impl Diagnostic for CliError {
+    fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
+        Some(Box::new(advice(self)?))
+    }
+}
+
+/// Returns what the user can do, if an option helps.
+fn advice(error: &CliError) -> Option<&'static str> {
+    match error {
+        CliError::Results(_) | CliError::ResultsCut(_) => Some(OTHER_FOLDER),
+        CliError::Folder(error) => of_folder(error),
+        CliError::Campaign(error) | CliError::Merge(MergeError::Campaign(error)) => of_campaign(error),
+        CliError::Merge(MergeError::NotAPart { .. }) => Some("`closecall campaign … --partition K/N` runs a part"),
+        CliError::Merge(MergeError::Incomplete { .. }) => Some(RESUME),
+        CliError::Saved(error) | CliError::Causes(CausesError::Saved(error)) => of_saved(error).or(Some(ALL_OPTIONS)),
+        CliError::Report(ReportError::Folder(error)) => of_folder(error),
+        CliError::Report(ReportError::Saved(error)) => of_saved(error),
+        CliError::Causes(CausesError::Foreign { .. }) => Some("--output FILE names the file"),
+        CliError::Causes(CausesError::Map(MapError::OfGrid { parameter, .. })) => Some(match *parameter {
+            "speed-mps" => "--speed-mps sets it",
+            "closing-mps" => "--closing-kmh sets it",
+            "detection-m" => "--detection-m sets it",
+            "front-thw-s" => "--front-thw-s sets it",
+            _ => "it follows from --detection-m and --closing-kmh",
+        }),
+        CliError::Classifier(ClassifierError::NeedsOnnxRuntime) => {
+            Some("--onnxruntime PATH names its libonnxruntime.so")
+        }
+        CliError::Gates(AssemblyError::NoBaseline { .. }) => Some("--paired runs the baseline, too"),
+        CliError::Gates(AssemblyError::DependentSamples { .. }) => Some("--design random draws independent samples"),
+        CliError::Arms(ArmsError::One { .. }) => Some("--controller names a single controller"),
+        CliError::Sensitivity(_) => Some("see `closecall study sensitivity --help`"),
+        CliError::Usage { .. } | CliError::Gates(_) | CliError::Arms(_) | CliError::Plan(_) | CliError::Causes(_) => {
+            Some(ALL_OPTIONS)
+        }
+        _ => None,
+    }
+}
+
+fn of_campaign(error: &CampaignError) -> Option<&'static str> {
+    match error {
+        CampaignError::Write(_) => Some(RESUME),
+        CampaignError::Folder(error) => of_folder(error),
+        _ => None,
+    }
+}
+
+fn of_folder(error: &FolderError) -> Option<&'static str> {
+    let is_resumable = matches!(error, FolderError::AlreadyThere { .. } | FolderError::Incomplete { .. });
+    is_resumable.then_some(RESUME)
+}
+
+fn of_saved(error: &SavedError) -> Option<&'static str> {
+    match error {
+        SavedError::Folder(error) => of_folder(error),
+        SavedError::ScenarioNotNamed { .. } => Some("--scenario NAME names it"),
+        SavedError::NotTrusted { .. } => Some("--trust-folder lets them run"),
+        _ => None,
+    }
+}
+
+/// Returns the lines after a verdict that say what makes a campaign judged, or a measurement.
+pub(super) fn after_verdict(judged: &Judgement) -> &'static str {
+    if judged.decision == Decision::NotJudged && judged.gates.is_empty() {
+        "  --gate CRITERION sets a gate, --no-gate measures without a verdict\n"
+    } else {
+        ""
+    }
+}
+
+/// Returns the option that gives what is missing for a net effect.
+pub(super) const fn to_provide(missing: Missing) -> &'static str {
+    match missing {
+        Missing::Rate => "--per-million-km LOW..HIGH states a range of the rate",
+        Missing::Campaign => "--campaign DIR names a paired campaign",
+    }
+}

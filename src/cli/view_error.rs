@@ -1,0 +1,44 @@
+//! Why nothing can be shown.
+
+use std::io;
+use std::path::PathBuf;
+
+use super::viewer::ViewerError;
+
+/// The reason why nothing can be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// The path has no recording.
+    #[error("failed to find a recording in {path}: name a file .rrd, or a folder that has such files")]
+    Nothing {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The file has the name of a recording, but is none.
+    #[error("failed to open {path}: the file is no recording: {reason}")]
+    Foreign {
+        /// The path.
+        path: PathBuf,
+        /// What the library says of it.
+        reason: String,
+    },
+    /// The path cannot be read.
+    #[error("failed to read {path}: {source}")]
+    Read {
+        /// The path.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The viewer shows nothing.
+    #[error(transparent)]
+    Viewer(#[from] ViewerError),
+    /// The report cannot be opened in the browser.
+    #[error("failed to open {path} in the browser: {source}")]
+    Browser {
+        /// The path of the report.
+        path: PathBuf,
+        /// The reason.
+        source: opener::OpenError,
+    },
+}
