@@ -5,7 +5,7 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, generate, inspect, merge, paper, record, reenact, render, robustness,
+    CliError, calibrate, causes, chain, drift, export, generate, inspect, merge, paper, record, reenact, render, robustness,
     sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
@@ -88,6 +88,8 @@ pub(super) enum Tool {
     Man(generate::ManArgs),
     /// Render labelled images of the rear camera, or of an aerial one
     Render(render::RenderArgs),
+    /// Write a sample as OpenSCENARIO and OpenDRIVE, for other simulators and players
+    Export(export::ExportArgs),
     /// Merge the parts of a campaign that ran on several machines, and judge the result
     Merge(merge::MergeArgs),
 }
@@ -134,6 +136,7 @@ impl Tool {
             Self::Completions(args) => generate::completions(args, command()),
             Self::Man(args) => generate::man(args, command()),
             Self::Render(args) => render::render(args),
+            Self::Export(args) => export::export(args),
             Self::Merge(args) => merge::merge(args),
         }
     }

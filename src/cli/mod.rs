@@ -15,6 +15,7 @@ mod drift;
 mod ending;
 mod ensemble;
 mod error;
+mod export;
 mod gates;
 mod generate;
 mod groups;

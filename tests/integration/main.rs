@@ -23,6 +23,7 @@ mod encounter_models;
 mod engagement;
 mod ensemble;
 mod every_day;
+mod exchange;
 mod evidence;
 mod exec_controller;
 mod exit_codes;
