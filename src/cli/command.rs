@@ -98,7 +98,7 @@ enum Command {
 }
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may know them by their name alone.
-const GROUPED: [(&str, &str); 25] = [
+const GROUPED: [(&str, &str); 26] = [
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
     ("completions", "tool completions"),
@@ -108,6 +108,7 @@ const GROUPED: [(&str, &str); 25] = [
     ("exposure", "study exposure"),
     ("fit", "traffic fit"),
     ("frontier", "study frontier"),
+    ("import", "tool import"),
     ("inspect", "traffic inspect"),
     ("lane-changes", "traffic lane-changes"),
     ("man", "tool man"),

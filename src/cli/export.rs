@@ -29,6 +29,8 @@ enum FormChoice {
     ClosedLoop,
     /// The closed loop with parameters, a value set and distributions
     Logical,
+    /// CommonRoad XML 2020a: the other vehicles as they drove, and a planning problem for the ego
+    Commonroad,
 }
 
 impl From<FormChoice> for Form {
@@ -37,6 +39,7 @@ impl From<FormChoice> for Form {
             FormChoice::OpenLoop => Self::OpenLoop,
             FormChoice::ClosedLoop => Self::ClosedLoop,
             FormChoice::Logical => Self::Logical,
+            FormChoice::Commonroad => Self::CommonRoad,
         }
     }
 }
@@ -55,10 +58,10 @@ pub(super) struct ExportArgs {
     /// Number of the sample
     #[arg(default_value_t = 0)]
     sample: u64,
-    /// Folder for the case: OpenSCENARIO XML 1.3, OpenDRIVE 1.8 and a catalogue of vehicles
+    /// Folder for the case: OpenSCENARIO XML 1.3, OpenDRIVE 1.8 and a catalogue of vehicles, or CommonRoad XML
     #[arg(short, long, value_name = "FOLDER", help_heading = heading::OUTPUT)]
     output: PathBuf,
-    /// Forms to write [default: all]
+    /// Forms to write [default: open-loop,closed-loop,logical]
     #[arg(long = "form", value_enum, value_delimiter = ',', value_name = "FORM,…", help_heading = heading::OUTPUT)]
     forms: Vec<FormChoice>,
     /// Number of samples in the value set of the logical form, from SAMPLE on
@@ -97,7 +100,7 @@ struct Chosen {
 pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     let chosen = if args.source.is_dir() { of_folder(args)? } else { of_file(args)? };
     let forms = match args.forms.as_slice() {
-        [] => Form::ALL.to_vec(),
+        [] => Form::OPENSCENARIO.to_vec(),
         forms => forms.iter().map(|form| Form::from(*form)).collect(),
     };
     let Chosen { file, scenario, key, arm, value_sets, inputs } = &chosen;
@@ -106,7 +109,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     protect(inputs, &outputs)?;
     check_backend_of(scenario, std::slice::from_ref(arm))?;
     let mut motion = Motion::default();
-    if forms.contains(&Form::OpenLoop) {
+    if forms.iter().any(|form| form.needs_run()) {
         run_guarded(scenario, *key, arm, &mut motion)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
     }

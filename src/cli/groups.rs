@@ -5,8 +5,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, export, generate, inspect, merge, paper, record, reenact, render, robustness,
-    sample, schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, export, generate, import, inspect, merge, paper, record, reenact,
+    render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -90,6 +90,8 @@ pub(super) enum Tool {
     Render(render::RenderArgs),
     /// Write a sample as OpenSCENARIO and OpenDRIVE, for other simulators and players
     Export(export::ExportArgs),
+    /// Make a scenario file of an OpenSCENARIO XML scenario
+    Import(import::ImportArgs),
     /// Merge the parts of a campaign that ran on several machines, and judge the result
     Merge(merge::MergeArgs),
 }
@@ -137,6 +139,7 @@ impl Tool {
             Self::Man(args) => generate::man(args, command()),
             Self::Render(args) => render::render(args),
             Self::Export(args) => export::export(args),
+            Self::Import(args) => import::import_file(args),
             Self::Merge(args) => merge::merge(args),
         }
     }

@@ -20,6 +20,7 @@ mod gates;
 mod generate;
 mod groups;
 mod help;
+mod import;
 mod inspect;
 mod library;
 mod merge;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use closecall_scenarios::library::LIBRARY;
+use closecall_scenarios::library;
 use closecall_traffic::{Road, maths};
 
 use crate::support::{ROOT, closecall, code, message, stdout};
@@ -23,9 +23,8 @@ fn run(words: &str, output: &Path) -> Output {
 fn exported(words: &str, folder: &Path) -> BTreeMap<String, String> {
     stdout(&run(&format!("tool export {words} -o"), folder), 0);
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-    let texts = files.map(|path| {
-        (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read_to_string(&path).unwrap())
-    });
+    let texts = files
+        .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read_to_string(&path).unwrap()));
     texts.collect()
 }
 
@@ -195,7 +194,14 @@ fn a_sample_of_a_campaign_is_exported_with_its_seed() {
     stdout(&output, 0);
     let text = fs::read_to_string(case.join("open-loop.xosc")).unwrap();
     assert!(attribute(&text, "description").contains("sample 1 of seed 9"), "{text:.400}");
-    let output = closecall(["tool".as_ref(), "export".as_ref(), campaign.as_os_str(), "7".as_ref(), "-o".as_ref(), case.as_os_str()]);
+    let output = closecall([
+        "tool".as_ref(),
+        "export".as_ref(),
+        campaign.as_os_str(),
+        "7".as_ref(),
+        "-o".as_ref(),
+        case.as_os_str(),
+    ]);
     assert_eq!(code(&output), 2);
 }
 
@@ -210,13 +216,15 @@ fn quality(python: &Path, folder: &Path) -> String {
 fn the_quality_checkers_find_no_issue_in_any_scenario_of_the_library() {
     let Some(python) = closecall_testing::python_with_exchange() else { return };
     let folder = tempfile::tempdir().unwrap();
-    for scenario in LIBRARY {
-        stdout(&run(&format!("tool export {} --sensors ground-truth -o", scenario.name), &folder.path().join(scenario.name.replace('/', "-"))), 0);
+    let names: Vec<_> = library::names().collect();
+    for name in &names {
+        let case = folder.path().join(name.replace('/', "-"));
+        stdout(&run(&format!("tool export {name} --sensors ground-truth -o"), &case), 0);
     }
     let said = quality(&python, folder.path());
     assert!(said.ends_with(", 0 issues\n"), "{said}");
     let files: usize = said.lines().last().unwrap().split(' ').next().unwrap().parse().unwrap();
-    assert!(files > 5 * LIBRARY.len(), "{said}");
+    assert!(files > 5 * names.len(), "{said}");
 }
 
 #[test]
@@ -230,4 +238,151 @@ fn the_quality_checkers_find_what_is_wrong() {
         let said = quality(&python, folder.path());
         assert!(!said.ends_with(", 0 issues\n"), "{wrong}: {said}");
     }
+}
+
+/// Runs the readers of OSI on these files, and returns what they find.
+fn read_osi(python: &Path, files: &[PathBuf]) -> serde_json::Value {
+    let script = PathBuf::from(ROOT).join("tests/integration/exchange/osi.py");
+    let output = Command::new(python).arg(script).args(files).output().unwrap();
+    serde_json::from_str(&stdout(&output, 0)).unwrap()
+}
+
+/// Returns the traces in a folder: `GroundTruth` first.
+fn traces(folder: &Path) -> Vec<PathBuf> {
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut traces: Vec<_> = files.filter(|path| path.extension().is_some_and(|end| end == "osi")).collect();
+    traces.sort();
+    traces
+}
+
+#[test]
+fn osi_traces_have_the_names_of_the_standard_and_other_endings_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    stdout(&run("run paper-figure --sensors ground-truth --osi", &folder.path().join("drive.osi")), 0);
+    let names: Vec<_> =
+        traces(folder.path()).iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect();
+    assert_eq!(names.len(), 2);
+    for (name, kind) in names.iter().zip(["gt", "sd"]) {
+        let parts: Vec<_> = name.split('_').collect();
+        assert!(parts[0].ends_with('Z') && parts[0].len() == 16, "{name}");
+        assert_eq!([parts[1], parts[2], parts[3], parts[5]], [kind, "380", "0", "drive.osi"]);
+        let messages: usize = parts[4].parse().unwrap();
+        assert!(messages > 100, "{name}");
+    }
+    let output = run("run paper-figure --sensors ground-truth --osi", &folder.path().join("drive.txt"));
+    assert_eq!(code(&output), 2);
+    assert!(message(&output).contains("must end with `.osi` or `.mcap`"), "{}", message(&output));
+}
+
+#[test]
+fn other_programs_read_the_osi_messages_of_a_run() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [mcap, osi, trace] = ["drive.mcap", "drive.osi", "trace.csv"].map(|name| folder.path().join(name));
+    let words = "run low-thw-overtake --sample 3 --sensors object";
+    stdout(&run(&format!("{words} --osi"), &mcap), 0);
+    stdout(&run(&format!("{words} --trace"), &trace), 0);
+    stdout(&run(&format!("{words} --osi"), &osi), 0);
+    let found = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
+    let (truth, tracks) = (&found["traces"]["gt"], &found["traces"]["sd"]);
+    let messages = &truth["messages"];
+    assert_eq!(found["objects"], 3);
+    assert_eq!(found["host"], 1);
+    for count in [&found["instants"], &tracks["messages"], &truth["betterosi"], &truth["named"], &tracks["betterosi"]] {
+        assert_eq!(count, messages);
+    }
+    for topic in ["ground_truth", "sensor_data", "ground_truth_map"] {
+        assert_eq!(found["channels"][topic]["unknown"], 0, "{found}");
+    }
+    assert_eq!(found["channels"]["sensor_data"]["messages"], *messages);
+    assert_eq!(found["channels"]["ground_truth_map"]["messages"], 1);
+    for trace in [truth, tracks] {
+        assert_eq!(trace["unknown"], 0);
+        assert_eq!(trace["version"], serde_json::json!([3, 8, 0]));
+    }
+    assert_eq!(truth["boundaries"], 4);
+    let lanes: Vec<u64> = truth["lanes"].as_array().unwrap().iter().map(|lanes| lanes.as_u64().unwrap()).collect();
+    assert_eq!((lanes[0], lanes[1..].iter().max()), (3, Some(&0)));
+    assert!(tracks["tracks"].as_u64().unwrap() > 100 && tracks["rmse"].as_f64().unwrap() > 0.0);
+    // The positions are those of the trace.
+    let mut reader = csv::Reader::from_path(&trace).unwrap();
+    let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+    let centres = truth["centres"].as_array().unwrap();
+    assert_eq!(rows.len(), 3 * centres.len());
+    for (message, rows) in centres.iter().zip(rows.chunks(3)) {
+        for (object, row) in message[1].as_array().unwrap().iter().zip(rows) {
+            let near = |index: usize, column: usize| {
+                let difference = object[index].as_f64().unwrap() - row[column].parse::<f64>().unwrap();
+                assert!(difference.abs() < 1e-9, "{row:?} {object}");
+            };
+            // On a straight road, x is s and y is d.
+            near(0, 3);
+            near(1, 4);
+        }
+    }
+}
+
+#[test]
+fn the_lanes_are_in_each_message_on_request() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mcap = folder.path().join("drive.mcap");
+    stdout(&run("run empty-wet-road --sensors ground-truth --set duration-s=2 --osi", &mcap), 0);
+    stdout(
+        &run(
+            "run empty-wet-road --sensors ground-truth --set duration-s=2 --osi-lanes --osi",
+            &folder.path().join("a.osi"),
+        ),
+        0,
+    );
+    let found = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
+    let lanes = found["traces"]["gt"]["lanes"].as_array().unwrap();
+    assert!(lanes.len() > 10 && lanes.iter().all(|count| count == &lanes[0] && count.as_u64() > Some(0)), "{found}");
+}
+
+#[test]
+fn a_sample_as_commonroad_is_read_back_with_the_positions_of_the_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = folder.path().join("trace.csv");
+    let case = folder.path().join("case");
+    let files = exported("paper-figure --sensors object --form commonroad", &case);
+    assert_eq!(files.keys().map(String::as_str).collect::<Vec<_>>(), ["commonroad.xml"]);
+    stdout(&run("run paper-figure --sensors object --trace", &trace), 0);
+    let data = closecall_recorded::trajectory_data::read(&case.join("commonroad.xml")).unwrap();
+    // The ego is the vehicle of the planning problem.
+    assert_eq!(data.trajectories.len(), 2);
+    let mut rows = 0;
+    for row in csv::Reader::from_path(&trace).unwrap().records().map(Result::unwrap) {
+        let number = match &row[1] {
+            "front" => 1_001,
+            "rear" => 1_002,
+            _ => continue,
+        };
+        let vehicle = data.trajectories.iter().find(|one| one.vehicle_id == number).unwrap();
+        let time_s: f64 = row[0].parse().unwrap();
+        let point = vehicle.points.iter().find(|point| (point.time.s() - time_s).abs() < 1e-6).unwrap();
+        // Positions along a road of the reader begin at the start of its lanelets.
+        let s_m: f64 = row[3].parse().unwrap();
+        let first_m: f64 = vehicle.points[0].s_m;
+        let start_m = if number == 1_001 { 525.6 } else { 375.4 };
+        assert!((point.s_m - first_m - (s_m - start_m)).abs() < TOLERANCE_M, "{row:?} {point:?}");
+        assert!((point.d_m - row[4].parse::<f64>().unwrap()).abs() < TOLERANCE_M, "{row:?} {point:?}");
+        rows += 1;
+    }
+    assert!(rows > 500, "{rows}");
+}
+
+#[test]
+fn commonroad_io_reads_a_sample_with_its_planning_problem() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    exported("paper-figure --sensors object --form commonroad", folder.path());
+    let script = PathBuf::from(ROOT).join("tests/integration/exchange/commonroad.py");
+    let output = Command::new(python).arg(script).arg(folder.path().join("commonroad.xml")).output().unwrap();
+    let found: serde_json::Value = serde_json::from_str(stdout(&output, 0).lines().last().unwrap()).unwrap();
+    assert_eq!((found["step_s"].as_f64(), found["lanelets"].as_u64()), (Some(0.04), Some(3)));
+    assert_eq!(found["start"], serde_json::json!([500.0, -5.625, 30.0]));
+    assert_eq!(found["on_lanelet"], serde_json::json!([2]));
+    let ends: Vec<_> = ["1001", "1002"].map(|id| found["obstacles"][id].as_u64().unwrap()).into();
+    assert!(ends[0] > 250 && ends[0] == ends[1], "{found}");
 }

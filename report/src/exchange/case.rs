@@ -12,7 +12,7 @@ use super::motion::Motion;
 use super::road::UsedRoad;
 use super::scenario::{CATALOG_FOLDER, ROAD_FILE};
 use super::vehicles::{self, CATALOG};
-use super::{distribution, open_loop};
+use super::{commonroad, distribution, open_loop};
 
 /// A form of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,11 +23,13 @@ pub enum Form {
     ClosedLoop,
     /// The same with parameters, beside their values and distributions.
     Logical,
+    /// The other vehicles as they drove, and a planning problem for the ego, as CommonRoad XML 2020a.
+    CommonRoad,
 }
 
 impl Form {
-    /// All forms.
-    pub const ALL: [Self; 3] = [Self::OpenLoop, Self::ClosedLoop, Self::Logical];
+    /// The forms of OpenSCENARIO.
+    pub const OPENSCENARIO: [Self; 3] = [Self::OpenLoop, Self::ClosedLoop, Self::Logical];
 
     /// Returns the name of the form.
     pub const fn name(self) -> &'static str {
@@ -35,7 +37,13 @@ impl Form {
             Self::OpenLoop => "open loop",
             Self::ClosedLoop => "closed loop",
             Self::Logical => "logical",
+            Self::CommonRoad => "CommonRoad",
         }
+    }
+
+    /// Returns whether the form has the motion of a run.
+    pub const fn needs_run(self) -> bool {
+        matches!(self, Self::OpenLoop | Self::CommonRoad)
     }
 
     /// Returns the files of the form, besides the road and the catalogue.
@@ -44,6 +52,7 @@ impl Form {
             Self::OpenLoop => &["open-loop.xosc"],
             Self::ClosedLoop => &["closed-loop.xosc"],
             Self::Logical => &["logical.xosc", "logical-values.xosc", "logical-distributions.xosc"],
+            Self::CommonRoad => &["commonroad.xml"],
         }
     }
 }
@@ -79,9 +88,10 @@ impl Case<'_> {
     pub fn files(&self, forms: &[Form]) -> CaseFiles {
         let (config, scenario) = (self.file.config(), self.scenario);
         // A player drives the closed loop itself: each vehicle gets as far as it would at the speed of its start.
-        let starts = scenario.actors.iter().flat_map(|actor| {
-            [actor.start.s_m, actor.start.s_m + actor.start.speed_mps * scenario.duration.s()]
-        });
+        let starts = scenario
+            .actors
+            .iter()
+            .flat_map(|actor| [actor.start.s_m, actor.start.s_m + actor.start.speed_mps * scenario.duration.s()]);
         let driven = self.motion.steps.iter().flat_map(|(_, states)| states.iter().map(|state| state.s_m));
         let road = UsedRoad::new(&scenario.road, starts.chain(driven));
         let mut files = CaseFiles::default();
@@ -96,7 +106,7 @@ impl Case<'_> {
             );
             let values = Values { sample: &scenario.parameters, are_named: *form == Form::Logical };
             let unsaid = match form {
-                Form::OpenLoop => unsaid_of_world(config, scenario),
+                Form::OpenLoop | Form::CommonRoad => unsaid_of_world(config, scenario),
                 Form::ClosedLoop | Form::Logical => unsaid(config, scenario, values.are_named),
             };
             let said = (description.as_str(), unsaid.as_slice());
@@ -104,20 +114,19 @@ impl Case<'_> {
             let names = form.files();
             let texts = match form {
                 Form::OpenLoop => vec![Some(open_loop::document((config, scenario), self.motion, said))],
+                Form::CommonRoad => vec![Some(commonroad::document(scenario, self.motion, road))],
                 Form::ClosedLoop => vec![Some(writer.document(said, None))],
                 Form::Logical => vec![
                     Some(writer.document(said, Some(self.file.text()))),
                     distribution::deterministic(names[0], &description, self.value_sets),
-                    distribution::stochastic(
-                        names[0],
-                        config,
-                        said,
-                        (self.key.seed, self.value_sets.len() as u64),
-                    ),
+                    distribution::stochastic(names[0], config, said, (self.key.seed, self.value_sets.len() as u64)),
                 ],
             };
             files.files.extend(names.iter().zip(texts).filter_map(|(name, text)| Some((name.into(), text?))));
             files.unsaid.push((*form, unsaid));
+        }
+        if forms == [Form::CommonRoad] {
+            return files;
         }
         files.files.push((ROAD_FILE.into(), road.document(&config.name)));
         let named = scenario.actors.iter().map(|actor| (actor.id.to_string(), actor.vehicle));

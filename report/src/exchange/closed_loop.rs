@@ -58,8 +58,7 @@ pub(super) struct Writer<'a> {
 impl Writer<'_> {
     /// Returns the document.
     pub(super) fn document(&self, (description, unsaid): (&str, &[String]), source: Option<&str>) -> String {
-        let mut init =
-            vec![environment::action(&self.config.environment, &self.scenario.environment, self.values)];
+        let mut init = vec![environment::action(&self.config.environment, &self.scenario.environment, self.values)];
         let (mut entities, mut groups) = (Vec::new(), Vec::new());
         for (index, actor) in self.scenario.actors.iter().enumerate() {
             let name = actor.id.as_str();
@@ -122,8 +121,7 @@ impl Writer<'_> {
 
     /// Returns the position of the rear axle at the start.
     fn position(&self, index: usize) -> Element {
-        let (actor, axle_m) =
-            (&self.scenario.actors[index], axle_to_centre_m(&self.vehicle(index).dimensions));
+        let (actor, axle_m) = (&self.scenario.actors[index], axle_to_centre_m(&self.vehicle(index).dimensions));
         let config = self.config_of(index).filter(|_| self.values.are_named);
         match config.map(|config| &config.start) {
             Some(StartConfig::Ahead(relative)) => self.relative_position(index, relative, 1.0),
@@ -151,8 +149,7 @@ impl Writer<'_> {
         // From rear axle to rear axle: the gap, the vehicle behind ahead of its axle, the vehicle ahead behind its axle.
         let behind_m =
             0.5 * self.vehicle(front).dimensions.length_m - axle_to_centre_m(&self.vehicle(front).dimensions);
-        let ahead_m =
-            0.5 * self.vehicle(back).dimensions.length_m + axle_to_centre_m(&self.vehicle(back).dimensions);
+        let ahead_m = 0.5 * self.vehicle(back).dimensions.length_m + axle_to_centre_m(&self.vehicle(back).dimensions);
         let distance_m = self.gap(index, start, back) + (behind_m + ahead_m).into();
         Element::new("RelativeLanePosition")
             .with("entityRef", &start.of)
@@ -223,9 +220,7 @@ impl Writer<'_> {
                 let gap_m = |speed| self.wiedemann_gap(model, speed);
                 self.following(index, gap_m).into_iter().collect()
             }
-            DriverConfig::Idm(model) => {
-                self.following(index, |speed| self.idm_gap(model, speed)).into_iter().collect()
-            }
+            DriverConfig::Idm(model) => self.following(index, |speed| self.idm_gap(model, speed)).into_iter().collect(),
         };
         events.extend(config.events.iter().zip(0..).filter_map(|(event, number)| self.event(index, event, number)));
         events
@@ -233,9 +228,11 @@ impl Writer<'_> {
 
     fn drawn_vehicle(&self, index: usize) -> Vec<Element> {
         let id = self.scenario.actors[index].id.as_str();
-        let drawn = self.config.traffic.iter().find(|traffic| {
-            id.strip_prefix(traffic.id.as_str()).is_some_and(|rest| rest.starts_with('-'))
-        });
+        let drawn = self
+            .config
+            .traffic
+            .iter()
+            .find(|traffic| id.strip_prefix(traffic.id.as_str()).is_some_and(|rest| rest.starts_with('-')));
         let event = match drawn.map(|traffic| &traffic.driver) {
             Some(DriverConfig::Wiedemann99(model)) => self.following(index, |speed| self.wiedemann_gap(model, speed)),
             Some(DriverConfig::Idm(model)) => self.following(index, |speed| self.idm_gap(model, speed)),
@@ -311,8 +308,8 @@ impl Writer<'_> {
             FollowConfig::Wiedemann99(model) => (model.cc0_m.as_ref(), model.cc1_s.as_ref(), [1.5, 0.9]),
             FollowConfig::Idm(model) => (model.standstill_gap_m.as_ref(), model.time_gap_s.as_ref(), [2.0, 1.5]),
         };
-        let expression = self.values.or(standstill, defaults[0]) / self.speed(index)
-            + self.values.or(headway, defaults[1]);
+        let expression =
+            self.values.or(standstill, defaults[0]) / self.speed(index) + self.values.or(headway, defaults[1]);
         let [standstill_m, headway_s] = [(standstill, defaults[0]), (headway, defaults[1])]
             .map(|(num, default): (Option<&Num>, f64)| num.map_or(default, |num| self.values.of_sample(num)));
         (expression, standstill_m / self.scenario.actors[index].start.speed_mps + headway_s)
@@ -372,9 +369,9 @@ impl Writer<'_> {
                 entries.push((duration_s, speed.clone()));
             }
         }
-        let entries = entries.into_iter().map(|(time_s, speed)| {
-            Element::new("SpeedProfileEntry").with("time", time_s).with("speed", speed)
-        });
+        let entries = entries
+            .into_iter()
+            .map(|(time_s, speed)| Element::new("SpeedProfileEntry").with("time", time_s).with("speed", speed));
         let profile = Element::new("SpeedProfileAction").with("followingMode", "position").children(entries);
         Some(profile.within("LongitudinalAction"))
     }
@@ -436,7 +433,8 @@ impl Writer<'_> {
             return of_sample.s().into();
         };
         let start = self.config_of(from).map(|config| &config.start);
-        let Some(StartConfig::Behind(start)) = start.filter(|start| matches!(start, StartConfig::Behind(start) if start.of == config.to))
+        let Some(StartConfig::Behind(start)) =
+            start.filter(|start| matches!(start, StartConfig::Behind(start) if start.of == config.to))
         else {
             return of_sample.s().into();
         };
@@ -467,28 +465,20 @@ pub(super) fn classes(config: &ScenarioConfig) -> Vec<(String, Vehicle)> {
 
 /// Returns the action that sets a speed at once.
 pub(super) fn set_speed(speed_mps: Expression) -> Element {
-    speed_action(dynamics("step", "time", 0.0.into()), speed_mps)
+    speed_action(["step", "time"], 0.0.into(), speed_mps)
 }
 
 fn brake_to(speed_mps: Expression, rate_mps2: Expression) -> Element {
-    speed_action(dynamics("linear", "rate", rate_mps2), speed_mps)
+    speed_action(["linear", "rate"], rate_mps2, speed_mps)
 }
 
-fn speed_action((shape, dimension, value): (&'static str, &'static str, Expression), speed_mps: Expression) -> Element {
+fn speed_action([shape, dimension]: [&str; 2], value: Expression, speed_mps: Expression) -> Element {
     let how = Element::new("SpeedActionDynamics")
         .with("dynamicsShape", shape)
         .with("value", value)
         .with("dynamicsDimension", dimension);
     let target = Element::new("AbsoluteTargetSpeed").with("value", speed_mps).within("SpeedActionTarget");
     Element::new("SpeedAction").child(how).child(target).within("LongitudinalAction")
-}
-
-const fn dynamics(
-    shape: &'static str,
-    dimension: &'static str,
-    value: Expression,
-) -> (&'static str, &'static str, Expression) {
-    (shape, dimension, value)
 }
 
 /// Returns the action of a lane change. The shape is the nearest to a quintic path that the standard has.
@@ -504,7 +494,8 @@ fn change_lanes(lane: Lane, duration_s: Expression) -> Element {
 /// Returns what the closed-loop forms cannot say of this scenario.
 pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bool) -> Vec<String> {
     let mut list = vec![
-        "the ego's sensors, tracks and their errors, and the stack that reads them: a controller drives the ego".to_owned(),
+        "the ego's sensors, tracks and their errors, and the stack that reads them: a controller drives the ego"
+            .to_owned(),
     ];
     for actor in &config.actors {
         let id = &actor.id;
@@ -534,7 +525,10 @@ pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bo
         let refers_to_missing = actor.events.iter().any(|event| match &event.when {
             TriggerConfig::CutOutStarted(cut_out) => config.actors.iter().any(|other| {
                 other.id == cut_out.actor
-                    && matches!(other.driver, DriverConfig::Wiedemann99(_) | DriverConfig::Idm(_) | DriverConfig::EgoStack(_))
+                    && matches!(
+                        other.driver,
+                        DriverConfig::Wiedemann99(_) | DriverConfig::Idm(_) | DriverConfig::EgoStack(_)
+                    )
             }),
             _ => false,
         });
@@ -567,7 +561,9 @@ pub(super) fn unsaid_of_world(config: &ScenarioConfig, scenario: &Scenario) -> V
         list.push("signs, gantries and trees beside the road".to_owned());
     }
     if scenario.road.overtaking_side() == Side::Right {
-        list.push("overtaking on the right: the road has right-hand traffic, so that its lanes run along it".to_owned());
+        list.push(
+            "overtaking on the right: the road has right-hand traffic, so that its lanes run along it".to_owned(),
+        );
     }
     list
 }

@@ -36,10 +36,8 @@ pub(super) fn stochastic(
         return None;
     }
     let distributions = config.parameters.0.iter().filter_map(|(name, config)| distribution(name, config));
-    let inner = Element::new("Stochastic")
-        .with("numberOfTestRuns", samples)
-        .with("randomSeed", seed)
-        .children(distributions);
+    let inner =
+        Element::new("Stochastic").with("numberOfTestRuns", samples).with("randomSeed", seed).children(distributions);
     Some(document(scenario_file, (description, unsaid), inner))
 }
 
@@ -86,16 +84,14 @@ fn log_normal_element(config: &LogNormalConfig) -> Option<Element> {
 
 /// Returns a histogram whose bins have the same probability: those between the quantiles.
 fn histogram(config: &EmpiricalConfig) -> Element {
-    let bins = config.quantiles.windows(2).map(|pair| {
-        Element::new("Bin").with("weight", 1).child(range(pair[0], pair[1]))
-    });
+    let bins =
+        config.quantiles.windows(2).map(|pair| Element::new("Bin").with("weight", 1).child(range(pair[0], pair[1])));
     Element::new("Histogram").children(bins)
 }
 
 fn set(elements: impl IntoIterator<Item = (String, f64)>) -> Element {
-    let elements = elements
-        .into_iter()
-        .map(|(value, weight)| Element::new("Element").with("value", value).with("weight", weight));
+    let elements =
+        elements.into_iter().map(|(value, weight)| Element::new("Element").with("value", value).with("weight", weight));
     Element::new("ProbabilityDistributionSet").children(elements)
 }
 

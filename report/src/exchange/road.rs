@@ -35,6 +35,11 @@ impl<'a> UsedRoad<'a> {
         Self { road, start_m, length_m: (high_m + MARGIN_M).ceil() - start_m }
     }
 
+    /// Returns the positions at which the road begins and ends (m).
+    pub(super) fn range_m(&self) -> [f64; 2] {
+        [self.start_m, self.start_m + self.length_m]
+    }
+
     /// Returns the document.
     pub(super) fn document(&self, name: &str) -> String {
         let header = Element::new("header")

@@ -10,8 +10,7 @@ fn condition(name: &str, delay_s: Expression, inner: Element) -> Element {
 
 /// Returns the condition that the simulation has run for this time (s).
 pub(super) fn at(name: &str, time_s: Expression) -> Element {
-    let time =
-        Element::new("SimulationTimeCondition").with("value", time_s).with("rule", "greaterOrEqual");
+    let time = Element::new("SimulationTimeCondition").with("value", time_s).with("rule", "greaterOrEqual");
     condition(name, 0.0.into(), time.within("ByValueCondition"))
 }
 

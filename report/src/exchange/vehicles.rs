@@ -42,10 +42,8 @@ pub(super) fn document<'a>(vehicles: impl IntoIterator<Item = &'a (String, Vehic
 /// Returns the element of a vehicle, in a catalogue.
 fn element(name: &str, vehicle: &Vehicle) -> Element {
     let Dimensions { length_m, width_m, height_m } = vehicle.dimensions;
-    let centre = Element::new("Center")
-        .with("x", axle_to_centre_m(&vehicle.dimensions))
-        .with("y", 0)
-        .with("z", 0.5 * height_m);
+    let centre =
+        Element::new("Center").with("x", axle_to_centre_m(&vehicle.dimensions)).with("y", 0).with("z", 0.5 * height_m);
     let size = Element::new("Dimensions").with("width", width_m).with("length", length_m).with("height", height_m);
     let performance = Performance::of(vehicle.class, Environment::CLEAR_DAY.friction);
     let diameter_m =

@@ -24,15 +24,8 @@ pub enum Need {
 
 impl Need {
     /// All needs.
-    pub const ALL: [Self; 7] = [
-        Self::Viewer,
-        Self::OnnxRuntime,
-        Self::Display,
-        Self::Data,
-        Self::Python,
-        Self::Browser,
-        Self::Exchange,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Viewer, Self::OnnxRuntime, Self::Display, Self::Data, Self::Python, Self::Browser, Self::Exchange];
 
     /// The word for this need in `CLOSECALL_REQUIRE` and in messages.
     pub const fn word(self) -> &'static str {
