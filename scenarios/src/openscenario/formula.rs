@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(number("${-$v * 2 - 1e-1}"), 39.9);
         assert_eq!(number("${max(abs($v), sqrt(4)) % 7}"), 6.0);
         assert_eq!(resolve("$name", &values).unwrap(), "car");
-        assert_eq!(resolve("$name$", &values).is_err(), true);
+        assert!(resolve("$name$", &values).is_err());
         for wrong in ["${$w}", "${1 +}", "${(1}", "${$name * 2}", "${1 / 0}", "${wrong(1)}", "${2 3}"] {
             assert!(resolve(wrong, &values).is_err(), "{wrong}");
         }

@@ -54,7 +54,7 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
         )]
         driving.push((id as i32, width));
     }
-    driving.sort_by(|a, b| b.0.cmp(&a.0));
+    driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
     let Some(&(_, lane_width_m)) = driving.iter().find(|(id, _)| *id == lane) else {
         let known: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
         let message =
