@@ -4,6 +4,8 @@ import sys
 import warnings
 
 warnings.simplefilter("ignore")
+# This file has the name of the package, and its folder is searched first.
+sys.path.pop(0)
 
 from commonroad.common.file_reader import CommonRoadFileReader
 
@@ -14,5 +16,9 @@ print(json.dumps({
     "lanelets": len(scenario.lanelet_network.lanelets),
     "obstacles": {str(one.obstacle_id): one.prediction.trajectory.final_state.time_step for one in scenario.dynamic_obstacles},
     "start": [*map(float, problem.initial_state.position), problem.initial_state.velocity],
-    "on_lanelet": scenario.lanelet_network.find_lanelet_by_position([problem.initial_state.position])[0],
+    "on_lanelet": [
+        lanelet.lanelet_id
+        for lanelet in scenario.lanelet_network.lanelets
+        if lanelet.polygon.contains_point(problem.initial_state.position)
+    ],
 }))
