@@ -180,7 +180,7 @@ fn options_that_belong_to_the_other_kind_of_source_are_refused() {
 fn a_sample_of_a_campaign_is_exported_with_its_seed() {
     let folder = tempfile::tempdir().unwrap();
     let campaign = folder.path().join("campaign");
-    let words = "campaign paper-figure -n 2 --seed 9 --sensors ground-truth --no-gate --out";
+    let words = "campaign low-thw-overtake -n 2 --seed 9 --sensors ground-truth --no-gate --out";
     code(&run(words, &campaign));
     let case = folder.path().join("case");
     let output = closecall([

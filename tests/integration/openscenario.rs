@@ -109,7 +109,7 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ("<OpenSCENARIO>", "<OpenScenario>", &["OpenSCENARIO"]),
         ("</OpenSCENARIO>", "", &["ends before its root element"]),
         ("revMajor=\"1\"", "revMajor=\"2\"", &[":3:", "FileHeader", "1.0 to 1.3"]),
-        ("${$EgoSpeed / 3.6}", "${$EgoSpeeed / 3.6}", &["AbsoluteTargetSpeed", "EgoSpeeed", "EgoSpeed"]),
+        ("${$EgoSpeed / 3.6}", "${$EgoFast / 3.6}", &["AbsoluteTargetSpeed", "EgoFast", "EgoSpeed"]),
         ("${$EgoSpeed / 3.6}", "${$EgoSpeed / 0}", &["AbsoluteTargetSpeed", "finite"]),
         ("${$EgoSpeed / 3.6}", "fast", &["AbsoluteTargetSpeed", "fast", "number"]),
         ("${$EgoSpeed / 3.6}", "NaN", &["AbsoluteTargetSpeed", "NaN", "number"]),
@@ -117,7 +117,7 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ("roadId=\"1\"", "roadId=\"7\"", &["road.xodr", "no road `7`", "only 1"]),
         ("laneId=\"-1\"", "laneId=\"-3\"", &["lane -3", "only -1, -2"]),
         ("s=\"50\" offset=\"0\"", "s=\"50\" offset=\"0.5\"", &["LanePosition", "offset"]),
-        ("vehicleCategory=\"truck\"", "vehicleCategory=\"tram\"", &[":28:", "Vehicle", "tram"]),
+        ("vehicleCategory=\"truck\"", "vehicleCategory=\"tram\"", &[":26:", "Vehicle", "tram"]),
         ("<Dimensions length=\"12\" width=\"2.5\" height=\"4\"/>", "", &["Vehicle", "BoundingBox/Dimensions"]),
         (
             "entityRef=\"Slow_Truck\" value=",

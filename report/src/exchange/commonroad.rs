@@ -132,10 +132,5 @@ fn planning_problem(scenario: &Scenario, motion: &Motion) -> Option<Element> {
         .child(exact("slipAngle", 0));
     let end = motion.steps.len() - 1;
     let time = Element::new("time").child(text("intervalStart", end)).child(text("intervalEnd", end));
-    Some(
-        Element::new("planningProblem")
-            .with("id", PLANNING_PROBLEM)
-            .child(initial)
-            .child(time.within("goalState")),
-    )
+    Some(Element::new("planningProblem").with("id", PLANNING_PROBLEM).child(initial).child(time.within("goalState")))
 }
