@@ -73,7 +73,6 @@ pub(super) enum Study {
     "closecall tool render -n 100 -o images",
     "closecall tool merge part-1 part-2 --out merged",
 ]))]
-#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 pub(super) enum Tool {
     /// Print the JSON Schema of scenario files
     #[command(after_help = examples([
