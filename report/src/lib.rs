@@ -4,6 +4,7 @@
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
 //! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
+//! * [`exchange`]: runs and scenarios in the formats of other tools: OpenSCENARIO, OpenDRIVE
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
 //! * [`perception`]: studies of perception as text, JSON, Parquet and a page
@@ -17,7 +18,9 @@
 pub mod calibration;
 pub mod campaign;
 mod charts;
+mod date;
 mod escape;
+pub mod exchange;
 /// The parts of a page of HTML: the document, tables, and a legend.
 pub mod page {
     pub use crate::campaign::html::page::{document, number, number_heads, table, text_heads};

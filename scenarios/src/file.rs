@@ -161,6 +161,13 @@ impl ScenarioFile {
         if text.trim().is_empty() {
             return Err(ScenarioError::Empty { path: path.to_owned() });
         }
+        if text.trim_start().starts_with('<') {
+            let message = format!(
+                "it is XML, and a scenario is a TOML file: `closecall tool import {} -o scenario.toml` imports OpenSCENARIO",
+                path.display()
+            );
+            return Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message });
+        }
         match base::expand(text) {
             Ok(None) => Self::parse_whole(path, text, settings),
             Ok(Some(whole)) => {

@@ -12,6 +12,7 @@
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall
 //! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
 //! * [`criteria`]: what a file asks of the outcomes
+//! * [`openscenario`]: scenarios of OpenSCENARIO XML, as scenario files
 
 mod actor;
 mod asked_mode;
@@ -35,6 +36,7 @@ mod lidar_file;
 mod locate;
 mod logical;
 pub mod member;
+pub mod openscenario;
 pub mod outcome;
 mod overridden;
 pub mod parameters;

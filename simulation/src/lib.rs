@@ -23,3 +23,4 @@ pub use run::{
     Arm, ControllerFactory, CurrentMargins, Lead, NoObserver, Observer, RunEvent, RunKey, SampleError, StepView,
     Stepper, TrackAuditor, simulate,
 };
+pub use world::Performance;

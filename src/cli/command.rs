@@ -90,7 +90,7 @@ enum Command {
     /// Compute from many runs, without a verdict: what moves a result, what a system reaches, where perception ends
     #[command(subcommand)]
     Study(Study),
-    /// Write what other programs read: schema, completions, manual pages, labelled images, merged campaigns
+    /// Write what other programs read: schema, completions, manual pages, labelled images, OpenSCENARIO, merged campaigns
     #[command(subcommand)]
     Tool(Tool),
     /// Run samples with a library or an FMU, for another process of this program
@@ -99,15 +99,17 @@ enum Command {
 }
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may know them by their name alone.
-const GROUPED: [(&str, &str); 24] = [
+const GROUPED: [(&str, &str); 26] = [
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
     ("completions", "tool completions"),
     ("criticality", "traffic criticality"),
     ("drift", "traffic drift"),
+    ("export", "tool export"),
     ("exposure", "study exposure"),
     ("fit", "traffic fit"),
     ("frontier", "study frontier"),
+    ("import", "tool import"),
     ("inspect", "traffic inspect"),
     ("lane-changes", "traffic lane-changes"),
     ("man", "tool man"),

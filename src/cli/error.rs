@@ -25,6 +25,7 @@ use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::ScenarioError;
 use closecall_scenarios::library::UnknownScenario;
 use closecall_scenarios::member::{ApplyError, MemberError};
+use closecall_scenarios::openscenario::ImportFailure;
 use closecall_scenarios::source::SourceError;
 use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::datasets::DatasetError;
@@ -47,6 +48,9 @@ pub enum CliError {
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// A scenario of another tool cannot be imported.
+    #[error(transparent)]
+    Import(#[from] ImportFailure),
     /// A member of a driver ensemble cannot be used.
     #[error(transparent)]
     Member(#[from] MemberError),
@@ -235,6 +239,8 @@ impl From<&CliError> for ExitCode {
     fn from(error: &CliError) -> Self {
         match error {
             CliError::Scenario(error) => Self::from(error),
+            CliError::Import(ImportFailure::Read { .. }) => Self::Io,
+            CliError::Import(_) => Self::InvalidInput,
             CliError::TrajectoryData(error) if error.is_io() => Self::Io,
             CliError::Reference(error) if error.is_io() => Self::Io,
             CliError::TrajectoryData(_)

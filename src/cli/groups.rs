@@ -5,8 +5,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, generate, inspect, merge, paper, record, reenact, render, robustness,
-    sample, schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, export, generate, import, inspect, merge, paper, record, reenact,
+    render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -73,7 +73,6 @@ pub(super) enum Study {
     "closecall tool render -n 100 -o images",
     "closecall tool merge part-1 part-2 --out merged",
 ]))]
-#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 pub(super) enum Tool {
     /// Print the JSON Schema of scenario files
     #[command(after_help = examples([
@@ -88,6 +87,10 @@ pub(super) enum Tool {
     Man(generate::ManArgs),
     /// Render labelled images of the rear camera, or of an aerial one
     Render(render::RenderArgs),
+    /// Write a sample as OpenSCENARIO and OpenDRIVE, for other simulators and players
+    Export(export::ExportArgs),
+    /// Make a scenario file of an OpenSCENARIO XML scenario
+    Import(import::ImportArgs),
     /// Merge the parts of a campaign that ran on several machines, and judge the result
     Merge(merge::MergeArgs),
 }
@@ -134,6 +137,8 @@ impl Tool {
             Self::Completions(args) => generate::completions(args, command()),
             Self::Man(args) => generate::man(args, command()),
             Self::Render(args) => render::render(args),
+            Self::Export(args) => export::export(args),
+            Self::Import(args) => import::import_file(args),
             Self::Merge(args) => merge::merge(args),
         }
     }

@@ -1,10 +1,11 @@
-//! Runs a sample and writes what the command line requests: a recording (Rerun file), a trace (table).
+//! Runs a sample and writes what the command line requests: a recording (Rerun file), a trace (table), messages (OSI).
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::{recording, table};
 use closecall_campaign::runner::run_guarded;
+use closecall_report::exchange::OsiRecorder;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
@@ -57,12 +58,34 @@ pub(super) struct WatchArgs {
     /// Write every return of the LiDARs (mode `full`) of the same run: a table with beam, range, position, intensity, time, box and truth, or a new folder with a point cloud for each scan
     #[arg(long, value_name = "FILE.parquet|FOLDER.pcd", help_heading = heading::OUTPUT)]
     pub(super) scans: Option<PathBuf>,
+    /// Write the same run as messages of ASAM OSI 3.8, `GroundTruth` and `SensorData` of each control step: one MCAP file with the map, or a
+    /// trace file for each type, whose name begins with date and type and ends with that of FILE
+    #[arg(long, value_name = "FILE.mcap|FILE.osi", value_parser = osi_file, help_heading = heading::OUTPUT)]
+    pub(super) osi: Option<PathBuf>,
+    /// Write the lanes in each `GroundTruth`, instead of the first one alone
+    #[arg(long, requires = "osi", help_heading = heading::OUTPUT)]
+    pub(super) osi_lanes: bool,
+}
+
+/// Parses the name of a file of OSI messages.
+fn osi_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let end = path.extension().map(|end| end.to_ascii_lowercase());
+    match end.as_ref().and_then(|end| end.to_str()) {
+        Some("osi" | "mcap") => Ok(path),
+        _ => Err("its name must end with `.osi` or `.mcap`".to_owned()),
+    }
 }
 
 impl WatchArgs {
     /// Returns the files to write.
-    pub(super) fn outputs(&self) -> [Output<'_>; 3] {
-        [("--record", self.record.as_deref()), ("--trace", self.trace.as_deref()), ("--scans", self.scans.as_deref())]
+    pub(super) fn outputs(&self) -> [Output<'_>; 4] {
+        [
+            ("--record", self.record.as_deref()),
+            ("--trace", self.trace.as_deref()),
+            ("--scans", self.scans.as_deref()),
+            ("--osi", self.osi.as_deref()),
+        ]
     }
 }
 
@@ -78,7 +101,9 @@ pub(super) fn run_watched(
         let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
         write_recording_unchecked(path, &films.into_iter().map(named).collect::<Vec<_>>())?;
     }
-    watch.outputs().into_iter().filter_map(|(_, path)| path).for_each(print_written);
+    // The names of trace files are those of the standard: they are printed when they are written.
+    let named = watch.outputs().into_iter().filter(|(option, _)| *option != "--osi");
+    named.filter_map(|(_, path)| path).for_each(print_written);
     Ok(outcomes)
 }
 
@@ -103,16 +128,24 @@ fn run(
     watch.record.as_deref().map(check_recording_possible).transpose()?;
     check_backend_of(scenario, arms)?;
     let mut tables = RunTables::new((scenario, arms.last()), watch.trace.as_deref(), watch.scans.as_deref())?;
+    let mut osi = watch.osi.as_ref().map(|_| OsiRecorder::new(scenario, watch.osi_lanes));
     let (mut films, mut outcomes) = (Vec::new(), Vec::new());
     for (index, arm) in arms.iter().enumerate() {
         let is_tested = index + 1 == arms.len();
         let mut recorder = is_filmed.then(|| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
-        let mut observers = RunObservers { recorder: recorder.as_mut(), tables: is_tested.then_some(&mut tables) };
+        let mut observers = RunObservers {
+            recorder: recorder.as_mut(),
+            tables: is_tested.then_some(&mut tables),
+            osi: osi.as_mut().filter(|_| is_tested),
+        };
         let outcome = run_guarded(scenario, key, arm, &mut observers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
         films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
         outcomes.push(outcome);
     }
     tables.finish()?;
+    if let (Some(osi), Some(path)) = (osi, &watch.osi) {
+        osi.write(path)?.iter().for_each(|path| print_written(path));
+    }
     Ok((outcomes, films))
 }

@@ -60,6 +60,16 @@ pub struct Dimensions {
     pub height_m: f64,
 }
 
+/// Wheelbase as a fraction of a vehicle's length: an assumption; 0.5 to 0.65 are plausible.
+const WHEELBASE_SHARE: f64 = 0.6;
+
+impl Dimensions {
+    /// Returns the distance from the rear axle to the front axle (m). The centre of the box lies half of it ahead of the rear axle.
+    pub fn wheelbase_m(&self) -> f64 {
+        WHEELBASE_SHARE * self.length_m
+    }
+}
+
 /// The properties of a vehicle, beside its shape, that the sensors perceive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {

@@ -1,17 +1,20 @@
 //! The observers of a run whose output is requested.
 
+use crate::exchange::OsiRecorder;
 use crate::tables::RunTables;
 use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::Time;
 
 use super::film::FilmRecorder;
 
-/// A recorder and tables that observe the same run, each only if it is requested.
+/// A recorder, tables and messages that observe the same run, each only if it is requested.
 pub struct RunObservers<'a> {
     /// The recorder of the film.
     pub recorder: Option<&'a mut FilmRecorder>,
     /// The writer of the tables.
     pub tables: Option<&'a mut RunTables>,
+    /// The recorder of OSI messages.
+    pub osi: Option<&'a mut OsiRecorder>,
 }
 
 impl Observer for RunObservers<'_> {
@@ -21,6 +24,9 @@ impl Observer for RunObservers<'_> {
         }
         if let Some(tables) = &mut self.tables {
             tables.step(view);
+        }
+        if let Some(osi) = &mut self.osi {
+            osi.step(view);
         }
     }
 

@@ -17,4 +17,5 @@ mod plant;
 mod search;
 mod state;
 
+pub use plant::Performance;
 pub(crate) use state::{Action, InitialVehicle, World};

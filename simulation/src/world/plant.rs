@@ -20,8 +20,6 @@ use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleCla
 
 use super::path::{LanePath, LateralState};
 
-/// Wheelbase as a fraction of a vehicle's length: an assumption; 0.5 to 0.65 are plausible.
-const WHEELBASE_SHARE: f64 = 0.6;
 /// Shortest distance of a lane change, even at walking pace (m): an assumption, the order of a car's turning circle.
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
 /// Speed at which a vehicle stands that is slowing down and not driven (m/s): numerical. A control law that approaches its gap
@@ -29,6 +27,26 @@ const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
 const STANDING_MPS: f64 = 0.01;
 /// Quasi-static brake dive of the body (rad per m/s²): an assumption, about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
+
+/// The strongest acceleration and braking of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Performance {
+    /// Largest acceleration (m/s²).
+    pub max_acceleration_mps2: f64,
+    /// Strongest braking (m/s²), on a road with this friction.
+    pub max_deceleration_mps2: f64,
+}
+
+impl Performance {
+    /// Returns the performance of a vehicle of this class on a road with this friction.
+    pub fn of(class: VehicleClass, friction: f64) -> Self {
+        let capability = Capability::for_class(class);
+        Self {
+            max_acceleration_mps2: capability.max_acceleration_mps2,
+            max_deceleration_mps2: capability.brake_share * friction * GRAVITY_MPS2,
+        }
+    }
+}
 
 /// Limits of the actuators of a vehicle class: assumptions.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +124,7 @@ impl Plant {
         Self {
             capability,
             brake_light_from_mps2: vehicle.brake_light_from_mps2,
-            wheelbase_m: WHEELBASE_SHARE * vehicle.dimensions.length_m,
+            wheelbase_m: vehicle.dimensions.wheelbase_m(),
             friction,
             lag_share: 1.0 - maths::exp(-step_s / capability.lag_s),
             step_s,

@@ -88,6 +88,15 @@ pub fn browser() -> Option<&'static str> {
     found(browser, Need::Browser, "neither Chromium nor Google Chrome is installed")
 }
 
+/// Returns a Python interpreter with the checkers and readers of exchange formats.
+///
+/// # Panics
+/// As [`skip`].
+pub fn python_with_exchange() -> Option<PathBuf> {
+    let reason = "CLOSECALL_EXCHANGE does not name a Python interpreter with asam-qc-openscenarioxml, asam-qc-opendrive, betterosi and mcap";
+    named_by("CLOSECALL_EXCHANGE", Need::Exchange, reason)
+}
+
 /// Returns the path that an environment variable names. An empty variable counts as none.
 fn named_by(variable: &str, need: Need, reason: &str) -> Option<PathBuf> {
     let path = std::env::var_os(variable).filter(|path| !path.is_empty()).map(PathBuf::from);

@@ -15,6 +15,7 @@
 //! | `data` | `CLOSECALL_DATA` names the folder of trajectory data |
 //! | `python` | `python3` is installed; for a comparison with Python's ONNX Runtime, `CLOSECALL_ONNXRUNTIME` lies in a Python environment that has it; to query recordings, `CLOSECALL_RERUN` lies in one with datafusion, pandas and matplotlib |
 //! | `browser` | Chromium or Google Chrome is installed |
+//! | `exchange` | `CLOSECALL_EXCHANGE` names a Python interpreter with the checkers and readers of exchange formats |
 //!
 //! ```no_run
 //! let Some(viewer) = closecall_testing::viewer() else { return };
@@ -27,7 +28,8 @@ mod require;
 
 pub use dbscan::dbscan_by_definition;
 pub use find::{
-    browser, data, has_display, has_python, onnxruntime, python_with_onnxruntime, python_with_rerun, viewer,
+    browser, data, has_display, has_python, onnxruntime, python_with_exchange, python_with_onnxruntime,
+    python_with_rerun, viewer,
 };
 pub use need::Need;
 pub use require::skip;

@@ -18,12 +18,14 @@ pub enum Need {
     Python,
     /// A web browser without a window.
     Browser,
+    /// The checkers and readers of exchange formats.
+    Exchange,
 }
 
 impl Need {
     /// All needs.
-    pub const ALL: [Self; 6] =
-        [Self::Viewer, Self::OnnxRuntime, Self::Display, Self::Data, Self::Python, Self::Browser];
+    pub const ALL: [Self; 7] =
+        [Self::Viewer, Self::OnnxRuntime, Self::Display, Self::Data, Self::Python, Self::Browser, Self::Exchange];
 
     /// The word for this need in `CLOSECALL_REQUIRE` and in messages.
     pub const fn word(self) -> &'static str {
@@ -34,6 +36,7 @@ impl Need {
             Self::Data => "data",
             Self::Python => "python",
             Self::Browser => "browser",
+            Self::Exchange => "exchange",
         }
     }
 }

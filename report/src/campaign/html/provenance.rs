@@ -1,12 +1,11 @@
 //! What a repetition of the campaign needs, and the sources of the sampled values.
 
-use std::time::SystemTime;
-
 use closecall_scenarios::parameters::Provenance;
 use maud::{Markup, html};
 
 use super::page::{table, text_heads};
 use crate::campaign::findings::Findings;
+use crate::date::today;
 use crate::units::labelled;
 
 /// Returns the versions, the command, the files and the sampling, then the sources of each scenario's parameters.
@@ -40,10 +39,7 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     if let Some(json) = manifest.determining_json() {
         entries.push(("configuration", format!("BLAKE3 {}", blake3::hash(json.as_bytes()).to_hex())));
     }
-    if let Ok(since) = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH) {
-        let [year, month, day] = date_of(since.as_secs() / SECONDS_PER_DAY);
-        entries.push(("page written on", format!("{year}-{month:02}-{day:02} (UTC)")));
-    }
+    entries.push(("page written on", format!("{} (UTC)", today())));
     for scenario in &manifest.scenarios {
         entries.push(("scenario", format!("{} ({}), BLAKE3 {}", scenario.name, scenario.path, scenario.blake3)));
     }
@@ -65,45 +61,10 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     entries
 }
 
-const SECONDS_PER_DAY: u64 = 86_400;
-
-/// Returns year, month and day of the Gregorian calendar, this many days after 1970-01-01.
-fn date_of(days: u64) -> [u64; 3] {
-    let is_leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    let (mut year, mut left) = (1970, days);
-    while left >= 365 + u64::from(is_leap(year)) {
-        left -= 365 + u64::from(is_leap(year));
-        year += 1;
-    }
-    let lengths = [31, 28 + u64::from(is_leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
-    let mut month = 1;
-    for length in lengths {
-        if left < length {
-            break;
-        }
-        left -= length;
-        month += 1;
-    }
-    [year, month, left + 1]
-}
-
 fn source_of(provenance: &Provenance) -> (&'static str, String) {
     match provenance {
         Provenance::Fitted(fitted) => ("fitted", format!("{} cases of {}", fitted.n, fitted.source)),
         Provenance::Assumed(why) => ("assumed", why.clone()),
         Provenance::Unstated => ("not stated", String::new()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn days_are_dates_of_the_gregorian_calendar() {
-        assert_eq!(date_of(0), [1970, 1, 1]);
-        assert_eq!(date_of(59), [1970, 3, 1]);
-        assert_eq!(date_of(11_016), [2000, 2, 29]);
-        assert_eq!(date_of(20_780), [2026, 11, 23]);
     }
 }

@@ -1,0 +1,166 @@
+//! Triggers and conditions.
+
+use super::dom::{ImportError, Node};
+use super::storyboard::{ElementState, Storyboard};
+use super::world::Vehicle;
+
+/// What a condition remembers from step to step: its last value, and when it became true.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    was: Option<bool>,
+    fired_s: Option<f64>,
+}
+
+impl Storyboard<'_> {
+    /// Returns whether a trigger is true. No trigger, or one without conditions, means at once.
+    pub(super) fn is_triggered(&mut self, trigger: Option<&Node>) -> Result<bool, ImportError> {
+        let Some(trigger) = trigger.filter(|trigger| !trigger.children.is_empty()) else { return Ok(true) };
+        let mut is_any = false;
+        for group in trigger.all("ConditionGroup") {
+            let mut are_all = true;
+            for condition in group.all("Condition") {
+                // Each is evaluated in each step, for its edge.
+                are_all &= self.holds(condition)?;
+            }
+            is_any |= are_all;
+        }
+        Ok(is_any)
+    }
+
+    fn holds(&mut self, node: &Node) -> Result<bool, ImportError> {
+        let value = self.value(node)?;
+        let edge = self.reader.text(node, "conditionEdge")?;
+        let delay_s = self.reader.number_or(node, "delay", 0.0)?;
+        let time_s = self.time_s;
+        let memory = self.memories.entry(node.id).or_default();
+        let was = memory.was.replace(value);
+        let is_now = match edge.as_str() {
+            "none" => value,
+            "rising" => was == Some(false) && value,
+            "falling" => was == Some(true) && !value,
+            "risingOrFalling" => was.is_some_and(|was| was != value),
+            _ => return Err(self.reader.error(node, format!("`conditionEdge` is `{edge}`"))),
+        };
+        if is_now && memory.fired_s.is_none() {
+            memory.fired_s = Some(time_s);
+        }
+        // A condition with a delay stays true once it has been: its value then is that of the past.
+        Ok(match delay_s > 0.0 {
+            true => memory.fired_s.is_some_and(|fired_s| time_s >= fired_s + delay_s - 1e-9),
+            false => is_now,
+        })
+    }
+
+    fn value(&self, node: &Node) -> Result<bool, ImportError> {
+        let inner = self.reader.only(node)?;
+        let reader = &self.reader;
+        match inner.name.as_str() {
+            "ByValueCondition" => self.by_value(reader.only(inner)?),
+            "ByEntityCondition" => {
+                let entities = reader.child(inner, &["TriggeringEntities"])?;
+                let rule = reader.text(entities, "triggeringEntitiesRule")?;
+                let condition = reader.only(reader.child(inner, &["EntityCondition"])?)?;
+                let mut values = Vec::new();
+                for entity in entities.all("EntityRef") {
+                    values.push(self.by_entity(self.vehicle(entity, "entityRef")?, condition)?);
+                }
+                match rule.as_str() {
+                    "any" => Ok(values.contains(&true)),
+                    "all" => Ok(!values.contains(&false)),
+                    _ => Err(reader.error(entities, format!("`triggeringEntitiesRule` is `{rule}`"))),
+                }
+            }
+            _ => Err(reader.error(inner, "this kind of condition is not read")),
+        }
+    }
+
+    fn by_value(&self, node: &Node) -> Result<bool, ImportError> {
+        let reader = &self.reader;
+        match node.name.as_str() {
+            "SimulationTimeCondition" => self.compare(node, self.time_s),
+            "ParameterCondition" => {
+                let name = reader.text(node, "parameterRef")?;
+                let value = reader.values.get(name.trim_start_matches('$')).cloned().unwrap_or_default();
+                match value.trim().parse() {
+                    Ok(number) => self.compare(node, number),
+                    Err(_) => Ok(value == reader.text(node, "value")?),
+                }
+            }
+            "StoryboardElementStateCondition" => {
+                let name = reader.text(node, "storyboardElementRef")?;
+                let state = reader.text(node, "state")?;
+                // A path such as `story::act` ends with the element's name.
+                let name = name.rsplit("::").next().unwrap_or_default();
+                let Some(element) = self.states.get(name) else {
+                    return if self.names.contains(name) {
+                        Ok(state == "standbyState")
+                    } else {
+                        Err(reader.error(node, format!("there is no storyboard element `{name}`")))
+                    };
+                };
+                let ElementState { started_s, ended_s } = *element;
+                let has_started = started_s <= self.time_s;
+                match state.as_str() {
+                    "startTransition" => Ok(has_started),
+                    "runningState" => Ok(has_started && ended_s.is_none()),
+                    "endTransition" | "completeState" | "stopTransition" => Ok(ended_s.is_some()),
+                    "standbyState" | "skipTransition" => Ok(false),
+                    _ => Err(reader.error(node, format!("`state` is `{state}`"))),
+                }
+            }
+            _ => Err(reader.error(node, "this condition is not read")),
+        }
+    }
+
+    fn by_entity(&self, own: &Vehicle, node: &Node) -> Result<bool, ImportError> {
+        let reader = &self.reader;
+        if let Some(kind) = reader.optional(node, "relativeDistanceType")?.filter(|kind| kind != "longitudinal") {
+            return Err(reader.error(node, format!("`relativeDistanceType` is `{kind}`: only `longitudinal` is read")));
+        }
+        match node.name.as_str() {
+            "TimeHeadwayCondition" => {
+                let other = self.vehicle(node, "entityRef")?;
+                let distance_m = own.distance_m(other, reader.is_true(node, "freespace")?);
+                // A vehicle behind, or one that stands, has no headway.
+                Ok(distance_m >= 0.0 && own.speed_mps > 0.0 && self.compare(node, distance_m / own.speed_mps)?)
+            }
+            "TimeToCollisionCondition" => {
+                let target = reader.child(node, &["TimeToCollisionConditionTarget"])?;
+                let entity = reader.only(target)?;
+                if entity.name != "EntityRef" {
+                    return Err(reader.error(entity, "the target must be an `EntityRef`"));
+                }
+                let other = self.vehicle(entity, "entityRef")?;
+                let distance_m = own.distance_m(other, reader.is_true(node, "freespace")?);
+                let closing_mps = (own.speed_mps - other.speed_mps) * distance_m.signum();
+                Ok(closing_mps > 0.0 && self.compare(node, distance_m.abs() / closing_mps)?)
+            }
+            "RelativeDistanceCondition" => {
+                let other = self.vehicle(node, "entityRef")?;
+                self.compare(node, own.distance_m(other, reader.is_true(node, "freespace")?).abs())
+            }
+            "SpeedCondition" => self.compare(node, own.speed_mps),
+            "AccelerationCondition" => self.compare(node, own.acceleration_mps2.abs()),
+            "RelativeSpeedCondition" => {
+                let other = self.vehicle(node, "entityRef")?;
+                self.compare(node, own.speed_mps - other.speed_mps)
+            }
+            "TraveledDistanceCondition" => Ok(own.travelled_m >= reader.number(node, "value")?),
+            _ => Err(reader.error(node, "this condition is not read")),
+        }
+    }
+
+    fn compare(&self, node: &Node, left: f64) -> Result<bool, ImportError> {
+        let right = self.reader.number(node, "value")?;
+        let rule = self.reader.text(node, "rule")?;
+        Ok(match rule.as_str() {
+            "greaterThan" => left > right,
+            "greaterOrEqual" => left >= right,
+            "lessThan" => left < right,
+            "lessOrEqual" => left <= right,
+            "equalTo" => (left - right).abs() <= 1e-9,
+            "notEqualTo" => (left - right).abs() > 1e-9,
+            _ => return Err(self.reader.error(node, format!("`rule` is `{rule}`"))),
+        })
+    }
+}

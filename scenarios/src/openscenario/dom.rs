@@ -1,0 +1,140 @@
+//! An XML document as a tree whose elements know their lines.
+
+use std::path::{Path, PathBuf};
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+/// Largest depth of elements: ten times that of a scenario.
+const MOST_DEPTH: usize = 200;
+/// Largest number of elements: a road network of a city has some hundred thousand.
+const MOST_ELEMENTS: usize = 2_000_000;
+
+/// A document that cannot be used, with its file, the line and the element.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("failed to import {}:{line}: {}{message}", path.display(), if element.is_empty() { String::new() } else { format!("`{element}`: ") })]
+pub struct ImportError {
+    /// The file.
+    pub path: PathBuf,
+    /// The line, counted from 1.
+    pub line: usize,
+    /// The element, or nothing if the document is no XML.
+    pub element: String,
+    /// What is wrong, and what is allowed.
+    pub message: String,
+}
+
+/// An element with its attributes and children.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Node {
+    pub(super) name: String,
+    pub(super) line: usize,
+    /// Number of the element in the document.
+    pub(super) id: usize,
+    attributes: Vec<(String, String)>,
+    pub(super) children: Vec<Node>,
+    pub(super) text: String,
+}
+
+impl Node {
+    /// Returns an attribute as it stands in the file.
+    pub(super) fn raw(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str())
+    }
+
+    /// Returns the first child of this name.
+    pub(super) fn child(&self, name: &str) -> Option<&Self> {
+        self.children.iter().find(|child| child.name == name)
+    }
+
+    /// Returns all children of this name.
+    pub(super) fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Self> {
+        self.children.iter().filter(move |child| child.name == name)
+    }
+
+    /// Returns the element at the end of a path of names.
+    pub(super) fn at(&self, path: &[&str]) -> Option<&Self> {
+        path.iter().try_fold(self, |node, name| node.child(name))
+    }
+
+    /// Returns an error at this element.
+    pub(super) fn error(&self, path: &Path, message: impl Into<String>) -> ImportError {
+        ImportError { path: path.to_owned(), line: self.line, element: self.name.clone(), message: message.into() }
+    }
+}
+
+/// Parses a document.
+///
+/// Entities other than those of XML itself are refused: quick-xml expands none, so that no document grows while it is read.
+///
+/// # Errors
+/// [`ImportError`] if the text is no XML document, has a document type declaration, or is too deep or too large.
+pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
+    let mut reader = Reader::from_str(text);
+    reader.config_mut().expand_empty_elements = true;
+    let mut open: Vec<Node> = Vec::new();
+    let (mut count, mut line, mut counted) = (0, 1, 0);
+    loop {
+        let event = reader.read_event();
+        let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX).min(text.len());
+        line += text.as_bytes()[counted.min(at)..at].iter().filter(|byte| **byte == b'\n').count();
+        counted = at;
+        let element = open.last().map(|node| node.name.clone()).unwrap_or_default();
+        let fail = |message: String| Err(ImportError { path: path.to_owned(), line, element, message });
+        match event {
+            Err(error) => return fail(format!("it is no XML document: {error}")),
+            Ok(Event::DocType(_)) => return fail("a document type declaration is not allowed".to_owned()),
+            Ok(Event::Start(start)) => {
+                count += 1;
+                if open.len() >= MOST_DEPTH || count > MOST_ELEMENTS {
+                    return fail(format!("more than {MOST_DEPTH} levels or {MOST_ELEMENTS} elements"));
+                }
+                match node(&start, line) {
+                    Ok(node) => open.push(Node { id: count, ..node }),
+                    Err(message) => return fail(message),
+                }
+            }
+            Ok(Event::Text(part)) => match (part.decode(), open.last_mut()) {
+                (Ok(part), Some(node)) => node.text.push_str(&part),
+                (Err(error), _) => return fail(format!("it is no text: {error}")),
+                (Ok(_), None) => {}
+            },
+            Ok(Event::CData(part)) => {
+                if let Some(node) = open.last_mut() {
+                    node.text.push_str(&String::from_utf8_lossy(&part));
+                }
+            }
+            Ok(Event::GeneralRef(name)) => {
+                let name = String::from_utf8_lossy(&name).into_owned();
+                match quick_xml::escape::unescape(&format!("&{name};")) {
+                    Ok(text) => {
+                        if let Some(node) = open.last_mut() {
+                            node.text.push_str(&text);
+                        }
+                    }
+                    Err(_) => return fail(format!("the entity `&{name};` is not known")),
+                }
+            }
+            Ok(Event::End(_)) => match (open.pop(), open.last_mut()) {
+                (Some(done), Some(parent)) => parent.children.push(done),
+                (Some(done), None) => return Ok(done),
+                (None, _) => return fail("an element ends that did not begin".to_owned()),
+            },
+            Ok(Event::Eof) => return fail("the document ends before its root element does".to_owned()),
+            Ok(_) => {}
+        }
+    }
+}
+
+fn node(start: &BytesStart<'_>, line: usize) -> Result<Node, String> {
+    let name = String::from_utf8_lossy(start.local_name().as_ref()).into_owned();
+    let mut attributes = Vec::new();
+    for attribute in start.attributes() {
+        let attribute = attribute.map_err(|error| format!("`{name}`: {error}"))?;
+        let key = String::from_utf8_lossy(attribute.key.local_name().as_ref()).into_owned();
+        let raw = String::from_utf8_lossy(&attribute.value).into_owned();
+        let value = quick_xml::escape::unescape(&raw).map_err(|error| format!("`{name}`: `{key}`: {error}"))?;
+        attributes.push((key, value.into_owned()));
+    }
+    Ok(Node { name, line, attributes, ..Node::default() })
+}

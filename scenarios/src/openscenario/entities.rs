@@ -1,0 +1,118 @@
+//! The vehicles of a scenario, from the file itself or from a catalogue.
+
+use std::path::PathBuf;
+
+use closecall_traffic::input;
+
+use super::dom::{ImportError, Node, parse};
+use super::reader::Reader;
+use super::world::Vehicle;
+
+/// Reads all entities.
+///
+/// # Errors
+/// [`ImportError`] at an entity that is no vehicle, or that no catalogue has.
+pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<String>), ImportError> {
+    let entities = reader.child(root, &["Entities"])?;
+    let (mut vehicles, mut controlled) = (Vec::new(), Vec::new());
+    for entity in &entities.children {
+        if entity.name != "ScenarioObject" {
+            return Err(reader.error(entity, "only `ScenarioObject` is read"));
+        }
+        let name = reader.text(entity, "name")?;
+        let mut vehicle = None;
+        for child in &entity.children {
+            match child.name.as_str() {
+                "Vehicle" => vehicle = Some(of_element(reader, child)?),
+                "CatalogReference" => vehicle = Some(of_catalog(reader, root, child)?),
+                "ObjectController" => controlled.push(name.clone()),
+                _ => {
+                    return Err(reader
+                        .error(child, format!("`{name}` is no vehicle: a scenario has cars, trucks and motorcycles")));
+                }
+            }
+        }
+        let Some(vehicle) = vehicle else { return Err(reader.error(entity, format!("`{name}` has no vehicle"))) };
+        vehicles.push(Vehicle { name, ..vehicle });
+    }
+    Ok((vehicles, controlled))
+}
+
+fn of_catalog(reader: &Reader, root: &Node, reference: &Node) -> Result<Vehicle, ImportError> {
+    let [catalog, entry] = ["catalogName", "entryName"].map(|name| reader.text(reference, name));
+    let (catalog, entry) = (catalog?, entry?);
+    let Some(locations) = root.child("CatalogLocations") else {
+        return Err(reader.error(reference, "the file has no `CatalogLocations`"));
+    };
+    let mut searched = Vec::new();
+    for location in &locations.children {
+        let Some(directory) = location.child("Directory") else { continue };
+        let folder = reader.path_in(directory, "path")?;
+        let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)
+            .map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect())
+            .unwrap_or_default();
+        files.retain(|path| path.extension().is_some_and(|end| end == "xosc"));
+        files.sort();
+        for path in files {
+            let text = input::read_text(&path)
+                .map_err(|error| reader.error(directory, format!("failed to read {}: {error}", path.display())))?;
+            let document = parse(&path, &text)?;
+            let Some(found) = document.child("Catalog").filter(|found| found.raw("name") == Some(&catalog)) else {
+                continue;
+            };
+            searched.push(path.display().to_string());
+            if let Some(node) = found.children.iter().find(|node| node.raw("name") == Some(&entry)) {
+                if node.name != "Vehicle" {
+                    let message =
+                        format!("`{entry}` is a `{}`: a scenario has cars, trucks and motorcycles", node.name);
+                    return Err(reader.error(reference, message));
+                }
+                return of_element(
+                    &with_declarations(&Reader { path, ..reader.clone() }, node, reference, reader)?,
+                    node,
+                );
+            }
+        }
+    }
+    let places =
+        if searched.is_empty() { "no file has a catalogue of that name".to_owned() } else { searched.join(", ") };
+    Err(reader.error(reference, format!("no entry `{entry}` in the catalogue `{catalog}` ({places})")))
+}
+
+/// Returns the reader of an entry, with its parameters: their values stand in the reference, or else in the entry.
+fn with_declarations(entry: &Reader, node: &Node, reference: &Node, outer: &Reader) -> Result<Reader, ImportError> {
+    let mut inner = entry.clone();
+    inner.values.clear();
+    for declaration in node.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
+    {
+        let value = entry.text(declaration, "value")?;
+        inner.values.insert(entry.text(declaration, "name")?, value);
+    }
+    for assignment in
+        reference.child("ParameterAssignments").into_iter().flat_map(|list| list.all("ParameterAssignment"))
+    {
+        inner.values.insert(outer.text(assignment, "parameterRef")?, outer.text(assignment, "value")?);
+    }
+    Ok(inner)
+}
+
+fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
+    let category = reader.text(node, "vehicleCategory")?;
+    let class = match category.as_str() {
+        "car" | "van" => "car",
+        "truck" | "bus" | "semitrailer" => "truck",
+        "motorbike" => "motorcycle",
+        _ => return Err(reader.error(node, format!("a `{category}` is no car, truck or motorcycle"))),
+    };
+    let size = reader.child(node, &["BoundingBox", "Dimensions"])?;
+    let centre = reader.child(node, &["BoundingBox", "Center"])?;
+    Ok(Vehicle {
+        class,
+        length_m: reader.number(size, "length")?,
+        width_m: reader.number(size, "width")?,
+        height_m: reader.number(size, "height")?,
+        mass_kg: node.raw("mass").map(|_| reader.number(node, "mass")).transpose()?,
+        centre_m: reader.number(centre, "x")?,
+        ..Vehicle::default()
+    })
+}

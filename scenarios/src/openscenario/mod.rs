@@ -1,0 +1,417 @@
+//! Reads scenarios of ASAM OpenSCENARIO XML 1.0 to 1.3, with their OpenDRIVE road.
+//!
+//! ```text
+//!  FILE.xosc ─▶ parameters, vehicles, road ─▶ storyboard, played ─▶ speeds and lane changes at times ─▶ scenario file
+//! ```
+//!
+//! The storyboard is played once with vehicles that follow their actions exactly. What the other vehicles do becomes a
+//! prescribed driver: speeds and lane changes at their times. Where a trigger looks at the ego, its time is that of an ego
+//! that keeps the speed of the file, as in a nominal encounter: it is the same for every controller. What a scenario cannot
+//! say is an error with file, line and element, or a note; nothing is left out in silence.
+
+mod condition;
+mod dom;
+mod entities;
+mod formula;
+mod reader;
+mod road;
+mod storyboard;
+mod world;
+
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use closecall_traffic::input;
+
+pub use dom::ImportError;
+
+use self::dom::{Node, parse};
+use self::formula::Values;
+use self::reader::Reader;
+use self::road::ImportedRoad;
+use self::storyboard::Storyboard;
+use self::world::Vehicle;
+use crate::{ScenarioError, ScenarioFile};
+
+/// Time gap of the ego's cruise control (s): an assumption, as the file has a controller of its own; 1 to 2 are plausible.
+const TIME_GAP_S: f64 = 1.5;
+/// Allowed durations of a lane change (s), as in a scenario file.
+const LANE_CHANGE_S: [f64; 2] = [1.5, 20.0];
+/// Deviation of a profile from the speeds of the storyboard (m/s).
+const SPEED_TOLERANCE_MPS: f64 = 1e-3;
+/// Time within which a change of speed belongs to the start (s).
+const AT_START_S: f64 = 0.05;
+/// Change of speed in one step of the storyboard above which no vehicle follows it (m/s).
+const JUMP_MPS: f64 = 0.5;
+/// Friction of the road that a friction scale of 1 stands for: that of a dry road.
+const DRY_FRICTION: f64 = 0.9;
+
+/// How a file is imported.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOptions {
+    /// Name of the vehicle that the controller under test drives, or `None` for `Ego`, or the only one with a controller.
+    pub ego: Option<String>,
+    /// Values of parameters that replace those of the file.
+    pub parameters: Vec<(String, String)>,
+}
+
+/// A scenario that was imported.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// The text of the scenario file.
+    pub text: String,
+    /// What the scenario says in another way than the file.
+    pub notes: Vec<String>,
+    /// When events begin and end (s), as the storyboard was played.
+    pub events: Vec<(f64, String)>,
+}
+
+/// A file that cannot be imported.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportFailure {
+    /// The file cannot be read.
+    #[error("failed to read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// An element is wrong, or is not read.
+    #[error(transparent)]
+    Element(#[from] ImportError),
+    /// The scenario that the file describes is none that can run.
+    #[error("failed to import {}: the scenario that it describes is not valid: {source}", path.display())]
+    Scenario {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: Box<ScenarioError>,
+    },
+}
+
+fn read_text(path: &Path) -> Result<String, ImportFailure> {
+    input::read_text(path).map_err(|source| match source.kind() {
+        io::ErrorKind::InvalidData => {
+            let (path, message) = (path.to_owned(), source.to_string());
+            ImportError { path, line: 1, element: String::new(), message }.into()
+        }
+        _ => ImportFailure::Read { path: path.to_owned(), source },
+    })
+}
+
+/// Imports a file.
+///
+/// # Errors
+/// [`ImportFailure`] with file, line and element.
+pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFailure> {
+    let root = parse(path, &read_text(path)?)?;
+    let mut reader = Reader { path: path.to_owned(), values: Values::new() };
+    check_kind(&reader, &root)?;
+    if let Some(text) = text_of_closecall(&root) {
+        let parsed = ScenarioFile::parse(path, text, &[]).and_then(|file| file.check());
+        parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
+        let notes = vec!["Closecall wrote this file: the scenario is the one that stands in it".to_owned()];
+        return Ok(Imported { text: text.to_owned(), notes, events: Vec::new() });
+    }
+    for declaration in root.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
+    {
+        let name = reader.text(declaration, "name")?;
+        let given = options.parameters.iter().find(|(known, _)| *known == name).map(|(_, value)| value.clone());
+        let value = match given {
+            Some(value) => value,
+            None => reader.text(declaration, "value")?,
+        };
+        reader.values.insert(name, value);
+    }
+    if let Some((unknown, _)) = options.parameters.iter().find(|(name, _)| !reader.values.contains_key(name)) {
+        let known: Vec<_> = reader.values.keys().map(String::as_str).collect();
+        return Err(reader
+            .error(&root, format!("there is no parameter `{unknown}`, only {}", known.join(", ")))
+            .into());
+    }
+    let (vehicles, controlled) = entities::read(&reader, &root)?;
+    let ego = ego_of(&reader, &root, (&vehicles, &controlled), options.ego.as_deref())?;
+    let storyboard = reader.child(&root, &["Storyboard"])?;
+    let road = road_of(&reader, &root, storyboard)?;
+    let mut played = Storyboard::new(reader.clone(), &road, vehicles, ego);
+    played.notes.extend(road.notes.iter().map(|note| format!("the road has {note}")));
+    let globals = played.init(storyboard)?;
+    let starts = played.vehicles.clone();
+    played.play(storyboard)?;
+    let environment = environment(&reader, &globals, &mut played.notes)?;
+    let text = scenario_text(path, &mut played, (&starts, &environment))?;
+    let parsed = ScenarioFile::parse(path, &text, &[]).and_then(|file| file.check());
+    parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
+    Ok(Imported { text, notes: played.notes, events: played.events })
+}
+
+fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
+    if root.name != "OpenSCENARIO" {
+        return Err(reader.error(root, "the root element must be `OpenSCENARIO`"));
+    }
+    let header = reader.child(root, &["FileHeader"])?;
+    let version = (reader.text(header, "revMajor")?, reader.text(header, "revMinor")?);
+    if version.0 != "1" || !["0", "1", "2", "3"].contains(&version.1.as_str()) {
+        let message = format!("version {}.{}: the versions 1.0 to 1.3 are read", version.0, version.1);
+        return Err(reader.error(header, message));
+    }
+    if let Some(distribution) = root.child("ParameterValueDistribution") {
+        let scenario = distribution.child("ScenarioFile").and_then(|file| file.raw("filepath")).unwrap_or_default();
+        let message =
+            format!("import the scenario that it names, `{scenario}`, with --parameter NAME=VALUE for each value");
+        return Err(reader.error(distribution, message));
+    }
+    match root.child("Catalog") {
+        Some(catalog) => Err(reader.error(catalog, "a catalogue is no scenario")),
+        None => Ok(()),
+    }
+}
+
+/// Returns the text of the scenario that Closecall wrote into the header of a logical scenario.
+fn text_of_closecall(root: &Node) -> Option<&str> {
+    let header = root.child("FileHeader").filter(|header| header.raw("author") == Some("Closecall"))?;
+    header.at(&["Properties", "CustomContent"]).map(|node| node.text.as_str())
+}
+
+fn ego_of(
+    reader: &Reader,
+    root: &Node,
+    (vehicles, controlled): (&[Vehicle], &[String]),
+    asked: Option<&str>,
+) -> Result<usize, ImportError> {
+    let position = |name: &str| vehicles.iter().position(|vehicle| vehicle.name == name);
+    let names: Vec<_> = vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
+    let entities = root.child("Entities").unwrap_or(root);
+    let refuse =
+        |what: String| Err(reader.error(entities, format!("{what}: name one of {} with --ego", names.join(", "))));
+    match (asked, controlled) {
+        (Some(name), _) => position(name).map_or_else(|| refuse(format!("there is no vehicle `{name}`")), Ok),
+        (None, controlled) => {
+            let usual = vehicles.iter().position(|vehicle| vehicle.name.eq_ignore_ascii_case("ego"));
+            let only = if let [name] = controlled { position(name) } else { None };
+            usual
+                .or(only)
+                .map_or_else(|| refuse("no vehicle is named `Ego`, and not one alone has a controller".to_owned()), Ok)
+        }
+    }
+}
+
+fn road_of(reader: &Reader, root: &Node, storyboard: &Node) -> Result<ImportedRoad, ImportFailure> {
+    let network = reader.child(root, &["RoadNetwork"])?;
+    let logic = reader.child(network, &["LogicFile"])?;
+    let mut stack = vec![storyboard];
+    let mut first = None;
+    while let Some(node) = stack.pop() {
+        if node.name == "LanePosition" {
+            first = Some(node);
+            break;
+        }
+        stack.extend(node.children.iter().rev());
+    }
+    let Some(position) = first else {
+        return Err(reader.error(storyboard, "no vehicle starts at a `LanePosition`, which says on which road").into());
+    };
+    let road_id = reader.text(position, "roadId")?;
+    #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
+    let lane = reader.number(position, "laneId")? as i32;
+    let path = reader.path_in(logic, "filepath")?;
+    let text = input::read_text(&path)
+        .map_err(|error| reader.error(logic, format!("failed to read {}: {error}", path.display())))?;
+    Ok(road::read(&path, &text, (&road_id, lane))?)
+}
+
+/// Returns the environment as a table of TOML.
+fn environment(reader: &Reader, globals: &[Node], notes: &mut Vec<String>) -> Result<String, ImportError> {
+    let mut keys = Vec::new();
+    for action in globals {
+        if action.name != "EnvironmentAction" {
+            return Err(reader.error(action, "this action is not read"));
+        }
+        let Some(environment) = action.child("Environment") else {
+            notes.push(format!("line {}: an environment of a catalogue: it is a clear, dry day", action.line));
+            continue;
+        };
+        if let Some(fog) = environment.at(&["Weather", "Fog"]) {
+            let visibility_m = reader.number(fog, "visualRange")?;
+            if !(20.0..=100_000.0).contains(&visibility_m) {
+                notes.push(format!(
+                    "line {}: a visibility of {visibility_m} m: the nearest from 20 to 100,000 m",
+                    fog.line
+                ));
+            }
+            keys.push(format!("visibility-m = {:?}", visibility_m.clamp(20.0, 100_000.0)));
+        }
+        if let Some(rain) = environment.at(&["Weather", "Precipitation"])
+            && rain.raw("precipitationType") == Some("rain")
+        {
+            let key = if rain.raw("precipitationIntensity").is_some() { "precipitationIntensity" } else { "intensity" };
+            keys.push(format!("rain-mm-per-h = {:?}", reader.number(rain, key)?));
+        }
+        if let Some(surface) = environment.child("RoadCondition") {
+            keys.push(format!("friction = {:?}", DRY_FRICTION * reader.number(surface, "frictionScaleFactor")?));
+        }
+        notes.push(format!("line {}: of the environment, visibility, rain and friction are read", action.line));
+    }
+    Ok(keys.join(", "))
+}
+
+/// Returns the name as Closecall writes names.
+fn kebab(name: &str) -> String {
+    let plain: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    if plain.starts_with(|c: char| c.is_ascii_lowercase()) { plain } else { format!("v-{plain}") }
+}
+
+/// Returns the points of a profile: those of the speeds between which they are linear.
+fn points(speeds: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> = speeds.first().copied().into_iter().collect();
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for pair in speeds.windows(2) {
+        let Some(&(t0, v0)) = points.last() else { continue };
+        let slope = |value: f64| (value - v0) / (pair[1].0 - t0);
+        let exact = slope(pair[1].1);
+        if !(low..=high).contains(&exact) {
+            points.push(pair[0]);
+            let (t0, v0) = pair[0];
+            let slope = |value: f64| (value - v0) / (pair[1].0 - t0);
+            (low, high) = (slope(pair[1].1 - SPEED_TOLERANCE_MPS), slope(pair[1].1 + SPEED_TOLERANCE_MPS));
+        } else {
+            low = low.max(slope(pair[1].1 - SPEED_TOLERANCE_MPS));
+            high = high.min(slope(pair[1].1 + SPEED_TOLERANCE_MPS));
+        }
+    }
+    match (points.last(), speeds.last()) {
+        (Some(end), Some(last)) if end.0 < last.0 && (points.len() > 1 || end.1 != last.1) => points.push(*last),
+        _ => {}
+    }
+    points
+}
+
+fn scenario_text(
+    path: &Path,
+    played: &mut Storyboard<'_>,
+    (starts, environment): (&[Vehicle], &str),
+) -> Result<String, ImportError> {
+    let road = played.road;
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let limit = road.speed_limit_mps.filter(|limit| *limit > 0.0 && *limit <= 100.0);
+    let mut actors = String::new();
+    let mut names: Vec<String> = Vec::new();
+    for (index, start) in starts.iter().enumerate() {
+        let id = kebab(&start.name);
+        if names.contains(&id) {
+            let message = format!("two vehicles would have the name `{id}`");
+            return Err(ImportError { path: path.to_owned(), line: 1, element: "Entities".to_owned(), message });
+        }
+        if id != start.name {
+            played.notes.push(format!("`{}` is named `{id}`", start.name));
+        }
+        names.push(id.clone());
+        let mut speeds = played.speeds[index].clone();
+        let at_start =
+            speeds.iter().rev().find(|(at_s, _)| *at_s <= AT_START_S).map_or(start.speed_mps, |(_, mps)| *mps);
+        if (at_start - start.speed_mps).abs() > JUMP_MPS {
+            played.notes.push(format!("`{}` starts with the {at_start} m/s that its first action sets", start.name));
+            speeds.iter_mut().take_while(|(at_s, _)| *at_s <= AT_START_S).for_each(|(_, mps)| *mps = at_start);
+        }
+        for pair in speeds.windows(2).filter(|pair| index != played.ego && (pair[1].1 - pair[0].1).abs() > JUMP_MPS) {
+            played.notes.push(format!(
+                "`{}` changes its speed at once at {:.2} s, by {:.2} m/s: here it takes as long as a vehicle needs",
+                start.name,
+                pair[1].0,
+                pair[1].1 - pair[0].1
+            ));
+        }
+        let speed_mps = speeds.first().map_or(start.speed_mps, |(_, mps)| *mps);
+        let lane = road.lanes.iter().position(|lane| *lane == start.lane).unwrap_or_default() + 1;
+        let mass =
+            start.mass_kg.filter(|mass| *mass > 0.0).map(|mass| format!(", mass-kg = {mass:?}")).unwrap_or_default();
+        let _ = write!(
+            actors,
+            "\n[[actor]]\nid = \"{id}\"\nvehicle = {{ class = \"{}\", length-m = {:?}, width-m = {:?}, height-m = {:?}{mass} }}\n\
+             start = {{ absolute = {{ lane = {lane}, s-m = {:?}, speed-mps = {speed_mps:?} }} }}\n",
+            start.class,
+            start.length_m,
+            start.width_m,
+            start.height_m,
+            start.s_m + start.centre_m,
+        );
+        if index == played.ego {
+            let set = if speed_mps > 0.0 { format!(", set-speed-mps = {speed_mps:?}") } else { String::new() };
+            let _ = writeln!(
+                actors,
+                "driver = {{ ego-stack = {{ acc = {{ time-gap-s = {TIME_GAP_S:?}{set} }}, aeb = {{}}, mis = {{}} }} }} # assumed: the file has no such controller"
+            );
+            continue;
+        }
+        let profile: Vec<_> =
+            points(&speeds).iter().map(|(at_s, mps)| format!("[{:?}, {mps:?}]", (at_s * 1e6).round() / 1e6)).collect();
+        let mut changes = Vec::new();
+        for change in played.lane_changes.iter().filter(|change| change.vehicle == index) {
+            if !(LANE_CHANGE_S[0]..=LANE_CHANGE_S[1]).contains(&change.duration_s) {
+                let message = format!("it takes {:.2} s; a lane change takes 1.5 to 20 s", change.duration_s);
+                let element = "LaneChangeAction".to_owned();
+                return Err(ImportError { path: path.to_owned(), line: change.line, element, message });
+            }
+            let side = if change.to > change.from { "left" } else { "right" };
+            changes.push(format!(
+                "{{ at-s = {:?}, to = \"{side}\", duration-s = {:?} }}",
+                (change.at_s * 1e6).round() / 1e6,
+                change.duration_s
+            ));
+        }
+        let changes =
+            if changes.is_empty() { String::new() } else { format!(", lane-changes = [{}]", changes.join(", ")) };
+        let _ = writeln!(actors, "driver = {{ prescribed = {{ profile = [{}]{changes} }} }}", profile.join(", "));
+    }
+    let duration_s = ((played.end_s * 10.0).ceil() / 10.0).clamp(0.1, 3_600.0);
+    let mut text = format!("# Imported from {}. Said in another way than there:\n", plain(&path.display().to_string()));
+    for note in &played.notes {
+        let _ = writeln!(text, "#   {}", plain(note));
+    }
+    let _ = write!(
+        text,
+        "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
+         road = {{ lanes = {}, lane-width-m = {:?}, curvature-per-m = {:?}{} }}\n",
+        kebab(&stem),
+        road.lanes.len(),
+        road.lane_width_m,
+        road.curvature_per_m,
+        limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),
+    );
+    if !environment.is_empty() {
+        let _ = writeln!(text, "environment = {{ {environment} }}");
+    }
+    text.push_str(&actors);
+    Ok(text)
+}
+
+/// Returns the text in one line.
+fn plain(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_has_a_point_where_the_slope_changes() {
+        let speeds: Vec<_> = (0..=1_000)
+            .map(|step| f64::from(step) * 0.01)
+            .map(|t| (t, 30.0 - 4.0 * (t - 2.0).clamp(0.0, 3.0)))
+            .collect();
+        let found = points(&speeds);
+        let times: Vec<_> = found.iter().map(|(t, _)| (t * 100.0).round()).collect();
+        assert_eq!(times, [0.0, 200.0, 500.0, 1_000.0]);
+        assert_eq!(points(&[(0.0, 30.0), (0.01, 30.0), (9.0, 30.0)]), [(0.0, 30.0)]);
+    }
+
+    #[test]
+    fn a_name_becomes_one_of_lower_case_letters_digits_and_hyphens() {
+        assert_eq!(kebab("OverTaker_2"), "overtaker-2");
+        assert_eq!(kebab("2nd"), "v-2nd");
+    }
+}

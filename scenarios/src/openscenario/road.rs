@@ -1,0 +1,112 @@
+//! The part of an OpenDRIVE road that a scenario of parallel lanes has: driving lanes of one direction, width, curvature, speed.
+
+use std::path::Path;
+
+use closecall_traffic::Road;
+
+use super::dom::{ImportError, Node, parse};
+
+/// Names of the lane types on which vehicles drive.
+const DRIVING: [&str; 8] = ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
+
+/// A road of a file, as far as a scenario can use it.
+#[derive(Clone, Debug)]
+pub(super) struct ImportedRoad {
+    /// The lanes of OpenDRIVE on the right of the reference line, from the left.
+    pub(super) lanes: Vec<i32>,
+    pub(super) lane_width_m: f64,
+    pub(super) curvature_per_m: f64,
+    pub(super) speed_limit_mps: Option<f64>,
+    /// What the scenario's road does not have.
+    pub(super) notes: Vec<String>,
+}
+
+/// Reads a road of this number. `lane` is a lane that vehicles use.
+///
+/// # Errors
+/// [`ImportError`] if the document is no OpenDRIVE, or the road has no such lane.
+pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Result<ImportedRoad, ImportError> {
+    let root = parse(path, text)?;
+    if root.name != "OpenDRIVE" {
+        return Err(root.error(path, "the root element must be `OpenDRIVE`"));
+    }
+    let Some(road) = root.all("road").find(|road| road.raw("id") == Some(road_id)) else {
+        let known: Vec<_> = root.all("road").filter_map(|road| road.raw("id")).collect();
+        return Err(root.error(path, format!("there is no road `{road_id}`, only {}", known.join(", "))));
+    };
+    let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
+    let Some(section) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
+    let mut notes = Vec::new();
+    if lanes.all("laneSection").count() > 1 {
+        notes.push("lanes that begin or end: the lanes are those of the first section".to_owned());
+    }
+    let right = section.child("right").ok_or_else(|| section.error(path, "it has no lanes on the right"))?;
+    let mut driving: Vec<(i32, f64)> = Vec::new();
+    for node in right.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
+        let id = number(path, node, "id")?;
+        let width = match node.child("width") {
+            Some(width) => number(path, width, "a")?,
+            None => return Err(node.error(path, "it has no `width`")),
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a lane's number is small, and compared with the text below"
+        )]
+        driving.push((id as i32, width));
+    }
+    driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
+    let Some(&(_, lane_width_m)) = driving.iter().find(|(id, _)| *id == lane) else {
+        let known: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
+        let message =
+            format!("lane {lane} is no driving lane on the right of road {road_id}, only {}", known.join(", "));
+        return Err(right.error(path, message));
+    };
+    if driving.iter().any(|(_, width)| *width != lane_width_m) {
+        notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
+    }
+    let curvature_per_m = curvature(path, road, &mut notes)?;
+    let limit =
+        road.at(&["type", "speed"]).filter(|speed| speed.raw("max").is_some_and(|max| max.parse::<f64>().is_ok()));
+    let speed_limit_mps = match limit {
+        Some(speed) => {
+            let factor = match speed.raw("unit") {
+                Some("km/h") => 1.0 / 3.6,
+                Some("mph") => 0.44704,
+                _ => 1.0,
+            };
+            Some(number(path, speed, "max")? * factor)
+        }
+        None => None,
+    };
+    let lanes = driving.into_iter().map(|(id, _)| id).collect();
+    Ok(ImportedRoad { lanes, lane_width_m, curvature_per_m, speed_limit_mps, notes })
+}
+
+/// Returns the curvature of a road that is one line or one arc, or that of a straight road with a note.
+fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<f64, ImportError> {
+    let plan = road.child("planView").ok_or_else(|| road.error(path, "it has no `planView`"))?;
+    let shapes: Vec<&Node> = plan.all("geometry").filter_map(|geometry| geometry.children.first()).collect();
+    if shapes.is_empty() {
+        return Err(plan.error(path, "it has no geometry"));
+    }
+    if let [arc] = &shapes[..]
+        && arc.name == "arc"
+    {
+        let curvature = number(path, arc, "curvature")?;
+        if Road::CURVATURE_PER_M.contains(curvature) {
+            return Ok(curvature);
+        }
+        notes.push(format!("a curvature of {curvature} 1/m: the road is straight"));
+    } else if shapes.iter().any(|shape| shape.name != "line") {
+        notes.push("a curvature that changes: the road is straight".to_owned());
+    }
+    Ok(0.0)
+}
+
+fn number(path: &Path, node: &Node, name: &str) -> Result<f64, ImportError> {
+    let Some(text) = node.raw(name) else { return Err(node.error(path, format!("it needs `{name}`"))) };
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(node.error(path, format!("`{name}` is `{text}`; a number is needed"))),
+    }
+}

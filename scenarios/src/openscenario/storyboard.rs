@@ -1,0 +1,665 @@
+//! Plays a storyboard with vehicles that follow their actions exactly, and writes down what each does and when.
+//!
+//! The ego keeps the speed of the file: as in a nominal encounter, the times of what the others do depend on the file alone,
+//! and are the same whatever the ego's controller does.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+
+use super::condition::Memory;
+use super::dom::{ImportError, Node};
+use super::reader::Reader;
+use super::road::ImportedRoad;
+use super::world::Vehicle;
+
+/// Step of the storyboard (s), that of esmini's tests.
+pub(super) const STEP_S: f64 = 0.01;
+/// Longest storyboard without a stop trigger that fires (s).
+const LONGEST_S: f64 = 300.0;
+/// Time that is played after the last action ended (s), if no trigger stops the storyboard.
+const AFTER_LAST_S: f64 = 20.0;
+
+/// Difference of two values that are the same but for rounding: numerical.
+const SAME: f64 = 1e-9;
+
+/// When an element began and ended (s).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ElementState {
+    pub(super) started_s: f64,
+    pub(super) ended_s: Option<f64>,
+}
+
+/// A lane change that a vehicle makes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LaneChange {
+    pub(super) vehicle: usize,
+    pub(super) at_s: f64,
+    pub(super) from: i32,
+    pub(super) to: i32,
+    pub(super) duration_s: f64,
+    pub(super) line: usize,
+}
+
+/// An action that takes time.
+#[derive(Clone, Debug)]
+enum Running {
+    /// A change of speed: from, to, begin, duration, and whether it is smooth.
+    Speed { vehicle: usize, from_mps: f64, to_mps: f64, begins_s: f64, duration_s: f64, is_smooth: bool },
+    /// A speed relative to another vehicle, for ever.
+    Relative { vehicle: usize, other: usize, value: f64, is_factor: bool },
+    /// Speeds at times, linear in between.
+    Profile { vehicle: usize, points: Vec<(f64, f64)> },
+    /// A lane change, until its end.
+    Lane { ends_s: f64 },
+}
+
+/// A running event.
+#[derive(Clone, Debug)]
+struct RunningEvent {
+    name: String,
+    maneuver: String,
+    is_longitudinal: Vec<usize>,
+    actions: Vec<Running>,
+}
+
+/// A storyboard that is played.
+pub(super) struct Storyboard<'a> {
+    pub(super) reader: Reader,
+    pub(super) road: &'a ImportedRoad,
+    pub(super) vehicles: Vec<Vehicle>,
+    pub(super) ego: usize,
+    pub(super) time_s: f64,
+    pub(super) memories: BTreeMap<usize, Memory>,
+    pub(super) states: BTreeMap<String, ElementState>,
+    pub(super) names: BTreeSet<String>,
+    running: Vec<RunningEvent>,
+    done: BTreeSet<usize>,
+    /// Time and speed of each vehicle in each step.
+    pub(super) speeds: Vec<Vec<(f64, f64)>>,
+    pub(super) lane_changes: Vec<LaneChange>,
+    /// Times of what happens, for the reader of the result.
+    pub(super) events: Vec<(f64, String)>,
+    pub(super) notes: Vec<String>,
+    /// Time at which the storyboard ends (s).
+    pub(super) end_s: f64,
+}
+
+impl<'a> Storyboard<'a> {
+    pub(super) fn new(reader: Reader, road: &'a ImportedRoad, vehicles: Vec<Vehicle>, ego: usize) -> Self {
+        let speeds = vec![Vec::new(); vehicles.len()];
+        Self {
+            reader,
+            road,
+            vehicles,
+            ego,
+            time_s: 0.0,
+            memories: BTreeMap::new(),
+            states: BTreeMap::new(),
+            names: BTreeSet::new(),
+            running: Vec::new(),
+            done: BTreeSet::new(),
+            speeds,
+            lane_changes: Vec::new(),
+            events: Vec::new(),
+            notes: Vec::new(),
+            end_s: 0.0,
+        }
+    }
+
+    /// Returns the vehicle that an attribute names.
+    pub(super) fn vehicle(&self, node: &Node, name: &str) -> Result<&Vehicle, ImportError> {
+        Ok(&self.vehicles[self.index(node, name)?])
+    }
+
+    pub(super) fn index(&self, node: &Node, name: &str) -> Result<usize, ImportError> {
+        let wanted = self.reader.text(node, name)?;
+        self.vehicles.iter().position(|vehicle| vehicle.name == wanted).ok_or_else(|| {
+            let known: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
+            self.reader.error(node, format!("there is no vehicle `{wanted}`, only {}", known.join(", ")))
+        })
+    }
+
+    /// Plays the storyboard to its end.
+    pub(super) fn play(&mut self, storyboard: &Node) -> Result<(), ImportError> {
+        self.collect_names(storyboard)?;
+        let mut last_action_s = 0.0;
+        loop {
+            for story in storyboard.all("Story") {
+                let outer = self.reader.values.clone();
+                self.declare(story)?;
+                for act in story.all("Act") {
+                    self.act(act)?;
+                }
+                self.reader.values = outer;
+            }
+            if !self.running.is_empty() {
+                last_action_s = self.time_s;
+            }
+            for (index, vehicle) in self.vehicles.iter().enumerate() {
+                self.speeds[index].push((self.time_s, vehicle.speed_mps));
+            }
+            let stop = storyboard.child("StopTrigger").filter(|trigger| !trigger.children.is_empty());
+            let stops = stop.is_some() && self.is_triggered(stop)?;
+            let limit_s = if stop.is_some() { LONGEST_S } else { last_action_s + AFTER_LAST_S };
+            if stops || self.time_s >= limit_s.min(LONGEST_S) {
+                self.end_s = self.time_s;
+                if !stops && stop.is_some() {
+                    self.notes
+                        .push(format!("the stop trigger never fires within {LONGEST_S} s: the scenario ends there"));
+                }
+                return Ok(());
+            }
+            self.advance();
+        }
+    }
+
+    fn collect_names(&mut self, node: &Node) -> Result<(), ImportError> {
+        for child in &node.children {
+            if matches!(child.name.as_str(), "Story" | "Act" | "ManeuverGroup" | "Maneuver" | "Event" | "Action")
+                && let Some(name) = child.raw("name")
+            {
+                self.names.insert(name.to_owned());
+            }
+            self.collect_names(child)?;
+        }
+        Ok(())
+    }
+
+    /// Adds the parameters that an element declares, unless they have values already.
+    pub(super) fn declare(&mut self, node: &Node) -> Result<(), ImportError> {
+        let lists = node.child("ParameterDeclarations").into_iter();
+        for declaration in lists.flat_map(|list| list.all("ParameterDeclaration")) {
+            let (name, value) = (self.reader.text(declaration, "name")?, self.reader.text(declaration, "value")?);
+            self.reader.values.entry(name).or_insert(value);
+        }
+        Ok(())
+    }
+
+    fn start(&mut self, name: &str) {
+        let started = ElementState { started_s: self.time_s, ended_s: None };
+        self.states.entry(name.to_owned()).or_insert(started);
+    }
+
+    fn end(&mut self, name: &str) {
+        let time_s = self.time_s;
+        if let Some(state) = self.states.get_mut(name).filter(|state| state.ended_s.is_none()) {
+            state.ended_s = Some(time_s);
+            self.events.push((time_s, format!("{name} ends")));
+        }
+    }
+
+    fn act(&mut self, act: &Node) -> Result<(), ImportError> {
+        let name = act.raw("name").unwrap_or_default().to_owned();
+        if self.states.get(&name).is_some_and(|state| state.ended_s.is_some()) {
+            return Ok(());
+        }
+        if !self.states.contains_key(&name) {
+            if !self.is_triggered(act.child("StartTrigger"))? {
+                return Ok(());
+            }
+            self.start(&name);
+        }
+        if let Some(stop) = act.child("StopTrigger").filter(|trigger| !trigger.children.is_empty())
+            && self.is_triggered(Some(stop))?
+        {
+            self.running.clear();
+            self.end(&name);
+            return Ok(());
+        }
+        for group in act.all("ManeuverGroup") {
+            if let Some(reference) = group.child("CatalogReference") {
+                return Err(self.reader.error(reference, "a manoeuvre of a catalogue is not read"));
+            }
+            let mut actors = Vec::new();
+            let list = self.reader.child(group, &["Actors"])?;
+            for entity in list.all("EntityRef") {
+                actors.push(self.index(entity, "entityRef")?);
+            }
+            for maneuver in group.all("Maneuver") {
+                let outer = self.reader.values.clone();
+                self.declare(maneuver)?;
+                self.maneuver(maneuver, &actors)?;
+                self.reader.values = outer;
+            }
+        }
+        Ok(())
+    }
+
+    fn maneuver(&mut self, maneuver: &Node, actors: &[usize]) -> Result<(), ImportError> {
+        let name = maneuver.raw("name").unwrap_or_default().to_owned();
+        self.start(&name);
+        let mut are_done = true;
+        for event in maneuver.all("Event") {
+            let key = event.id;
+            let event_name = event.raw("name").unwrap_or_default().to_owned();
+            if !self.done.contains(&key) {
+                // The conditions of an event are looked at until it begins.
+                if self.is_triggered(event.child("StartTrigger"))? {
+                    self.done.insert(key);
+                    self.start(&event_name);
+                    self.events.push((self.time_s, format!("{event_name} begins")));
+                    self.begin(event, (&event_name, &name), actors)?;
+                }
+            }
+            are_done &= self.states.get(&event_name).is_some_and(|state| state.ended_s.is_some());
+        }
+        if are_done {
+            self.end(&name);
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, event: &Node, (name, maneuver): (&str, &str), actors: &[usize]) -> Result<(), ImportError> {
+        if self.reader.number_or(event, "maximumExecutionCount", 1.0)? > 1.0 {
+            return Err(self.reader.error(event, "`maximumExecutionCount` must be 1: an event happens once"));
+        }
+        let priority = self.reader.text(event, "priority")?;
+        if matches!(priority.as_str(), "override" | "overwrite") {
+            let ended: Vec<String> = self
+                .running
+                .iter()
+                .filter(|running| running.maneuver == maneuver)
+                .map(|running| running.name.clone())
+                .collect();
+            self.running.retain(|running| running.maneuver != maneuver);
+            for ended in ended {
+                self.end(&ended);
+            }
+        }
+        let mut running = RunningEvent {
+            name: name.to_owned(),
+            maneuver: maneuver.to_owned(),
+            is_longitudinal: Vec::new(),
+            actions: Vec::new(),
+        };
+        for action in event.all("Action") {
+            let action_name = action.raw("name").unwrap_or_default().to_owned();
+            self.start(&action_name);
+            let inner = self.reader.only(action)?;
+            if inner.name != "PrivateAction" {
+                return Err(self.reader.error(inner, "only actions of vehicles are read"));
+            }
+            for &actor in actors {
+                self.action(self.reader.only(inner)?.clone(), actor, &mut running)?;
+            }
+        }
+        // A new change of speed ends the one before.
+        let replaced = running.is_longitudinal.clone();
+        for other in &mut self.running {
+            other.actions.retain(|action| match action {
+                Running::Speed { vehicle, .. }
+                | Running::Relative { vehicle, .. }
+                | Running::Profile { vehicle, .. } => !replaced.contains(vehicle),
+                Running::Lane { .. } => true,
+            });
+        }
+        self.running.push(running);
+        self.end_events();
+        Ok(())
+    }
+
+    fn action(&mut self, node: Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        if actor == self.ego && node.name != "ControllerAction" && node.name != "ActivateControllerAction" {
+            let name = &self.vehicles[actor].name;
+            self.notes.push(format!(
+                "line {}: `{}` of `{name}`, the ego: its controller drives instead; the others begin as if it happened",
+                node.line, node.name
+            ));
+        }
+        match node.name.as_str() {
+            "LongitudinalAction" => {
+                let inner = self.reader.only(&node)?.clone();
+                match inner.name.as_str() {
+                    "SpeedAction" => self.speed_action(&inner, actor, running),
+                    "SpeedProfileAction" => self.speed_profile(&inner, actor, running),
+                    _ => Err(self
+                        .reader
+                        .error(&inner, "during a run, only `SpeedAction` and `SpeedProfileAction` are read")),
+                }
+            }
+            "LateralAction" => {
+                let inner = self.reader.only(&node)?.clone();
+                match inner.name.as_str() {
+                    "LaneChangeAction" => self.lane_change(&inner, actor, running),
+                    _ => Err(self
+                        .reader
+                        .error(&inner, "only `LaneChangeAction` is read: a vehicle keeps the centre of its lane")),
+                }
+            }
+            "ControllerAction" | "ActivateControllerAction" => {
+                self.notes.push(format!(
+                    "line {}: `{}` of `{}`: a scenario has one controller, that of the ego",
+                    node.line, node.name, self.vehicles[actor].name
+                ));
+                Ok(())
+            }
+            _ => Err(self.reader.error(&node, "this action is not read")),
+        }
+    }
+
+    /// Returns the target speed of a speed action (m/s), and the vehicle that it stays relative to.
+    fn target_speed(&self, node: &Node) -> Result<(f64, Option<Running>), ImportError> {
+        let target = self.reader.only(self.reader.child(node, &["SpeedActionTarget"])?)?;
+        let value = self.reader.number(target, "value")?;
+        match target.name.as_str() {
+            "AbsoluteTargetSpeed" => Ok((value, None)),
+            "RelativeTargetSpeed" => {
+                let other = self.index(target, "entityRef")?;
+                let is_factor = self.reader.text(target, "speedTargetValueType")? == "factor";
+                let base_mps = self.vehicles[other].speed_mps;
+                let speed_mps = if is_factor { base_mps * value } else { base_mps + value };
+                let stays = self.reader.is_true(target, "continuous")?;
+                Ok((speed_mps, stays.then_some(Running::Relative { vehicle: 0, other, value, is_factor })))
+            }
+            _ => Err(self.reader.error(target, "this target is not read")),
+        }
+    }
+
+    fn speed_action(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        let dynamics = self.reader.child(node, &["SpeedActionDynamics"])?;
+        let (to_mps, stays) = self.target_speed(node)?;
+        let from_mps = self.vehicles[actor].speed_mps;
+        let (duration_s, is_smooth) = self.transition(dynamics, (from_mps, to_mps), 0.5 * (from_mps + to_mps))?;
+        running.is_longitudinal.push(actor);
+        if let Some(Running::Relative { other, value, is_factor, .. }) = stays {
+            self.vehicles[actor].speed_mps = to_mps;
+            running.actions.push(Running::Relative { vehicle: actor, other, value, is_factor });
+        } else if duration_s <= 0.0 {
+            self.vehicles[actor].speed_mps = to_mps;
+        } else {
+            let begins_s = self.time_s;
+            running.actions.push(Running::Speed { vehicle: actor, from_mps, to_mps, begins_s, duration_s, is_smooth });
+        }
+        Ok(())
+    }
+
+    /// Returns the duration of a transition (s), and whether it is smooth. `mean_mps` is the mean speed in it.
+    fn transition(&self, node: &Node, (from, to): (f64, f64), mean_mps: f64) -> Result<(f64, bool), ImportError> {
+        let shape = self.reader.text(node, "dynamicsShape")?;
+        // The largest slope of a smooth transition is higher than the mean one.
+        let (is_smooth, steepness) = match shape.as_str() {
+            "step" => return Ok((0.0, false)),
+            "linear" => (false, 1.0),
+            "sinusoidal" => (true, 0.5 * PI),
+            "cubic" => (true, 1.5),
+            _ => return Err(self.reader.error(node, format!("`dynamicsShape` is `{shape}`"))),
+        };
+        let value = self.reader.number(node, "value")?;
+        let dimension = self.reader.text(node, "dynamicsDimension")?;
+        let duration_s = match dimension.as_str() {
+            "time" => value,
+            "rate" if (to - from).abs() < SAME => 0.0,
+            "rate" => steepness * (to - from).abs() / value.abs(),
+            "distance" => value / mean_mps,
+            _ => return Err(self.reader.error(node, format!("`dynamicsDimension` is `{dimension}`"))),
+        };
+        if duration_s.is_finite() && duration_s >= 0.0 {
+            return Ok((duration_s, is_smooth));
+        }
+        Err(self.reader.error(node, format!("it takes {duration_s} s to come from {from} to {to}")))
+    }
+
+    fn speed_profile(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        if let Some(limits) = node.child("DynamicConstraints") {
+            return Err(self.reader.error(limits, "limits of a speed profile are not read"));
+        }
+        if node.raw("entityRef").is_some() {
+            return Err(self.reader.error(node, "speeds relative to another vehicle are not read"));
+        }
+        let mut points = vec![(self.time_s, self.vehicles[actor].speed_mps)];
+        let mut at_s = self.time_s;
+        for entry in node.all("SpeedProfileEntry") {
+            let duration_s = self.reader.number(entry, "time")?;
+            if !(duration_s >= 0.0) {
+                return Err(self.reader.error(entry, "`time` must be 0 or more"));
+            }
+            if duration_s == 0.0 {
+                // A first entry at the start sets the speed at once.
+                points.pop();
+            }
+            at_s += duration_s;
+            points.push((at_s, self.reader.number(entry, "speed")?));
+        }
+        running.is_longitudinal.push(actor);
+        running.actions.push(Running::Profile { vehicle: actor, points });
+        Ok(())
+    }
+
+    fn lane_change(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        if self.reader.number_or(node, "targetLaneOffset", 0.0)? != 0.0 {
+            return Err(self
+                .reader
+                .error(node, "`targetLaneOffset` must be 0: a vehicle keeps the centre of its lane"));
+        }
+        let target = self.reader.only(self.reader.child(node, &["LaneChangeTarget"])?)?;
+        let shift = self.reader.number(target, "value")?;
+        let from = self.vehicles[actor].lane;
+        #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road below")]
+        let to = match target.name.as_str() {
+            "AbsoluteTargetLane" => shift as i32,
+            "RelativeTargetLane" => self.shifted(self.vehicle(target, "entityRef")?.lane, shift as i32),
+            _ => return Err(self.reader.error(target, "this target is not read")),
+        };
+        let [from_index, to_index] = [from, to].map(|lane| self.road.lanes.iter().position(|known| *known == lane));
+        let Some((from_index, to_index)) = from_index.zip(to_index) else {
+            let known: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
+            let message = format!("lane {to} is no driving lane on the right of the road, only {}", known.join(", "));
+            return Err(self.reader.error(target, message));
+        };
+        if from_index == to_index {
+            return Ok(());
+        }
+        if from_index.abs_diff(to_index) > 1 {
+            return Err(self
+                .reader
+                .error(target, format!("from lane {from} to lane {to}: only the next lane is read")));
+        }
+        let dynamics = self.reader.child(node, &["LaneChangeActionDynamics"])?;
+        let (duration_s, _) =
+            self.transition(dynamics, (0.0, self.road.lane_width_m), self.vehicles[actor].speed_mps)?;
+        let at_s = self.time_s;
+        self.vehicles[actor].lane = to;
+        self.lane_changes.push(LaneChange { vehicle: actor, at_s, from, to, duration_s, line: node.line });
+        running.actions.push(Running::Lane { ends_s: at_s + duration_s });
+        Ok(())
+    }
+
+    /// Returns the lane that lies some lanes to the left of a lane. The numbers of OpenDRIVE leave out 0.
+    pub(super) fn shifted(&self, lane: i32, shift: i32) -> i32 {
+        let sum = lane.saturating_add(shift);
+        if lane < 0 && sum >= 0 { sum + 1 } else { sum }
+    }
+
+    fn advance(&mut self) {
+        for vehicle in &mut self.vehicles {
+            vehicle.s_m += vehicle.speed_mps * STEP_S;
+            vehicle.travelled_m += vehicle.speed_mps * STEP_S;
+        }
+        self.time_s = ((self.time_s + STEP_S) / STEP_S).round() * STEP_S;
+        let before: Vec<f64> = self.vehicles.iter().map(|vehicle| vehicle.speed_mps).collect();
+        let (time_s, mut set) = (self.time_s, Vec::new());
+        for event in &mut self.running {
+            event.actions.retain(|action| match action {
+                Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, is_smooth } => {
+                    let share = ((time_s - begins_s) / duration_s).clamp(0.0, 1.0);
+                    let part = if *is_smooth { share * share * (3.0 - 2.0 * share) } else { share };
+                    set.push((*vehicle, from_mps + part * (to_mps - from_mps)));
+                    share < 1.0
+                }
+                Running::Relative { vehicle, other, value, is_factor } => {
+                    let base_mps = before[*other];
+                    set.push((*vehicle, if *is_factor { base_mps * value } else { base_mps + value }));
+                    true
+                }
+                Running::Profile { vehicle, points } => {
+                    let after = points.partition_point(|(at_s, _)| *at_s <= time_s);
+                    let (Some(&(t0, v0)), next) = (points.get(after.saturating_sub(1)), points.get(after)) else {
+                        return false;
+                    };
+                    let speed_mps = next.map_or(v0, |(t1, v1)| v0 + (v1 - v0) * (time_s - t0) / (t1 - t0));
+                    set.push((*vehicle, speed_mps));
+                    next.is_some()
+                }
+                Running::Lane { ends_s } => time_s < *ends_s - 1e-9,
+            });
+        }
+        for (vehicle, speed_mps) in set {
+            self.vehicles[vehicle].speed_mps = speed_mps.max(0.0);
+        }
+        for (vehicle, before_mps) in self.vehicles.iter_mut().zip(before) {
+            vehicle.acceleration_mps2 = (vehicle.speed_mps - before_mps) / STEP_S;
+        }
+        self.end_events();
+    }
+
+    /// Ends the events whose actions are over.
+    fn end_events(&mut self) {
+        let ended: Vec<String> =
+            self.running.iter().filter(|event| event.actions.is_empty()).map(|event| event.name.clone()).collect();
+        self.running.retain(|event| !event.actions.is_empty());
+        for name in ended {
+            self.end(&name);
+        }
+    }
+
+    /// Performs the actions at the beginning.
+    pub(super) fn init(&mut self, storyboard: &Node) -> Result<Vec<Node>, ImportError> {
+        let actions = self.reader.child(storyboard, &["Init", "Actions"])?.clone();
+        let mut globals = Vec::new();
+        // A speed can be relative to a vehicle whose actions stand behind: the positions and speeds are set twice.
+        for round in 0..2 {
+            for node in &actions.children {
+                match node.name.as_str() {
+                    "GlobalAction" if round == 0 => globals.push(self.reader.only(node)?.clone()),
+                    "GlobalAction" => {}
+                    "Private" => {
+                        let vehicle = self.index(node, "entityRef")?;
+                        for action in node.all("PrivateAction") {
+                            self.init_action(self.reader.only(action)?, vehicle, round)?;
+                        }
+                    }
+                    _ => return Err(self.reader.error(node, "this action is not read")),
+                }
+            }
+        }
+        match self.vehicles.iter().find(|vehicle| !vehicle.is_placed) {
+            Some(vehicle) => {
+                Err(self.reader.error(&actions, format!("no `TeleportAction` says where `{}` starts", vehicle.name)))
+            }
+            None => Ok(globals),
+        }
+    }
+
+    fn init_action(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
+        match node.name.as_str() {
+            "TeleportAction" => {
+                let position = self.reader.only(self.reader.child(node, &["Position"])?)?;
+                self.place(position, vehicle, round)
+            }
+            "LongitudinalAction" => {
+                let inner = self.reader.only(node)?;
+                match inner.name.as_str() {
+                    "SpeedAction" => {
+                        let (speed_mps, stays) = self.target_speed(inner)?;
+                        if stays.is_some() && round == 1 {
+                            self.notes.push(format!(
+                                "line {}: the speed of `{}` is relative to another at the start, and does not follow it afterwards",
+                                inner.line, self.vehicles[vehicle].name
+                            ));
+                        }
+                        self.vehicles[vehicle].speed_mps = speed_mps;
+                        Ok(())
+                    }
+                    "LongitudinalDistanceAction" => self.keep_distance(inner, vehicle),
+                    _ => Err(self.reader.error(inner, "this action is not read")),
+                }
+            }
+            "ControllerAction" | "ActivateControllerAction" => {
+                if vehicle != self.ego && round == 0 {
+                    let name = &self.vehicles[vehicle].name;
+                    self.notes
+                        .push(format!("line {}: the controller of `{name}`: it drives as the actions say", node.line));
+                }
+                Ok(())
+            }
+            _ => Err(self.reader.error(node, "this action is not read")),
+        }
+    }
+
+    /// Puts a vehicle at the distance from another that an action asks for at the beginning.
+    fn keep_distance(&mut self, node: &Node, vehicle: usize) -> Result<(), ImportError> {
+        let other = self.index(node, "entityRef")?;
+        if self.reader.is_true(node, "continuous")? {
+            return Err(self
+                .reader
+                .error(node, "`continuous` must be `false`: a vehicle does not follow another by an action"));
+        }
+        let distance_m = match node.raw("distance") {
+            Some(_) => self.reader.number(node, "distance")?,
+            None => {
+                let behind = if self.vehicles[vehicle].s_m < self.vehicles[other].s_m { vehicle } else { other };
+                self.reader.number(node, "timeGap")? * self.vehicles[behind].speed_mps
+            }
+        };
+        let is_free_space = self.reader.is_true(node, "freespace")?;
+        let (own, of) = (&self.vehicles[vehicle], &self.vehicles[other]);
+        let sign = if own.s_m < of.s_m { -1.0 } else { 1.0 };
+        let s_m = match (is_free_space, sign > 0.0) {
+            (false, _) => of.s_m + sign * distance_m,
+            (true, true) => of.front_m() + distance_m - (own.back_m() - own.s_m),
+            (true, false) => of.back_m() - distance_m - (own.front_m() - own.s_m),
+        };
+        self.vehicles[vehicle].s_m = s_m;
+        Ok(())
+    }
+
+    fn place(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
+        let reader = self.reader.clone();
+        if reader.number_or(node, "offset", 0.0)? != 0.0 {
+            return Err(reader.error(node, "`offset` must be 0: a vehicle starts at the centre of its lane"));
+        }
+        if let Some(orientation) = node.child("Orientation") {
+            let heading_rad = reader.number_or(orientation, "h", 0.0)?;
+            if !(heading_rad.abs() < 1e-3) {
+                return Err(reader.error(orientation, "`h` must be 0: a vehicle starts along the road"));
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
+        let (s_m, lane) = match node.name.as_str() {
+            "LanePosition" => (reader.number(node, "s")?, reader.number(node, "laneId")? as i32),
+            "RelativeLanePosition" => {
+                let other = self.vehicle(node, "entityRef")?;
+                let shift_m = if node.raw("ds").is_some() {
+                    reader.number(node, "ds")?
+                } else {
+                    reader.number(node, "dsLane")?
+                };
+                (other.s_m + shift_m, self.shifted(other.lane, reader.number(node, "dLane")? as i32))
+            }
+            "RelativeRoadPosition" => {
+                let other = self.vehicle(node, "entityRef")?;
+                let shift_m = reader.number(node, "dt")?;
+                let lanes = shift_m / self.road.lane_width_m;
+                if (lanes - lanes.round()).abs() > 0.2 {
+                    return Err(
+                        reader.error(node, format!("`dt` of {shift_m} m does not lead to the centre of a lane"))
+                    );
+                }
+                (other.s_m + reader.number(node, "ds")?, self.shifted(other.lane, lanes.round() as i32))
+            }
+            _ => {
+                return Err(reader
+                    .error(node, "only `LanePosition`, `RelativeLanePosition` and `RelativeRoadPosition` are read"));
+            }
+        };
+        if !self.road.lanes.contains(&lane) {
+            let known: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
+            let message = format!("lane {lane} is no driving lane on the right of the road, only {}", known.join(", "));
+            // The other vehicle may not be placed yet.
+            return if round == 0 && node.name != "LanePosition" { Ok(()) } else { Err(reader.error(node, message)) };
+        }
+        let placed = &mut self.vehicles[vehicle];
+        (placed.s_m, placed.lane, placed.is_placed) = (s_m, lane, true);
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! `closecall tool import`: makes a scenario file of a scenario of another tool.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_scenarios::openscenario::{ImportOptions, import};
+use closecall_traffic::atomic::write_file;
+
+use super::CliError;
+use super::help::{examples, heading};
+use super::output::{command_line, outln, print_written};
+use super::protect::protect;
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall tool import`.
+#[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall tool import case.xosc -o scenario.toml",
+    "closecall tool import cut-in.xosc --ego car_white -o scenario.toml",
+    "closecall tool import cut-in.xosc --parameter EgoSpeed=120 -o scenario.toml",
+]))]
+pub(super) struct ImportArgs {
+    /// Scenario of OpenSCENARIO XML 1.0 to 1.3; its road and its catalogues are found relative to it
+    #[arg(value_name = "FILE.xosc")]
+    file: PathBuf,
+    /// Scenario file to write
+    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    output: PathBuf,
+    /// Vehicle that the controller under test drives [default: `Ego`, or the only one with a controller]
+    #[arg(long, value_name = "NAME", help_heading = heading::SCENARIO)]
+    ego: Option<String>,
+    /// Value of a parameter of the file, instead of its default; can be given more than once
+    #[arg(long = "parameter", value_name = "NAME=VALUE", value_parser = parameter, help_heading = heading::SCENARIO)]
+    parameters: Vec<(String, String)>,
+}
+
+fn parameter(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("it must be `NAME=VALUE`".to_owned()),
+    }
+}
+
+pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
+    protect(std::slice::from_ref(&args.file), &[("--output", Some(&args.output))])?;
+    let options = ImportOptions { ego: args.ego.clone(), parameters: args.parameters.clone() };
+    let imported = import(&args.file, &options)?;
+    write_file(&args.output, |file| write!(file, "# Made by `{}`\n{}", command_line(), imported.text))?;
+    print_written(&args.output);
+    if !imported.notes.is_empty() {
+        outln!("said in another way than in {}:", args.file.display());
+        imported.notes.iter().for_each(|note| outln!("  {note}"));
+    }
+    if !imported.events.is_empty() {
+        outln!("events, if the ego keeps the speed of the file:");
+        imported.events.iter().for_each(|(time_s, what)| outln!("  {time_s:7.2} s  {what}"));
+    }
+    Ok(ExitCode::Pass)
+}

@@ -1,0 +1,388 @@
+//! Cases in the formats of other tools.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use closecall_scenarios::library;
+use closecall_traffic::{Road, maths};
+
+use crate::support::{ROOT, closecall, code, message, stdout};
+
+/// Distance within which the positions of a file agree with the trace (m).
+const TOLERANCE_M: f64 = 0.01;
+
+/// Runs the program with these words and the path of an output.
+fn run(words: &str, output: &Path) -> Output {
+    let words = words.split_whitespace().map(Into::into).chain([output.as_os_str().to_owned()]);
+    closecall(words.collect::<Vec<_>>())
+}
+
+/// Exports a sample, and returns the texts of the files by their names.
+fn exported(words: &str, folder: &Path) -> BTreeMap<String, String> {
+    stdout(&run(&format!("tool export {words} -o"), folder), 0);
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    let texts = files
+        .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read_to_string(&path).unwrap()));
+    texts.collect()
+}
+
+/// Returns the value of an attribute of the first element that begins at or behind the start of the text.
+fn attribute<'a>(text: &'a str, name: &str) -> &'a str {
+    let (_, rest) = text.split_once(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name}: {text:.200}"));
+    rest.split('"').next().unwrap()
+}
+
+fn number(text: &str, name: &str) -> f64 {
+    attribute(text, name).parse().unwrap()
+}
+
+/// Returns the parts of a text that begin behind each occurrence of `start`.
+fn parts<'a>(text: &'a str, start: &str) -> Vec<&'a str> {
+    text.split(start).skip(1).collect()
+}
+
+#[test]
+fn the_open_loop_form_has_the_positions_of_the_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    for (index, curvature) in [0.0, 0.002].into_iter().enumerate() {
+        let words = format!("paper-figure 0 --sensors object --set road.curvature-per-m={curvature}");
+        let files = exported(&words, &folder.path().join(index.to_string()));
+        let trace = folder.path().join("trace.csv");
+        let run_words = "run paper-figure --sample 0 --sensors object --set road.curvature-per-m";
+        stdout(&run(&format!("{run_words}={curvature} --trace"), &trace), 0);
+        let road = Road::straight(3).with_curvature(curvature);
+        let catalog = folder.path().join(index.to_string()).join("catalogs/vehicles/VehicleCatalog.xosc");
+        let catalog = fs::read_to_string(catalog).unwrap();
+        let ahead_m: BTreeMap<_, _> = parts(&catalog, "<Vehicle ")
+            .into_iter()
+            .map(|vehicle| {
+                let centre = vehicle.split_once("<Center").unwrap().1;
+                (vehicle.split('"').nth(1).unwrap().to_owned(), number(centre, "x"))
+            })
+            .collect();
+        let mut positions = BTreeMap::new();
+        for trajectory in parts(&files["open-loop.xosc"], "<Trajectory ") {
+            let name = trajectory.split('"').nth(1).unwrap().strip_suffix("-trajectory").unwrap();
+            for vertex in parts(trajectory, "<Vertex") {
+                let [x, y, h] = ["x", "y", "h"].map(|key| number(vertex, key));
+                let (sin, cos) = maths::sin_cos(h);
+                let centre = road.road_position_m(x + ahead_m[name] * cos, y + ahead_m[name] * sin);
+                positions.insert((name.to_owned(), (number(vertex, "time") * 1e3).round() as i64), centre);
+            }
+        }
+        let mut rows = 0;
+        let mut reader = csv::Reader::from_path(&trace).unwrap();
+        let headers = reader.headers().unwrap().clone();
+        let column = |name: &str| headers.iter().position(|header| header == name).unwrap();
+        let [time, actor, s, d] = ["time_s", "actor", "s_m", "d_m"].map(column);
+        for row in reader.records() {
+            let row = row.unwrap();
+            let value = |column: usize| row[column].parse::<f64>().unwrap();
+            let (s_m, d_m) = positions[&(row[actor].to_owned(), (value(time) * 1e3).round() as i64)];
+            assert!((s_m - value(s)).abs() < TOLERANCE_M, "{row:?}: {s_m}");
+            assert!((d_m - value(d)).abs() < TOLERANCE_M, "{row:?}: {d_m}");
+            rows += 1;
+        }
+        assert!(rows > 1_000, "{rows}");
+        assert_eq!(rows, positions.len());
+    }
+}
+
+#[test]
+fn a_case_lists_what_it_cannot_say_in_its_header_and_on_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = stdout(&run("tool export rear-follower-stays --form closed-loop -o", folder.path()), 0);
+    let text = fs::read_to_string(folder.path().join("closed-loop.xosc")).unwrap();
+    for what in ["rear: the state of Wiedemann 99", "paint, registration plates", "front: its weaving"] {
+        assert!(said.contains(what), "{said}");
+        assert!(text.contains(what), "{what}");
+    }
+    assert!(attribute(&text, "description").ends_with("closed loop"));
+    assert!(!folder.path().join("open-loop.xosc").exists());
+}
+
+#[test]
+fn the_closed_loop_has_the_manoeuvres_with_their_triggers_and_names_the_controller() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = &exported("paper-figure --controller acc --form closed-loop", folder.path())["closed-loop.xosc"];
+    assert!(text.contains("<Controller name=\"acc\">"), "{text}");
+    // The ego has no manoeuvre of its own.
+    assert!(!text.contains("ego-group"));
+    let brakes = text.split_once("<Event name=\"front-brakes\"").unwrap().1;
+    assert_eq!(number(brakes.split_once("<SpeedActionDynamics").unwrap().1, "value"), 6.0);
+    assert_eq!(number(brakes.split_once("<SimulationTimeCondition").unwrap().1, "value"), 12.0);
+    let changes = text.split_once("<Event name=\"rear-changes-lanes\"").unwrap().1;
+    assert_eq!(attribute(changes.split_once("<AbsoluteTargetLane").unwrap().1, "value"), "-1");
+    // The marking is crossed after half of 6.8 s, in which the headway falls by closing × time / speed.
+    let closing_mps = 20.0 / 3.0;
+    let expected_s = 0.2 + closing_mps * 3.4 / (30.0 + closing_mps);
+    let begins_s = number(changes.split_once("<TimeHeadwayCondition").unwrap().1, "value");
+    assert!((begins_s - expected_s).abs() < 1e-9, "{begins_s} {expected_s}");
+}
+
+#[test]
+fn the_value_set_has_the_parameters_of_the_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "low-thw-overtake 5 --seed 7 --form logical --value-sets 3";
+    let files = exported(words, folder.path());
+    let sets = parts(&files["logical-values.xosc"], "<ParameterValueSet>");
+    assert_eq!(sets.len(), 3);
+    for (set, sample) in sets.into_iter().zip(5..) {
+        let words = ["run", "low-thw-overtake", "--seed", "7", "--sensors", "ground-truth", "--format", "json"];
+        let sample = format!("--sample={sample}");
+        let outcome = stdout(&closecall(words.into_iter().chain([sample.as_str()])), 0);
+        let outcome: serde_json::Value = serde_json::from_str(&outcome).unwrap();
+        let parameters = outcome["parameters"].as_object().unwrap();
+        assert_eq!(parts(set, "<ParameterAssignment").len(), parameters.len());
+        for assignment in parts(set, "<ParameterAssignment") {
+            let expected = &parameters[&attribute(assignment, "parameterRef").replace('_', "-")];
+            let value = attribute(assignment, "value");
+            match expected.as_f64() {
+                Some(number) => assert_eq!(value.parse::<f64>().unwrap(), number),
+                None => assert_eq!(expected, value),
+            }
+        }
+    }
+    // Each parameter is declared, and has a distribution.
+    let declared = parts(&files["logical.xosc"], "<ParameterDeclaration ").len();
+    assert_eq!(declared, parts(&files["logical-distributions.xosc"], "<StochasticDistribution ").len());
+    let log_normal = files["logical-distributions.xosc"].split_once("parameterName=\"cut_out_thw_s\"").unwrap().1;
+    let [mean, variance] = ["expectedValue", "variance"].map(|name| number(log_normal, name));
+    let sigma_squared = maths::ln(1.0 + variance / (mean * mean));
+    assert!((sigma_squared.sqrt() - 0.58).abs() < 1e-12);
+    assert!((mean / (1.0 + variance / (mean * mean)).sqrt() - 0.758).abs() < 1e-12);
+}
+
+#[test]
+fn a_scenario_without_parameters_has_no_values_and_no_distributions() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = exported("paper-figure --form logical", folder.path());
+    let names: Vec<_> = files.keys().map(String::as_str).collect();
+    assert_eq!(names, ["logical.xosc", "road.xodr"]);
+    assert!(!files["logical.xosc"].contains("ParameterDeclaration"));
+}
+
+#[test]
+fn options_that_belong_to_the_other_kind_of_source_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("case");
+    let output = run("tool export paper-figure --arm acc -o", &out);
+    assert_eq!(code(&output), 2);
+    assert!(message(&output).contains("belong to a campaign"), "{}", message(&output));
+    let output = run("tool export no-such-scenario -o", &out);
+    assert_ne!(code(&output), 0);
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_sample_of_a_campaign_is_exported_with_its_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = folder.path().join("campaign");
+    let words = "campaign low-thw-overtake -n 2 --seed 9 --sensors ground-truth --no-gate --out";
+    code(&run(words, &campaign));
+    let case = folder.path().join("case");
+    let output = closecall([
+        "tool".as_ref(),
+        "export".as_ref(),
+        campaign.as_os_str(),
+        "1".as_ref(),
+        "-o".as_ref(),
+        case.as_os_str(),
+    ]);
+    stdout(&output, 0);
+    let text = fs::read_to_string(case.join("open-loop.xosc")).unwrap();
+    assert!(attribute(&text, "description").contains("sample 1 of seed 9"), "{text:.400}");
+    let output = closecall([
+        "tool".as_ref(),
+        "export".as_ref(),
+        campaign.as_os_str(),
+        "7".as_ref(),
+        "-o".as_ref(),
+        case.as_os_str(),
+    ]);
+    assert_eq!(code(&output), 2);
+}
+
+/// Runs the quality checkers of ASAM on the files below these folders.
+fn quality(python: &Path, folder: &Path) -> String {
+    let script = PathBuf::from(ROOT).join("tests/integration/exchange/quality.py");
+    let output = Command::new(python).arg(script).arg(folder).output().unwrap();
+    stdout(&output, 0)
+}
+
+#[test]
+fn the_quality_checkers_find_no_issue_in_any_scenario_of_the_library() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let names: Vec<_> = library::names().collect();
+    for name in &names {
+        let case = folder.path().join(name.replace('/', "-"));
+        stdout(&run(&format!("tool export {name} --sensors ground-truth -o"), &case), 0);
+    }
+    let said = quality(&python, folder.path());
+    assert!(said.ends_with(", 0 issues\n"), "{said}");
+    let files: usize = said.lines().last().unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(files > 5 * names.len(), "{said}");
+}
+
+#[test]
+fn the_quality_checkers_find_what_is_wrong() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let files = exported("paper-figure --form closed-loop", folder.path());
+    let path = folder.path().join("closed-loop.xosc");
+    for (right, wrong) in [("frictionScaleFactor=", "friction="), ("entityRef=\"front\"", "entityRef=\"nobody\"")] {
+        fs::write(&path, files["closed-loop.xosc"].replace(right, wrong)).unwrap();
+        let said = quality(&python, folder.path());
+        assert!(!said.ends_with(", 0 issues\n"), "{wrong}: {said}");
+    }
+}
+
+/// Runs the readers of OSI on these files, and returns what they find.
+fn read_osi(python: &Path, files: &[PathBuf]) -> serde_json::Value {
+    let script = PathBuf::from(ROOT).join("tests/integration/exchange/osi.py");
+    let output = Command::new(python).arg(script).args(files).output().unwrap();
+    serde_json::from_str(&stdout(&output, 0)).unwrap()
+}
+
+/// Returns the traces in a folder: `GroundTruth` first.
+fn traces(folder: &Path) -> Vec<PathBuf> {
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut traces: Vec<_> = files.filter(|path| path.extension().is_some_and(|end| end == "osi")).collect();
+    traces.sort();
+    traces
+}
+
+#[test]
+fn osi_traces_have_the_names_of_the_standard_and_other_endings_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    stdout(&run("run paper-figure --sensors ground-truth --osi", &folder.path().join("drive.osi")), 0);
+    let names: Vec<_> =
+        traces(folder.path()).iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect();
+    assert_eq!(names.len(), 2);
+    for (name, kind) in names.iter().zip(["gt", "sd"]) {
+        let parts: Vec<_> = name.split('_').collect();
+        assert!(parts[0].ends_with('Z') && parts[0].len() == 16, "{name}");
+        assert_eq!([parts[1], parts[2], parts[3], parts[5]], [kind, "380", "0", "drive.osi"]);
+        let messages: usize = parts[4].parse().unwrap();
+        assert!(messages > 100, "{name}");
+    }
+    let output = run("run paper-figure --sensors ground-truth --osi", &folder.path().join("drive.txt"));
+    assert_eq!(code(&output), 2);
+    assert!(message(&output).contains("must end with `.osi` or `.mcap`"), "{}", message(&output));
+}
+
+#[test]
+fn other_programs_read_the_osi_messages_of_a_run() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [mcap, osi, trace] = ["drive.mcap", "drive.osi", "trace.csv"].map(|name| folder.path().join(name));
+    let words = "run low-thw-overtake --sample 3 --sensors object";
+    stdout(&run(&format!("{words} --osi"), &mcap), 0);
+    stdout(&run(&format!("{words} --trace"), &trace), 0);
+    stdout(&run(&format!("{words} --osi"), &osi), 0);
+    let found = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
+    let (truth, tracks) = (&found["traces"]["gt"], &found["traces"]["sd"]);
+    let messages = &truth["messages"];
+    assert_eq!(found["objects"], 3);
+    assert_eq!(found["host"], 1);
+    for count in [&found["instants"], &tracks["messages"], &truth["betterosi"], &truth["named"], &tracks["betterosi"]] {
+        assert_eq!(count, messages);
+    }
+    for topic in ["ground_truth", "sensor_data", "ground_truth_map"] {
+        assert_eq!(found["channels"][topic]["unknown"], 0, "{found}");
+    }
+    assert_eq!(found["channels"]["sensor_data"]["messages"], *messages);
+    assert_eq!(found["channels"]["ground_truth_map"]["messages"], 1);
+    for trace in [truth, tracks] {
+        assert_eq!(trace["unknown"], 0);
+        assert_eq!(trace["version"], serde_json::json!([3, 8, 0]));
+    }
+    assert_eq!(truth["boundaries"], 4);
+    let lanes: Vec<u64> = truth["lanes"].as_array().unwrap().iter().map(|lanes| lanes.as_u64().unwrap()).collect();
+    assert_eq!((lanes[0], lanes[1..].iter().max()), (3, Some(&0)));
+    assert!(tracks["tracks"].as_u64().unwrap() > 100 && tracks["rmse"].as_f64().unwrap() > 0.0);
+    // The positions are those of the trace.
+    let mut reader = csv::Reader::from_path(&trace).unwrap();
+    let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+    let centres = truth["centres"].as_array().unwrap();
+    assert_eq!(rows.len(), 3 * centres.len());
+    for (message, rows) in centres.iter().zip(rows.chunks(3)) {
+        for (object, row) in message[1].as_array().unwrap().iter().zip(rows) {
+            let near = |index: usize, column: usize| {
+                let difference = object[index].as_f64().unwrap() - row[column].parse::<f64>().unwrap();
+                assert!(difference.abs() < 1e-9, "{row:?} {object}");
+            };
+            // On a straight road, x is s and y is d.
+            near(0, 3);
+            near(1, 4);
+        }
+    }
+}
+
+#[test]
+fn the_lanes_are_in_each_message_on_request() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mcap = folder.path().join("drive.mcap");
+    stdout(&run("run empty-wet-road --sensors ground-truth --set duration-s=2 --osi", &mcap), 0);
+    stdout(
+        &run(
+            "run empty-wet-road --sensors ground-truth --set duration-s=2 --osi-lanes --osi",
+            &folder.path().join("a.osi"),
+        ),
+        0,
+    );
+    let found = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
+    let lanes = found["traces"]["gt"]["lanes"].as_array().unwrap();
+    assert!(lanes.len() > 10 && lanes.iter().all(|count| count == &lanes[0] && count.as_u64() > Some(0)), "{found}");
+}
+
+#[test]
+fn a_sample_as_commonroad_is_read_back_with_the_positions_of_the_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = folder.path().join("trace.csv");
+    let case = folder.path().join("case");
+    let files = exported("paper-figure --sensors object --form commonroad", &case);
+    assert_eq!(files.keys().map(String::as_str).collect::<Vec<_>>(), ["commonroad.xml"]);
+    stdout(&run("run paper-figure --sensors object --trace", &trace), 0);
+    let data = closecall_recorded::trajectory_data::read(&case.join("commonroad.xml")).unwrap();
+    // The ego is the vehicle of the planning problem.
+    assert_eq!(data.trajectories.len(), 2);
+    let mut rows = 0;
+    for row in csv::Reader::from_path(&trace).unwrap().records().map(Result::unwrap) {
+        let number = match &row[1] {
+            "front" => 1_001,
+            "rear" => 1_002,
+            _ => continue,
+        };
+        let vehicle = data.trajectories.iter().find(|one| one.vehicle_id == number).unwrap();
+        let time_s: f64 = row[0].parse().unwrap();
+        let point = vehicle.points.iter().find(|point| (point.time.s() - time_s).abs() < 1e-6).unwrap();
+        // Positions along a road of the reader begin at the start of its lanelets.
+        let s_m: f64 = row[3].parse().unwrap();
+        let first_m: f64 = vehicle.points[0].s_m;
+        let start_m = if number == 1_001 { 525.6 } else { 375.4 };
+        assert!((point.s_m - first_m - (s_m - start_m)).abs() < TOLERANCE_M, "{row:?} {point:?}");
+        assert!((point.d_m - row[4].parse::<f64>().unwrap()).abs() < TOLERANCE_M, "{row:?} {point:?}");
+        rows += 1;
+    }
+    assert!(rows > 500, "{rows}");
+}
+
+#[test]
+fn commonroad_io_reads_a_sample_with_its_planning_problem() {
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    exported("paper-figure --sensors object --form commonroad", folder.path());
+    let script = PathBuf::from(ROOT).join("tests/integration/exchange/commonroad.py");
+    let output = Command::new(python).arg(script).arg(folder.path().join("commonroad.xml")).output().unwrap();
+    let found: serde_json::Value = serde_json::from_str(stdout(&output, 0).lines().last().unwrap()).unwrap();
+    assert_eq!((found["step_s"].as_f64(), found["lanelets"].as_u64()), (Some(0.04), Some(3)));
+    assert_eq!(found["start"], serde_json::json!([500.0, -5.625, 30.0]));
+    assert_eq!(found["on_lanelet"], serde_json::json!([2]));
+    let ends: Vec<_> = ["1001", "1002"].map(|id| found["obstacles"][id].as_u64().unwrap()).into();
+    assert!(ends[0] > 250 && ends[0] == ends[1], "{found}");
+}

@@ -1,0 +1,309 @@
+//! Scenarios of OpenSCENARIO become scenario files, or are refused by name.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::support::{closecall, code, json, message, stdout};
+
+const SCENARIO: &str = include_str!("exchange/cut-in.xosc");
+const ROAD: &str = include_str!("exchange/road.xodr");
+
+/// Writes a scenario and its road into a folder, and returns the path of the scenario.
+fn written(folder: &Path, scenario: &str, road: &str) -> PathBuf {
+    fs::write(folder.join("road.xodr"), road).unwrap();
+    let path = folder.join("case.xosc");
+    fs::write(&path, scenario).unwrap();
+    path
+}
+
+/// Imports a file with further options.
+fn imported(path: &Path, output: &Path, more: &[&str]) -> std::process::Output {
+    let (path, output) = (path.to_str().unwrap(), output.to_str().unwrap());
+    closecall([&["tool", "import", path, "-o", output], more].concat())
+}
+
+/// Returns the time (s) of an event in the printed list.
+fn time_of(said: &str, event: &str) -> f64 {
+    let line = said.lines().find(|line| line.ends_with(event)).unwrap_or_else(|| panic!("{event}: {said}"));
+    line.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_cut_in_has_the_starts_speeds_and_lane_changes_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let said = stdout(&imported(&written(folder.path(), SCENARIO, ROAD), &output, &[]), 0);
+    // The ego closes 10 m/s from 60 m to 30 m, its speed times the headway.
+    assert!((time_of(&said, "cut-in begins") - 3.0).abs() <= 0.011, "{said}");
+    assert!((time_of(&said, "cut-in ends") - 7.0).abs() <= 0.011, "{said}");
+    assert!((time_of(&said, "brake begins") - 7.5).abs() <= 0.021, "{said}");
+    assert!((time_of(&said, "brake ends") - 12.5).abs() <= 0.031, "{said}");
+    assert!(said.contains("`Slow_Truck` is named `slow-truck`"), "{said}");
+    let text = fs::read_to_string(&output).unwrap();
+    let scenario: toml::Table = toml::from_str(&text).unwrap();
+    assert_eq!(scenario["road"]["lanes"].as_integer(), Some(2));
+    assert_eq!(scenario["road"]["curvature-per-m"].as_float(), Some(0.001));
+    assert!((scenario["road"]["speed-limit-mps"].as_float().unwrap() - 120.0 / 3.6).abs() < 1e-9);
+    let actors = scenario["actor"].as_array().unwrap();
+    let start = |index: usize| &actors[index]["start"]["absolute"];
+    // The centre of the box lies ahead of the rear axle.
+    assert_eq!(start(0)["s-m"].as_float(), Some(51.4));
+    assert_eq!((start(1)["s-m"].as_float(), start(1)["lane"].as_integer()), (Some(114.0), Some(2)));
+    assert_eq!(start(1)["speed-mps"].as_float(), Some(20.0));
+    assert_eq!(actors[1]["vehicle"]["class"].as_str(), Some("truck"));
+    let driver = &actors[1]["driver"]["prescribed"];
+    assert_eq!(driver["lane-changes"][0]["to"].as_str(), Some("left"));
+    assert_eq!(driver["lane-changes"][0]["duration-s"].as_float(), Some(4.0));
+    let profile = driver["profile"].as_array().unwrap();
+    let lowest = profile.iter().map(|point| point[1].as_float().unwrap()).fold(f64::INFINITY, f64::min);
+    assert!((lowest - 10.0).abs() < 1e-6, "{text}");
+    let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
+    json(&closecall(run), 0);
+}
+
+#[test]
+fn parameters_and_the_ego_are_options() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, output) = (written(folder.path(), SCENARIO, ROAD), folder.path().join("scenario.toml"));
+    let said = stdout(&imported(&path, &output, &["--parameter", "Gap=80"]), 0);
+    assert!((time_of(&said, "cut-in begins") - 5.0).abs() <= 0.011, "{said}");
+    let refused = imported(&path, &output, &["--parameter", "Gab=80"]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("no parameter `Gab`, only EgoSpeed, Gap, Headway"), "{}", message(&refused));
+    let said = stdout(&imported(&path, &output, &["--ego", "Slow_Truck"]), 0);
+    // What the ego does in the file is said not to happen.
+    assert!(said.contains("`LateralAction` of `Slow_Truck`, the ego"), "{said}");
+    let refused = imported(&path, &output, &["--ego", "ego"]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("name one of Ego, Slow_Truck"), "{}", message(&refused));
+}
+
+#[test]
+fn a_logical_scenario_of_closecall_comes_back_as_it_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let words = ["tool", "export", "low-thw-overtake", "--form", "logical", "-o", case.to_str().unwrap()];
+    stdout(&closecall(words), 0);
+    let output = folder.path().join("scenario.toml");
+    stdout(&imported(&case.join("logical.xosc"), &output, &[]), 0);
+    let run = |scenario: &str| {
+        let words = ["run", scenario, "--sample", "4", "--seed", "2", "--sensors", "object", "--format", "json"];
+        let outcome = json(&closecall(words), 0);
+        (outcome["parameters"].clone(), outcome["collisions"].clone(), outcome["margins"].clone())
+    };
+    assert_eq!(run(output.to_str().unwrap()), run("low-thw-overtake"));
+}
+
+#[test]
+fn a_scenario_command_says_which_command_imports_xml() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(folder.path(), SCENARIO, ROAD);
+    let output = closecall(["run", path.to_str().unwrap()]);
+    assert_eq!(code(&output), 3);
+    assert!(message(&output).contains("closecall tool import"), "{}", message(&output));
+}
+
+/// Faults of a scenario: what is replaced by what, and the words that the message must have.
+fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
+    vec![
+        ("<OpenSCENARIO>", "<OpenScenario>", &["OpenSCENARIO"]),
+        ("</OpenSCENARIO>", "", &["ends before its root element"]),
+        ("revMajor=\"1\"", "revMajor=\"2\"", &[":3:", "FileHeader", "1.0 to 1.3"]),
+        ("${$EgoSpeed / 3.6}", "${$EgoFast / 3.6}", &["AbsoluteTargetSpeed", "EgoFast", "EgoSpeed"]),
+        ("${$EgoSpeed / 3.6}", "${$EgoSpeed / 0}", &["AbsoluteTargetSpeed", "finite"]),
+        ("${$EgoSpeed / 3.6}", "fast", &["AbsoluteTargetSpeed", "fast", "number"]),
+        ("${$EgoSpeed / 3.6}", "NaN", &["AbsoluteTargetSpeed", "NaN", "number"]),
+        ("road.xodr", "no-such-road.xodr", &[":11:", "LogicFile", "no-such-road.xodr"]),
+        ("roadId=\"1\"", "roadId=\"7\"", &["road.xodr", "no road `7`", "only 1"]),
+        ("laneId=\"-1\"", "laneId=\"-3\"", &["lane -3", "only -1, -2"]),
+        ("s=\"50\" offset=\"0\"", "s=\"50\" offset=\"0.5\"", &["LanePosition", "offset"]),
+        ("vehicleCategory=\"truck\"", "vehicleCategory=\"tram\"", &[":26:", "Vehicle", "tram"]),
+        ("<Dimensions length=\"12\" width=\"2.5\" height=\"4\"/>", "", &["Vehicle", "BoundingBox/Dimensions"]),
+        (
+            "entityRef=\"Slow_Truck\" value=",
+            "entityRef=\"Fast_Truck\" value=",
+            &["TimeHeadwayCondition", "Fast_Truck", "Ego, Slow_Truck"],
+        ),
+        (
+            "<LaneChangeActionDynamics dynamicsShape=\"sinusoidal\" value=\"4\"",
+            "<LaneChangeActionDynamics dynamicsShape=\"sinusoidal\" value=\"40\"",
+            &["LaneChangeAction", "1.5 to 20 s"],
+        ),
+        (
+            "RelativeTargetLane entityRef=\"Ego\" value=\"0\"",
+            "RelativeTargetLane entityRef=\"Ego\" value=\"4\"",
+            &["RelativeTargetLane", "only -1, -2"],
+        ),
+        ("<LaneChangeAction>", "<LaneOffsetAction continuous=\"false\">", &["it is no XML document"]),
+        ("TimeHeadwayCondition", "OffroadCondition", &["OffroadCondition", "not read"]),
+        (
+            "storyboardElementRef=\"cut-in\"",
+            "storyboardElementRef=\"cut-on\"",
+            &["StoryboardElementStateCondition", "cut-on"],
+        ),
+        ("conditionEdge=\"none\"", "conditionEdge=\"sharp\"", &["Condition", "sharp"]),
+        ("rule=\"lessThan\"", "rule=\"nearly\"", &["TimeHeadwayCondition", "nearly"]),
+    ]
+}
+
+#[test]
+fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let mut count = 0;
+    for (right, wrong, words) in faults() {
+        assert!(SCENARIO.contains(right), "{right}");
+        let path = written(folder.path(), &SCENARIO.replacen(right, wrong, 1), ROAD);
+        let refused = imported(&path, &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{wrong}: {said}");
+        assert!(said.contains("case.xosc:") || said.contains("road.xodr:"), "{wrong}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{wrong}: {word}: {said}");
+        }
+        assert!(!output.exists(), "{wrong}");
+        count += 1;
+    }
+    assert!(count >= 20, "{count}");
+}
+
+#[test]
+fn a_wrong_road_is_refused_with_file_line_and_element() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let faults: [(&str, &str, &str); 20] = [
+        ("<OpenDRIVE>", "<OpenStreet>", "it is no XML"),
+        ("</OpenDRIVE>", "", "ends before its root element"),
+        ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
+        ("id=\"1\"", "id=\"2\"", "no road `1`"),
+        ("id=\"1\"", "", "no road `1`"),
+        ("<planView>", "<planView><planView>", "no XML"),
+        ("planView", "plan", "no `planView`"),
+        ("curvature=\"0.001\"", "", "needs `curvature`"),
+        ("curvature=\"0.001\"", "curvature=\"round\"", "`curvature` is `round`"),
+        ("curvature=\"0.001\"", "curvature=\"inf\"", "`curvature` is `inf`"),
+        ("<arc curvature=\"0.001\"/>", "", "no geometry"),
+        ("lanes>", "ways>", "no `lanes`"),
+        ("laneSection", "section", "no `laneSection`"),
+        ("right>", "left>", "no lanes on the right"),
+        ("type=\"driving\"", "type=\"walking\"", "no driving lane"),
+        ("id=\"-1\"", "id=\"one\"", "`id` is `one`"),
+        ("a=\"3.5\"", "", "needs `a`"),
+        ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
+        ("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", "", "no `width`"),
+        ("a=\"3.5\"", "a=\"35\"", "lane-width-m"),
+    ];
+    for (right, wrong, word) in faults {
+        assert!(ROAD.contains(right), "{right}");
+        let road = match word {
+            "`OpenDRIVE`"
+            | "no `planView`"
+            | "no `lanes`"
+            | "no `laneSection`"
+            | "no lanes on the right"
+            | "no driving lane"
+            | "lane-width-m" => ROAD.replace(right, wrong),
+            _ => ROAD.replacen(right, wrong, 1),
+        };
+        let refused = imported(&written(folder.path(), SCENARIO, &road), &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{wrong}: {said}");
+        assert!(said.contains(word), "{wrong}: {word}: {said}");
+        assert!(!output.exists(), "{wrong}");
+    }
+}
+
+#[test]
+fn an_entity_bomb_is_refused_before_it_grows() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let bomb = format!(
+        "<!DOCTYPE OpenSCENARIO [<!ENTITY a \"{}\">{}]>",
+        "lol".repeat(100),
+        (1..10)
+            .map(|level| format!("<!ENTITY a{level} \"{}\">", format!("&a{};", level - 1).repeat(10)))
+            .collect::<String>()
+    );
+    let with_bomb = SCENARIO.replacen("<OpenSCENARIO>", &format!("{bomb}<OpenSCENARIO>"), 1);
+    let refused = imported(&written(folder.path(), &with_bomb, ROAD), &output, &[]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("document type declaration"), "{}", message(&refused));
+    // Without its declaration, the name stands for nothing.
+    let with_name = SCENARIO.replacen("a cut-in, for tests", "&a9;", 1);
+    let refused = imported(&written(folder.path(), &with_name, ROAD), &output, &[]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("FileHeader"), "{}", message(&refused));
+    let deep = format!("{}{}", "<a>".repeat(100_000), "</a>".repeat(100_000));
+    let refused = imported(&written(folder.path(), &deep, ROAD), &output, &[]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("200 levels"), "{}", message(&refused));
+    assert!(!output.exists());
+}
+
+/// The scenarios of others that are imported; all others are refused, each at a line and an element.
+const IMPORTED: [&str; 9] = [
+    "alks_decelerate",
+    "cut-in",
+    "highway_driver",
+    "slow-lead-vehicle",
+    "alks_scenario_4_1_1_free_driving_template",
+    "alks_scenario_4_3_1_follow_lead_vehicle_comfortable_template",
+    "alks_scenario_4_3_2_follow_lead_vehicle_emergency_brake_template",
+    "alks_scenario_4_4_1_cut_in_no_collision_template",
+    "alks_scenario_4_4_2_cut_in_unavoidable_collision_template",
+];
+
+#[test]
+fn each_scenario_of_others_is_imported_and_runs_or_is_refused_by_name() {
+    let Some(data) = closecall_testing::data() else { return };
+    let folders = ["esmini_openx/xosc", "osc_alks/concrete_scenarios", "osc_alks"].map(|name| data.join(name));
+    if folders.iter().any(|folder| !folder.is_dir()) {
+        closecall_testing::skip(closecall_testing::Need::Data, "CLOSECALL_DATA has no esmini_openx and osc_alks");
+        return;
+    }
+    let work = tempfile::tempdir().unwrap();
+    let output = work.path().join("scenario.toml");
+    let (mut ran, mut refused) = (Vec::new(), 0);
+    for folder in folders {
+        let entries = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        for path in entries.filter(|path| path.extension().is_some_and(|end| end == "xosc")) {
+            let _ = fs::remove_file(&output);
+            let result = imported(&path, &output, &[]);
+            let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
+            if code(&result) == 0 {
+                let scenario = output.to_str().unwrap();
+                let run = ["run", scenario, "--sensors", "ground-truth", "--set", "duration-s=25", "--format", "json"];
+                json(&closecall(run), 0);
+                ran.push(stem);
+            } else {
+                let said = message(&result);
+                assert_eq!(code(&result), 3, "{said}");
+                assert!(said.contains(".xosc:") && said.contains('`'), "{said}");
+                assert!(!output.exists(), "{said}");
+                refused += 1;
+            }
+        }
+    }
+    ran.sort();
+    let mut expected: Vec<_> = IMPORTED.map(str::to_owned).into();
+    expected.sort();
+    assert_eq!(ran, expected);
+    assert!(refused >= 20, "{refused}");
+}
+
+#[test]
+fn the_events_of_a_cut_in_are_those_of_esmini_within_a_step() {
+    let Some(data) = closecall_testing::data() else { return };
+    let path = data.join("esmini_openx/xosc/cut-in.xosc");
+    if !path.is_file() {
+        closecall_testing::skip(closecall_testing::Need::Data, "CLOSECALL_DATA has no esmini_openx");
+        return;
+    }
+    // The step of esmini's test, and the rounding of a time to it.
+    const STEP_S: f64 = 0.01 + 1e-9;
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    assert!((time_of(&said, "OvertakerBrakeEvent begins") - 7.74).abs() <= STEP_S, "{said}");
+    assert!((time_of(&said, "CutInManeuver ends") - 16.74).abs() <= STEP_S, "{said}");
+}
