@@ -46,6 +46,8 @@ struct Found {
     speed_mps: f64,
     /// Number of steps in which a track has another class.
     misclassified: usize,
+    /// Number of steps in which a track is not in the lane of the vehicle, so that the lane would count as free.
+    in_other_lane: usize,
 }
 
 /// Lets the vehicle pass, with the random numbers of this sample.
@@ -91,6 +93,8 @@ fn pass(passing: &Passing, sample: u64) -> Found {
             if step >= since + SETTLED_STEPS {
                 found.speed_mps = found.speed_mps.max((track.vx_mps() - truck.state.speed_mps).abs());
                 found.misclassified += usize::from(track.class.best_vehicle_class() != VehicleClass::Truck);
+                let lane = if passing.left_m > 0.0 { 0 } else { 2 };
+                found.in_other_lane += usize::from(!(track.lane[lane] >= 0.5));
             }
         }
         for vehicle in [&mut ego, &mut truck] {
@@ -121,7 +125,8 @@ fn assert_one_track(cases: &[Passing]) {
         let found = pass(passing, sample);
         let is_one = found.ids.len() == 1 && found.several == 0;
         let is_followed = 4 * found.confirmed_steps > found.steps;
-        if !(is_one && is_followed && found.speed_mps <= SPEED_MPS && found.misclassified == 0) {
+        let is_right = found.speed_mps <= SPEED_MPS && found.misclassified == 0 && found.in_other_lane == 0;
+        if !(is_one && is_followed && is_right) {
             wrong.push(format!("{passing:?}: {found:?}"));
         }
     }

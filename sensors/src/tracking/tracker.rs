@@ -150,12 +150,16 @@ impl TrackState {
         seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
     }
 
-    /// Returns the positions along the road between which parts of the vehicle lie (m). A front that is out of view may be anywhere.
+    /// Returns the positions along the road between which parts of the vehicle lie (m). A front that is out of view may be that of the
+    /// longest truck.
     fn span_m(&self) -> [f64; 2] {
         let [along, _] = self.filter.estimate();
         match self.ends.has_front {
             true => [along.position_m - self.size_m().0, along.position_m + FRONT_MARGIN_M],
-            false => [along.position_m - self.ends.rearmost_m, f64::INFINITY],
+            false => {
+                let rear_m = along.position_m - self.ends.rearmost_m;
+                [rear_m, rear_m + LONGEST_TRUCK_M]
+            }
         }
     }
 
