@@ -5,7 +5,7 @@ use closecall_traffic::{CONTROL_STEP, ClassScores};
 use crate::detection_classifier::DetectionClassifier;
 use crate::faults::Faults;
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::{Detection, Extent, Scene, SensorError};
+use crate::{Detection, Extent, Scene, SeenPart, SensorError};
 
 /// Distance by which a detection may lie outside of the box of its vehicle (m): an assumption, more than the error of any
 /// box and less than the distance of two vehicles.
@@ -75,6 +75,7 @@ pub(crate) fn give_true_boxes(detections: &mut [Detection], others: &[OtherVehic
         (detection.heading_rad, detection.length_m, detection.width_m) =
             (other.heading_rad, other.length_m, other.width_m);
         (detection.length, detection.width) = (Extent::Seen, Extent::Seen);
+        detection.seen = SeenPart::FACE;
     }
 }
 

@@ -10,7 +10,7 @@ use crate::camera::{FOCAL_PX, Instance, RearCamera, is_beside_road, overlap};
 use crate::tracking::LaneGeometry;
 use closecall_traffic::{ClassScores, Time, maths};
 
-use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy};
+use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, SeenPart};
 
 /// Share of the smaller of two boxes that both have in common, from which an instance and a detection belong together (assumption:
 /// a cluster may be a part of the vehicle, and the length of its box is often assumed).
@@ -178,6 +178,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         seen_by: SeenBy::CameraAlone,
         points: ALONE_POINTS,
         is_centred: false,
+        seen: SeenPart::FACE,
         class: ClassScores(scores),
     };
     (!is_beside_road(&detection, lane)).then_some(detection)

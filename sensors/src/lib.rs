@@ -33,7 +33,7 @@ mod tests;
 pub mod tracking;
 mod worker_classifier;
 
-pub use crate::tracking::{Detection, Extent, SeenBy, TrackerConfig, TrackerModel};
+pub use crate::tracking::{Detection, Extent, SeenBy, SeenPart, TrackerConfig, TrackerModel};
 pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use closecall_traffic::{Scene, SceneVehicle};

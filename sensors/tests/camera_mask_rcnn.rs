@@ -131,6 +131,45 @@ fn the_layout_of_torchvision_is_read_with_a_batch_and_with_masks_of_the_size_of_
     assert_eq!(found[0].mask.extent_px(), Some([0.0, 0.0, 1280.0, 800.0]));
 }
 
+/// Returns the error of a network whose file is `bytes`, with these values for the colours of a pixel.
+fn error_of(bytes: &[u8], input: MaskRcnnInput, backend: &Backend) -> String {
+    let labels = LabelMap::parse("3=car 8=truck 4=motorcycle").unwrap();
+    let detector = InstanceDetector::new(bytes, Some(&labels), backend).unwrap();
+    let mut detector = detector.with_input(input).with_name("own.onnx");
+    let [width, height] = [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
+    let picture = Image { width: width as u32, height: height as u32, rgb: vec![0; width * height * 3] };
+    detector.detect(&picture).unwrap_err().to_string()
+}
+
+/// Returns the bytes of a file with the first occurrence of a number replaced by another one.
+fn replaced(bytes: &[u8], from: f32, to: f32) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    let place = bytes.windows(4).position(|window| window == from.to_le_bytes()).expect("the number");
+    bytes[place..place + 4].copy_from_slice(&to.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn an_answer_that_is_no_box_or_no_probability_is_an_error_that_names_network_and_tensor() {
+    let Some(backend) = backend() else { return };
+    let zoo = include_bytes!("mask_rcnn_layouts/model-zoo.onnx");
+    let torchvision = include_bytes!("mask_rcnn_layouts/torchvision.onnx");
+    let rgb = |bytes: &[u8]| error_of(bytes, MaskRcnnInput::Rgb, &backend);
+    // The boxes have 700 for the left side of one, and 480 for its lower side.
+    for side in [f32::NAN, f32::INFINITY, 900.0] {
+        let error = rgb(&replaced(torchvision, 700.0, side));
+        assert!(error.contains("own.onnx") && error.contains("`boxes`"), "{error}");
+    }
+    // The scores are the values of the first pixel and the mean of its channel, as a share of 255.
+    for mean in [f32::NAN, f32::NEG_INFINITY, 7.0 * 255.0, -1.0] {
+        let error = rgb(&replaced(zoo, 102.9801, mean));
+        assert!(error.contains("own.onnx") && error.contains("`6572`") && error.contains("0 to 1"), "{error}");
+    }
+    // A network that takes shares of full brightness, and gets bytes less their means.
+    let error = error_of(torchvision, MaskRcnnInput::BgrMean, &backend);
+    assert!(error.contains("own.onnx") && error.contains("`scores`"), "{error}");
+}
+
 #[test]
 fn a_network_without_labels_is_refused() {
     let Some(backend) = backend() else { return };

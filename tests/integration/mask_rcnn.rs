@@ -90,6 +90,27 @@ fn a_network_with_another_layout_is_refused_before_any_work() {
 }
 
 #[test]
+fn a_network_whose_scores_are_no_probabilities_ends_the_samples_in_an_error_that_names_it() {
+    let Some(library_file) = closecall_testing::onnxruntime() else { return };
+    let scenario = library("low-thw-overtake");
+    let folder = folder();
+    let out = folder.path().join("out");
+    let model = "sensors/tests/mask_rcnn_layouts/torchvision.onnx";
+    let network = format!("sensors.rear-camera.mask-rcnn.model={model}");
+    // The network takes shares of full brightness, not bytes less their means.
+    let [labels, input] = ["labels=3=car 8=truck 4=motorcycle", "input=bgr-mean"]
+        .map(|value| format!("sensors.rear-camera.mask-rcnn.{value}"));
+    let sets = ["--set", &network, "--set", &labels, "--set", &input];
+    let more = [&["--onnxruntime", library_file.to_str().unwrap()], &sets[..]].concat();
+    let output = closecall(campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
+    let text = format!("{}{}", stderr(&output), String::from_utf8_lossy(&output.stdout));
+    assert_eq!(code(&output), 5, "{text}");
+    for part in [model, "`scores`", "probabilities from 0 to 1"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
 fn one_and_three_jobs_give_the_same_bits() {
     let Some(library_file) = closecall_testing::onnxruntime() else { return };
     let scenario = library("low-thw-overtake");

@@ -53,7 +53,7 @@ impl Detector {
     /// # Errors
     /// [`AerialError::Network`] if the backend cannot be loaded, or if the process uses another one.
     pub fn shipped(backend: &Backend) -> Result<Self, AerialError> {
-        Ok(Self { network: Network::new(SHIPPED_DETECTOR, backend)?, planes: Vec::new() })
+        Ok(Self { network: Network::new("aerial-detector.onnx", SHIPPED_DETECTOR, backend)?, planes: Vec::new() })
     }
 
     /// Returns the vehicles in a picture with a score of at least `from`, the best first. Both sides of the picture are

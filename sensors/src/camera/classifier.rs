@@ -92,12 +92,31 @@ pub enum ClassifierError {
         reason: String,
     },
     /// The output of the network is not four probabilities.
-    #[error("failed to read the classifier's answer: {found:?} are not four probabilities")]
+    #[error(
+        "failed to read the answer of {SHIPPED_FILE}: {found:?} in its tensor `{tensor}` are not four probabilities"
+    )]
     Answer {
+        /// The name of the output.
+        tensor: String,
         /// The values that the network returned.
         found: Vec<String>,
     },
+    /// The network returned a value that its output cannot have.
+    #[error("failed to read the answer of {model}: its tensor `{tensor}` has {value}, but {allowed} are needed")]
+    Value {
+        /// The name of the network, or the path of its file.
+        model: String,
+        /// The name of the output.
+        tensor: String,
+        /// The value, and where it is.
+        value: String,
+        /// What the values must be.
+        allowed: &'static str,
+    },
 }
+
+/// Name of the file of [`SHIPPED_MODEL`].
+const SHIPPED_FILE: &str = "rear-classifier.onnx";
 
 /// The network, loaded into one inference session.
 #[derive(Debug)]
@@ -145,14 +164,16 @@ impl Classifier {
         clear_upper_parts();
         let outputs = outputs.map_err(run)?;
         let (_, output) = outputs[0].try_extract_tensor::<f32>().map_err(run)?;
-        scores_from(output)
+        let invalid = |found| ClassifierError::Answer { tensor: outputs.keys().next().unwrap_or("").to_owned(), found };
+        scores_from(output).map_err(invalid)
     }
 }
 
-fn scores_from(output: &[f32]) -> Result<ClassScores, ClassifierError> {
+/// Returns the class scores of an output, or its values if they are not four probabilities.
+fn scores_from(output: &[f32]) -> Result<ClassScores, Vec<String>> {
     /// Four probabilities in single precision sum to 1 within this tolerance.
     const TOLERANCE: f64 = 1e-4;
-    let invalid_output = || ClassifierError::Answer { found: output.iter().map(f32::to_string).collect() };
+    let invalid_output = || output.iter().map(f32::to_string).collect::<Vec<_>>();
     let probabilities: [f32; 4] = output.try_into().map_err(|_| invalid_output())?;
     let probabilities = probabilities.map(f64::from);
     let sum: f64 = probabilities.iter().sum();

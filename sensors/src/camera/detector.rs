@@ -35,6 +35,13 @@ const WANTED: &str = "an input float [3, 800, 1280] or [1, 3, 800, 1280] (sides 
 /// Rows and columns of the image.
 const IMAGE: [usize; 2] = [HEIGHT_PX as usize, WIDTH_PX as usize];
 
+/// Name of the file of [`SHIPPED_MASK_RCNN`].
+const SHIPPED_FILE: &str = "rear-mask-rcnn.onnx";
+/// Allowed scores and masks.
+const PROBABILITIES: &str = "probabilities from 0 to 1";
+/// Difference by which a probability in single precision may be outside of 0 to 1.
+const ROUNDING: f32 = 1e-4;
+
 /// A network, loaded into one inference session.
 #[derive(Debug)]
 pub struct InstanceDetector {
@@ -45,6 +52,8 @@ pub struct InstanceDetector {
     outputs: [String; 4],
     sampling: Sampling,
     labels: LabelMap,
+    /// Name of the network in errors.
+    name: String,
     colours: MaskRcnnInput,
     /// Rows and columns of the input: those of the image, or those of the pixels that the network reads.
     sides: [usize; 2],
@@ -94,7 +103,13 @@ impl InstanceDetector {
         let takes_sampled = word("closecall.takes-sampled").is_some_and(|text| text == "yes");
         let sides = if takes_sampled { [sampling.rows().len(), sampling.columns().len()] } else { IMAGE };
         let (colours, planes) = (MaskRcnnInput::Rgb, vec![0.0; sides[0] * sides[1] * CHANNELS]);
-        Ok(Self { session, input, outputs, sampling, labels, colours, sides, planes })
+        Ok(Self { session, input, outputs, sampling, labels, name: SHIPPED_FILE.to_owned(), colours, sides, planes })
+    }
+
+    /// Returns the same network, whose errors name it so: the path of its file.
+    #[must_use]
+    pub fn with_name(self, name: &str) -> Self {
+        Self { name: name.to_owned(), ..self }
     }
 
     /// Returns the same network, which takes these values for the colours of a pixel. [`MaskRcnnInput::Rgb`] is usual.
@@ -112,7 +127,8 @@ impl InstanceDetector {
     /// network. The same picture always gives the same bits.
     ///
     /// # Errors
-    /// [`ClassifierError::Run`] if inference fails, and [`ClassifierError::Layout`] if an output has another shape.
+    /// [`ClassifierError::Run`] if inference fails, [`ClassifierError::Layout`] if an output has another shape, and
+    /// [`ClassifierError::Value`] if a box is not finite or has no sides, or a score or a mask is not a probability.
     pub fn detect(&mut self, picture: &Image) -> Result<Vec<Instance>, ClassifierError> {
         self.fill(picture);
         let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
@@ -121,7 +137,7 @@ impl InstanceDetector {
         let input = TensorRef::from_array_view((&sides[4 - rank..], self.planes.as_slice())).map_err(run)?;
         let outputs = self.session.run(ort::inputs![name.as_str() => input]);
         clear_upper_parts();
-        instances(&outputs.map_err(run)?, &self.outputs, &self.labels)
+        instances(&outputs.map_err(run)?, &self.outputs, (&self.labels, &self.name))
     }
 }
 
@@ -147,9 +163,10 @@ impl InstanceDetector {
 /// Returns the instances of the network's outputs.
 fn instances(
     outputs: &SessionOutputs<'_>,
-    [boxes, labels, scores, masks]: &[String; 4],
-    map: &LabelMap,
+    names: &[String; 4],
+    (map, model): (&LabelMap, &str),
 ) -> Result<Vec<Instance>, ClassifierError> {
+    let [boxes, labels, scores, masks] = names;
     let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
     let (boxes_shape, boxes) = outputs[boxes.as_str()].try_extract_tensor::<f32>().map_err(run)?;
     let (labels_shape, labels) = outputs[labels.as_str()].try_extract_tensor::<i64>().map_err(run)?;
@@ -163,15 +180,27 @@ fn instances(
             format!("boxes {boxes_shape:?}, labels {labels_shape:?}, scores {scores_shape:?}, masks {masks_shape:?}");
         return Err(ClassifierError::Layout { found, wanted: WANTED });
     }
+    let check = |tensor: &String, place: Option<usize>, values: &[f32], allowed: &'static str| {
+        let Some(index) = place else { return Ok(()) };
+        let value = format!("{} as value {index}", values[index]);
+        Err(ClassifierError::Value { model: model.to_owned(), tensor: tensor.clone(), value, allowed })
+    };
+    let is_no_box =
+        |sides: &[f32]| sides.iter().any(|side| !side.is_finite()) || sides[2] < sides[0] || sides[3] < sides[1];
+    let wrong_side = |sides: &[f32]| sides.iter().position(|side| !side.is_finite()).unwrap_or(2);
+    let wrong_box = boxes.chunks_exact(4).enumerate().find(|(_, sides)| is_no_box(sides));
+    let wrong_box = wrong_box.map(|(index, sides)| 4 * index + wrong_side(sides));
+    check(&names[0], wrong_box, boxes, "finite sides: left, top, right beyond left, and bottom beyond top (px)")?;
+    let is_no_probability = |value: &f32| !(-ROUNDING..=1.0 + ROUNDING).contains(value);
+    check(&names[2], scores.iter().position(is_no_probability), scores, PROBABILITIES)?;
+    check(&names[3], masks.iter().position(is_no_probability), masks, PROBABILITIES)?;
     let is_image = [columns, rows] == [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
     let found = (0..count).filter_map(|index| {
         let box_px: [f64; 4] = std::array::from_fn(|part| f64::from(boxes[4 * index + part]));
         let class = map.class(labels[index])?;
         let area_px = if is_image { [0.0, 0.0, WIDTH_PX.into(), HEIGHT_PX.into()] } else { box_px };
         let mask = Mask::new(area_px, [columns, rows], masks[index * rows * columns..][..rows * columns].to_vec())?;
-        let score = f64::from(scores[index]);
-        let is_finite = score.is_finite() && box_px.iter().all(|part| part.is_finite());
-        is_finite.then_some(Instance { box_px, class, score, mask })
+        Some(Instance { box_px, class, score: f64::from(scores[index]).clamp(0.0, 1.0), mask })
     });
     Ok(found.collect())
 }

@@ -123,7 +123,7 @@ mod tests {
     use closecall_traffic::{CONTROL_STEP, VehicleClass};
 
     use super::*;
-    use crate::tracking::{Extent, SeenBy};
+    use crate::tracking::{Extent, SeenBy, SeenPart};
 
     fn at(face_x_m: f64, face_y_m: f64) -> Detection {
         Detection {
@@ -141,6 +141,7 @@ mod tests {
             seen_by: SeenBy::Lidar,
             points: 50,
             is_centred: false,
+            seen: SeenPart::FACE,
             class: ClassScores::UNKNOWN,
         }
     }

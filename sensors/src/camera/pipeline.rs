@@ -165,7 +165,7 @@ mod tests {
 
     use super::*;
     use crate::camera::CameraConfig;
-    use crate::tracking::{Extent, SeenBy};
+    use crate::tracking::{Extent, SeenBy, SeenPart};
 
     fn vehicle(class: VehicleClass, s_m: f64) -> SceneVehicle {
         let state = VehicleState { s_m, d_m: -5.6, speed_mps: 30.0, ..VehicleState::default() };
@@ -188,6 +188,7 @@ mod tests {
             seen_by: SeenBy::Lidar,
             points: 50,
             is_centred: false,
+            seen: SeenPart::FACE,
             class: ClassScores::UNKNOWN,
         }
     }

@@ -55,7 +55,7 @@ impl MaskRcnn {
             }
             other => other,
         });
-        Ok(detector?.with_input(self.input))
+        Ok(detector?.with_input(self.input).with_name(path))
     }
 }
 

@@ -38,6 +38,7 @@ fn detection(class: VehicleClass, face_x_m: f64, face_y_m: f64) -> Detection {
         seen_by: SeenBy::Lidar,
         points: 50,
         is_centred: false,
+        seen: crate::SeenPart::FACE,
         class: ClassScores::UNKNOWN,
     }
 }

@@ -12,7 +12,7 @@ use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
 use crate::tracking::SIDE_PROTRUSION_M;
 
-use crate::{Detection, Extent, SeenBy, SensorError};
+use crate::{Detection, Extent, SeenBy, SeenPart, SensorError};
 
 /// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
 const OCCLUSION_COLUMNS: f64 = 3.0;
@@ -307,6 +307,12 @@ fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, la
         seen_by: SeenBy::Lidar,
         points: fit.points,
         is_centred: is_pair || across.is_by_plate,
+        seen: SeenPart {
+            is_cut: fit.is_truncated() && fit.sees_side(),
+            along_m: [fit.rear_u_m, fit.front_u_m].map(|u_m| u_m - front_u_m),
+            across_m: fit.across_m.map(|v_m| v_m - across.middle_m),
+            spacing_m: [fit.rear_u_m, fit.front_u_m].map(|u_m| side_spacing_m(fit, u_m)),
+        },
         class,
     }
 }
@@ -342,11 +348,17 @@ fn has_seen_length(fit: &BoxFit) -> bool {
 
 /// Returns true if the columns hit the side so densely that its farthest point is the rear end.
 fn sees_rear(fit: &BoxFit) -> bool {
+    side_spacing_m(fit, fit.rear_u_m) < SIDE_SPACING_M
+}
+
+/// Returns the spacing of the columns on the side at the position `u_m` along the box's heading (m); infinite if the box is straight
+/// behind the sensor, so that no side is seen.
+fn side_spacing_m(fit: &BoxFit, u_m: f64) -> f64 {
     // At distance r and lateral offset y, columns with the azimuth step Δφ hit a side every Δφ·r²/y.
     let (sin, cos) = maths::sin_cos(fit.heading_rad);
     let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);
-    let (x, y) = (fit.rear_u_m * cos - middle * sin, fit.rear_u_m * sin + middle * cos);
+    let (x, y) = (u_m * cos - middle * sin, u_m * sin + middle * cos);
     let step_rad = fit.spacing_m / fit.range_m.max(1.0);
     let y = y - fit.sensor_y_m;
-    y.abs() > 1.0 && step_rad * (x * x + y * y) / y.abs() < SIDE_SPACING_M
+    if y.abs() > 1.0 { step_rad * (x * x + y * y) / y.abs() } else { f64::INFINITY }
 }

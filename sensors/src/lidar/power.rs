@@ -13,8 +13,9 @@
 //! scatter of the intensities.
 //!
 //! Calibration: P = 1 for a surface of reflectivity 0.5 that faces the sensor and fills the footprint at the nominal
-//! range (200 m), in air that does not attenuate. A surface of reflectivity 0.8 is then detected with probability 0.9
-//! up to 226 m, and one of reflectivity 0.1 up to 80 m.
+//! range, in air that does not attenuate. The nominal range of the SCALA, 200 m, is an assumption, and so are the reflectivity and the
+//! probability that it refers to: the maker publishes none of them. 150 to 250 m are plausible. A surface of reflectivity 0.8 is then
+//! detected with probability 0.9 up to 226 m, and one of reflectivity 0.1 up to 80 m.
 
 use closecall_traffic::{Environment, KOSCHMIEDER, maths, rain_db_per_km};
 

@@ -2,6 +2,7 @@
 
 mod fixed_gap;
 mod front;
+mod long_vehicles;
 mod several_lidars;
 mod silhouettes;
 mod tracking;

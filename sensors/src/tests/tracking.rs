@@ -13,7 +13,7 @@ use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::tracking::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
 use crate::tracking::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use crate::tracking::{RearView, TrackList, Tracker, TrackerScan};
-use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, TrackAudit, TrackerConfig};
+use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, SeenPart, TrackAudit, TrackerConfig};
 use closecall_traffic::{StandardNormal, ego_frame::EgoFrame, maths};
 
 const LEFT_LANE_M: f64 = -1.875;
@@ -160,6 +160,7 @@ impl Bench {
                 seen_by: SeenBy::Lidar,
                 points: 20,
                 is_centred: false,
+                seen: SeenPart::FACE,
                 class: ClassScores([0.6, 0.1, 0.1, 0.2]),
             });
         }

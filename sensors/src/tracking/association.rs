@@ -31,9 +31,9 @@ fn to_integer(cost: f64) -> i64 {
 
 /// Writes into `assigned` the index in `measurements` of each track's detection, or `None` if it has none.
 ///
-/// Each track is given by its filter and half of its length (m). `costs` is memory that the next call may reuse.
+/// Each track is given by its filter, half of its length (m), and whether it follows a face. `costs` is memory that the next call may reuse.
 pub(crate) fn assign<'a>(
-    tracks: impl ExactSizeIterator<Item = (&'a RoadFilter, f64)>,
+    tracks: impl ExactSizeIterator<Item = (&'a RoadFilter, f64, bool)>,
     measurements: &[Measurement],
     costs: &mut Assignment,
     assigned: &mut Vec<Option<usize>>,
@@ -46,9 +46,11 @@ pub(crate) fn assign<'a>(
     }
     // The additional column of each track stands for "no detection".
     costs.begin(rows, detections + rows, FORBIDDEN);
-    for (row, (track, half_length_m)) in tracks.enumerate() {
+    for (row, (track, half_length_m, has_face)) in tracks.enumerate() {
         let mut largest_log_variance = f64::NEG_INFINITY;
-        for (column, measurement) in measurements.iter().enumerate() {
+        // Where the face of a vehicle that is cut off lies is not measured.
+        let whole = measurements.iter().enumerate().filter(|(_, measurement)| has_face && !measurement.seen.is_cut);
+        for (column, measurement) in whole {
             let axes = track.fit(measurement, half_length_m);
             let sum = |of: fn(&AxisFit) -> f64| of(&axes[0]) + of(&axes[1]);
             if sum(|axis| axis.squared_distance) <= GATE {
@@ -71,6 +73,7 @@ mod tests {
 
     use super::*;
     use crate::tracking::axis::AxisMeasurement;
+    use crate::tracking::road_filter::Span;
 
     fn track(s_m: f64, d_m: f64) -> RoadFilter {
         RoadFilter::new(&measurement(s_m, d_m), 0.0, None)
@@ -78,12 +81,14 @@ mod tests {
 
     fn measurement(s_m: f64, d_m: f64) -> Measurement {
         let axis = |position_m| AxisMeasurement { position_m, white_sd_m: 0.5, slow_sd_m: 0.0, time_offset_s: 0.0 };
-        Measurement { along: axis(s_m), across: axis(d_m), is_part: false, knows_middle: true }
+        let seen =
+            Span { is_cut: false, is_face: true, along_m: [s_m; 2], across_m: [d_m; 2], spacing_m: [f64::INFINITY; 2] };
+        Measurement { along: axis(s_m), across: axis(d_m), is_part: false, knows_middle: true, seen }
     }
 
     fn assignment(tracks: &[RoadFilter], measurements: &[Measurement]) -> Vec<Option<usize>> {
         let mut assigned = Vec::new();
-        assign(tracks.iter().map(|track| (track, 0.0)), measurements, &mut Assignment::new(), &mut assigned);
+        assign(tracks.iter().map(|track| (track, 0.0, true)), measurements, &mut Assignment::new(), &mut assigned);
         assigned
     }
 

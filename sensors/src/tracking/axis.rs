@@ -204,6 +204,14 @@ impl AxisFilter {
         }
     }
 
+    /// Moves the point that the filter follows by `offset_m`, which is known with the variance `variance_m2`.
+    pub(crate) fn shift(&mut self, offset_m: f64, variance_m2: f64) {
+        for estimate in &mut self.estimates[..self.modes.len()] {
+            estimate.state[0] += offset_m;
+            estimate.covariance[(0, 0)] += variance_m2;
+        }
+    }
+
     /// Corrects the filter with a measured position.
     #[inline]
     pub fn measure_position(&mut self, measurement: &AxisMeasurement) {

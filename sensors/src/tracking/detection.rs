@@ -18,6 +18,25 @@ pub enum Extent {
     Assumed,
 }
 
+/// The part of a vehicle that a scan shows, relative to the middle of the detection's face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenPart {
+    /// Whether the field of view cuts off the vehicle's side, so that its nearest face is out of view. The face of the detection is then
+    /// an assumption.
+    pub is_cut: bool,
+    /// Distances along the box's heading of the rearmost and of the foremost point (m), positive ahead of the face.
+    pub along_m: [f64; 2],
+    /// Distances across the box's heading of the rightmost and of the leftmost point (m), positive to the left.
+    pub across_m: [f64; 2],
+    /// Spacing of the columns on the side at the rearmost and at the foremost point (m), infinite if no side is seen.
+    pub spacing_m: [f64; 2],
+}
+
+impl SeenPart {
+    /// A face of which no extent is known.
+    pub const FACE: Self = Self { is_cut: false, along_m: [0.0; 2], across_m: [0.0; 2], spacing_m: [f64::INFINITY; 2] };
+}
+
 /// The sensor that found a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeenBy {
@@ -62,6 +81,8 @@ pub struct Detection {
     /// Whether the seen parts are symmetric about the middle of the vehicle, as a plate or both headlamps are. Otherwise, a few points
     /// may be a part off the middle.
     pub is_centred: bool,
+    /// The part of the vehicle that is seen.
+    pub seen: SeenPart,
     /// Class scores from the box's shape, or from the camera if it has classified the box.
     pub class: ClassScores,
 }

@@ -11,6 +11,8 @@ use crate::tracking::{Detection, Extent};
 const MEASURED_SD_M: f64 = 0.3;
 /// Least variance of an averaged extent (m²), so that later scans can still correct a slow error.
 const MIN_VARIANCE_M2: f64 = 0.003;
+/// Share of a length beyond the present one by which it grows in one scan (assumption).
+const GROWTH_SHARE: f64 = 0.3;
 
 /// The estimate of one extent.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,6 +21,8 @@ struct ExtentEstimate {
     measured: Option<(f64, f64)>,
     /// The latest assumed extent (m).
     assumed_m: f64,
+    /// The extent that parts of the vehicle have shown together (m): it is at least as long.
+    least_m: f64,
 }
 
 impl ExtentEstimate {
@@ -38,7 +42,8 @@ impl ExtentEstimate {
 
     /// Returns the extent of a track whose class has the usual extent `usual_m`.
     fn value_m(&self, usual_m: f64) -> f64 {
-        self.measured.map_or(usual_m.max(self.assumed_m), |(mean_m, _)| mean_m)
+        let extent_m = self.measured.map_or(usual_m.max(self.assumed_m), |(mean_m, _)| mean_m);
+        extent_m.max(self.least_m)
     }
 }
 
@@ -54,6 +59,18 @@ impl TrackExtent {
     pub(crate) fn update(&mut self, detection: &Detection) {
         self.length.update(detection.length_m, detection.length);
         self.width.update(detection.width_m, detection.width);
+    }
+
+    /// Lets the length grow towards the distance between two ends of the vehicle's parts, which it has at least.
+    ///
+    /// A single scan that takes a part of another vehicle for one of this vehicle changes it little.
+    pub(crate) fn span_length(&mut self, length_m: f64) {
+        self.length.least_m += GROWTH_SHARE * (length_m - self.length.least_m).max(0.0);
+    }
+
+    /// Returns the length that parts of the vehicle have shown together (m); 0 before there are several.
+    pub(crate) fn spanned_m(&self) -> f64 {
+        self.length.least_m
     }
 
     /// Returns length and width (m) of a track with the class scores `class`.

@@ -8,7 +8,7 @@
 use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::axis::AxisMeasurement;
-use super::road_filter::Measurement;
+use super::road_filter::{Measurement, Span};
 use crate::tracking::{Detection, Extent};
 use closecall_traffic::ego_frame::EgoFrame;
 
@@ -36,6 +36,9 @@ const PART_SD_M: f64 = 0.2;
 /// Maximum distance of a lamp or a plate from the middle of a car or truck (m). Nothing else is seen of a vehicle with
 /// dark paint or in fog.
 const MAX_PART_OFFSET_M: f64 = 0.8;
+
+/// Score from which a class is sure enough to tell a vehicle from a part of a truck (assumption).
+pub(crate) const SURE_SCORE: f64 = 0.7;
 
 /// Converts a detection to a measurement, for a scan that ended at `time` with the ego's frame `frame`.
 pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Time) -> Measurement {
@@ -68,7 +71,21 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
         across: axis(d_m, lateral_sd_m, ACROSS_SLOW_SHARE * lateral_sd_m * lateral_sd_m),
         is_part: part_offset_sd_m > PART_SD_M,
         knows_middle: (detection.is_centred || detection.width == Extent::Seen) && lateral_sd_m <= PART_SD_M,
+        // A vehicle follows the road closely enough for its sides to be along it.
+        seen: Span {
+            is_cut: detection.seen.is_cut,
+            is_face: !detection.seen.is_cut && is_face(detection),
+            along_m: detection.seen.along_m.map(|along_m| s_m + along_m),
+            across_m: detection.seen.across_m.map(|across_m| d_m + across_m),
+            spacing_m: detection.seen.spacing_m,
+        },
     }
+}
+
+/// Returns whether a detection shows the face of a vehicle rather than a wheel, a guard or the tail of a truck: both of its edges are
+/// seen, and it is classified as a vehicle. A classifier alone takes the wheels of a truck for a car.
+fn is_face(detection: &Detection) -> bool {
+    detection.width == Extent::Seen && detection.class.0[detection.class.best_vehicle_class() as usize] >= SURE_SCORE
 }
 
 /// Returns the standard deviation of a uniform distribution over ±`half_width_m` (m), or 0 if `half_width_m` is
@@ -82,7 +99,7 @@ mod tests {
     use closecall_traffic::{ClassScores, Road, VehicleState};
 
     use super::*;
-    use crate::tracking::SeenBy;
+    use crate::tracking::{SeenBy, SeenPart};
 
     /// Returns the standard deviation of the measured position across the road for a box 40 m behind the ego (m).
     fn across_sd_m(width_m: f64, points: usize, class: VehicleClass) -> f64 {
@@ -109,6 +126,7 @@ mod tests {
             seen_by: SeenBy::Lidar,
             points,
             is_centred: false,
+            seen: SeenPart::FACE,
             class: ClassScores(scores),
         };
         let ego = VehicleState { s_m: 1_000.0, d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };

@@ -19,6 +19,7 @@ pub mod axis;
 mod classes;
 mod config;
 mod detection;
+mod ends;
 mod extent;
 mod gaussian;
 mod lane;
@@ -31,7 +32,7 @@ mod tracker;
 mod view;
 
 pub use config::{DETECTION_PROBABILITY, MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
-pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy};
+pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy, SeenPart};
 pub use gaussian::Gaussian;
 pub use lane::LaneGeometry;
 pub use track_list::TrackList;

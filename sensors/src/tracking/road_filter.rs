@@ -54,6 +54,23 @@ pub(crate) struct Measurement {
     pub(crate) is_part: bool,
     /// Whether the middle of the face was seen.
     pub(crate) knows_middle: bool,
+    /// The part of the vehicle that was seen.
+    pub(crate) seen: Span,
+}
+
+/// The part of a vehicle that a scan shows, in road axes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    /// Whether the field of view cuts off the vehicle's side, so that the face is out of view.
+    pub(crate) is_cut: bool,
+    /// Whether a front is seen: both of its edges, or a class that only a front shows.
+    pub(crate) is_face: bool,
+    /// Positions along the road of the rearmost and of the foremost point (m).
+    pub(crate) along_m: [f64; 2],
+    /// Positions across the road of the rightmost and of the leftmost point (m).
+    pub(crate) across_m: [f64; 2],
+    /// Spacing of the columns on the side at these two points (m), infinite if no side is seen.
+    pub(crate) spacing_m: [f64; 2],
 }
 
 impl Measurement {
@@ -178,6 +195,30 @@ impl RoadFilter {
         self.across.measure_position(&self.smoothed(measurement).across_for(half_length_m, &estimate));
     }
 
+    /// Corrects the filter along the road with a position of the face that follows from another part of the vehicle.
+    pub(crate) fn correct_along(&mut self, measured: &AxisMeasurement, sensor: Option<usize>) {
+        let [along, _] = self.estimate();
+        if Self::counts(&mut self.followed[0], measured, &along, sensor) {
+            self.smooth_axis(0, measured.slow_sd_m * measured.slow_sd_m);
+            self.along.measure_position(&AxisMeasurement { slow_sd_m: self.slow_m2[0].sqrt(), ..*measured });
+        }
+    }
+
+    /// Corrects the filter across the road with a position of the centre that follows from a side of the vehicle.
+    pub(crate) fn correct_across(&mut self, measured: &AxisMeasurement, sensor: Option<usize>) {
+        let [_, across] = self.estimate();
+        if Self::counts(&mut self.followed[1], measured, &across, sensor) {
+            self.smooth_axis(1, measured.slow_sd_m * measured.slow_sd_m);
+            self.across.measure_position(&AxisMeasurement { slow_sd_m: self.slow_m2[1].sqrt(), ..*measured });
+        }
+    }
+
+    /// Moves the point that the filter follows along the road by `offset_m`, which is known with the variance `variance_m2`.
+    pub(crate) fn shift_along(&mut self, offset_m: f64, variance_m2: f64) {
+        self.along.shift(offset_m, variance_m2);
+        self.followed[0].age_s = f64::INFINITY;
+    }
+
     /// Returns whether the measurement of a sensor along or across the road counts: if it is that of the camera alone (`None`), if it is the sensor that the axis follows, if that one
     /// has not measured for a while, and it is followed from now on, or if it agrees with what that one has measured last.
     /// `estimate` is that of the axis.
@@ -207,8 +248,13 @@ impl RoadFilter {
 
     /// Smooths the variance of the slow error along or across the road with that of the latest measurement.
     fn smooth(&mut self, axis: usize, measurement: &Measurement) {
+        self.smooth_axis(axis, measurement.slow_m2()[axis]);
+    }
+
+    /// Smooths the variance of the slow error along or across the road with a new one (m²).
+    fn smooth_axis(&mut self, axis: usize, slow_m2: f64) {
         let new_share = 1.0 - std::mem::replace(&mut self.slow_share[axis], 1.0);
-        self.slow_m2[axis] += new_share * (measurement.slow_m2()[axis] - self.slow_m2[axis]);
+        self.slow_m2[axis] += new_share * (slow_m2 - self.slow_m2[axis]);
     }
 
     /// Returns the measurement with the smoothed standard deviations of the slow error.

@@ -1,16 +1,17 @@
 //! The tracker: it updates all tracks with one scan after the other.
 
-use closecall_traffic::{Road, Source, Time, Track, TrackId, VehicleState, maths};
+use closecall_traffic::{ClassScores, Road, Source, Time, Track, TrackId, VehicleClass, VehicleState, maths};
 
 use super::TrackList;
 use super::assignment::{Assignment, RESERVED};
 use super::association::assign;
-use super::axis::AxisEstimate;
+use super::axis::{AxisEstimate, AxisMeasurement};
 use super::classes::{FusedClass, vehicle_log_likelihood_ratio};
 use super::config::TrackerModel;
+use super::ends::{Ends, SidePoint};
 use super::extent::TrackExtent;
 use super::lifecycle::Lifecycle;
-use super::measurement::measurement;
+use super::measurement::{SURE_SCORE, measurement};
 use super::motion::EgoRear;
 use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
 use super::view::{Face, RearView};
@@ -26,6 +27,43 @@ const MAX_PART_SPEED_MPS: f64 = 3.0;
 const MIN_WHOLE_WIDTH_M: f64 = 1.9;
 /// Maximum distance by which a part stands out ahead of a vehicle's face (m).
 const FRONT_MARGIN_M: f64 = 1.0;
+
+/// Length beyond which a vehicle is no car (m; assumption): vans are up to 6.2 m long.
+const LONGEST_CAR_M: f64 = 6.5;
+/// Width by which a truck is wider than a car (m).
+const MAX_WIDER_M: f64 = 0.7;
+/// Distance by which something of a vehicle must be ahead of what was taken for its front (m; assumption).
+const FALSE_FRONT_M: f64 = 0.5;
+/// Greatest length of a truck (m): that of the European modular system, Council Directive 96/53/EC.
+const LONGEST_TRUCK_M: f64 = 25.25;
+/// Standard deviation of the followed point up to which parts tell the length of a vehicle (m; assumption).
+const SPAN_SD_M: f64 = 0.5;
+/// Standard deviation of the speed beyond which a track is lost whose front is unknown (m/s; assumption).
+const LOST_SPEED_SD_MPS: f64 = 3.0;
+/// Greatest distance between two axles of a truck, between which nothing else may be seen (m; assumption).
+const WHEELS_APART_M: f64 = 8.0;
+/// Distance up to which parts of a vehicle adjoin (m; assumption): that of cab and load, less than the gap between vehicles.
+const ADJOINING_M: f64 = 2.0;
+/// Spacing of the columns on a part's side below which the part would show a face if it were one (m; assumption): up to 15 m.
+const NEAR_SPACING_M: f64 = 0.15;
+/// Class scores of a vehicle that is longer (assumption).
+const LONG_VEHICLE: ClassScores = ClassScores([0.01, 0.97, 0.01, 0.01]);
+/// Number of points from which on a box has the full weight of a scan.
+const LONG_VEHICLE_POINTS: usize = 12;
+/// Spacing of the columns on a side up to which its rearmost point is a point of the vehicle rather than of the pattern (m; assumption).
+const MAX_SPACING_M: f64 = 1.0;
+/// Standard deviation of the end of a side within the last step of the columns (columns): 1/√12.
+const SIDE_SD_COLUMNS: f64 = 0.3;
+/// Standard deviation of a point on a side due to the noise of the ranges (m; assumption).
+const SIDE_SD_M: f64 = 0.05;
+/// Distance across the road up to which parts are on the same side of a vehicle (m; assumption).
+const SAME_SIDE_M: f64 = 0.3;
+/// Slow standard deviation of a front or a centre that follows from a side (m; assumption): wheels, guards and panels lie within 0.1 m.
+const SIDE_SLOW_SD_M: f64 = 0.1;
+/// Difference up to which the nearer side of a vehicle shows its centre (m; assumption): beyond it, it is a part on the far side.
+const SIDE_GATE_M: f64 = 0.7;
+/// Standard deviation of the length of a vehicle whose front has not been in view (m; assumption), by class: trucks are 7 to 19 m long.
+const LENGTH_SD_M: [f64; 3] = [0.5, 4.0, 0.2];
 
 /// The detections of one scan, all in the ego's frame at `time`.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +92,7 @@ struct TrackState {
     lifecycle: Lifecycle,
     class: FusedClass,
     extent: TrackExtent,
+    ends: Ends,
     /// What the scans of the present update show of it.
     seen: Seen,
 }
@@ -89,11 +128,94 @@ impl TrackState {
 
     /// Returns whether a face at (`s_m`, `d_m`) lies within this track's box.
     fn contains(&self, s_m: f64, d_m: f64) -> bool {
-        let (length_m, width_m) = self.size_m();
+        let [rear_m, front_m] = self.span_m();
+        let [_, across] = self.filter.estimate();
+        s_m >= rear_m && s_m <= front_m && (d_m - across.position_m).abs() <= self.half_width_m()
+    }
+
+    /// Returns whether something seen belongs to this vehicle: it overlaps the track's box along and across the road.
+    fn covers(&self, measurement: &Measurement, ego_d_m: f64) -> bool {
         let [along, across] = self.filter.estimate();
-        let is_along = (-length_m..=FRONT_MARGIN_M).contains(&(s_m - along.position_m));
-        let half_width_m = 0.5 * width_m.max(MIN_WHOLE_WIDTH_M) + SIDE_PROTRUSION_M;
-        is_along && (d_m - across.position_m).abs() <= half_width_m
+        let seen = &measurement.seen;
+        let [rear_m, front_m] = self.span_m();
+        let [seen_rear_m, seen_front_m] =
+            seen.along_m.map(|s_m| s_m - measurement.along.time_offset_s * along.speed_mps);
+        let [right_m, left_m] = seen.across_m.map(|d_m| d_m - across.position_m);
+        let rear_m = if seen.is_face { rear_m } else { rear_m - self.beyond_m() };
+        // The far side of a vehicle of which only a part is seen may be that of a truck.
+        let half_width_m = self.half_width_m();
+        let far_m = if self.ends.has_front { half_width_m } else { half_width_m + MAX_WIDER_M };
+        let [to_right_m, to_left_m] =
+            if across.position_m > ego_d_m { [half_width_m, far_m] } else { [far_m, half_width_m] };
+        seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
+    }
+
+    /// Returns the positions along the road between which parts of the vehicle lie (m). A front that is out of view may be that of the
+    /// longest truck.
+    fn span_m(&self) -> [f64; 2] {
+        let [along, _] = self.filter.estimate();
+        match self.ends.has_front {
+            true => [along.position_m - self.size_m().0, along.position_m + FRONT_MARGIN_M],
+            false => {
+                let rear_m = along.position_m - self.ends.rearmost_m;
+                [rear_m, rear_m + LONGEST_TRUCK_M]
+            }
+        }
+    }
+
+    /// Returns how far behind the track's box parts of the vehicle may be seen, such as a wheel of a trailer below which the beams pass (m).
+    fn beyond_m(&self) -> f64 {
+        let is_truck = self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE;
+        let may_be_long = is_truck || !self.ends.has_front;
+        if may_be_long { (LONGEST_TRUCK_M - self.size_m().0).max(0.0) } else { 0.0 }
+    }
+
+    /// Returns half of the width within which parts of the vehicle lie (m).
+    fn half_width_m(&self) -> f64 {
+        0.5 * self.size_m().1.max(MIN_WHOLE_WIDTH_M) + SIDE_PROTRUSION_M
+    }
+
+    /// Returns whether speed and kind of the vehicle are known well enough to confirm the track. A single end that is seen beside the ego
+    /// belongs to a vehicle of any kind and length.
+    fn is_settled(&self, model: &TrackerModel) -> bool {
+        let [along, _] = self.filter.estimate();
+        let is_known = self.ends.has_front || self.extent.spanned_m() > LONGEST_CAR_M;
+        is_known && along.speed_variance_m2ps2.sqrt() <= model.settled_speed_sd_mps
+    }
+
+    /// Lets the vehicle reach back from a point `ahead_m` ahead of the followed one over those of these parts that adjoin.
+    fn span<'a>(&mut self, ahead_m: f64, parts: impl Iterator<Item = &'a Measurement> + Clone) {
+        let [along, _] = self.filter.estimate();
+        if along.position_variance_m2.sqrt() > SPAN_SD_M {
+            return;
+        }
+        let mut rearmost_m = if self.ends.has_front { 0.0 } else { self.ends.rearmost_m };
+        loop {
+            let reach = parts.clone().filter(|part| part.seen.spacing_m[0] <= MAX_SPACING_M).filter_map(|part| {
+                let now_m = along.position_m + part.along.time_offset_s * along.speed_mps;
+                let [rear_m, front_m] = part.seen.along_m.map(|s_m| now_m - s_m);
+                (front_m <= rearmost_m + ADJOINING_M && rear_m > rearmost_m).then_some(rear_m)
+            });
+            match reach.max_by(f64::total_cmp) {
+                Some(rear_m) => rearmost_m = rear_m,
+                None => break,
+            }
+        }
+        self.ends.rearmost_m = self.ends.rearmost_m.max(rearmost_m);
+        self.extent.span_length((ahead_m + rearmost_m).min(LONGEST_TRUCK_M));
+    }
+
+    /// Counts a detection of the track for its lifecycle.
+    fn count(&mut self, seen_by: SeenBy, model: &TrackerModel) {
+        let is_settled = self.is_settled(model);
+        let rules = &model.rules;
+        match (seen_by, self.seen) {
+            (_, Seen::Hit) | (SeenBy::CameraAlone, Seen::Kept) => {}
+            (SeenBy::CameraAlone, _) => self.lifecycle.keep(rules),
+            (SeenBy::Lidar, Seen::Kept) => self.lifecycle.count_kept_as_hit(rules, is_settled),
+            (SeenBy::Lidar, _) => self.lifecycle.hit(rules, is_settled),
+        }
+        self.seen = self.seen.max(seen_in(seen_by));
     }
 }
 
@@ -107,6 +229,10 @@ pub struct Tracker {
     measurements: Vec<Measurement>,
     assignment: Assignment,
     assigned: Vec<Option<usize>>,
+    /// For each detection that no track is corrected with, the track whose vehicle it is a part of.
+    owners: Vec<Option<usize>>,
+    /// The points on the side of the track that is corrected.
+    side_points: Vec<SidePoint>,
     faces: Vec<Option<Face>>,
 }
 
@@ -120,6 +246,8 @@ impl Tracker {
             measurements: Vec::with_capacity(RESERVED),
             assignment: Assignment::new(),
             assigned: Vec::with_capacity(RESERVED),
+            owners: Vec::with_capacity(RESERVED),
+            side_points: Vec::with_capacity(RESERVED),
             faces: Vec::with_capacity(RESERVED),
         }
     }
@@ -188,14 +316,26 @@ impl Tracker {
             }
         }
         self.measurements.clear();
-        let measured = scan.detections.iter().map(|detection| measurement(detection, &frame, self.time));
+        let right_edge_m = scan.road.right_edge_m();
+        let measured = scan.detections.iter().map(|detection| {
+            let mut measured = measurement(detection, &frame, self.time);
+            let [right_m, left_m] = measured.seen.across_m;
+            if right_m > 0.0 || left_m < right_edge_m {
+                // What lies entirely beside the carriageway is no part of a vehicle on it.
+                (measured.seen.is_cut, measured.seen.is_face) = (false, true);
+            }
+            measured
+        });
         self.measurements.extend(measured);
-        let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0));
+        let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0, track.ends.has_front));
         assign(tracks, &self.measurements, &mut self.assignment, &mut self.assigned);
         self.project_faces(&scan.view, &frame);
+        self.find_owners(scan.ego.d_m);
+        self.release_false_fronts(scan);
         for track_index in 0..self.tracks.len() {
             match self.assigned[track_index] {
                 Some(detection_index) => self.correct(track_index, detection_index, scan),
+                None if self.is_beside(track_index) => self.correct_by_parts(track_index, scan),
                 None => self.miss(track_index),
             }
         }
@@ -214,24 +354,147 @@ impl Tracker {
     fn correct(&mut self, track_index: usize, detection_index: usize, scan: &TrackerScan<'_>) {
         let detection = &scan.detections[detection_index];
         let track = &mut self.tracks[track_index];
-        track.filter.correct(
-            &self.measurements[detection_index],
-            0.5 * track.size_m().0,
-            followed_sensor(detection, scan),
-        );
+        let measurement = &self.measurements[detection_index];
+        track.filter.correct(measurement, 0.5 * track.size_m().0, followed_sensor(detection, scan));
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
-        let [along, _] = track.filter.estimate();
-        let is_settled = along.speed_variance_m2ps2.sqrt() <= self.model.settled_speed_sd_mps;
-        let rules = &self.model.rules;
-        match (detection.seen_by, track.seen) {
-            (_, Seen::Hit) | (SeenBy::CameraAlone, Seen::Kept) => {}
-            (SeenBy::CameraAlone, _) => track.lifecycle.keep(rules),
-            (SeenBy::Lidar, Seen::Kept) => track.lifecycle.count_kept_as_hit(rules, is_settled),
-            (SeenBy::Lidar, _) => track.lifecycle.hit(rules, is_settled),
-        }
-        track.seen = track.seen.max(seen_in(detection));
+        self.find_side_points(track_index, Some(detection_index), scan.ego.d_m);
+        let track = &mut self.tracks[track_index];
+        track.ends.learn(&self.side_points);
+        let of_track = self.owners.iter().zip(&self.measurements).filter(|(owner, _)| **owner == Some(track_index));
+        let parts = of_track.map(|(_, part)| part).chain([&self.measurements[detection_index]]);
+        track.span(0.0, parts);
+        track.count(detection.seen_by, &self.model);
         track.lifecycle.add_evidence(vehicle_log_likelihood_ratio(&detection.class, detection.points));
+    }
+
+    /// Finds, for each detection without a track, the track whose vehicle it is a part of: the earliest one that covers it.
+    fn find_owners(&mut self, ego_d_m: f64) {
+        self.owners.clear();
+        for (detection_index, measurement) in self.measurements.iter().enumerate() {
+            let is_free = measurement.is_finite() && !self.assigned.contains(&Some(detection_index));
+            let owner = self.tracks.iter().position(|track| is_free && track.covers(measurement, ego_d_m));
+            self.owners.push(owner);
+        }
+    }
+
+    /// Makes a detection that a track is assigned as its front a part, if more of the vehicle is seen ahead of it, where the field of view
+    /// cuts it off.
+    fn release_false_fronts(&mut self, scan: &TrackerScan<'_>) {
+        for track_index in 0..self.tracks.len() {
+            let Some(detection_index) = self.assigned[track_index] else { continue };
+            let face_m = self.measurements[detection_index].seen.along_m[1];
+            if scan.ego.s_m + scan.rear_x_m - face_m > WHEELS_APART_M {
+                continue;
+            }
+            let is_ahead = |part: &Measurement| part.seen.is_cut && part.seen.along_m[1] > face_m + FALSE_FRONT_M;
+            if self.parts(track_index).any(|(_, part)| is_ahead(part)) {
+                self.assigned[track_index] = None;
+                self.owners[detection_index] = Some(track_index);
+                self.tracks[track_index].ends.has_front = false;
+            }
+        }
+    }
+
+    /// Lists the ends of a track's parts, and of the detection that it is assigned, on the side that faces the ego.
+    ///
+    /// What is seen on the far side below the vehicle ends where something nearer hides it: such an end is no point of the vehicle.
+    fn find_side_points(&mut self, track_index: usize, assigned: Option<usize>, ego_d_m: f64) {
+        let mut points = std::mem::take(&mut self.side_points);
+        points.clear();
+        let [along, across] = self.tracks[track_index].filter.estimate();
+        let is_left = across.position_m > ego_d_m;
+        let parts =
+            || self.parts(track_index).map(|(_, part)| part).chain(assigned.map(|index| &self.measurements[index]));
+        let nearest_m = parts().map(|part| near_side_m(part, is_left)).fold(f64::INFINITY, f64::min);
+        for part in parts().filter(|part| near_side_m(part, is_left) <= nearest_m + SAME_SIDE_M) {
+            let ends = part.seen.along_m.into_iter().zip(part.seen.spacing_m).enumerate();
+            for (end, (s_m, spacing_m)) in ends {
+                // The foremost point of a part that is cut off is that of the field of view.
+                if spacing_m <= MAX_SPACING_M && !(end == 1 && part.seen.is_cut) {
+                    let now_m = s_m - part.along.time_offset_s * along.speed_mps;
+                    points.push(SidePoint { behind_m: along.position_m - now_m, spacing_m });
+                }
+            }
+        }
+        self.side_points = points;
+    }
+
+    /// Returns the parts of a track's vehicle in the latest scan.
+    fn parts(&self, track_index: usize) -> impl Iterator<Item = (usize, &Measurement)> {
+        let of_track = self.owners.iter().zip(&self.measurements).enumerate();
+        of_track.filter(move |(_, (owner, _))| **owner == Some(track_index)).map(|(index, (_, part))| (index, part))
+    }
+
+    /// Returns whether parts of a track's vehicle are seen, and its front is out of view.
+    fn is_beside(&self, track_index: usize) -> bool {
+        let is_in_view = self.faces[track_index].is_some() && self.tracks[track_index].ends.has_front;
+        self.parts(track_index).any(|(_, part)| part.seen.is_cut || !is_in_view)
+    }
+
+    /// Corrects a track with the parts of its vehicle that are seen beside the ego.
+    ///
+    /// Along the road, the points on its side tell how the vehicle has moved. Across the road, its nearer side shows its centre.
+    fn correct_by_parts(&mut self, track_index: usize, scan: &TrackerScan<'_>) {
+        let [along, across] = self.tracks[track_index].filter.estimate();
+        let now_m = |part: &Measurement, s_m: f64| s_m - part.along.time_offset_s * along.speed_mps;
+        let foremost = self.parts(track_index).map(|(index, part)| (now_m(part, part.seen.along_m[1]), index));
+        let Some((front_m, front_index)) = foremost.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let has_cut = self.parts(track_index).any(|(_, part)| part.seen.is_cut);
+        let has_front = self.tracks[track_index].ends.has_front;
+        // An axle that is seen alone may be that of a vehicle whose next one is still out of view.
+        let behind_m = scan.ego.s_m + scan.rear_x_m - front_m;
+        let is_face = self.measurements[front_index].seen.is_face || behind_m > WHEELS_APART_M;
+        if !has_front && !has_cut && is_face {
+            // The front has come into view.
+            let face = self.measurements[front_index].along;
+            let track = &mut self.tracks[track_index];
+            let [face_m, variance_m2] = face.position_now(along.speed_mps);
+            track.filter.shift_along(face_m - along.position_m, variance_m2);
+            track.ends.follow_front(face_m - along.position_m);
+            self.owners[front_index] = None;
+            return self.correct(track_index, front_index, scan);
+        }
+        let is_left = across.position_m > scan.ego.d_m;
+        let half_width_m = 0.5 * self.tracks[track_index].size_m().1;
+        let nearest = self.parts(track_index).map(|(_, part)| (near_side_m(part, is_left), part.across.time_offset_s));
+        let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
+        self.find_side_points(track_index, None, scan.ego.d_m);
+        let track = &mut self.tracks[track_index];
+        let sensor = Some(scan.sensor);
+        if let Some((side_m, time_offset_s)) = nearest {
+            let position_m = if is_left { side_m + half_width_m } else { -side_m - half_width_m };
+            if (position_m - across.position_m).abs() <= SIDE_GATE_M {
+                let (white_sd_m, slow_sd_m) = (SIDE_SD_M, SIDE_SLOW_SD_M);
+                let measured = AxisMeasurement { position_m, white_sd_m, slow_sd_m, time_offset_s };
+                track.filter.correct_across(&measured, sensor);
+            }
+        }
+        // Something of the vehicle is ahead of what was taken for its front.
+        let sd_m = along.position_variance_m2.sqrt();
+        track.ends.has_front &= !has_cut || front_m - along.position_m <= FRONT_MARGIN_M + 3.0 * sd_m;
+        let measured = track.ends.measure(&self.side_points, sd_m);
+        if let Some([offset_m, spacing_m]) = measured {
+            let measured = AxisMeasurement {
+                position_m: along.position_m + offset_m,
+                white_sd_m: maths::hypot(SIDE_SD_M, SIDE_SD_COLUMNS * spacing_m),
+                slow_sd_m: SIDE_SLOW_SD_M,
+                time_offset_s: 0.0,
+            };
+            track.filter.correct_along(&measured, sensor);
+        }
+        let ahead_m = if track.ends.has_front { 0.0 } else { front_m - along.position_m };
+        let of_track = self.owners.iter().zip(&self.measurements).filter(|(owner, _)| **owner == Some(track_index));
+        track.span(ahead_m, of_track.map(|(_, part)| part));
+        if track.extent.spanned_m() > LONGEST_CAR_M {
+            track.class.update(&LONG_VEHICLE, LONG_VEHICLE_POINTS);
+        }
+        // A vehicle whose front is unknown and whose speed nothing measures is not followed.
+        let [along, _] = track.filter.estimate();
+        let is_lost = along.speed_variance_m2ps2.sqrt() > LOST_SPEED_SD_MPS;
+        if track.ends.has_front || measured.is_some() || !is_lost {
+            track.count(SeenBy::Lidar, &self.model);
+        }
     }
 
     /// Notes whether a scan could have detected a track that it did not detect.
@@ -253,29 +516,57 @@ impl Tracker {
 
     /// Starts a track for each detection that is assigned to no track and does not lie within a track's box.
     fn start_tracks(&mut self, scan: &TrackerScan<'_>, ego_mps: f64, list: &mut TrackList) {
-        for (detection_index, detection) in scan.detections.iter().enumerate() {
-            let measurement = &self.measurements[detection_index];
-            let (s_m, d_m) = (measurement.along.position_m, measurement.across.position_m);
-            let is_taken = self.assigned.contains(&Some(detection_index))
-                || self.tracks.iter().any(|track| track.contains(s_m, d_m));
-            if is_taken || !measurement.is_finite() {
-                continue;
-            }
-            let mut track = TrackState {
-                id: list.new_id(),
-                filter: RoadFilter::new(measurement, ego_mps, followed_sensor(detection, scan)),
-                lifecycle: match detection.seen_by {
-                    SeenBy::Lidar => Lifecycle::first_hit(&self.model.rules),
-                    SeenBy::CameraAlone => Lifecycle::first_kept(&self.model.rules),
-                },
-                class: FusedClass::unknown(),
-                extent: TrackExtent::default(),
-                seen: seen_in(detection),
-            };
-            track.extent.update(detection);
-            track.class.update(&detection.class, detection.points);
-            self.tracks.push(track);
+        // A vehicle that the field of view cuts off comes before its parts, and its near side before its far side.
+        let nearest_cut = |tracker: &Self, after_m: f64| {
+            let cut = tracker.measurements.iter().enumerate().filter(|(_, measurement)| measurement.seen.is_cut);
+            let aside_m = cut.map(|(index, measurement)| {
+                let [right_m, left_m] = measurement.seen.across_m.map(|d_m| d_m - scan.ego.d_m);
+                (right_m.max(-left_m), index)
+            });
+            aside_m.filter(|(aside_m, _)| *aside_m > after_m).min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let mut after_m = f64::NEG_INFINITY;
+        while let Some((aside_m, detection_index)) = nearest_cut(self, after_m) {
+            self.start_track(detection_index, scan, ego_mps, list);
+            after_m = aside_m;
         }
+        for detection_index in 0..scan.detections.len() {
+            if !self.measurements[detection_index].seen.is_cut {
+                self.start_track(detection_index, scan, ego_mps, list);
+            }
+        }
+    }
+
+    /// Starts a track for a detection unless it is assigned to a track or lies within a track's box.
+    fn start_track(&mut self, detection_index: usize, scan: &TrackerScan<'_>, ego_mps: f64, list: &mut TrackList) {
+        let detection = &scan.detections[detection_index];
+        let measurement = &self.measurements[detection_index];
+        let (s_m, d_m) = (measurement.along.position_m, measurement.across.position_m);
+        let seen = &measurement.seen;
+        let is_taken = self.assigned.contains(&Some(detection_index))
+            || self.tracks.iter().any(|track| track.contains(s_m, d_m) || track.covers(measurement, scan.ego.d_m));
+        if is_taken || !measurement.is_finite() || seen.is_cut && seen.spacing_m[0] > MAX_SPACING_M {
+            return;
+        }
+        let has_front = !seen.is_cut && (seen.is_face || seen.spacing_m[0] > NEAR_SPACING_M);
+        let measurement = if has_front { *measurement } else { of_rear(measurement) };
+        let mut track = TrackState {
+            id: list.new_id(),
+            filter: RoadFilter::new(&measurement, ego_mps, followed_sensor(detection, scan)),
+            lifecycle: match detection.seen_by {
+                SeenBy::Lidar => Lifecycle::first_hit(&self.model.rules),
+                SeenBy::CameraAlone => Lifecycle::first_kept(&self.model.rules),
+            },
+            class: FusedClass::unknown(),
+            extent: TrackExtent::default(),
+            ends: Ends::new(has_front),
+            seen: seen_in(detection.seen_by),
+        };
+        if has_front {
+            track.extent.update(detection);
+        }
+        track.class.update(&detection.class, detection.points);
+        self.tracks.push(track);
     }
 
     /// Deletes tracks that have ended, and tracks that are parts of other tracks.
@@ -306,9 +597,24 @@ fn followed_sensor(detection: &Detection, scan: &TrackerScan<'_>) -> Option<usiz
     (detection.seen_by == SeenBy::Lidar).then_some(scan.sensor)
 }
 
-/// Returns what a scan shows of a track that this detection belongs to.
-fn seen_in(detection: &Detection) -> Seen {
-    match detection.seen_by {
+/// Returns the measurement of the rear end of a vehicle whose front is out of view.
+fn of_rear(measurement: &Measurement) -> Measurement {
+    let Measurement { along, across, seen, .. } = *measurement;
+    let white_sd_m = maths::hypot(SIDE_SD_M, SIDE_SD_COLUMNS * seen.spacing_m[0]);
+    let along = AxisMeasurement { position_m: seen.along_m[0], white_sd_m, slow_sd_m: SIDE_SLOW_SD_M, ..along };
+    Measurement { along, across, ..*measurement }
+}
+
+/// Returns the position across the road of the side of a part that faces the ego (m), with the sign that makes it grow with the distance
+/// from the ego.
+fn near_side_m(part: &Measurement, is_left: bool) -> f64 {
+    let [right_m, left_m] = part.seen.across_m;
+    if is_left { right_m } else { -left_m }
+}
+
+/// Returns what a scan shows of a track that a detection by these sensors belongs to.
+fn seen_in(seen_by: SeenBy) -> Seen {
+    match seen_by {
         SeenBy::Lidar => Seen::Hit,
         SeenBy::CameraAlone => Seen::Kept,
     }
@@ -321,7 +627,15 @@ fn seen_in(detection: &Detection) -> Seen {
 fn to_track(track: &TrackState, [along, across]: [AxisEstimate; 2], frame: &EgoFrame<'_>, time: Time) -> Track {
     let (length_m, width_m) = track.size_m();
     let half_length_m = 0.5 * length_m / frame.path_scale(across.position_m);
-    let centre = AxisEstimate { position_m: along.position_m - half_length_m, ..along };
+    let (front_m, variance_m2) = match track.ends.has_front {
+        true => (along.position_m, 0.0),
+        false => {
+            let sd_m = LENGTH_SD_M[track.class.scores().best_vehicle_class() as usize];
+            (along.position_m - track.ends.rearmost_m + 2.0 * half_length_m, sd_m * sd_m)
+        }
+    };
+    let position_variance_m2 = along.position_variance_m2 + variance_m2;
+    let centre = AxisEstimate { position_m: front_m - half_length_m, position_variance_m2, ..along };
     let estimate = in_ego_frame(&[centre, across], frame);
     Track {
         id: track.id,

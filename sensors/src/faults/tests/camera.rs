@@ -29,6 +29,7 @@ fn score(fault: &str, environment: Environment, gaps_m: &[f64]) -> f64 {
             seen_by: crate::SeenBy::Lidar,
             points: 20,
             is_centred: false,
+            seen: crate::SeenPart::FACE,
             class: ClassScores::UNKNOWN,
         }];
         let seen = ImagedScene { now: &scene, imaged: &scene, fault: fault.as_ref() };

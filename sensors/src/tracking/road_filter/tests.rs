@@ -19,6 +19,13 @@ fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
         across: axis(d_m, if is_part { 0.46 } else { 0.04 }),
         is_part,
         knows_middle: !is_part,
+        seen: Span {
+            is_cut: false,
+            is_face: true,
+            along_m: [s_m; 2],
+            across_m: [d_m; 2],
+            spacing_m: [f64::INFINITY; 2],
+        },
     }
 }
 

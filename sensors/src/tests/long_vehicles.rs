@@ -1,0 +1,165 @@
+//! Long vehicles beside the ego: the whole chain follows each as one vehicle, whichever of its parts the sensor sees.
+//!
+//! Beside the ego, the beams pass below the load of a truck. They show a cab, the guards and the wheels on both sides as separate
+//! clusters, and the field of view cuts off the front.
+
+use std::collections::BTreeSet;
+
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, TrackId, TrackStatus, VehicleClass,
+};
+
+use super::tracking::PERIOD_S;
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+use crate::{NoiseKey, Scene, SensorMode, SensorsConfig};
+
+/// Speed of the ego (m/s).
+const EGO_MPS: f64 = 30.0;
+/// Number of steps with a confirmed track after which its errors count: 1 s.
+const SETTLED_STEPS: usize = 25;
+/// Greatest error of the speed (m/s).
+const SPEED_MPS: f64 = 1.0;
+
+/// A long vehicle in a neighbouring lane, at a constant speed.
+#[derive(Clone, Copy, Debug)]
+struct Passing {
+    length_m: f64,
+    /// Lateral distance from the ego (m), positive to the left.
+    left_m: f64,
+    /// Speed beyond the ego's (m/s).
+    faster_mps: f64,
+    /// Position of its front ahead of the ego's rear at the start (m).
+    front_m: f64,
+    seconds: f64,
+}
+
+/// The rear tracks of a passing.
+#[derive(Debug, Default)]
+struct Found {
+    /// Numbers of the confirmed tracks.
+    ids: BTreeSet<u32>,
+    steps: usize,
+    confirmed_steps: usize,
+    /// Number of steps with several confirmed tracks.
+    several: usize,
+    /// Largest error of a track's speed (m/s).
+    speed_mps: f64,
+    /// Number of steps in which a track has another class.
+    misclassified: usize,
+    /// Number of steps in which a track is not in the lane of the vehicle, so that the lane would count as free.
+    in_other_lane: usize,
+}
+
+/// Lets the vehicle pass, with the random numbers of this sample.
+fn pass(passing: &Passing, sample: u64) -> Found {
+    let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
+    let key = NoiseKey { seed: 9, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() };
+    let mut perception = sensors.build(&key).unwrap();
+    let road = Road::straight(3);
+    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), EGO_MPS);
+    let rear_s_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m;
+    let s_m = rear_s_m + passing.front_m - 0.5 * passing.length_m;
+    let mut truck = scene_vehicle(1, VehicleClass::Truck, s_m, OWN_LANE_M + passing.left_m);
+    truck.vehicle.dimensions.length_m = passing.length_m;
+    truck.state.speed_mps = EGO_MPS + passing.faster_mps;
+    let mut found = Found::default();
+    let mut confirmed_at: Vec<(TrackId, usize)> = Vec::new();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds")]
+    let steps = (passing.seconds / PERIOD_S) as usize;
+    for (step, index) in (0..steps).zip(0..) {
+        let others = [truck];
+        let scene = Scene {
+            time: CONTROL_STEP * index,
+            road: &road,
+            environment: &Environment::CLEAR_DAY,
+            ego,
+            others: &others,
+        };
+        let tracks = perception.step(&scene).unwrap();
+        let is_confirmed = |track: &&_| {
+            let track: &closecall_traffic::Track = track;
+            track.source == Source::Rear && track.status != TrackStatus::Tentative
+        };
+        let confirmed: Vec<_> = tracks.iter().filter(is_confirmed).collect();
+        found.steps += 1;
+        found.several += usize::from(confirmed.len() > 1);
+        found.confirmed_steps += usize::from(!confirmed.is_empty());
+        for track in confirmed {
+            found.ids.insert(track.id.0);
+            if !confirmed_at.iter().any(|(id, _)| *id == track.id) {
+                confirmed_at.push((track.id, step));
+            }
+            let since = confirmed_at.iter().find(|(id, _)| *id == track.id).unwrap().1;
+            if step >= since + SETTLED_STEPS {
+                found.speed_mps = found.speed_mps.max((track.vx_mps() - truck.state.speed_mps).abs());
+                found.misclassified += usize::from(track.class.best_vehicle_class() != VehicleClass::Truck);
+                let lane = if passing.left_m > 0.0 { 0 } else { 2 };
+                found.in_other_lane += usize::from(!(track.lane[lane] >= 0.5));
+            }
+        }
+        for vehicle in [&mut ego, &mut truck] {
+            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
+        }
+    }
+    found
+}
+
+/// Returns passings of a vehicle of this length: it overtakes slowly and fast, the ego passes it slowly and fast, and it is beside the ego
+/// from the start.
+fn passings(length_m: f64, left_m: f64) -> Vec<Passing> {
+    let of = |faster_mps: f64, front_m: f64, seconds: f64| Passing { length_m, left_m, faster_mps, front_m, seconds };
+    vec![
+        of(2.0, -30.0, 19.0 + 0.5 * length_m),
+        of(6.0, -60.0, 13.0 + length_m / 6.0),
+        of(-2.0, length_m + 8.0, 20.0 + 0.5 * length_m),
+        of(-6.0, length_m + 8.0, 10.0 + length_m / 6.0),
+        of(0.0, 3.0, 8.0),
+        of(0.5, 0.0, 16.0),
+        of(-0.5, 10.0, 16.0),
+    ]
+}
+
+fn assert_one_track(cases: &[Passing]) {
+    let mut wrong = Vec::new();
+    for (passing, sample) in cases.iter().zip(0..) {
+        let found = pass(passing, sample);
+        let is_one = found.ids.len() == 1 && found.several == 0;
+        let is_followed = 4 * found.confirmed_steps > found.steps;
+        let is_right = found.speed_mps <= SPEED_MPS && found.misclassified == 0 && found.in_other_lane == 0;
+        if !(is_one && is_followed && is_right) {
+            wrong.push(format!("{passing:?}: {found:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
+
+#[test]
+fn a_truck_that_passes_or_is_passed_is_one_track_with_its_speed_and_class() {
+    let lanes = [3.75, -3.75].into_iter();
+    let cases: Vec<_> = lanes
+        .flat_map(|left_m| [12.0, 16.5, 18.0, 25.0].into_iter().flat_map(move |length_m| passings(length_m, left_m)))
+        .collect();
+    assert_one_track(&cases);
+}
+
+#[test]
+fn trucks_of_other_lengths_speeds_and_offsets_are_one_track_too() {
+    let mut cases = Vec::new();
+    for (length_m, left_m, faster_mps, front_m, seconds) in [
+        (10.0, 3.5, 3.0, -40.0, 22.0),
+        (13.6, -3.9, 1.2, -15.0, 25.0),
+        (15.0, 4.1, 9.0, -80.0, 14.0),
+        (17.3, -3.4, 4.0, -70.0, 25.0),
+        (19.0, 3.6, 1.5, -12.0, 25.0),
+        (22.0, -3.75, 2.5, -25.0, 22.0),
+        (10.5, 3.6, -3.0, 14.0, 18.0),
+        (13.6, 3.9, -1.2, 15.0, 30.0),
+        (14.2, -3.5, -9.0, 40.0, 12.0),
+        (17.3, 3.4, -4.0, 30.0, 20.0),
+        (19.0, -4.0, -1.5, 20.0, 30.0),
+        (22.0, 3.75, -2.5, 25.0, 25.0),
+    ] {
+        cases.push(Passing { length_m, left_m, faster_mps, front_m, seconds });
+    }
+    assert_one_track(&cases);
+}

@@ -1,0 +1,192 @@
+//! The points on the side of a vehicle beside the ego, whose front the field of view may cut off.
+//!
+//! ```text
+//!              rear end    axle        followed point p
+//!                 ┌─────────┬───────────────┃━━━━━━┐        The front is seen: p is the front.
+//!   field of view │         │          │    ┃      │        The front is out of view: p keeps its distances from
+//!                 └─────────┴──────────│────┃━━━━━━┘        the points on the side that were seen before.
+//!                 ◀───── behind_m ──────────┃
+//! ```
+//!
+//! The ends of the parts that a scan shows are those of the load, the cab, a guard or a wheel: beams at another height meet other parts,
+//! and weak returns are lost. Each of these points keeps its place on the vehicle. Other ends do not: where a layer of beams passes below
+//! the load, the end of what is seen moves over the vehicle.
+//!
+//! [`Ends`] remember the distances of the points behind the followed point. A point measures it once it has kept its distance for some
+//! scans. The estimate does not jump when the visible end changes. The end of a box whose front or length follows from the visible end of
+//! each scan does.
+
+/// Number of distances that are remembered: the ends of cab, load, guard and wheels (assumption).
+const POINTS: usize = 8;
+/// Difference up to which a point may be one that is remembered, in addition to the spacing of the columns and the deviation of the
+/// estimate (m; assumption): more than the noise of a range, less than the distance of two wheels.
+const SAME_POINT_M: f64 = 0.15;
+/// Greatest difference up to which it may be (m; assumption).
+const MAX_SAME_POINT_M: f64 = 0.8;
+/// Difference up to which a point keeps its distance (m; assumption), in addition to a share of the spacing of the columns: the noise of
+/// a range.
+const KEPT_M: f64 = 0.05;
+/// That share.
+const KEPT_COLUMNS: f64 = 0.5;
+/// Number of scans in which a point keeps its distance before it measures (assumption). Where the end of what is seen stays beside the
+/// ego, a vehicle that is faster by 0.5 m/s moves on by 0.16 m meanwhile.
+const PROVEN_SCANS: u8 = 8;
+/// Least share by which a remembered distance is corrected while the front is seen (assumption).
+const LEARNING_SHARE: f64 = 0.05;
+
+/// A point on a vehicle's side as a scan shows it: the end of one of the vehicle's parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SidePoint {
+    /// Distance behind the followed point (m).
+    pub(crate) behind_m: f64,
+    /// Spacing of the columns there (m).
+    pub(crate) spacing_m: f64,
+}
+
+/// What is known of the ends of a track's vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ends {
+    /// Whether the followed point is the front.
+    pub(crate) has_front: bool,
+    /// Distance of the rearmost point that was seen behind the followed point (m).
+    pub(crate) rearmost_m: f64,
+    points: [Option<Remembered>; POINTS],
+    /// Index of the next point to replace.
+    next: usize,
+}
+
+/// A point on a vehicle's side that was seen before.
+#[derive(Clone, Copy, Debug)]
+struct Remembered {
+    /// Distance behind the followed point (m).
+    behind_m: f64,
+    /// Number of scans in which it has kept this distance, at most [`PROVEN_SCANS`].
+    scans: u8,
+}
+
+impl Ends {
+    /// Creates the ends of a vehicle whose followed point is the front, or else its rear end.
+    ///
+    /// The rear end is the first point of a vehicle of which nothing else is seen, and measures from the start.
+    pub(crate) const fn new(has_front: bool) -> Self {
+        let mut points = [None; POINTS];
+        points[0] = Some(Remembered { behind_m: 0.0, scans: PROVEN_SCANS });
+        Self { has_front, rearmost_m: 0.0, points, next: 1 }
+    }
+
+    /// Moves the followed point ahead by `offset_m`, to the front.
+    pub(crate) fn follow_front(&mut self, offset_m: f64) {
+        self.has_front = true;
+        self.rearmost_m += offset_m;
+        self.points.iter_mut().flatten().for_each(|point| point.behind_m += offset_m);
+    }
+
+    /// Returns how far ahead of its estimate the followed point is by these points, and the spacing of the columns on the best of them
+    /// (m). The estimate has the standard deviation `sd_m`. Returns `None` if no point measures it.
+    ///
+    /// Of several points, those that agree with the one nearest to the prediction count.
+    pub(crate) fn measure(&mut self, points: &[SidePoint], sd_m: f64) -> Option<[f64; 2]> {
+        let offset_m = |remembered: &Remembered, point: &SidePoint| remembered.behind_m - point.behind_m;
+        let proven = points.iter().filter_map(|point| {
+            let remembered = self.nearest(point, sd_m).filter(|remembered| remembered.scans >= PROVEN_SCANS)?;
+            Some([offset_m(remembered, point), point.spacing_m])
+        });
+        let best = proven.min_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
+        let base_m = best.map_or(0.0, |[offset_m, _]| offset_m);
+        let (mut sum, mut weights, mut least_m) = (0.0, 0.0, f64::INFINITY);
+        for point in points {
+            let Some(remembered) = self.nearest(point, sd_m) else {
+                self.remember(point);
+                continue;
+            };
+            let offset_m = offset_m(remembered, point);
+            if (offset_m - base_m).abs() > KEPT_M + KEPT_COLUMNS * point.spacing_m {
+                *remembered = Remembered { behind_m: point.behind_m + base_m, scans: 0 };
+            } else if remembered.scans >= PROVEN_SCANS {
+                // Weighted by the inverse squares of the spacings.
+                let weight = 1.0 / (KEPT_M + point.spacing_m).powi(2);
+                (sum, weights, least_m) = (sum + weight * offset_m, weights + weight, point.spacing_m.min(least_m));
+            } else {
+                remembered.scans += 1;
+            }
+        }
+        (weights > 0.0).then(|| [sum / weights, least_m])
+    }
+
+    /// Learns the distances of these points while the front is seen.
+    pub(crate) fn learn(&mut self, points: &[SidePoint]) {
+        for point in points {
+            let Some(remembered) = self.nearest(point, 0.0) else {
+                self.remember(point);
+                continue;
+            };
+            let off_m = point.behind_m - remembered.behind_m;
+            if off_m.abs() > KEPT_M + KEPT_COLUMNS * point.spacing_m {
+                *remembered = Remembered { behind_m: point.behind_m, scans: 0 };
+            } else {
+                remembered.behind_m += off_m * LEARNING_SHARE.max(1.0 / (f64::from(remembered.scans) + 2.0));
+                remembered.scans = PROVEN_SCANS.min(remembered.scans + 1);
+            }
+        }
+    }
+
+    fn remember(&mut self, point: &SidePoint) {
+        self.points[self.next] = Some(Remembered { behind_m: point.behind_m, scans: 0 });
+        self.next = (self.next + 1) % POINTS;
+    }
+
+    /// Returns the remembered point nearest to a point, if it may be the same.
+    fn nearest(&mut self, point: &SidePoint, sd_m: f64) -> Option<&mut Remembered> {
+        let off_m = |remembered: &Remembered| (remembered.behind_m - point.behind_m).abs();
+        let limit_m = (SAME_POINT_M + point.spacing_m + 2.0 * sd_m).min(MAX_SAME_POINT_M);
+        let nearest = self.points.iter_mut().flatten().min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        nearest.filter(|nearest| off_m(nearest) <= limit_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points<const N: usize>(behind_m: [f64; N]) -> [SidePoint; N] {
+        behind_m.map(|behind_m| SidePoint { behind_m, spacing_m: 0.1 })
+    }
+
+    #[test]
+    fn a_point_measures_once_it_has_kept_its_distance() {
+        let mut ends = Ends::new(true);
+        for _ in 0..=PROVEN_SCANS {
+            assert_eq!(ends.measure(&points([18.0]), 0.0), None);
+        }
+        // The next scan of the mirror's other side ends at an axle, and the one after it at the rear end again.
+        assert_eq!(ends.measure(&points([16.8]), 0.0), None);
+        let [offset_m, _] = ends.measure(&points([18.08]), 0.0).unwrap();
+        assert!((offset_m + 0.08).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_end_that_moves_over_the_vehicle_never_measures() {
+        let mut ends = Ends::new(true);
+        // It stays beside the ego, while the vehicle is 2 m/s faster.
+        for scan in 0..100 {
+            assert_eq!(ends.measure(&points([4.0 + 0.08 * f64::from(scan)]), 0.05), None);
+        }
+    }
+
+    #[test]
+    fn a_point_that_disagrees_with_the_prediction_counts_for_nothing_beside_one_that_agrees() {
+        let mut ends = Ends::new(true);
+        (0..=PROVEN_SCANS).for_each(|_| ends.learn(&points([3.0, 9.0])));
+        let [offset_m, _] = ends.measure(&points([2.98, 9.2]), 0.1).unwrap();
+        assert!((offset_m - 0.02).abs() < 1e-9, "{offset_m}");
+    }
+
+    #[test]
+    fn the_remembered_points_keep_their_places_when_the_front_comes_into_view() {
+        let mut ends = Ends::new(false);
+        assert!(ends.measure(&points([0.05]), 0.0).is_some());
+        ends.follow_front(12.0);
+        assert!(ends.has_front && ends.rearmost_m == 12.0);
+        assert!(ends.measure(&points([12.05]), 0.0).is_some());
+    }
+}
