@@ -41,8 +41,8 @@ const LIBRARY: [(&str, &str); 17] = embedded![
 ];
 
 /// The scenarios of the folder `traffic` of the library: those with surrounding traffic.
-const TRAFFIC: [(&str, &str); 3] =
-    embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic"];
+const TRAFFIC: [(&str, &str); 4] =
+    embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic", "trucks-alongside"];
 
 /// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
 /// base.

@@ -8,8 +8,7 @@ use crate::support::{ROOT, all_of_library, traffic_of_library};
 #[expect(dead_code, reason = "the program's entry is not called")]
 mod write_evidence;
 
-use write_evidence::Size;
-use write_evidence::page::{Section, between_markers, outcomes, with_section};
+use write_evidence::page::{Section, Size, between_markers, outcomes, with_section};
 
 /// Returns a committed section.
 fn committed(section: Section) -> String {
@@ -55,7 +54,7 @@ fn no_section_is_older_than_the_outcomes_that_it_shows() {
 fn the_committed_sections_have_the_form_that_the_program_writes() {
     let size = Size { samples: 3, member_samples: 2, seed: 1001 };
     for section in [Section::Arms, Section::Slowing] {
-        let written = size.section(section).unwrap();
+        let written = write_evidence::written(section, size).unwrap();
         let head = |text: &str| -> Vec<String> {
             text.lines()
                 .filter(|line| line.starts_with("| ") && line.contains(" without | with |"))

@@ -160,7 +160,7 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
     if let Some(distribution) = root.child("ParameterValueDistribution") {
         let scenario = distribution.child("ScenarioFile").and_then(|file| file.raw("filepath")).unwrap_or_default();
         let message =
-            format!("import the scenario that it names, `{scenario}`, with --parameter NAME=VALUE for each value");
+            format!("it holds values only: import the scenario that it names, `{scenario}`, and give each value");
         return Err(reader.error(distribution, message));
     }
     match root.child("Catalog") {
@@ -185,7 +185,7 @@ fn ego_of(
     let names: Vec<_> = vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
     let entities = root.child("Entities").unwrap_or(root);
     let refuse =
-        |what: String| Err(reader.error(entities, format!("{what}: name one of {} with --ego", names.join(", "))));
+        |what: String| Err(reader.error(entities, format!("{what}: name one of {} as the ego", names.join(", "))));
     match (asked, controlled) {
         (Some(name), _) => position(name).map_or_else(|| refuse(format!("there is no vehicle `{name}`")), Ok),
         (None, controlled) => {

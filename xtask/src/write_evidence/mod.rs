@@ -16,7 +16,7 @@ pub(crate) mod scenarios;
 use std::error::Error;
 use std::time::Instant;
 
-use page::Section;
+use page::{Section, Size};
 
 /// The command line.
 #[derive(clap::Parser)]
@@ -35,33 +35,21 @@ pub(crate) struct Args {
     seed: u64,
 }
 
-/// How many samples are run, with which seed.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Size {
-    /// Of each campaign.
-    pub(crate) samples: u64,
-    /// Of each member of the driver ensemble, of each scenario with surrounding traffic, of each fault.
-    pub(crate) member_samples: u64,
-    pub(crate) seed: u64,
-}
-
-impl Size {
-    /// Returns what a section has between its markers.
-    pub(crate) fn section(self, section: Section) -> Result<String, Box<dyn Error>> {
-        let table = match section {
-            Section::Scenarios => scenarios::library(self),
-            Section::Ensemble => scenarios::ensemble(self),
-            Section::Arms => rows::arms(self),
-            Section::Promise => rows::promise(self),
-            Section::Twins => rows::twins(self),
-            Section::Distributions => rows::distributions(self),
-            Section::Slowing => rows::slowing(self),
-            Section::Faults => rows::faults(self),
-            Section::Sensitivity => printed::sensitivity(self),
-            Section::Frontier => printed::frontier(self),
-        }?;
-        Ok(format!("{}\n{table}", page::provenance(section, self)?))
-    }
+/// Returns what a section has between its markers.
+pub(crate) fn written(section: Section, size: Size) -> Result<String, Box<dyn Error>> {
+    let table = match section {
+        Section::Scenarios => scenarios::library(size),
+        Section::Ensemble => scenarios::ensemble(size),
+        Section::Arms => rows::arms(size),
+        Section::Promise => rows::promise(size),
+        Section::Twins => rows::twins(size),
+        Section::Distributions => rows::distributions(size),
+        Section::Slowing => rows::slowing(size),
+        Section::Faults => rows::faults(size),
+        Section::Sensitivity => printed::sensitivity(size),
+        Section::Frontier => printed::frontier(size),
+    }?;
+    Ok(format!("{}\n{table}", page::provenance(section, size)?))
 }
 
 #[expect(clippy::print_stdout, reason = "a program on the command line")]
@@ -70,7 +58,7 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn Error>> {
     let sections = if args.sections.is_empty() { Section::ALL.to_vec() } else { args.sections };
     for section in sections {
         let started = Instant::now();
-        let written = size.section(section)?;
+        let written = written(section, size)?;
         let path = page::root().join(section.page());
         std::fs::write(&path, page::with_section(&std::fs::read_to_string(&path)?, section, &written)?)?;
         println!("{}: {} after {:.0} s", section.page(), section.name(), started.elapsed().as_secs_f64());

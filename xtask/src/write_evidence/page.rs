@@ -6,7 +6,15 @@ use std::process::Command;
 
 use clap::ValueEnum;
 
-use super::Size;
+/// How many samples are run, with which seed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Size {
+    /// Of each campaign.
+    pub(crate) samples: u64,
+    /// Of each member of the driver ensemble, of each scenario with surrounding traffic, of each fault.
+    pub(crate) member_samples: u64,
+    pub(crate) seed: u64,
+}
 
 /// A section of a page, which stands between markers of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -61,6 +69,18 @@ impl Section {
         }
     }
 
+    /// Returns true if the figures rest on a scenario of the library, by its name in [`DIGESTS`].
+    fn rests_on(self, scenario: &str) -> bool {
+        let is_headline = scenario == "low-thw-overtake";
+        match self {
+            Self::Scenarios | Self::Ensemble => !scenario.starts_with("faults/"),
+            Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
+            Self::Twins => super::rows::TWINS.contains(&scenario),
+            Self::Faults => is_headline || scenario.starts_with("faults/"),
+            Self::Frontier => is_headline || scenario == "lead-brakes-at-any-time",
+        }
+    }
+
     /// Returns true if the figures rest on runs with full sensors.
     const fn is_full(self) -> bool {
         matches!(self, Self::Scenarios | Self::Promise | Self::Twins | Self::Faults)
@@ -106,7 +126,10 @@ pub(crate) fn with_section(page: &str, section: Section, written: &str) -> Resul
 pub(crate) fn outcomes(section: Section) -> Result<String, Box<dyn Error>> {
     let digests: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(root().join(DIGESTS))?)?;
     let mut hasher = blake3::Hasher::new();
-    hasher.update(digests["outcomes"].to_string().as_bytes());
+    let digests = digests["outcomes"].as_object().ok_or("no outcomes have digests")?;
+    for (scenario, of_modes) in digests.iter().filter(|(scenario, _)| section.rests_on(scenario)) {
+        hasher.update(format!("{scenario} {of_modes}").as_bytes());
+    }
     if section.is_full() {
         let readme = std::fs::read_to_string(root().join("README.md"))?;
         let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next());
@@ -124,8 +147,11 @@ pub(crate) fn provenance(section: Section, size: Size) -> Result<String, Box<dyn
         let output = Command::new(program).args(arguments).current_dir(root()).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
-    let commit =
-        printed("git", &["describe", "--always", "--dirty", "--exclude=*"]).unwrap_or_else(|| "unknown".to_owned());
+    let commit = printed("git", &["rev-parse", "--short", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
+    // What is not the program, such as these pages, may differ.
+    let changes = printed("git", &["status", "--porcelain", "--", "*.rs", "*.toml", "*.onnx", "Cargo.lock"]);
+    let is_whole = changes.is_some_and(|changes| changes.is_empty());
+    let commit = if is_whole { commit } else { format!("{commit}, modified") };
     let date = printed("date", &["+%Y-%m-%d"]).unwrap_or_else(|| "unknown".to_owned());
     let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpus.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("unknown processor");

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::process::Command;
 
-use super::{Size, page};
+use super::page::{self, Size};
 
 /// Returns a command and what it prints, as blocks of Markdown. The program lies beside this one.
 fn printed(words: &[&str]) -> Result<String, Box<dyn Error>> {

@@ -9,8 +9,8 @@ use closecall_campaign::summary::Summary;
 use closecall_scenarios::{ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 
+use super::page::{self, Size};
 use super::scenarios::{files_of, run, share};
-use super::{Size, page};
 
 /// A row of a table of pairs: the words in its first cell, and the changes of the scenario.
 struct Row {
@@ -37,7 +37,7 @@ const DISTRIBUTIONS: [Row; 9] = [
 ];
 
 /// Scenarios in which nothing happens ahead: the twins of those with a hazard, and those that never had one.
-const TWINS: [&str; 9] = [
+pub(super) const TWINS: [&str; 10] = [
     "cut-in-into-margin-without-cut-in",
     "overtake-without-brake",
     "rear-follower-stays",
@@ -47,6 +47,7 @@ const TWINS: [&str; 9] = [
     "empty-wet-road",
     "traffic/busy-overtake-without-brake",
     "traffic/dense-traffic",
+    "traffic/trucks-alongside",
 ];
 
 /// The controllers that ship, the baseline first.

@@ -17,7 +17,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::perception::agreement::{Agreement, Pair};
 
-use super::{Size, page};
+use super::page::{self, Size};
 
 /// The arms, the baseline first. The others are compared with it.
 const ARMS: [(&str, &str); 4] = [
