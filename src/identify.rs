@@ -1,6 +1,8 @@
 //! Names the sources that the program is built from: the commit, its date, and whether they differ from it. Cargo runs it
 //! before it builds the package.
 
+#![expect(clippy::print_stdout, reason = "Cargo reads what it prints")]
+
 use std::process::Command;
 
 /// What the outcome of a sample follows from.

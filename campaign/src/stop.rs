@@ -101,7 +101,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| format!("`{text}` is not a time above 0 such as 90s, 15m or 8h"))
 }
 
-/// What a caller of [`Campaign::run`] ends after a record.
+/// What a caller of [`Campaign::run`](crate::execution::Campaign::run) ends after a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// The scenario of the record. The next scenario begins.

@@ -104,7 +104,7 @@ fn a_run_without_a_lidar_and_a_wrong_extension_are_answered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scans.parquet");
     let error = write(&path, "sensors.mode = \"object\"\n").unwrap_err();
-    assert!(error.contains("scans.parquet") && error.contains("--sensors full"), "{error}");
+    assert!(error.contains("scans.parquet") && error.contains("only sensors of mode `full` have"), "{error}");
     assert!(!path.exists());
     let error = write(&folder.path().join("scans.las"), "sensors.mode = \"full\"\n").unwrap_err();
     assert!(error.contains("*.parquet or a folder *.pcd"), "{error}");

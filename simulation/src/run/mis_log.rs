@@ -66,7 +66,15 @@ pub(super) struct MisLog {
     unavailable: Option<Unavailability>,
 }
 
+/// Reasons, one after the other, for which a run has room from the start: more than most runs have.
+const RESERVED: usize = 32;
+
 impl MisLog {
+    pub(super) fn new() -> Self {
+        let (reasons, near_since_s) = (Vec::with_capacity(RESERVED), Vec::with_capacity(RESERVED));
+        Self { reasons, near_since_s, ..Self::default() }
+    }
+
     /// Observes one control step.
     pub(super) fn observe(&mut self, now: &MisObservation<'_>) {
         self.note_reason(now.time.s(), now.command.reason);

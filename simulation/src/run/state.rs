@@ -131,7 +131,7 @@ impl<'a> Run<'a> {
             encounter: Encounter::default(),
             meter: MarginMeter::new(scenario.physics_step.s()),
             cost: CostMeter::new(scenario.physics_step.s()),
-            mis: MisLog::default(),
+            mis: MisLog::new(),
             promise: PromiseMeter::new(),
             moments: Moments::default(),
             mis_settings,

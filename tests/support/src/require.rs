@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn an_unknown_word_is_an_error_that_lists_the_known_ones() {
         let message = parse("viewer,veiwer").unwrap_err();
-        let known = "viewer, onnxruntime, display, data, python, browser";
+        let known = "viewer, onnxruntime, display, data, python, browser, exchange";
         assert_eq!(message, format!("CLOSECALL_REQUIRE holds the unknown word `veiwer`; known are {known}"));
         assert!(parse("Viewer").is_err() && parse("viewer data").is_err());
     }
