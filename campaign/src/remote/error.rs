@@ -65,7 +65,7 @@ pub enum RemoteError {
         /// The index of the scenario.
         work: usize,
     },
-    /// The answer of a machine is not that of the block.
+    /// A machine answered something that does not belong to the block.
     #[error(
         "failed to use the results of block {block} of `{scenario}` ({samples} samples from {first} on): {message}"
     )]

@@ -244,7 +244,7 @@ impl Writer<'_> {
 
     /// Returns the gap of equilibrium of Wiedemann 99, cc0 + cc1·v + cc2/2 (m).
     fn wiedemann_gap(&self, model: &Wiedemann99Config, speed: Expression) -> Expression {
-        // The defaults are those of Vissim.
+        // Vissim has the same defaults.
         self.values.or(model.cc0_m.as_ref(), 1.5)
             + self.values.or(model.cc1_s.as_ref(), 0.9) * speed
             + self.values.or(model.cc2_m.as_ref(), 4.0) * 0.5.into()
@@ -424,7 +424,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Returns the time of an event relative to the nominal encounter (s); `of_sample` is that of the sample.
+    /// Returns the time of an event relative to the nominal encounter (s); `of_sample` is its time in the sample.
     fn nominal_time(&self, config: &NominalEncounterConfig, of_sample: Time) -> Expression {
         if !self.values.are_named {
             return of_sample.s().into();

@@ -13,7 +13,7 @@ use crate::date::today;
 
 /// Distance between the points of a bound (m). In the tightest curve, with a radius of 400 m, it deviates by 3 cm.
 const POINT_SPACING_M: f64 = 10.0;
-/// Number of the first dynamic obstacle: above those of the lanelets. Each number is used once.
+/// Number of the first dynamic obstacle. Lanelets have lower numbers, and each number is used once.
 const FIRST_OBSTACLE: usize = 1_000;
 /// Number of the planning problem.
 const PLANNING_PROBLEM: usize = 100_000;
