@@ -116,7 +116,7 @@ impl PlanArgs {
             (Design::Random, false) => Ok(Inference::FixedSamples),
             (_, false) => Ok(Inference::Design),
             (design, true) => Err(CliError::usage(format!(
-                "--time-budget needs independent samples, and those of --design {design} are not: use --design random"
+                "--time-budget needs independent samples: --design random draws them, and --design {design} does not"
             ))),
         }
     }

@@ -25,7 +25,7 @@ pub enum AssemblyError {
     },
     /// A gate on a probability needs independent samples.
     #[error(
-        "a gate on the probability of a collision needs independent samples, and those of the design `{design}` are not: use the design `random`"
+        "a gate on the probability of a collision needs independent samples: the design `random` draws them, and `{design}` does not"
     )]
     DependentSamples {
         /// The sampling design.
