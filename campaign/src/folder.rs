@@ -14,6 +14,7 @@
 //! ```
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::outcome::Outcome;
@@ -125,12 +126,13 @@ impl Folder {
         let folder = Self::open(path);
         fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
         let is_new = folder.is_unused()?;
-        if !is_new && !folder.file(MANIFEST).exists() {
+        let has_manifest = folder.has(MANIFEST)?;
+        if !is_new && !has_manifest {
             return Err(FolderError::NotACampaign { path: path.to_owned() });
         }
         let lock = Lock::acquire(path)?;
         folder.remove_temporary_files()?;
-        if folder.file(MANIFEST).exists() {
+        if folder.has(MANIFEST)? {
             let there = folder.manifest()?;
             let grows = resume && there.grows_to(manifest);
             let differences = if grows { Vec::new() } else { there.differences(manifest) };
@@ -163,6 +165,13 @@ impl Folder {
         Ok(true)
     }
 
+    /// Returns true if the folder has a file of this name. A file of which the system cannot say whether it is there is not
+    /// taken for missing: it would be overwritten.
+    pub(crate) fn has(&self, name: &str) -> Result<bool, FolderError> {
+        let path = self.file(name);
+        path.try_exists().map_err(|source| FolderError::Read { path, source })
+    }
+
     /// Removes the temporary files of a program that was killed while writing.
     fn remove_temporary_files(&self) -> Result<(), FolderError> {
         let fail = |source| FolderError::Read { path: self.path.clone(), source };
@@ -170,6 +179,17 @@ impl Folder {
             let entry = entry.map_err(fail)?;
             if is_temporary(&entry.file_name()) {
                 fs::remove_file(entry.path()).map_err(|source| WriteError::new(&entry.path(), source))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the journal and the wall times, if there are any.
+    pub(crate) fn remove_journal(&self) -> Result<(), WriteError> {
+        for path in [JOURNAL, WALL_TIMES].map(|name| self.file(name)) {
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(WriteError::new(&path, error)),
+                _ => (),
             }
         }
         Ok(())
@@ -263,7 +283,7 @@ impl Folder {
     /// # Errors
     /// [`FolderError`] if the journal cannot be read, or a line of it is damaged.
     pub fn agreement(&self, outcome: &Outcome) -> Result<Agreement, FolderError> {
-        if !self.file(JOURNAL).exists() {
+        if !self.has(JOURNAL)? {
             return Ok(Agreement::NotCompared);
         }
         for record in self.records()? {
@@ -353,7 +373,7 @@ impl LockedFolder {
     pub fn resume(&self, mut check: impl FnMut(&Record) -> Result<(), String>) -> Result<ResumedFiles, FolderError> {
         let path = self.folder.file(JOURNAL);
         let (mut kept_bytes, mut kept_records, mut torn) = (0, 0_u64, None);
-        if path.exists() {
+        if self.folder.has(JOURNAL)? {
             let fail = |source| FolderError::Read { path: path.clone(), source };
             for (index, entry) in journal::read(&path).map_err(fail)?.enumerate() {
                 match entry.map_err(fail)? {

@@ -166,12 +166,22 @@ impl Parts {
         Ok(())
     }
 
-    /// Writes the whole campaign into a new folder. Call [`Self::check`] first.
+    /// Writes the whole campaign into a new folder. Call [`Self::check`] first. With `resume`, the folder may hold what an
+    /// interrupted merge of the same campaign has left, which is written anew.
     ///
     /// # Errors
     /// [`MergeError`] if a part cannot be read, or if the new folder cannot be written or is not new.
-    pub fn merge(&self, works: &[Arc<Work>], out: &Path, command: Vec<String>) -> Result<LockedFolder, MergeError> {
-        let merged = Folder::lock(out, &Manifest { command, ..self.manifest.clone() }, false)?;
+    pub fn merge(
+        &self,
+        works: &[Arc<Work>],
+        out: &Path,
+        command: Vec<String>,
+        resume: bool,
+    ) -> Result<LockedFolder, MergeError> {
+        let merged = Folder::lock(out, &Manifest { command, ..self.manifest.clone() }, resume)?;
+        if resume {
+            merged.folder.remove_journal()?;
+        }
         let mut files = merged.resume(|_| Err("the folder of the merged campaign holds results already".to_owned()))?;
         let mut readers = Vec::with_capacity(self.folders.len());
         for (part, folder) in &self.folders {

@@ -50,10 +50,10 @@ struct Redo {
 /// Repairs the journal of a folder. If the campaign is stopped meanwhile, parts that are not complete stay as they are.
 pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repair, CampaignError> {
     let path = folder.journal_path();
-    if !path.exists() {
+    let read_error = |source| FolderError::Read { path: path.clone(), source };
+    if !path.try_exists().map_err(read_error)? {
         return Ok(Repair::default());
     }
-    let read_error = |source| FolderError::Read { path: path.clone(), source };
     let redos = scan(campaign, &path).map_err(read_error)?;
     if redos.is_empty() {
         return Ok(Repair::default());

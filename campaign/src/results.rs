@@ -159,7 +159,7 @@ fn remove(path: &Path) -> Result<bool, FolderError> {
             let _lock = Lock::acquire(path)?;
             inspect(path, true)?;
             let recordings = path.join(RECORDINGS);
-            if recordings.exists() {
+            if recordings.try_exists().map_err(fail(&recordings))? {
                 remove_files(&recordings, |_| true)?;
                 fs::remove_dir(&recordings).map_err(fail(&recordings))?;
             }

@@ -89,7 +89,7 @@ pub(super) fn replace<'a>(path: &Path, run_again: impl Iterator<Item = &'a Finis
     let new: BTreeMap<(&str, u64), &[f64]> = run_again
         .map(|finished| ((finished.record.scenario.as_str(), finished.record.sample), finished.wall_s.as_slice()))
         .collect();
-    if !path.exists() {
+    if !path.try_exists().map_err(|source| WriteError::new(path, source))? {
         return Ok(());
     }
     let times: Vec<WallTime> = read(path).map_err(|source| WriteError::new(path, source))?.collect();

@@ -34,8 +34,11 @@ pub(super) struct MergeArgs {
     #[arg(required = true, value_name = "DIR")]
     parts: Vec<PathBuf>,
     /// Folder for the whole campaign; it must be new or empty
-    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: PathBuf,
+    /// Write the whole campaign anew into a folder that holds it already, or a part of it after a merge that was interrupted
+    #[arg(long, help_heading = heading::OUTPUT)]
+    resume: bool,
     /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
     /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
     /// scenarios [default: each-kind]
@@ -66,7 +69,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     parts.check(&works)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
-    let merged = parts.merge(&works, &args.out, session::arguments())?;
+    let merged = parts.merge(&works, &args.out, session::arguments(), args.resume)?;
     // Samples are run again to record them. The merged folder is trusted as its parts are.
     let selection = if is_trusted { selection(args.record) } else { Selection::default() };
     if is_trusted {

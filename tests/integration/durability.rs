@@ -236,6 +236,31 @@ fn a_full_disk_is_an_i_o_error_and_loses_nothing() {
     }
 }
 
+#[test]
+#[cfg(unix)]
+fn a_gigabyte_of_zeros_behind_a_journal_is_cut_off_and_not_kept_in_memory() {
+    let folder = folder();
+    let whole = undisturbed(folder.path());
+    let out = folder.path().join("zeros");
+    stdout(&closecall(args(&out, &[])), 0);
+    let journal = fs::OpenOptions::new().write(true).open(out.join("journal.jsonl")).unwrap();
+    journal.set_len(journal.metadata().unwrap().len() + (1 << 30)).unwrap();
+    // The shell limits the address space to less than the zeros take. Two worker threads and the network fit.
+    let limited = |arguments: &[String]| {
+        let script = "ulimit -v 900000; exec \"$@\"";
+        let mut command = Command::new("sh");
+        command.current_dir(ROOT).args(["-c", script, "sh", env!("CARGO_BIN_EXE_closecall")]).args(arguments);
+        command.output().unwrap()
+    };
+    let checked = limited(&["check".to_owned(), out.to_str().unwrap().to_owned()]);
+    assert_eq!(code(&checked), 3, "{}", stderr(&checked));
+    assert!(stdout(&checked, 3).contains("journal.jsonl:401"), "{}", stdout(&checked, 3));
+    stdout(&limited(&args(&out, &["--resume"])), 0);
+    for file in REPORTS {
+        assert!(bytes(&whole, file) == bytes(&out, file), "{file} differs");
+    }
+}
+
 fn partition(folder: &Path, part: &str, more: &[&str]) -> std::path::PathBuf {
     let out = folder.join(format!("part-{}", part.replace('/', "-of-")));
     let more: Vec<&str> = ["--partition", part].iter().chain(more).copied().collect();

@@ -30,6 +30,8 @@ mod evidence_pages;
 mod exchange;
 mod exec_controller;
 mod exit_codes;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod failing_calls;
 mod faulty_controllers;
 mod fitted;
 mod fmu_controllers;

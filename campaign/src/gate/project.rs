@@ -1,5 +1,6 @@
 //! The project file, `closecall.toml`: gates for every campaign that is run in a folder or below it.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::criteria::GateConfig;
@@ -40,8 +41,22 @@ impl ProjectFile {
     /// # Errors
     /// [`ProjectError`] if the file cannot be read, or has an unknown key or an invalid criterion.
     pub fn find(folder: &Path) -> Result<Option<Self>, ProjectError> {
-        let found = folder.ancestors().map(|folder| folder.join(PROJECT_FILE)).find(|path| path.is_file());
-        found.map(|path| Self::read(&path)).transpose()
+        for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
+            match path.metadata() {
+                Ok(file) if file.is_file() => return Self::read(&path).map(Some),
+                // Gates that may be there must not be left out.
+                Err(error)
+                    if !matches!(
+                        error.kind(),
+                        ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::PermissionDenied
+                    ) =>
+                {
+                    return Err(ProjectError { path, message: error.to_string() });
+                }
+                _ => (),
+            }
+        }
+        Ok(None)
     }
 
     fn read(path: &Path) -> Result<Self, ProjectError> {

@@ -88,7 +88,7 @@ pub(super) fn record(
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
     // An earlier, identical campaign may have recorded other samples.
-    if path.exists() {
+    if path.try_exists().map_err(|source| WriteError::new(&path, source))? {
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
     let (mut recorded, mut entries) = (Recorded::default(), Vec::new());
