@@ -9,7 +9,7 @@ Units are part of the names: ``gap_m`` (m), ``speed_mps`` (m/s), ``acceleration_
 Positions of tracks are in the ego's frame: x ahead, y to the left, origin at the centre of the ego.
 """
 
-from ._campaign import CampaignResult, campaign
+from ._campaign import CampaignOptions, CampaignResult, campaign
 from ._controller import Controller, State
 from ._errors import ClosecallError, FileError, InputError, SampleError, UsageError
 from ._native import VERSION as __version__
@@ -17,9 +17,10 @@ from ._native import ControllerInput, LeadVehicle, Odometry, Sensors, Setup, Tab
 from ._outcome import Collision, Margins, MisSummary, Moment, Outcome, Promise
 from ._run import run
 from ._scenario import Scenario
-from ._traffic import criticality, fit, lane_changes
+from ._traffic import Rows, criticality, fit, lane_changes
 
 __all__ = [
+    "CampaignOptions",
     "CampaignResult",
     "ClosecallError",
     "Collision",
@@ -34,6 +35,7 @@ __all__ = [
     "Odometry",
     "Outcome",
     "Promise",
+    "Rows",
     "SampleError",
     "Scenario",
     "Sensors",

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
+import shutil
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 from . import _host, _native
 from ._command import call, option
@@ -35,14 +42,70 @@ class CampaignResult:
     failures: list[dict[str, Any]]
     #: All keys of the output.
     report: dict[str, Any] = field(repr=False)
-    #: The folder of the campaign, if there is one.
+    #: The folder of the campaign that ``out`` names, if it does.
     folder: Path | None = None
+    #: The outcomes and the report of a campaign without ``out``, for as long as the result lives.
+    _kept: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False, compare=False)
 
     def outcomes(self) -> _native.Table:
-        """Returns ``outcomes.parquet``: a row for each sample and controller."""
-        if self.folder is None:
-            raise UsageError("a campaign without `out` keeps no outcomes")
-        return _native.read_table(self.folder / "outcomes.parquet")
+        """Returns the outcomes, with a row for each sample and controller, as ``outcomes.parquet`` has them."""
+        return _native.read_table(self._file("outcomes.parquet"))
+
+    def _file(self, name: str) -> Path:
+        folder = self.folder if self._kept is None else Path(self._kept.name)
+        if folder is None or not (folder / name).exists():
+            raise UsageError(f"the campaign has no {name}: it has ended early ({self.verdict})")
+        return folder / name
+
+    def _repr_html_(self) -> str:
+        """Returns the report, with the verdict, the table of the arms and the map of the outcomes, for a notebook."""
+        try:
+            report = self._file("report.html").read_text(encoding="utf-8")
+        except UsageError:
+            return f"<pre>{html.escape(repr(self))}</pre>"
+        # A frame keeps the styles of the report and of the notebook apart.
+        style = "width: 100%; height: 40em; border: 1px solid #8888; resize: vertical"
+        return f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(report)}" style="{style}"></iframe>'
+
+
+class CampaignOptions(TypedDict, total=False):
+    """The further keywords of :func:`campaign`, each an option of ``closecall campaign``: its help explains them."""
+
+    preset: str | None
+    until_certain: bool
+    time_budget: str | None
+    judge_seed: int | str | None
+    check_share: float | None
+    check_at_most: int | None
+    no_validity_checks: bool
+    controller_timeout_ms: int | None
+    controller_memory_mib: int | None
+    onnxruntime: str | None
+    ray: str | None
+    sample_timeout_s: float | None
+    retry_crashed: int | None
+    partition: str | None
+    fail_fast: bool
+    max_errors: int | None
+    retry_errors: bool
+    strict_artifacts: bool
+    record: str | None
+    no_gate: bool
+    max_collisions: int | None
+    max_other_collisions: int | None
+    max_probability: float | None
+    confidence: float | None
+    max_induced: int | None
+    min_prevented: float | None
+    max_harm: float | None
+    min_rear_thw: float | None
+    max_engagement_rate: float | None
+    max_speed_deficit_mps: float | None
+    max_jerk: float | None
+    max_flip_rate: float | None
+    max_flaky: int | None
+    ensemble: str | Sequence[str] | None
+    fitted: str | None
 
 
 def campaign(
@@ -61,14 +124,17 @@ def campaign(
     gate: Sequence[str] = (),
     progress: bool | Callable[[int, int], Any] = False,
     isolate: bool = False,
-    **options: str | float | bool | Sequence[str] | None,
+    **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
     """Runs many samples of scenarios, and judges the result, as ``closecall campaign`` does.
 
     The folder, the verdict and the exit code are those of the command line. ``n`` is the number of samples of each scenario.
     ``controller`` is as in :func:`run`; ``paired`` compares it with ``acc`` on the same samples. ``arms`` names
     several controllers, the baseline first. ``gate`` lists criteria such as ``"upper(induced) <= 0.01"``. ``options`` are
-    further options of the command line, with underscores: ``max_collisions=3``, ``sample_timeout_s=10``, ``no_gate=True``.
+    further options of the command line, with underscores: ``max_collisions=3``, ``sample_timeout_s=10``, ``no_gate=True``; see
+    :class:`CampaignOptions`.
+
+    Without ``out`` the outcomes and the report live as long as the result does, and the call can be repeated.
 
     ``progress`` is called with the number of samples that are done and of all; ``True`` shows a bar of ``tqdm``.
 
@@ -79,6 +145,9 @@ def campaign(
 
     Ctrl-C raises ``KeyboardInterrupt`` after the samples that are running, and a second one at once. With ``out``, ``resume=True`` goes on from there.
     """
+    for name in set(options) - set(CampaignOptions.__annotations__):
+        similar = get_close_matches(name, CampaignOptions.__annotations__, n=1)
+        raise UsageError(f"campaign() has no keyword `{name}`" + (f"; did you mean `{similar[0]}`?" if similar else ""))
     several = [scenarios] if isinstance(scenarios, (Scenario, str, os.PathLike)) else scenarios
     words: list[str] = []
     changes: list[list[str]] = []
@@ -110,19 +179,37 @@ def campaign(
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         which = option("arms" if arms is not None else "controller", names)
         named: dict[str, object] = {"samples": n, "paired": paired, "seed": whole("seed", seed), "design": design, "sensors": sensors, "jobs": jobs}
-        named |= {"out": None if out is None else os.fspath(out), "resume": resume, "gate": [gate] if isinstance(gate, str) else list(gate), "set": settings}
+        named |= {"resume": resume, "gate": [gate] if isinstance(gate, str) else list(gate), "set": settings}
+        if out is None and resume:
+            raise UsageError("resume: name the folder of the campaign with `out`")
+        kept = tempfile.TemporaryDirectory(prefix="closecall-") if out is None else None
+        folder = Path(kept.name, "results") if kept is not None else Path(os.fspath(out or ""))
+        named["out"] = os.fspath(folder)
+        if kept is not None and "record" not in options:
+            # Nobody could look at the recordings.
+            named["record"] = "0"
         further = [word for name, value in {**named, **options}.items() for word in option(name, value)]
         code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
     keys = json.loads(output)
-    folder = None if out is None else Path(out)
-    return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys, folder)
+    if kept is not None:
+        _keep_results(folder)
+    result = (code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys)
+    return CampaignResult(*result, None if kept is not None else folder, kept)
+
+
+def _keep_results(folder: Path) -> None:
+    """Moves the outcomes and the report out of a folder, and removes what else is in it."""
+    for name in ("outcomes.parquet", "report.html"):
+        if (folder / name).exists():
+            (folder / name).rename(folder.parent / name)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 #: The options that limit worker processes, with their largest values.
 LIMITS = {"controller_timeout_ms": 600_000, "controller_memory_mib": 1_048_576}
 
 
-def _limits(options: dict[str, Any]) -> _host.Limits:
+def _limits(options: CampaignOptions) -> _host.Limits:
     """Returns the limits of worker processes that the options give."""
     values = []
     for (name, largest), default in zip(LIMITS.items(), _host.Limits()):

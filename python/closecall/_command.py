@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 import warnings
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from . import _native
+from ._errors import ClosecallError
 
 PROGRAM = "closecall"
 
@@ -39,12 +41,27 @@ def main() -> int:
 
 
 def call(arguments: Iterable[str], progress: Callable[[int, int], Any] | None = None) -> tuple[int, str]:
-    """Runs a command, and returns its exit code and its output. Its warnings become Python's."""
-    code, output, messages = _native.call([PROGRAM, *arguments], progress)
+    """Runs a command, and returns its exit code and its output. Its warnings become Python's. Messages name keywords."""
+    try:
+        code, output, messages = _native.call([PROGRAM, *arguments], progress)
+    except ClosecallError as error:
+        error.args = (keywords(str(error)), *error.args[1:])
+        raise
     for message in messages:
         if message.startswith("warning: "):
-            warnings.warn(message.removeprefix("warning: "), stacklevel=3)
+            warnings.warn(keywords(message.removeprefix("warning: ")), stacklevel=3)
     return code, output
+
+
+#: An option of the command line in a text, and its value.
+OPTION = re.compile(r"(?<![\w/-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)(?: <[^>]*>| [A-Z]+\b)?")
+#: The keywords whose options have other names.
+RENAMED = {"samples": "n", "record": "record"}
+
+
+def keywords(text: str) -> str:
+    """Returns a text of the command line that names keywords instead of options: ``--max-collisions`` is ``max_collisions=``."""
+    return OPTION.sub(lambda option: RENAMED.get(option[1], option[1].replace("-", "_")) + "=", text)
 
 
 def option(name: str, value: object) -> list[str]:

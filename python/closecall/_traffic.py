@@ -7,11 +7,32 @@ import os
 from collections.abc import Sequence
 from typing import Any, Literal
 
+from . import _native
 from ._command import call, option
 
 PathLike = str | os.PathLike[str]
 #: The layout of a trajectory file. By default it is recognised by the content.
 Layout = Literal["ngsim", "highd", "commonroad", "csv", "in-car"]
+
+
+class Rows(list[dict[str, Any]]):
+    """Rows of a table, as dictionaries. ``pyarrow.table(rows)``, ``polars.DataFrame(rows.table())`` and
+    ``pandas.DataFrame.from_arrow(rows)`` make a table of them."""
+
+    def table(self) -> _native.Table:
+        """Returns the rows as a table. A nested key such as ``metrics`` gives columns such as ``metrics.thw_s``."""
+        return _native.rows_table(json.dumps([_flat(row) for row in self]))
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        return self.table().__arrow_c_stream__(requested_schema)
+
+
+def _flat(row: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Returns a row whose nested dictionaries have become keys with dots."""
+    flat: dict[str, Any] = {}
+    for key, value in row.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+    return flat
 
 
 def lane_changes(
@@ -22,17 +43,17 @@ def lane_changes(
     reference: PathLike | None = None,
     layout: Layout | None = None,
     drop_bad_rows: bool = False,
-) -> list[dict[str, Any]] | dict[str, Any]:
+) -> Rows | dict[str, Any]:
     """Finds the lane changes in a trajectory file, as ``closecall traffic lane-changes`` does.
 
-    Each has ``track_id``, ``direction``, ``start_s``, ``crossing_s``, ``end_s``, ``duration_s``, ``speed_mps`` (m/s), ``complete`` and
+    The result has a dictionary for each, and is a table, too (:class:`Rows`). Each has ``track_id``, ``direction``, ``start_s``, ``crossing_s``, ``end_s``, ``duration_s``, ``speed_mps`` (m/s), ``complete`` and
     more. With ``reference``, a list of known lane changes (CSV), the result is a dictionary with recall and precision.
 
     Raises :class:`InputError` with file, line and column (``key``) if the file cannot be used.
     """
     named: dict[str, object] = {"criterion": criterion, "lanes": lanes, "reference": _path(reference)}
-    found: list[dict[str, Any]] | dict[str, Any] = _json("lane-changes", [file], {**named, **_reading(layout, drop_bad_rows)})
-    return found
+    result = _json("lane-changes", [file], {**named, **_reading(layout, drop_bad_rows)})
+    return Rows(result) if isinstance(result, list) else dict(result)
 
 
 def criticality(
@@ -42,16 +63,15 @@ def criticality(
     ttce_alone: bool = False,
     layout: Layout | None = None,
     drop_bad_rows: bool = False,
-) -> list[dict[str, Any]]:
+) -> Rows:
     """Computes how critical each lane change of a trajectory file is, as ``closecall traffic criticality`` does.
 
     ``speed_limit_mps`` (m/s) is 120 km/h by default. Each lane change has the keys of :func:`lane_changes` and ``metrics``
-    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``.
+    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``. The result is a table, too
+    (:class:`Rows`).
     """
     named: dict[str, object] = {"speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone}
-    found = _json("criticality", [file], {**named, **_reading(layout, drop_bad_rows)})
-    assert isinstance(found, list)
-    return found
+    return Rows(_json("criticality", [file], {**named, **_reading(layout, drop_bad_rows)}))
 
 
 def fit(
@@ -70,10 +90,8 @@ def fit(
     ``interval_95``, ``quantiles``, ``n`` and ``goodness_of_fit``.
     """
     several = [files] if isinstance(files, (str, os.PathLike)) else files
-    named: dict[str, object] = {"output": _path(output), "provenance": provenance, "correlations": correlations, "seed": seed}
-    found = _json("fit", several, {**named, **_reading(layout, drop_bad_rows)})
-    assert isinstance(found, dict)
-    return found
+    named: dict[str, object] = {"out": _path(output), "provenance": provenance, "correlations": correlations, "seed": seed}
+    return dict(_json("fit", several, {**named, **_reading(layout, drop_bad_rows)}))
 
 
 def _reading(layout: Layout | None, drop_bad_rows: bool) -> dict[str, object]:

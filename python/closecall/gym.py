@@ -157,8 +157,28 @@ def _split(values: NDArray[np.float64], max_tracks: int) -> Observation:
     }
 
 
-def _action_space(limits_mps2: tuple[float, float]) -> spaces.Box:
-    return spaces.Box(limits_mps2[0], limits_mps2[1], (1,), dtype=np.float64)
+#: The bounds of an action if none are given (m/s²).
+ACTION_LIMITS_MPS2 = (-9.0, 3.0)
+
+
+class _Actions:
+    """The action space of an environment, and the accelerations of its actions."""
+
+    def __init__(self, limits_mps2: tuple[float, float], normalized: bool) -> None:
+        low, high = limits_mps2
+        if not low < high:
+            raise UsageError(f"action_limits_mps2: expected two numbers, the smaller first, not {limits_mps2!r}")
+        self._middle, self._half = (0.5 * (low + high), 0.5 * (high - low)) if normalized else (0.0, 1.0)
+        self.space = spaces.Box(*((-1.0, 1.0) if normalized else (low, high)), (1,), dtype=np.float64)
+
+    def mps2(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Returns the accelerations (m/s²) of actions."""
+        return self._middle + self._half * actions
+
+    def one_mps2(self, action: Any) -> float:
+        """Returns the acceleration (m/s²) of one action."""
+        number = float(action if isinstance(action, (float, int)) else _numbers(action, 1, _ONE).item())
+        return self._middle + self._half * number
 
 
 def _numbers(action: Any, count: int, shape: str) -> NDArray[np.float64]:
@@ -190,7 +210,8 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     ``scenario`` is a scenario, a path, or a name of the library. ``sensors`` is the depth of the sensor simulation (``"object"``
     by default). ``max_tracks`` is the number of tracks in an observation. ``action_limits_mps2`` are the
     bounds of ``action_space``, an acceleration (m/s², shape (1,)): a step does not clip, as a campaign does not clip the same
-    command; ``gymnasium.wrappers.ClipAction`` does. ``reward`` replaces :func:`default_reward`. With ``truth``, ``info["truth"]`` holds the ego's true
+    command; ``gymnasium.wrappers.ClipAction`` does. With ``normalized_actions`` an action is a number from -1 to 1, which stands for
+    the accelerations between the limits, as most learning algorithms expect. ``reward`` replaces :func:`default_reward`. With ``truth``, ``info["truth"]`` holds the ego's true
     margins: ``gap_front_m``, ``thw_front_s``, ``gap_rear_m``, ``thw_rear_s``, ``ttc_rear_s``, each ``None`` if absent. At the end
     ``info["outcome"]`` is the :class:`closecall.Outcome`, which is the truth, too.
 
@@ -205,14 +226,16 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         *,
         sensors: SensorsLike | None = "object",
         max_tracks: int = 16,
-        action_limits_mps2: tuple[float, float] = (-9.0, 3.0),
+        action_limits_mps2: tuple[float, float] = ACTION_LIMITS_MPS2,
+        normalized_actions: bool = False,
         reward: Reward = default_reward,
         truth: bool = True,
         render_mode: str | None = None,
     ) -> None:
         self.scenario = loaded(scenario)
         self.observation_space: Any = observation_space(max_tracks)
-        self.action_space: Any = _action_space(action_limits_mps2)
+        self._actions = _Actions(action_limits_mps2, normalized_actions)
+        self.action_space: Any = self._actions.space
         self.render_mode = render_mode
         self._episode = _native.Episode(self.scenario._native, sensors, max_tracks)
         self._max_tracks = max_tracks
@@ -237,9 +260,9 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     def step(
         self, action: NDArray[np.float64] | float
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Commands an acceleration (m/s²) for 0.04 s."""
+        """Commands an acceleration for 0.04 s: in m/s², or normalized."""
         _check_open(self._is_closed)
-        acceleration_mps2 = float(action if isinstance(action, (float, int)) else _numbers(action, 1, _ONE).item())
+        acceleration_mps2 = self._actions.one_mps2(action)
         observed_bytes, end = self._episode.step(acceleration_mps2)
         observed = self._observation(observed_bytes)
         info = self._true_margins()
@@ -282,7 +305,8 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         *,
         sensors: SensorsLike | None = "object",
         max_tracks: int = 16,
-        action_limits_mps2: tuple[float, float] = (-9.0, 3.0),
+        action_limits_mps2: tuple[float, float] = ACTION_LIMITS_MPS2,
+        normalized_actions: bool = False,
         reward: Reward = default_reward,
         truth: bool = False,
         render_mode: str | None = None,
@@ -293,7 +317,8 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         self.render_mode = render_mode
         self.scenario = loaded(scenario)
         self.single_observation_space = observation_space(max_tracks)
-        self.single_action_space = _action_space(action_limits_mps2)
+        self._actions = _Actions(action_limits_mps2, normalized_actions)
+        self.single_action_space = self._actions.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._episodes = _native.Episodes(self.scenario._native, sensors, max_tracks, num_envs)
@@ -327,9 +352,9 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
     def step(
         self, actions: NDArray[np.float64]
     ) -> tuple[Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Commands an acceleration (m/s²) to each run; ``actions`` has the shape (``num_envs``, 1)."""
+        """Commands an acceleration to each run, in m/s² or normalized; ``actions`` has the shape (``num_envs``, 1)."""
         _check_open(self.closed)
-        accelerations = _numbers(actions, self.num_envs, f"({self.num_envs}, 1)")
+        accelerations = self._actions.mps2(_numbers(actions, self.num_envs, f"({self.num_envs}, 1)"))
         starts: list[tuple[int, int] | None] = [None] * self.num_envs
         restarted, has_restarted = self._has_ended, self._has_ended.any()
         if has_restarted:
@@ -375,22 +400,29 @@ class PolicyController:
     stepping is judged.
 
     ``policy(observation)`` returns the acceleration (m/s²), or an action of the environment, for an observation of
-    :class:`EncounterEnv` with the same ``max_tracks``.
+    :class:`EncounterEnv` with the same ``max_tracks``, ``action_limits_mps2`` and ``normalized_actions``.
     A policy with a memory is given as a function that creates one: ``campaign(controller=lambda: PolicyController(Mine()))``.
     """
 
-    def __init__(self, policy: Callable[[Observation], Any], max_tracks: int = 16) -> None:
+    def __init__(
+        self,
+        policy: Callable[[Observation], Any],
+        max_tracks: int = 16,
+        *,
+        action_limits_mps2: tuple[float, float] = ACTION_LIMITS_MPS2,
+        normalized_actions: bool = False,
+    ) -> None:
         _check_max_tracks(max_tracks)
         if not callable(policy):
             raise UsageError(f"policy: {policy!r} cannot be called with an observation")
         self.policy = policy
         self.max_tracks = max_tracks
+        self._actions = _Actions(action_limits_mps2, normalized_actions)
 
     def step(self, input: _native.ControllerInput) -> float:
         """Returns the acceleration (m/s²) that the policy answers."""
         values = np.frombuffer(input.observation(self.max_tracks), dtype=np.float64)
-        answer = self.policy(_split(values, self.max_tracks))
-        return float(answer if isinstance(answer, (float, int)) else _numbers(answer, 1, _ONE).item())
+        return self._actions.one_mps2(self.policy(_split(values, self.max_tracks)))
 
 
 gymnasium.register(

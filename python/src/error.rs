@@ -70,9 +70,10 @@ fn of_scenario(error: &ScenarioError) -> Location {
         | ScenarioError::Syntax { path, .. }
         | ScenarioError::Value { path, .. }
         | ScenarioError::UnusedParameter { path, .. }
-        | ScenarioError::Set { path, .. } => path.display().to_string(),
+        | ScenarioError::Set { path, .. } => Some(path.display().to_string()),
+        ScenarioError::Unknown { .. } => None,
     };
-    Location { file: Some(file), line: error.line().map(|line| line as u64), key }
+    Location { file, line: error.line().map(|line| line as u64), key }
 }
 
 fn raise(py: Python<'_>, code: ExitCode, message: &str, location: &Location) -> PyErr {

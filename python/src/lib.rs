@@ -44,7 +44,7 @@ mod _native {
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]
-    use super::table::Table;
+    use super::table::{Table, rows_table};
     #[pymodule_export]
     const PYTHON_PREFIX: &str = closecall_simulation::controller::hosted::PREFIX;
     #[pymodule_export]

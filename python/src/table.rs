@@ -1,9 +1,11 @@
 //! Tables that other libraries read without copying, by the Arrow PyCapsule interface
 //! (<https://arrow.apache.org/docs/format/CDataInterface/PyCapsuleInterface.html>).
 
+use std::collections::BTreeSet;
 use std::ffi::CStr;
+use std::sync::Arc;
 
-use arrow::array::{RecordBatch, RecordBatchIterator};
+use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, StringArray};
 use arrow::datatypes::SchemaRef;
 use arrow::error::ArrowError;
 use arrow::ffi::FFI_ArrowSchema;
@@ -11,6 +13,7 @@ use arrow::ffi_stream::FFI_ArrowArrayStream;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
+use serde_json::{Map, Value};
 
 const SCHEMA_NAME: &CStr = c"arrow_schema";
 const STREAM_NAME: &CStr = c"arrow_array_stream";
@@ -78,6 +81,47 @@ impl Table {
         let batches = self.batches.clone().into_iter().map(Ok::<_, ArrowError>);
         let stream = FFI_ArrowArrayStream::new(Box::new(RecordBatchIterator::new(batches, self.schema.clone())));
         PyCapsule::new_with_value(py, stream, STREAM_NAME)
+    }
+}
+
+/// Returns the table of a JSON array of objects. A column has the type of its values: truth values, whole numbers, numbers or
+/// text. Values of several types, and lists, become JSON text.
+#[pyfunction]
+pub(crate) fn rows_table(rows: &str) -> PyResult<Table> {
+    let rows: Vec<Map<String, Value>> =
+        serde_json::from_str(rows).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let mut names: Vec<&String> = Vec::new();
+    let mut known = BTreeSet::new();
+    for name in rows.iter().flat_map(Map::keys) {
+        if known.insert(name) {
+            names.push(name);
+        }
+    }
+    let columns = names.into_iter().map(|name| {
+        let values: Vec<Option<&Value>> =
+            rows.iter().map(|row| row.get(name).filter(|value| !value.is_null())).collect();
+        (name, column(&values), true)
+    });
+    let batch = RecordBatch::try_from_iter_with_nullable(columns).map_err(refused)?;
+    Ok(batch.into())
+}
+
+/// Returns the column of these values, of which `None` is absent.
+fn column(values: &[Option<&Value>]) -> ArrayRef {
+    let are = |is: fn(&Value) -> bool| values.iter().flatten().all(|value| is(value));
+    if are(Value::is_boolean) {
+        Arc::new(values.iter().map(|value| value.and_then(Value::as_bool)).collect::<BooleanArray>())
+    } else if are(Value::is_i64) {
+        Arc::new(values.iter().map(|value| value.and_then(Value::as_i64)).collect::<Int64Array>())
+    } else if are(Value::is_number) {
+        Arc::new(values.iter().map(|value| value.and_then(Value::as_f64)).collect::<Float64Array>())
+    } else {
+        let is_text = are(Value::is_string);
+        let text = |value: &Value| match value {
+            Value::String(text) if is_text => text.clone(),
+            other => other.to_string(),
+        };
+        Arc::new(values.iter().map(|value| value.map(text)).collect::<StringArray>())
     }
 }
 

@@ -1,0 +1,136 @@
+"""What a notebook needs: results without a folder, cells that run twice, tables, keywords that are checked."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+import pytest
+from support import SCENARIO, command
+
+import closecall as cc
+from closecall import _campaign, _command
+
+TYPED = Path(__file__).with_name("typed")
+
+
+def small(**options: object) -> cc.CampaignResult:
+    return cc.campaign(SCENARIO, n=20, seed=1, sensors="object", paired=True, **options)  # type: ignore[arg-type]
+
+
+def test_a_cell_without_a_folder_runs_twice_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    first, second = small(), small()
+    expected = small(out="kept")
+    tables = [pyarrow.table(result.outcomes()) for result in (first, second, expected)]
+    assert tables[0].equals(tables[1]) and tables[0].equals(tables[2]) and tables[0].num_rows == 40
+    assert first.folder is None and expected.folder == Path("kept")
+    assert os.listdir(tmp_path) == ["kept"]
+    assert first._kept is not None
+    kept = Path(first._kept.name)
+    assert sorted(os.listdir(kept)) == ["outcomes.parquet", "report.html"]
+    del first
+    gc.collect()
+    assert not kept.exists()
+
+
+def test_a_campaign_shows_its_report_in_a_notebook() -> None:
+    result = small(no_gate=True)
+    shown = result._repr_html_()
+    assert shown.startswith("<iframe") and "Outcome map" in shown and result.verdict in shown
+    assert len(repr(result)) < 400 and "0x" not in repr(result)
+
+
+def test_a_campaign_without_a_folder_cannot_be_resumed() -> None:
+    with pytest.raises(cc.UsageError, match="name the folder of the campaign with `out`"):
+        small(resume=True)
+
+
+def test_lane_changes_and_criticality_are_tables(tmp_path: Path) -> None:
+    file = tmp_path / "traffic.csv"
+    assert command("traffic", "record", SCENARIO, "-n", "3", "--seed", "1", "--sensors", "object", "-o", file).returncode == 0
+    changes, critical = cc.lane_changes(file), cc.criticality(file)
+    assert isinstance(changes, cc.Rows)
+    table = pyarrow.table(changes)
+    assert table.num_rows == len(changes) > 0
+    assert table.column("track_id").to_pylist() == [row["track_id"] for row in changes]
+    assert table.schema.field("start_s").type == pyarrow.float64() and table.schema.field("complete").type == pyarrow.bool_()
+    metrics = pyarrow.table(critical.table())
+    assert metrics.column("metrics.thw_s").to_pylist() == [row["metrics"].get("thw_s") for row in critical]
+    assert pyarrow.table(cc.Rows()).num_rows == 0
+
+
+def test_messages_name_keywords() -> None:
+    with pytest.raises(cc.UsageError, match="no keyword `max_colisions`; did you mean `max_collisions`") as raised:
+        small(max_colisions=3)
+    with pytest.raises(cc.UsageError, match="max_collisions=") as raised:
+        small(max_collisions="three")
+    assert "--" not in str(raised.value)
+    with pytest.raises(cc.UsageError) as raised:
+        small(partition="3/2")
+    assert "--" not in str(raised.value)
+    words = "with --out DIR, or --no-gate; see a--b and --max-flip-rate <SHARE>"
+    assert _command.keywords(words) == "with out=, or no_gate=; see a--b and max_flip_rate="
+
+
+def test_the_keywords_of_a_campaign_are_the_options_of_the_command() -> None:
+    shown = re.findall(r"^ +(?:-[a-z], )?--([a-z-]+)", command("campaign", "--help").stdout, re.MULTILINE)
+    options = {name.replace("-", "_") for name in shown}
+    explicit = {"samples", "controller", "arms", "paired", "seed", "design", "sensors", "jobs", "out", "resume", "gate"}
+    settings_of_scenarios, of_the_command_line = {"set"}, {"help", "format", "no_out"}
+    assert set(_campaign.CampaignOptions.__annotations__) == options - explicit - settings_of_scenarios - of_the_command_line
+
+
+def findings(file: Path) -> dict[int, str]:
+    """Returns the errors of pyright in strict mode, by line."""
+    settings = {"typeCheckingMode": "strict", "include": [str(file)], "pythonVersion": "3.11"}
+    project = file.parent / "pyrightconfig.json"
+    project.write_text(json.dumps(settings))
+    words = [sys.executable, "-m", "basedpyright", "--outputjson", "--pythonpath", sys.executable, "-p", str(project)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300)
+    errors = [one for one in json.loads(done.stdout)["generalDiagnostics"] if one["severity"] == "error"]
+    return {one["range"]["start"]["line"] + 1: one["message"] for one in errors}
+
+
+@pytest.mark.parametrize("name", ["clean.py", "planted.py"])
+def test_pyright_is_clean_on_good_code_and_finds_planted_mistakes(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("basedpyright")
+    file = tmp_path / name
+    text = (TYPED / name).read_text()
+    file.write_text(text)
+    calls = {number for number, line in enumerate(text.splitlines(), 1) if line.startswith("cc.")}
+    assert set(findings(file)) == (calls if name == "planted.py" else set())
+
+
+def test_a_normalized_action_is_an_acceleration_between_the_limits() -> None:
+    gym = pytest.importorskip("closecall.gym")
+    plain, scaled = gym.EncounterEnv(), gym.EncounterEnv(normalized_actions=True)
+    assert (scaled.action_space.low, scaled.action_space.high) == (-1.0, 1.0)
+    for env in (plain, scaled):
+        env.reset(seed=1, options={"sample": 3})
+    ends = [False, False]
+    while not any(ends):
+        observed = [plain.step(np.array([-1.5])), scaled.step(np.array([0.25]))]
+        ends = [step[2] or step[3] for step in observed]
+        assert observed[0][1] == observed[1][1]
+    assert ends[0] == ends[1] and plain.outcome() == scaled.outcome()
+    vector = gym.EncounterVectorEnv(2, normalized_actions=True)
+    assert (vector.action_space.low, vector.action_space.high) == (-1.0, 1.0) or (vector.action_space.high == 1.0).all()
+    with pytest.raises(cc.UsageError, match="the smaller first"):
+        gym.EncounterEnv(action_limits_mps2=(3.0, -9.0))
+
+
+def test_a_policy_with_normalized_actions_is_judged_as_it_was_trained() -> None:
+    gym = pytest.importorskip("closecall.gym")
+    outcomes = [
+        cc.run(SCENARIO, gym.PolicyController(lambda _: -1.5), sensors="object", sample=3),
+        cc.run(SCENARIO, gym.PolicyController(lambda _: 0.25, normalized_actions=True), sensors="object", sample=3),
+    ]
+    assert outcomes[0].margins == outcomes[1].margins

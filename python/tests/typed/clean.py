@@ -1,0 +1,8 @@
+from __future__ import annotations
+
+import closecall as cc
+
+result = cc.campaign("low-thw-overtake", n=200, paired=True, max_collisions=3, ensemble=["typical"])
+print(result.verdict, result.outcomes().num_rows)
+outcome = cc.run("low-thw-overtake", "mis", sample=3)
+print(outcome.margins.min_thw_rear_s)
