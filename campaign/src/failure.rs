@@ -27,7 +27,7 @@ pub enum FailureKind {
 impl From<&ScenarioError> for FailureKind {
     fn from(error: &ScenarioError) -> Self {
         match error {
-            ScenarioError::Set { .. } => Self::Usage,
+            ScenarioError::Set { .. } | ScenarioError::Unknown { .. } => Self::Usage,
             ScenarioError::Read { .. } => Self::Io,
             ScenarioError::NotText { .. }
             | ScenarioError::TooLarge { .. }

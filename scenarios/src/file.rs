@@ -37,6 +37,14 @@ pub enum ScenarioError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// No file and no scenario of the library has this name.
+    #[error("there is no scenario `{name}`: no file and no scenario of the library has this name{suggestion}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// The end of the message, which names a similar scenario of the library; empty if there is none.
+        suggestion: String,
+    },
     /// The file is not UTF-8 text.
     #[error("failed to read {}: line {line} is not UTF-8 text; a scenario is a TOML file", path.display())]
     NotText {
@@ -117,7 +125,11 @@ impl ScenarioError {
         match self {
             Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
             Self::Value { line, .. } | Self::UnusedParameter { line, .. } => *line,
-            Self::Read { .. } | Self::TooLarge { .. } | Self::Empty { .. } | Self::Set { .. } => None,
+            Self::Read { .. }
+            | Self::TooLarge { .. }
+            | Self::Empty { .. }
+            | Self::Set { .. }
+            | Self::Unknown { .. } => None,
         }
     }
 }

@@ -168,7 +168,8 @@ pub struct UnknownScenario {
     pub known: String,
 }
 
-fn suggestion(name: &str) -> String {
+/// Returns the end of a message that suggests a name of the library, or an empty text if none is similar.
+pub(crate) fn suggestion(name: &str) -> String {
     nearest(name, names()).map(|known| format!("; did you mean `{known}`?")).unwrap_or_default()
 }
 

@@ -11,7 +11,6 @@ use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::input::read_text;
-use closecall_traffic::suggest::nearest;
 
 use super::{ScenarioError, ScenarioFile, Setting, library};
 
@@ -131,27 +130,25 @@ fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError
     if let Some(text) = library::text(name) {
         return ScenarioFile::parse(&library::path(name), text, settings);
     }
-    match ScenarioFile::load(path, settings) {
-        Err(ScenarioError::Read { path, source }) if source.kind() == ErrorKind::NotFound => {
-            let source = match nearest(name, library::names()) {
-                Some(known) => Error::new(source.kind(), format!("{source}; did you mean `{known}` of the library?")),
-                None => source,
-            };
-            Err(ScenarioError::Read { path, source })
-        }
-        loaded => loaded,
+    if is_name(path) {
+        return Err(ScenarioError::Unknown { name: name.to_owned(), suggestion: library::suggestion(name) });
     }
+    ScenarioFile::load(path, settings)
+}
+
+/// Returns true for a name without folder and extension, which may be that of a scenario of the library.
+fn is_name(path: &Path) -> bool {
+    path.components().count() == 1 && path.extension().is_none()
 }
 
 /// Returns the file that `path` names, with or without its extension and folder; `None` if there is none.
 pub fn existing(path: &Path) -> Option<PathBuf> {
-    let is_name = path.components().count() == 1 && path.extension().is_none();
     let file = path.with_extension("toml");
     let named = [file.clone(), Path::new(SCENARIOS).join(file)];
     if path.exists() {
         return Some(path.to_owned());
     }
-    named.into_iter().find(|file| is_name && file.is_file())
+    named.into_iter().find(|file| is_name(path) && file.is_file())
 }
 
 fn from_standard_input(settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
@@ -235,7 +232,7 @@ mod tests {
     fn a_name_of_the_library_is_a_scenario_and_a_similar_one_a_suggestion() {
         assert_eq!(load(Path::new("paper-figure"), &[]).unwrap().config().name, "paper-figure");
         let error = load(Path::new("paper-figur"), &[]).unwrap_err().to_string();
-        assert!(error.contains("did you mean `paper-figure` of the library?"), "{error}");
+        assert!(error.contains("did you mean `paper-figure`?"), "{error}");
         assert!(!load(Path::new("zzz.toml"), &[]).unwrap_err().to_string().contains("did you mean"));
     }
 }

@@ -8,12 +8,13 @@ use closecall_campaign::baseline::Baseline;
 use closecall_campaign::folder::Folder;
 use closecall_report::campaign::BaselineText;
 use closecall_report::json::stamped;
+use closecall_traffic::atomic::WriteError;
 use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{out, outln, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall baseline`.
@@ -72,7 +73,7 @@ pub(super) fn baseline(args: &BaselineArgs) -> Result<ExitCode, CliError> {
 
 fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
     // Only a baseline is replaced: another file may be an input.
-    if file.exists() {
+    if file.try_exists().map_err(|source| WriteError::new(file, source))? {
         Baseline::read(file)?;
     }
     let baseline = Baseline::of(&Folder::open(dir))?;
@@ -81,7 +82,7 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
         let (samples, collisions, errors) = (scenario.samples, scenario.collisions, scenario.errors);
         outln!("{name}: {samples} samples, {collisions} collisions, {errors} errors");
     }
-    outln!("written: {}", file.display());
+    print_written(file);
     Ok(ExitCode::Pass)
 }
 

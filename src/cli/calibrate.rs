@@ -29,7 +29,7 @@ pub(super) struct CalibrateArgs {
     #[arg(long, value_enum, default_value_t = Model::Idm, help_heading = heading::METHOD)]
     model: Model,
     /// File for the pooled parameters, as a member of a driver ensemble (`closecall campaign --ensemble FILE`)
-    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -43,7 +43,7 @@ enum Model {
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
-    protect(&args.files, &[("--output", args.output.as_deref())])?;
+    protect(&args.files, &[("--out", args.output.as_deref())])?;
     let data = read(&args.files)?;
     let model = match args.model {
         Model::Idm => FollowingModel::Idm,

@@ -91,7 +91,7 @@ pub(super) struct MinimizeArgs {
     of: SavedSampleArgs,
     /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is written beside it, with
     /// `-passes` at the end of its name
-    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -103,7 +103,7 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     let case = Case::of(&saved, args.of.scenario.as_deref(), args.of.sample, args.of.controller.as_deref());
     let case = case.map_err(CausesError::from)?;
     let paths = output_files(&case, args.output.as_deref())?;
-    protect(&of_campaign(&args.of.dir), &paths.each_ref().map(|path| ("--output", Some(path.as_path()))))?;
+    protect(&of_campaign(&args.of.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
     let minimized = minimize_sample(&saved, &case)?;
     let files = write_files(&case, &minimized, &paths, command_for)?;
     match args.format {
@@ -139,7 +139,7 @@ pub(super) struct MapArgs {
     #[arg(long, default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
     /// Folder for the page, the pictures (SVG) and the points (CSV, JSON)
-    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     #[command(flatten)]
     set: SetArgs,

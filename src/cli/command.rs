@@ -1,10 +1,12 @@
 //! The commands of the program.
 
 use std::borrow::Cow;
+use std::error::Error;
+use std::num::{ParseFloatError, ParseIntError};
 use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
 use closecall_campaign::session::{Printed, Session, set_arguments};
@@ -30,10 +32,60 @@ use crate::exit_code::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the built-in
-    /// backend tract. It is loaded only if the network is used
-    #[arg(long, global = true, value_name = "PATH", env = "ORT_DYLIB_PATH", help_heading = heading::EXECUTION)]
-    onnxruntime: Option<PathBuf>,
+}
+
+/// The commands that may run the camera's network, each as the words that name it.
+const WITH_NETWORK: [&[&str]; 20] = [
+    &["run"],
+    &["campaign"],
+    &["replay"],
+    &["explain"],
+    &["minimize"],
+    &["plot"],
+    &["view"],
+    &["check"],
+    &["traffic", "chain"],
+    &["traffic", "calibrate"],
+    &["traffic", "paper"],
+    &["traffic", "reenact"],
+    &["traffic", "record"],
+    &["traffic", "sample"],
+    &["study", "frontier"],
+    &["study", "map"],
+    &["study", "sensitivity"],
+    &["study", "sensors"],
+    &["tool", "export"],
+    &["tool", "merge"],
+];
+
+/// The option for the shared library of ONNX Runtime.
+const ONNXRUNTIME: &str = "onnxruntime";
+
+/// Adds the option for the shared library of ONNX Runtime to a command.
+fn with_network(command: clap::Command, path: &[&'static str]) -> clap::Command {
+    match path {
+        [] => command.arg(
+            clap::Arg::new(ONNXRUNTIME)
+                .long(ONNXRUNTIME)
+                .value_name("PATH")
+                .value_parser(clap::value_parser!(PathBuf))
+                .env("ORT_DYLIB_PATH")
+                .help_heading(heading::EXECUTION)
+                .help(
+                    "Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the \
+                     built-in backend tract. It is loaded only if the network is used",
+                ),
+        ),
+        [name, below @ ..] => command.mut_subcommand(name, |command| with_network(command, below)),
+    }
+}
+
+/// Returns the shared library of ONNX Runtime that the arguments of a command name.
+fn onnxruntime(matches: &clap::ArgMatches) -> Option<PathBuf> {
+    match matches.subcommand() {
+        Some((_, below)) => onnxruntime(below),
+        None => matches.try_get_one::<PathBuf>(ONNXRUNTIME).ok().flatten().cloned(),
+    }
 }
 
 /// The end of the program's help.
@@ -49,6 +101,8 @@ Exit codes:
   7  invalid: a validity check of the simulator failed
   130  ended by Ctrl-C (SIGINT)
   143  ended by SIGTERM
+
+Terms such as ego, headway, prevented, induced: docs/reference/glossary.md
 
 Examples:
   closecall run low-thw-overtake
@@ -130,20 +184,58 @@ const GROUPED: [(&str, &str); 26] = [
 
 /// Returns the commands and options of the program, from which help, manual pages and completions are made.
 pub fn command() -> clap::Command {
-    Cli::command()
+    WITH_NETWORK.into_iter().fold(Cli::command(), with_network)
 }
 
-/// Parses the arguments. The name of a command that belongs to a group is answered with its whole name.
-fn parse(arguments: &[std::ffi::OsString]) -> Result<Cli, clap::Error> {
-    Cli::try_parse_from(arguments).map_err(|error| match error.get(ContextKind::InvalidSubcommand) {
-        Some(ContextValue::String(name)) => match GROUPED.iter().find(|(alone, _)| alone == name) {
-            Some((_, whole)) => {
-                command().error(ErrorKind::InvalidSubcommand, format!("the command is now `closecall {whole}`"))
+/// Parses the arguments, and returns the command and the shared library of ONNX Runtime.
+fn parse(arguments: &[std::ffi::OsString]) -> Result<(Command, Option<PathBuf>), clap::Error> {
+    let mut known = command();
+    let matches = known.try_get_matches_from_mut(arguments).map_err(plain_words)?;
+    let onnxruntime = onnxruntime(&matches);
+    let cli = Cli::from_arg_matches(&matches).map_err(|error| plain_words(error.format(&mut known)))?;
+    Ok((cli.command, onnxruntime))
+}
+
+/// Says in plain words what is wrong with an argument: the whole name of a command that belongs to a group, and what a number must be.
+fn plain_words(error: clap::Error) -> clap::Error {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let (kind, message) = match error.kind() {
+        kind @ ErrorKind::InvalidSubcommand => {
+            let grouped = GROUPED.iter().find(|(alone, _)| text(ContextKind::InvalidSubcommand) == Some(*alone));
+            let Some((_, whole)) = grouped else { return error };
+            (kind, format!("the command is now `closecall {whole}`"))
+        }
+        kind @ ErrorKind::ValueValidation => {
+            let (Some(value), Some(option)) = (text(ContextKind::InvalidValue), text(ContextKind::InvalidArg)) else {
+                return error;
+            };
+            let Some(allowed) = error.source().and_then(allowed_number) else { return error };
+            (kind, format!("invalid value '{value}' for '{option}': expected {allowed}"))
+        }
+        kind @ ErrorKind::UnknownArgument => {
+            let Some(argument) = text(ContextKind::InvalidArg) else { return error };
+            if argument.parse::<f64>().is_err() {
+                return error;
             }
-            None => error,
-        },
-        _ => error,
-    })
+            (kind, format!("unexpected argument '{argument}': the option before it takes no number below 0"))
+        }
+        _ => return error,
+    };
+    clap::Error::raw(kind, format!("{message}\n\nFor more information, try '--help'.\n"))
+}
+
+/// Returns what a number must be, if this is why it could not be read.
+fn allowed_number(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    if error.is::<ParseIntError>() {
+        Some("a whole number, 0 or more")
+    } else if error.is::<ParseFloatError>() {
+        Some("a number, such as 0.5")
+    } else {
+        None
+    }
 }
 
 /// Runs the program with these arguments. The first is the program's name.
@@ -156,8 +248,8 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     };
     // If a hook is already set, the program that uses this crate as a library has set it: it stays.
     drop(miette::set_hook(Box::new(handler)));
-    let cli = match parse(arguments) {
-        Ok(cli) => cli,
+    let (command, onnxruntime) = match parse(arguments) {
+        Ok(parsed) => parsed,
         Err(error) => {
             // Help and version are not errors: clap prints them to standard output.
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Pass };
@@ -171,7 +263,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         }
     };
     // The browser that `view` opens outlives it.
-    if !matches!(cli.command, Command::View(_)) {
+    if !matches!(command, Command::View(_)) {
         adopt_orphans();
     }
     watch(announce, |signal| {
@@ -183,10 +275,10 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         return ExitCode::Usage;
     }
     // A worker process has the backend of its task.
-    if !matches!(cli.command, Command::Host { .. }) {
-        choose_backend(cli.onnxruntime.as_deref());
+    if !matches!(command, Command::Host { .. }) {
+        choose_backend(onnxruntime.as_deref());
     }
-    let result = dispatch(cli.command);
+    let result = dispatch(command);
     end_all();
     remove_unpacked();
     match result {
@@ -216,9 +308,9 @@ fn wrong_stack() -> Option<String> {
 /// of the arguments is the program's name.
 pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<ExitCode, CliError>, Printed) {
     session.run(arguments, || {
-        let cli = parse(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
-        choose_backend(cli.onnxruntime.as_deref());
-        dispatch(cli.command)
+        let (command, onnxruntime) = parse(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
+        choose_backend(onnxruntime.as_deref());
+        dispatch(command)
     })
 }
 

@@ -59,7 +59,7 @@ pub(super) struct ExportArgs {
     #[arg(default_value_t = 0)]
     sample: u64,
     /// Folder for the case: OpenSCENARIO XML 1.3, OpenDRIVE 1.8 and a catalogue of vehicles, or CommonRoad XML
-    #[arg(short, long, value_name = "FOLDER", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FOLDER", help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Forms to write [default: open-loop,closed-loop,logical]
     #[arg(long = "form", value_enum, value_delimiter = ',', value_name = "FORM,…", help_heading = heading::OUTPUT)]
@@ -105,7 +105,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     };
     let Chosen { file, scenario, key, arm, value_sets, inputs } = &chosen;
     let written = forms.iter().flat_map(|form| form.files()).map(|name| args.output.join(name)).collect::<Vec<_>>();
-    let outputs: Vec<_> = written.iter().map(|path| ("--output", Some(path.as_path()))).collect();
+    let outputs: Vec<_> = written.iter().map(|path| ("--out", Some(path.as_path()))).collect();
     protect(inputs, &outputs)?;
     check_backend_of(scenario, std::slice::from_ref(arm))?;
     let mut motion = Motion::default();

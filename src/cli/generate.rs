@@ -8,7 +8,7 @@ use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{out, print_written};
 use crate::exit_code::ExitCode;
 
 /// The name of the program.
@@ -36,7 +36,7 @@ pub(super) struct CompletionsArgs {
 ]))]
 pub(super) struct ManArgs {
     /// Folder for one page per command; without it, the page of the program is printed
-    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
 }
 
@@ -59,7 +59,7 @@ pub(super) fn man(args: &ManArgs, command: Command) -> Result<ExitCode, CliError
             let fail = |source| WriteError::new(folder, source);
             std::fs::create_dir_all(folder).map_err(fail)?;
             clap_mangen::generate_to(command, folder).map_err(fail)?;
-            outln!("written: {}", folder.display());
+            print_written(folder);
         }
     }
     Ok(ExitCode::Pass)

@@ -24,7 +24,7 @@ pub(super) struct ImportArgs {
     #[arg(value_name = "FILE.xosc")]
     file: PathBuf,
     /// Scenario file to write
-    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Vehicle that the controller under test drives [default: `Ego`, or the only one with a controller]
     #[arg(long, value_name = "NAME", help_heading = heading::SCENARIO)]
@@ -42,7 +42,7 @@ fn parameter(text: &str) -> Result<(String, String), String> {
 }
 
 pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
-    protect(std::slice::from_ref(&args.file), &[("--output", Some(&args.output))])?;
+    protect(std::slice::from_ref(&args.file), &[("--out", Some(&args.output))])?;
     let options = ImportOptions { ego: args.ego.clone(), parameters: args.parameters.clone() };
     let imported = import(&args.file, &options)?;
     write_file(&args.output, |file| write!(file, "# Made by `{}`\n{}", command_line(), imported.text))?;

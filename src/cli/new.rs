@@ -11,7 +11,7 @@ use closecall_scenarios::source::SCENARIOS;
 
 use super::CliError;
 use super::help::{examples, heading};
-use super::output::outln;
+use super::output::{print_error, print_written};
 use super::version::commit;
 use crate::exit_code::ExitCode;
 
@@ -30,7 +30,7 @@ pub(super) struct NewArgs {
     #[arg(long, value_name = "LIBRARY_NAME", help_heading = heading::SCENARIO)]
     from: Option<String>,
     /// File to write [default: NAME.toml; in a repository with closecall.toml, scenarios/NAME.toml]
-    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
 }
 
@@ -63,12 +63,12 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
     // A copy or a template that `check` refuses would be a defect of the program.
     ScenarioFile::parse(&path, &text, &[])?.check()?;
     if !create(&path, &text)? {
-        let message = format!("{} exists, and is not overwritten: name another file with --output", path.display());
+        let message = format!("{} exists, and is not overwritten: name another file with --out", path.display());
         return Err(CliError::Usage { message });
     }
+    print_written(&path);
     let shown = path.display();
-    outln!("written: {shown}");
-    outln!("next: closecall check {shown} --watch, closecall campaign {shown} -n 200 --paired");
+    print_error(format_args!("next: closecall check {shown} --watch, closecall campaign {shown} -n 200 --paired\n"));
     Ok(ExitCode::Pass)
 }
 
@@ -81,17 +81,23 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
     for (path, text) in repository_files(&args.dir, Installation { url, rev }) {
         let is_new = create(&path, &text)?;
         let advice = if is_new { String::new() } else { advice(&path, &text) };
-        outln!("{}: {}{advice}", if is_new { "written" } else { "kept" }, path.display());
+        print_error(format_args!("{}: {}{advice}\n", if is_new { "written" } else { "kept" }, path.display()));
     }
     let missing: Vec<&str> = [("CLOSECALL_URL", url), ("CLOSECALL_REV", rev)]
         .into_iter()
         .filter_map(|(name, value)| (value == TO_FILL_IN).then_some(name))
         .collect();
     if !missing.is_empty() {
-        outln!("fill in: {} in .github/workflows/closecall.yml and .gitlab-ci.yml", missing.join(" and "));
+        print_error(format_args!(
+            "fill in: {} in .github/workflows/closecall.yml and .gitlab-ci.yml\n",
+            missing.join(" and ")
+        ));
     }
     let scenarios = args.dir.join(SCENARIOS);
-    outln!("next: closecall check {0}, closecall campaign {0} -n 200 --paired", scenarios.display());
+    print_error(format_args!(
+        "next: closecall check {0}, closecall campaign {0} -n 200 --paired\n",
+        scenarios.display()
+    ));
     Ok(ExitCode::Pass)
 }
 

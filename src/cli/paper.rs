@@ -40,13 +40,13 @@ pub(super) struct PaperArgs {
     #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(0..=10_000), help_heading = heading::METHOD)]
     repetitions: u64,
     /// Folder for the pictures and `index.html`
-    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]
     output: PathBuf,
 }
 
 pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let index = args.output.join("index.html");
-    protect(&of_trajectories(&args.data.files), &[("--output", Some(&index))])?;
+    protect(&of_trajectories(&args.data.files), &[("--out", Some(&index))])?;
     let data_sets = args.data.read_all()?;
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
     let recorded = data_sets

@@ -16,7 +16,7 @@ use super::args::SetArgs;
 use super::arms::{ArmArgs, ComparisonArgs, arm};
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::outln;
+use super::output::{outln, print_written};
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
 use super::saved::{LimitArgs, TrustArgs};
 use crate::exit_code::ExitCode;
@@ -52,7 +52,7 @@ pub(super) struct PlotArgs {
     #[command(flatten)]
     set: SetArgs,
     /// File to write; its extension, .svg, .png or .pdf, determines the format
-    #[arg(short, long, value_name = "FILE.svg|FILE.png|FILE.pdf", value_parser = PictureFile::parse, help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.svg|FILE.png|FILE.pdf", value_parser = PictureFile::parse, help_heading = heading::OUTPUT)]
     output: PictureFile,
     /// Width on paper in mm, from 50 to 1200; of a PNG file at 300 pixels per inch [default: 900 px of CSS, 238 mm]
     #[arg(long, value_name = "MM", value_parser = parse_width_mm, help_heading = heading::OUTPUT)]
@@ -65,7 +65,7 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
     for film in &films {
         outln!("{}: {}", film.title(), film.headline());
     }
-    outln!("written to {}", args.output.path().display());
+    print_written(args.output.path());
     Ok(ExitCode::Pass)
 }
 
@@ -74,7 +74,7 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         return Err(CliError::usage("--scenario chooses a scenario of a campaign: name its folder instead of a file"));
     }
     let file = args.set.load(&args.source)?;
-    protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--output", Some(args.output.path()))])?;
+    protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--out", Some(args.output.path()))])?;
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
@@ -94,7 +94,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
             "a campaign has many samples: name one, as `closecall plot DIR SAMPLE -o FILE.svg`",
         ));
     };
-    protect(&files_of_campaign(&args.source), &[("--output", Some(args.output.path()))])?;
+    protect(&files_of_campaign(&args.source), &[("--out", Some(args.output.path()))])?;
     let LimitArgs { controller_timeout_ms, controller_memory_mib } = args.arm.controller.limits;
     let mut saved = args.trust.open(&args.source)?;
     saved.limit(controller_timeout_ms, controller_memory_mib);

@@ -39,7 +39,7 @@ pub(super) struct RecordArgs {
     #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true, help_heading = heading::OUTPUT)]
     in_car: Option<Option<String>>,
     /// Trajectory file to write, in the plain CSV layout; with --in-car in the in-car layout
-    #[arg(short, long, value_name = "FILE.csv", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.csv", help_heading = heading::OUTPUT)]
     output: PathBuf,
 }
 
@@ -52,7 +52,7 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
 
 fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let file = args.sim.set.load(&args.scenario)?;
-    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &[("--output", Some(&args.output))])?;
+    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &[("--out", Some(&args.output))])?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let recording = recorder.finish(&file.config().name);
@@ -66,7 +66,7 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
 fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, CliError> {
     let file = args.sim.set.load(&args.scenario)?;
     let truth = ground_truth_path(&args.output);
-    let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
+    let outputs = [("--out", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
     let chosen = recorded_actor(file.config(), actor)
         .map_err(|message| CliError::Usage { message: format!("{message}, with --in-car=ACTOR") })?;

@@ -68,7 +68,7 @@ pub(super) struct ReenactArgs {
     #[command(flatten)]
     watch: WatchArgs,
     /// Save the scenario of the encounter, for further runs and variations
-    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -77,7 +77,7 @@ pub(super) struct ReenactArgs {
 
 pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
-    let outputs = [&[("--output", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
+    let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
     let found = chosen(&args.file, &args.read, args.track)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);

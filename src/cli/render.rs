@@ -24,7 +24,7 @@ use crate::exit_code::ExitCode;
 ]))]
 pub(super) struct RenderArgs {
     /// Folder for the images
-    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Number of random scenes
     #[arg(short = 'n', long = "scenes", default_value_t = 20, allow_negative_numbers = true, value_parser = scene_count, help_heading = heading::SCENES)]

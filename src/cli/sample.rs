@@ -51,7 +51,7 @@ pub(super) struct SampleArgs {
     #[command(flatten)]
     set: SetArgs,
     /// Folder for `sample.svg`, `sample.rrd` (a Rerun file) and the scenario of each step, `step-1.toml` and so on
-    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Also write each step as an encounter with the margin increase system, `transferred-1.toml` and so on: the vehicle that
     /// changes lanes becomes the rear vehicle, the vehicle that it overtakes the ego, and the next one the lead vehicle
@@ -68,7 +68,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let path = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
-    protect(&inputs, &[("--output", svg.as_deref()), ("--output", rrd.as_deref())])?;
+    protect(&inputs, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
     let found = chosen(&args.file, &args.read, args.lane_change)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let mut all = Sampled::new(&found);

@@ -41,7 +41,7 @@ pub(super) struct SensorsArgs {
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     seed: u64,
     /// Folder for the page (sensors.html), the figures (JSON, Parquet) and the curves (Parquet)
-    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     #[command(flatten)]
     set: SetArgs,

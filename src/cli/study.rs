@@ -44,7 +44,7 @@ pub(super) struct StudyArgs {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
     /// Folder for the page, the charts (SVG) and the figures (JSON)
-    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     #[command(flatten)]
     set: SetArgs,

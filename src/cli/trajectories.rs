@@ -119,7 +119,7 @@ pub(super) struct FitArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// File to write [default: standard output]
-    #[arg(short, long, value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Origin of the trajectory files, for the heading of the output
     #[arg(long, default_value = "", help_heading = heading::OUTPUT)]
@@ -131,7 +131,7 @@ pub(super) struct FitArgs {
     /// Seed of the bootstrap, which computes the confidence intervals
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
-    /// Output format; without --output, `human` prints the text of the file
+    /// Output format; without --out, `human` prints the text of the file
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
@@ -208,7 +208,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
-    protect(&of_trajectories(&args.data.files), &[("--output", args.output.as_deref())])?;
+    protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     let data_sets = args.data.read_all()?;
     let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
@@ -220,7 +220,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
             out!("{}", FitText(&fitted));
-            outln!("written to {}", path.display());
+            print_written(path);
         }
     }
     Ok(ExitCode::Pass)

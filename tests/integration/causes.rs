@@ -102,7 +102,7 @@ fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
     for sample in failing.into_iter().take(5) {
         let file = parent.path().join(format!("case-{sample}.toml"));
         let (dir, name, number) = (path.to_str().unwrap(), file.to_str().unwrap(), sample.to_string());
-        let found = json(&closecall(["minimize", dir, &number, "--output", name, "--format", "json"]), 0);
+        let found = json(&closecall(["minimize", dir, &number, "--out", name, "--format", "json"]), 0);
         let off = found["minimized"]["off_nominal"].as_array().unwrap().len();
         assert!(off <= 3 || found["minimized"]["why_more_than_three"].is_string(), "{found:#}");
         let run = |file: &str| number_of_collisions(&json(&closecall(["run", file, "--format", "json"]), 0));
@@ -120,7 +120,7 @@ fn a_minimized_case_of_another_controller_names_it_and_no_foreign_file_is_overwr
     let path = campaign(parent.path(), "acc", 120, &["--controller", "acc"]);
     let sample = failing(&path).first().unwrap().to_string();
     let (dir, file) = (path.to_str().unwrap(), parent.path().join("case acc.toml"));
-    let words = ["minimize", dir, &sample, "--controller", "acc", "--output", file.to_str().unwrap()];
+    let words = ["minimize", dir, &sample, "--controller", "acc", "--out", file.to_str().unwrap()];
     let text = stdout(&closecall(words), 0);
     let commands = text.lines().filter(|line| line.contains("closecall run '") && line.ends_with("--controller acc"));
     assert!(commands.count() >= 1 && !text.contains("closecall run /"), "{text}");

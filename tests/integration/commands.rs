@@ -18,7 +18,7 @@ fn run_in(folder: &Path, args: &[&str]) -> std::process::Output {
 #[test]
 fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
     let folder = folder();
-    let written = stdout(&run_in(folder.path(), &["init"]), 0);
+    let written = stderr(&run_in(folder.path(), &["init"]));
     let files = [".github/workflows/closecall.yml", ".gitlab-ci.yml", ".gitignore", "scenarios/late-overtake.toml"];
     for path in files.into_iter().chain(["closecall.toml", "scenario.schema.json"]) {
         assert!(written.contains(&format!("written: ./{path}")), "{written}");
@@ -26,7 +26,7 @@ fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
     }
     assert!(!std::fs::read_to_string(folder.path().join(".gitlab-ci.yml")).unwrap().contains('@'));
     assert!(written.contains("fill in: CLOSECALL_URL"), "{written}");
-    let written = stdout(&run_in(folder.path(), &["new", "mine"]), 0);
+    let written = stderr(&run_in(folder.path(), &["new", "mine"]));
     assert!(written.starts_with("written: scenarios/mine.toml\n"), "{written}");
     for name in ["mine", "late-overtake"] {
         let text = std::fs::read_to_string(folder.path().join(format!("scenarios/{name}.toml"))).unwrap();
@@ -46,11 +46,11 @@ fn new_and_init_overwrite_nothing() {
     std::fs::write(folder.path().join(".gitlab-ci.yml"), "own").unwrap();
     assert!(message(&run_in(folder.path(), &["new", "mine"])).contains("is not overwritten"));
     assert_eq!(code(&run_in(folder.path(), &["new", "mine"])), 2);
-    assert!(stdout(&run_in(folder.path(), &["init"]), 0).contains("kept: ./.gitlab-ci.yml"));
+    assert!(stderr(&run_in(folder.path(), &["init"])).contains("kept: ./.gitlab-ci.yml"));
     for name in ["mine.toml", ".gitlab-ci.yml"] {
         assert_eq!(std::fs::read_to_string(folder.path().join(name)).unwrap(), "own");
     }
-    let copied = stdout(&run_in(folder.path(), &["new", "other", "--from", "paper-figure", "-o", "x/other.toml"]), 0);
+    let copied = stderr(&run_in(folder.path(), &["new", "other", "--from", "paper-figure", "-o", "x/other.toml"]));
     assert!(copied.starts_with("written: x/other.toml"), "{copied}");
     stdout(&run_in(folder.path(), &["check", "x/other.toml"]), 0);
 }
@@ -142,16 +142,76 @@ fn the_paths_of_written_files_are_printed() {
 }
 
 #[test]
+fn results_are_on_standard_output_and_the_paths_of_files_on_standard_error() {
+    let folder = folder();
+    let campaign =
+        ["campaign", "paper-figure", "-n", "2", "--sensors", "ground-truth", "--no-gate", "--out", "results"];
+    assert_eq!(code(&run_in(folder.path(), &campaign)), 0);
+    let recorded =
+        ["traffic", "record", "low-thw-overtake", "-n", "2", "--sensors", "ground-truth", "-o", "traffic.csv"];
+    for (words, file) in [
+        (&["new", "mine"][..], "mine.toml"),
+        (&["init", "repository"], "repository/closecall.toml"),
+        (&["plot", "paper-figure", "-o", "figure.svg"], "figure.svg"),
+        (&["baseline", "save", "results", "baseline.json"], "baseline.json"),
+        (&["tool", "man", "--out", "pages"], "pages"),
+        (&["tool", "export", "paper-figure", "-o", "case"], "case"),
+        (&recorded, "traffic.csv"),
+        (&["traffic", "fit", "traffic.csv", "-o", "fitted.toml"], "fitted.toml"),
+    ] {
+        let output = run_in(folder.path(), words);
+        let printed = stdout(&output, 0);
+        assert!(!printed.contains("written"), "{words:?}: {printed}");
+        let told = stderr(&output);
+        let names = |line: &str| line.starts_with("written: ") && line.contains(file);
+        assert!(told.lines().any(names), "{words:?}: {told}");
+    }
+}
+
+#[test]
 fn a_misspelt_or_negative_value_is_explained() {
     for (args, expected) in [
         (["run", "paper-figure", "--controller", "miss"], "did you mean `mis`?"),
         (["run", "paper-figure", "--set", "duration=3"], "did you mean `duration-s`?"),
         (["campaign", "paper-figure", "-n", "-5"], "`-5` is negative: a whole number of 1 or more is needed"),
         (["campaign", "paper-figure", "--samples", "1e3"], "is not a whole number"),
+        (["campaign", "paper-figure", "--max-collisions", "-1"], "the option before it takes no number below 0"),
+        (["campaign", "paper-figure", "--max-collisions", "many"], "expected a whole number, 0 or more"),
+        (
+            ["run", "paper-figure", "--sample", "1.5"],
+            "'1.5' for '--sample <SAMPLE>': expected a whole number, 0 or more",
+        ),
+        (
+            ["run", "paper-figur", "--seed", "1"],
+            "there is no scenario `paper-figur`: no file and no scenario of the library",
+        ),
     ] {
         let output = closecall(args);
         assert_eq!(code(&output), 2, "{args:?}");
-        assert!(message(&output).contains(expected), "{}", message(&output));
+        let text = message(&output);
+        assert!(text.contains(expected) && !text.contains("-- -1") && !text.contains("digit"), "{text}");
+    }
+}
+
+#[test]
+fn the_option_for_onnx_runtime_belongs_to_the_commands_that_may_run_the_network() {
+    let has_option = |words: &[&str]| stdout(&closecall(words.iter().chain(&["--help"])), 0).contains("--onnxruntime");
+    for words in [&["run"][..], &["campaign"], &["replay"], &["explain"], &["study", "sensors"], &["tool", "merge"]] {
+        assert!(has_option(words), "{words:?}");
+    }
+    for words in [&["list"][..], &["new"], &["init"], &["baseline", "save"], &["traffic", "fit"], &["tool", "schema"]] {
+        assert!(!has_option(words), "{words:?}");
+    }
+    let refused = closecall(["list", "--onnxruntime", "libonnxruntime.so"]);
+    assert!(code(&refused) == 2 && message(&refused).contains("--onnxruntime"), "{}", message(&refused));
+}
+
+#[test]
+fn the_place_of_an_output_has_the_same_option_in_every_command() {
+    for (words, command) in commands() {
+        for option in command.get_opts().filter(|option| ["out", "output"].contains(&option.get_id().as_str())) {
+            assert_eq!((option.get_short(), option.get_long()), (Some('o'), Some("out")), "{words}");
+        }
     }
 }
 

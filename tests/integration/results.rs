@@ -491,7 +491,7 @@ fn init_tells_git_to_leave_the_results_alone() {
         "{ignored}"
     );
     fs::write(folder.path().join(".gitignore"), "target\n").unwrap();
-    let kept = stdout(&run(folder.path(), &["init"]), 0);
+    let kept = stderr(&run(folder.path(), &["init"]));
     assert!(kept.contains("kept: ./.gitignore (add the line /closecall-results/"), "{kept}");
     assert_eq!(fs::read_to_string(folder.path().join(".gitignore")).unwrap(), "target\n");
 }

@@ -51,8 +51,8 @@ mod tests {
     fn an_output_is_neither_an_input_nor_another_output() {
         let [input, new] = ["a.toml", "new.csv"].map(Path::new);
         let inputs = [input.to_owned()];
-        assert!(check_outputs(&inputs, &[("--output", Some(input))]).is_err());
-        assert!(check_outputs(&inputs, &[("--output", Some(new)), ("--trace", None)]).is_ok());
+        assert!(check_outputs(&inputs, &[("--out", Some(input))]).is_err());
+        assert!(check_outputs(&inputs, &[("--out", Some(new)), ("--trace", None)]).is_ok());
         assert!(check_outputs(&inputs, &[("--record", Some(new)), ("--trace", Some(new))]).is_err());
     }
 
