@@ -113,3 +113,25 @@ fn the_glossary_of_the_book_is_that_of_the_code() {
     assert!(terms.len() > 20, "{terms:?}");
     assert_eq!(terms, read("traffic/src/lib.rs"));
 }
+
+/// Returns true if a page is the glossary, or links it.
+fn explains_terms(markdown: &str) -> bool {
+    markdown.starts_with("# Glossary") || targets(markdown).iter().any(|target| target.contains("glossary.md"))
+}
+
+#[test]
+fn every_page_with_terms_or_letters_of_the_field_links_the_glossary() {
+    let words = ["THW", "TTC", "TTCE", "DCE", "MIS", "NEES", "prevented", "induced", "trajectory data", "E", "F", "R"];
+    let is_of_a_word = |character: char| character.is_alphanumeric() || "-_'".contains(character);
+    let has_term = |markdown: &str| {
+        let text = prose(markdown).join(" ");
+        text.split(|character: char| !is_of_a_word(character)).any(|word| words.contains(&word))
+    };
+    for path in documents() {
+        let markdown = std::fs::read_to_string(&path).unwrap();
+        let is_page = path.components().any(|part| part.as_os_str() == "docs") && !path.ends_with("SUMMARY.md");
+        assert!(!is_page || !has_term(&markdown) || explains_terms(&markdown), "{}", path.display());
+    }
+    assert!(!explains_terms("# Gates\n\nThe MIS.\n\n```text\n[glossary](glossary.md)\n```\n"));
+    assert!(explains_terms("# Gates\n\nThe [MIS](glossary.md).\n"));
+}

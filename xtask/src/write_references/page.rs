@@ -32,7 +32,7 @@ pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
 const INTRODUCTION: &str = "\
 # The scenario file
 
-This page lists every table and key of the scenario file. `cargo run --release -p closecall-xtask -- write-references` writes the page
+This page lists every table and key of the scenario file; the [glossary](glossary.md) explains the terms. `cargo run --release -p closecall-xtask -- write-references` writes the page
 from the program. Descriptions are doc comments of the code, ranges are the checks of `closecall check`, and examples are
 values of [every-key.toml](scenario/every-key.toml), a scenario that uses every key. A test fails if page and program differ.
 
