@@ -54,6 +54,16 @@ pub fn rate_text(rate: f64) -> String {
     }
 }
 
+/// Returns a time in the unit that gives it two digits, up to a year: nobody waits for longer.
+pub fn duration_text(seconds: f64) -> String {
+    const UNITS: [(f64, &str); 3] = [(86_400.0, "days"), (3_600.0, "h"), (60.0, "min")];
+    if !(seconds < 365.0 * 86_400.0) {
+        return "more than a year".to_owned();
+    }
+    let unit = UNITS.into_iter().find(|(unit_s, _)| seconds >= 2.0 * unit_s);
+    unit.map_or_else(|| format!("{seconds:.0} s"), |(unit_s, name)| format!("{:.0} {name}", seconds / unit_s))
+}
+
 fn line(done: u64, all: u64, elapsed: Duration) -> String {
     let elapsed_s = elapsed.as_secs_f64();
     let per_second = done as f64 / elapsed_s;
@@ -61,10 +71,10 @@ fn line(done: u64, all: u64, elapsed: Duration) -> String {
         0 => String::new(),
         _ => {
             let left_s = (all.saturating_sub(done)) as f64 / per_second;
-            format!(", {} samples/s, {left_s:.0} s left", rate_text(per_second))
+            format!(", {} samples/s, {} left", rate_text(per_second), duration_text(left_s))
         }
     };
-    format!("{done} of {all} samples after {elapsed_s:.0} s{left}")
+    format!("{done} of {all} samples after {}{left}", duration_text(elapsed_s))
 }
 
 #[cfg(test)]
@@ -77,6 +87,24 @@ mod tests {
     fn a_line_states_the_progress() {
         assert_eq!(line(50, 200, Duration::from_secs(10)), "50 of 200 samples after 10 s, 5.0 samples/s, 30 s left");
         assert_eq!(line(0, 200, Duration::from_secs(30)), "0 of 200 samples after 30 s");
+    }
+
+    #[test]
+    fn a_time_has_the_unit_that_a_reader_grasps() {
+        for (seconds, text) in [
+            (0.4, "0 s"),
+            (119.0, "119 s"),
+            (120.0, "2 min"),
+            (7_200.0, "2 h"),
+            (172_800.0, "2 days"),
+            (3.2e7, "more than a year"),
+            (f64::INFINITY, "more than a year"),
+            (f64::NAN, "more than a year"),
+        ] {
+            assert_eq!(duration_text(seconds), text);
+        }
+        let of_many = line(10, 1_000_000_000_000, Duration::from_secs(10));
+        assert!(of_many.ends_with("1.0 samples/s, more than a year left"), "{of_many}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use closecall_sensors::SensorMode;
 use closecall_sensors::camera::Pipeline;
 use closecall_traffic::input;
 use closecall_traffic::suggest::hint;
-use closecall_traffic::{ActorId, Check, ConfigError, KeyPath, ParameterName, Parameters, Problem, Segment};
+use closecall_traffic::{ActorId, Check, ConfigError, KeyPath, ParameterName, Parameters, Problem, Segment, Value};
 use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
@@ -313,7 +313,10 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError::Value`] if a value is out of range or contradicts another value.
     pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
-        self.config.check(parameters).map_err(|source| self.located(source, describe(parameters)))
+        self.config.check(parameters).map_err(|source| {
+            let at = describe(&parameters_near(&self.text, &source.path), parameters);
+            self.located(source, at)
+        })
     }
 
     /// Returns an error with its place in the file. `at` says when it holds.
@@ -345,8 +348,36 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn describe(parameters: &Parameters) -> String {
-    let values: Vec<String> = parameters.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+/// Returns the names of the parameters that a value uses, or else those of the nearest table around it that uses some. The whole
+/// file does not count: its parameters would hide the one that matters.
+fn parameters_near(text: &str, path: &KeyPath) -> Vec<String> {
+    let Ok(document) = toml::from_str::<toml::Table>(text) else { return Vec::new() };
+    let root = toml::Value::Table(document);
+    let mut around = vec![&root];
+    for segment in &path.0 {
+        let below = around.last().and_then(|value| match segment {
+            Segment::Key(key) => value.get(key.as_str()),
+            Segment::Index(index) => value.get(*index),
+        });
+        around.extend(below);
+    }
+    let of_each = around.into_iter().skip(1).rev().map(|value| {
+        let mut names = Vec::new();
+        append_names(value, &mut names);
+        names
+    });
+    of_each.into_iter().find(|names| !names.is_empty()).unwrap_or_default().into_iter().map(str::to_owned).collect()
+}
+
+/// Returns the values of some parameters, as the end of a message.
+fn describe(names: &[String], parameters: &Parameters) -> String {
+    const DIGITS: f64 = 1e6;
+    let shown = |value: &Value| match value {
+        Value::Number(number) => ((number * DIGITS).round() / DIGITS).to_string(),
+        Value::Label(label) => label.clone(),
+    };
+    let chosen = parameters.iter().filter(|(name, _)| names.iter().any(|used| used == name.as_str()));
+    let values: Vec<String> = chosen.map(|(name, value)| format!("{name} = {}", shown(value))).collect();
     if values.is_empty() { String::new() } else { format!(" (with {})", values.join(", ")) }
 }
 
@@ -466,6 +497,15 @@ fn key_at(text: &str, offset: usize) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_names_the_parameters_that_the_value_uses_and_no_others() {
+        let setting = "actor.rear.start.behind.gap-m=-5".parse().unwrap();
+        let text = super::super::library::text("low-thw-overtake").unwrap();
+        let file = ScenarioFile::parse(Path::new("a.toml"), text, &[setting]).unwrap();
+        let message = file.check().unwrap_err().to_string();
+        assert!(message.contains("(with closing-mps = 8.35)") && !message.contains("cut-out-thw-s"), "{message}");
+    }
 
     #[test]
     fn a_misspelt_key_or_word_is_answered_with_a_suggestion() {

@@ -25,7 +25,7 @@ use closecall_campaign::summary::Summary;
 use closecall_campaign::wall_times::SpentTime;
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
-use closecall_report::heartbeat::{Heartbeat, rate_text};
+use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::source::expand;
@@ -434,12 +434,15 @@ pub(super) fn progress_bar(samples: u64) -> ProgressBar {
     if session::is_active() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {rate} samples/s, {eta} left") {
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {rate} samples/s, {time} left") {
         let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
             // A bar that cannot be written has no reader.
             let _ = text.write_str(&rate_text(state.per_sec()));
         };
-        bar.set_style(style.with_key("rate", rate));
+        let time = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
+            let _ = text.write_str(&duration_text(state.eta().as_secs_f64()));
+        };
+        bar.set_style(style.with_key("rate", rate).with_key("time", time));
     }
     bar
 }
