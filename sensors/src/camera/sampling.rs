@@ -1,7 +1,8 @@
 //! The columns and rows of the image that a network reads.
 //!
-//! A network need not read every pixel. Objects far away are small and lie near the horizon, and near ones are large, so
-//! that few pixels say as much as all. What is not read need not be rendered.
+//! A network need not read every pixel. Distant objects are small and lie near the horizon, and
+//! near objects are large. A few pixels therefore carry as much information as all pixels. Other
+//! pixels need not be rendered.
 
 use super::picture::{HEIGHT_PX, WIDTH_PX};
 
