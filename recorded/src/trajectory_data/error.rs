@@ -365,7 +365,8 @@ impl TrajectoryFileProblem {
     }
 }
 
-/// An error while writing a trajectory file. A file that existed before at the same path is left unchanged.
+/// An error while writing a trajectory file. A file that existed before at the same path is left
+/// unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The file cannot be written.

@@ -37,7 +37,8 @@ const SUMO: &[u8] = b"<fcd-export";
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see [`WINDOW_ROWS`].
+/// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see
+/// [`WINDOW_ROWS`].
 ///
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
@@ -62,8 +63,8 @@ pub fn read_with(path: &Path, options: ReadOptions) -> Result<TrajectoryData, Tr
     Ok(TrajectoryData { lanes: options.lanes, ..data })
 }
 
-/// Reads trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
-/// name.
+/// Reads trajectory data that consists of one file from any byte source. `path` appears in errors
+/// and supplies the name.
 ///
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with line, column and allowed values.
@@ -71,8 +72,8 @@ pub fn read_from(source: impl Read, path: &Path) -> Result<TrajectoryData, Traje
     open_from(source, path, ReadOptions::default(), usize::MAX)?.collect_all()
 }
 
-/// Opens trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
-/// name. Data of more than `window` rows must be sorted by vehicle or by time.
+/// Opens trajectory data that consists of one file from any byte source. `path` appears in errors
+/// and supplies the name. Data of more than `window` rows must be sorted by vehicle or by time.
 ///
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with line, column and allowed values.

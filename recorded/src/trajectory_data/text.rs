@@ -19,7 +19,8 @@ pub(super) struct TextSource<R> {
     name: Option<String>,
     /// The first line with its number, if it is a row instead of a header.
     first: Option<(u64, String)>,
-    /// Length of the last field of the row before (bytes): a shorter one at the end of the file may be cut.
+    /// Length of the last field of the row before (bytes): a shorter one at the end of the file may
+    /// be cut.
     usual_last_field: usize,
 }
 
@@ -33,8 +34,9 @@ impl<R: BufRead> TextSource<R> {
         Self::with_recognised_layout(lines, number, first)
     }
 
-    /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts, it calls `meta` for
-    /// the content of the metadata files. For exiD it also calls `infer_road`, which derives the road from the traffic.
+    /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts,
+    /// it calls `meta` for the content of the metadata files. For exiD it also calls `infer_road`,
+    /// which derives the road from the traffic.
     pub(super) fn with_meta(
         source: R,
         meta: impl FnOnce() -> Result<Meta, TrajectoryFileError>,
@@ -132,7 +134,7 @@ fn parse(
     format.columns.parse(line, fields)
 }
 
-/// Checks that all rows with a data set name carry the same one: one file holds one data set.
+/// Checks that all rows with a data set name carry the same name: one file holds one data set.
 fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), FieldError> {
     let Some((column, found)) = format.columns.data(line, fields) else { return Ok(()) };
     match name {
