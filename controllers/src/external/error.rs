@@ -18,7 +18,7 @@ pub enum LoadError {
     NotALibrary {
         /// The file.
         path: String,
-        /// What it is, or what is wrong.
+        /// The kind of the file, or its fault.
         reason: String,
         /// The platform of this program.
         own: String,
@@ -68,7 +68,7 @@ pub enum LoadError {
     Fmu {
         /// The file.
         path: String,
-        /// What is wrong, and what is expected.
+        /// The fault, and the expected content.
         reason: String,
     },
 }
@@ -84,6 +84,6 @@ fn listed(names: &[String]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-fn exported(found: &[String]) -> String {
-    if found.is_empty() { "it exports nothing".to_owned() } else { format!("it exports {}", listed(found)) }
+fn exported(symbols: &[String]) -> String {
+    if symbols.is_empty() { "it exports nothing".to_owned() } else { format!("it exports {}", listed(symbols)) }
 }
