@@ -38,7 +38,11 @@ pub(crate) struct OtherVehicle {
 fn check_finite(vehicle: &SceneVehicle, scene: &Scene<'_>) -> Result<(), SensorError> {
     let state = &vehicle.state;
     let sum = state.s_m + state.d_m + state.heading_rad + state.speed_mps;
-    if sum.is_finite() { Ok(()) } else { Err(SensorError::NotFinite { what: "a vehicle's state", time: scene.time }) }
+    if sum.is_finite() {
+        Ok(())
+    } else {
+        Err(SensorError::NotFinite { quantity: "a vehicle's state", time: scene.time })
+    }
 }
 
 /// Replaces the contents of `others` with the scene's other vehicles, and returns the ego's frame.

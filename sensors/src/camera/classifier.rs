@@ -79,11 +79,11 @@ pub enum ClassifierError {
     )]
     NeedsOnnxRuntime,
     /// The network has other inputs or outputs.
-    #[error("failed to use the network: it has {found}; wanted are {wanted}")]
+    #[error("failed to use the network: it has {actual}; wanted are {wanted}")]
     Layout {
-        /// What it has.
-        found: String,
-        /// What it must have.
+        /// The actual layout.
+        actual: String,
+        /// The required layout.
         wanted: &'static str,
     },
     /// The network failed during inference. The session must not be used again.
@@ -94,13 +94,13 @@ pub enum ClassifierError {
     },
     /// The output of the network is not four probabilities.
     #[error(
-        "failed to read the answer of {SHIPPED_FILE}: {found:?} in its tensor `{tensor}` are not four probabilities"
+        "failed to read the answer of {SHIPPED_FILE}: {actual:?} in its tensor `{tensor}` are not four probabilities"
     )]
     Answer {
         /// The name of the output.
         tensor: String,
         /// The values that the network returned.
-        found: Vec<String>,
+        actual: Vec<String>,
     },
     /// The network returned a value that its output cannot have.
     #[error("failed to read the answer of {model}: its tensor `{tensor}` has {value}, but {allowed} are needed")]
@@ -166,7 +166,8 @@ impl Classifier {
         clear_upper_parts();
         let outputs = outputs.map_err(run)?;
         let (_, output) = outputs[0].try_extract_tensor::<f32>().map_err(run)?;
-        let invalid = |found| ClassifierError::Answer { tensor: outputs.keys().next().unwrap_or("").to_owned(), found };
+        let invalid =
+            |actual| ClassifierError::Answer { tensor: outputs.keys().next().unwrap_or("").to_owned(), actual };
         scores_from(output).map_err(invalid)
     }
 }

@@ -183,9 +183,9 @@ fn instances(
     let (rows, columns, count) = (side(2), side(3), scores.len());
     let is_right = boxes.len() == 4 * count && labels.len() == count && masks.len() == count * rows * columns;
     if !is_right || (count > 0 && rows * columns == 0) {
-        let found =
+        let actual =
             format!("boxes {boxes_shape:?}, labels {labels_shape:?}, scores {scores_shape:?}, masks {masks_shape:?}");
-        return Err(ClassifierError::Layout { found, wanted: WANTED });
+        return Err(ClassifierError::Layout { actual, wanted: WANTED });
     }
     let check = |tensor: &String, place: Option<usize>, values: &[f32], allowed: &'static str| {
         let Some(index) = place else { return Ok(()) };
@@ -223,7 +223,10 @@ fn layout(session: &Session) -> Result<((String, usize), [String; 4]), Classifie
                 outlets.iter().map(|outlet| format!("{} {}", outlet.name(), outlet.dtype())).collect();
             if words.is_empty() { "none".to_owned() } else { words.join(", ") }
         };
-        ClassifierError::Layout { found: format!("inputs {}; outputs {}", list(inputs), list(outputs)), wanted: WANTED }
+        ClassifierError::Layout {
+            actual: format!("inputs {}; outputs {}", list(inputs), list(outputs)),
+            wanted: WANTED,
+        }
     };
     let sides = [1, CHANNELS as i64, HEIGHT_PX.into(), WIDTH_PX.into()];
     let [input] = inputs else { return Err(wrong()) };

@@ -15,9 +15,9 @@ pub struct Sampling {
 
 /// The reason why columns or rows cannot be sampled.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the {what} {text:?} are not {wanted}")]
+#[error("the {axis} {text:?} are not {wanted}")]
 pub struct SamplingError {
-    what: &'static str,
+    axis: &'static str,
     text: String,
     wanted: String,
 }
@@ -33,7 +33,7 @@ impl Sampling {
     /// # Errors
     /// [`SamplingError`] if the numbers do not ascend, or lie outside of the image.
     pub fn parse(columns: &str, rows: &str) -> Result<Self, SamplingError> {
-        let read = |what, text: &str, limit: u16| {
+        let read = |axis, text: &str, limit: u16| {
             let numbers: Option<Vec<i32>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
             let is_right = |numbers: &Vec<i32>| {
                 numbers.first().is_some_and(|first| *first >= 0)
@@ -41,7 +41,7 @@ impl Sampling {
                     && numbers.is_sorted_by(|one, next| one < next)
             };
             numbers.filter(is_right).ok_or_else(|| SamplingError {
-                what,
+                axis,
                 text: text.chars().take(80).collect(),
                 wanted: format!("ascending whole numbers from 0 to {}", limit - 1),
             })

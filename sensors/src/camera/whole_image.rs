@@ -52,8 +52,8 @@ impl MaskRcnn {
         let bytes = std::fs::read(path).map_err(|error| at(error.to_string()))?;
         let detector = InstanceDetector::new(&bytes, labels.as_ref(), backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
-            ClassifierError::Layout { found, wanted } => {
-                ClassifierError::Layout { found: format!("{path}: {found}"), wanted }
+            ClassifierError::Layout { actual, wanted } => {
+                ClassifierError::Layout { actual: format!("{path}: {actual}"), wanted }
             }
             other => other,
         });

@@ -90,7 +90,7 @@ pub(crate) fn select_candidates(
             *kept = inside & is_behind & !ground & !droplet;
         }
         if !are_finite {
-            return Err(SensorError::NotFinite { what: "a LiDAR point", time });
+            return Err(SensorError::NotFinite { quantity: "a LiDAR point", time });
         }
         for (lane, _) in kept.iter().enumerate().filter(|(_, kept)| **kept) {
             let [back_m, left_m] = position_m(scan.x_m[first + lane], scan.y_m[first + lane]);
