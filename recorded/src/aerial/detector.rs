@@ -74,7 +74,7 @@ impl Detector {
         let (shape, output) = self.network.run([1, CHANNELS, height, width], &self.planes)?;
         let expected = [1, OUTPUTS, height / STRIDE, width / STRIDE];
         if shape != expected {
-            return Err(AerialError::Output { found: shape, expected });
+            return Err(AerialError::Output { actual: shape, expected });
         }
         Ok(decode(&output, [height / STRIDE, width / STRIDE], from))
     }

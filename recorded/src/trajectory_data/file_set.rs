@@ -113,7 +113,7 @@ impl FileSet {
         let (tracks_path, recording_path) = (self.path(TRACKS_META), self.path(RECORDING_META));
         let data = table(&recording_path, digest, recording_meta)?;
         let [(_, data)] = <[_; 1]>::try_from(data).map_err(|rows| {
-            let problem = TrajectoryFileProblem::RowCount { found: rows.len(), needed: 1 };
+            let problem = TrajectoryFileProblem::RowCount { actual: rows.len(), needed: 1 };
             with_path(&recording_path, ReadError::of_file(problem))
         })?;
         let mut vehicles = BTreeMap::new();
@@ -215,7 +215,7 @@ fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, FieldError>) -
     while let Some((number, line)) = lines.next().map_err(at_line)? {
         fields.split(line, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
         if fields.len() != needed {
-            return Err(ReadError::new(number, TrajectoryFileProblem::ColumnCount { found: fields.len(), needed }));
+            return Err(ReadError::new(number, TrajectoryFileProblem::ColumnCount { actual: fields.len(), needed }));
         }
         let row = read(&Cells { header: &header, line, fields: &fields });
         numbered_rows.push((number, row.map_err(|error| ReadError::new(number, error))?));

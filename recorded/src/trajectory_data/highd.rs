@@ -219,7 +219,7 @@ impl TextLayout for HighdColumns {
 /// another number and removes it: the next call reports the next such vehicle.
 pub(super) fn check_row_counts(vehicles: &mut BTreeMap<u64, VehicleMeta>, meta_file: &str) -> Result<(), FieldError> {
     let wrong = vehicles.iter().find(|(_, vehicle)| vehicle.rows_read != vehicle.rows);
-    let Some((&number, &VehicleMeta { rows: stated, rows_read: found, line, .. })) = wrong else { return Ok(()) };
+    let Some((&number, &VehicleMeta { rows: stated, rows_read: actual, line, .. })) = wrong else { return Ok(()) };
     vehicles.remove(&number);
-    Err(TrajectoryFileProblem::OtherCount { vehicle: number, found, stated, file: meta_file.to_owned(), line }.into())
+    Err(TrajectoryFileProblem::OtherCount { vehicle: number, actual, stated, file: meta_file.to_owned(), line }.into())
 }

@@ -119,10 +119,10 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
 
 /// Rejects a file whose layout differs from the required one.
 fn check_choice(source: &dyn RowSource, options: &ReadOptions) -> Result<(), ReadError> {
-    let found = source.info().layout;
+    let actual = source.info().layout;
     match options.layout {
-        Some(choice) if !choice.includes(found) => {
-            Err(ReadError::of_file(TrajectoryFileProblem::OtherLayout { found, asked: choice.name() }))
+        Some(choice) if !choice.includes(actual) => {
+            Err(ReadError::of_file(TrajectoryFileProblem::OtherLayout { actual, asked: choice.name() }))
         }
         _ => Ok(()),
     }
@@ -134,16 +134,16 @@ fn reader_for<'a>(
     options: &ReadOptions,
 ) -> Result<Box<dyn RowSource + 'a>, ReadError> {
     let start = input.fill_buf().map_err(|error| ReadError::of_file(io_problem(error)))?;
-    if let Some((_, what)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
-        return Err(ReadError::of_file(TrajectoryFileProblem::Archive { what }));
+    if let Some((_, kind)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Archive { kind }));
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
-    if let Some((_, what)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning)) {
-        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
+    if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning)) {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
     if text.starts_with(b"<") && text.windows(SUMO.len()).any(|window| window == SUMO) {
-        let what = "floating car data (FCD) of SUMO";
-        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
+        let kind = "floating car data (FCD) of SUMO";
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
     let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
         Box::new(CommonRoadSource::new(input)?)

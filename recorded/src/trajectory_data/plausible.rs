@@ -33,19 +33,19 @@ pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(
     if layout != Layout::InCar {
         let lengths = cars().map(|row| (row.length_m, row.line)).collect();
         let plausible =
-            Plausible { name: "the median length of cars", unit: "m", range: (2.0, 12.0), allowed: "2 to 12 m" };
+            Plausible { quantity: "the median length of cars", unit: "m", range: (2.0, 12.0), allowed: "2 to 12 m" };
         check_median(lengths, plausible)?;
         let widths = cars().map(|row| (row.width_m, row.line)).collect();
         let plausible =
-            Plausible { name: "the median width of cars", unit: "m", range: (1.0, 3.0), allowed: "1 to 3 m" };
+            Plausible { quantity: "the median width of cars", unit: "m", range: (1.0, 3.0), allowed: "1 to 3 m" };
         check_median(widths, plausible)?;
     }
     let steps = steps(rows, clock);
     if steps.len() < MIN_STEPS {
         return Ok(());
     }
-    let name = "the median distance between two frames, as a share of what the recorded speed makes,";
-    check_median(steps, Plausible { name, unit: "", range: (0.6, 1.6), allowed: "0.6 to 1.6" })
+    let quantity = "the median distance between two frames, as a share of what the recorded speed makes,";
+    check_median(steps, Plausible { quantity, unit: "", range: (0.6, 1.6), allowed: "0.6 to 1.6" })
 }
 
 /// Returns, for each step between two frames, the travelled distance as a share of what the speed
@@ -66,7 +66,7 @@ fn steps(rows: &[Row], clock: FrameClock) -> Vec<(f64, u64)> {
 
 /// A median, as the error names it, and its plausible range.
 struct Plausible {
-    name: &'static str,
+    quantity: &'static str,
     unit: &'static str,
     range: (f64, f64),
     /// The range as text.
@@ -76,7 +76,7 @@ struct Plausible {
 /// Rejects `values` if their median lies outside the plausible range. The error names the line of
 /// the median.
 fn check_median(mut values: Vec<(f64, u64)>, plausible: Plausible) -> Result<(), ReadError> {
-    let Plausible { name, unit, range: (low, high), allowed } = plausible;
+    let Plausible { quantity, unit, range: (low, high), allowed } = plausible;
     if values.is_empty() {
         return Ok(());
     }
@@ -85,6 +85,6 @@ fn check_median(mut values: Vec<(f64, u64)>, plausible: Plausible) -> Result<(),
     if median >= low && median <= high {
         return Ok(());
     }
-    let found = format!("{median:.3} {unit}").trim_end().to_owned();
-    Err(ReadError::new(line, TrajectoryFileProblem::Implausible { what: name, found, allowed }))
+    let actual = format!("{median:.3} {unit}").trim_end().to_owned();
+    Err(ReadError::new(line, TrajectoryFileProblem::Implausible { quantity, actual, allowed }))
 }

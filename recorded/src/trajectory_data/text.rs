@@ -126,9 +126,9 @@ fn parse(
         line
     };
     fields.split(line, format.separator)?;
-    let (found, needed) = (fields.len(), format.width);
-    if found != needed {
-        return Err(TrajectoryFileProblem::ColumnCount { found, needed }.into());
+    let (actual, needed) = (fields.len(), format.width);
+    if actual != needed {
+        return Err(TrajectoryFileProblem::ColumnCount { actual, needed }.into());
     }
     check_name(line, format, fields, name)?;
     format.columns.parse(line, fields)
@@ -136,13 +136,13 @@ fn parse(
 
 /// Checks that all rows with a data set name carry the same name: one file holds one data set.
 fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), FieldError> {
-    let Some((column, found)) = format.columns.data(line, fields) else { return Ok(()) };
+    let Some((column, actual)) = format.columns.data(line, fields) else { return Ok(()) };
     match name {
-        _ if found.is_empty() => {}
-        None => *name = Some(found.to_owned()),
-        Some(first) if first == found => {}
+        _ if actual.is_empty() => {}
+        None => *name = Some(actual.to_owned()),
+        Some(first) if first == actual => {}
         Some(first) => {
-            let problem = TrajectoryFileProblem::SeveralRecordings { first: first.clone(), found: found.to_owned() };
+            let problem = TrajectoryFileProblem::SeveralRecordings { first: first.clone(), actual: actual.to_owned() };
             return Err(FieldError::at(column, problem));
         }
     }

@@ -84,7 +84,9 @@ fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Result<(), Write
         ("the width", track.dimensions.width_m),
     ];
     match quantities.into_iter().find(|(_, value)| !value.is_finite()) {
-        Some((what, _)) => Err(WriteError::NotFinite { track_id: track.track_id, time_s: point.time.s(), what }),
+        Some((quantity, _)) => {
+            Err(WriteError::NotFinite { track_id: track.track_id, time_s: point.time.s(), quantity })
+        }
         None => Ok(()),
     }
 }

@@ -134,7 +134,7 @@ fn check_finite(frame: &InCarFrame) -> Result<(), WriteError> {
         ("the distance to the right marking", bus.and_then(|bus| bus.markings.right_m).unwrap_or_default()),
     ];
     match quantities.into_iter().find(|(_, value)| !value.is_finite()) {
-        Some((what, _)) => Err(WriteError::NotFinite { track_id: 1, time_s: frame.time.s(), what }),
+        Some((quantity, _)) => Err(WriteError::NotFinite { track_id: 1, time_s: frame.time.s(), quantity }),
         None => Ok(()),
     }
 }

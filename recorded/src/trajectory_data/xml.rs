@@ -82,7 +82,7 @@ impl<R: BufRead> Xml<R> {
 
     /// Returns an error at the current line.
     pub(super) fn fail<T>(&self, reason: impl Into<String>) -> Result<T, ReadError> {
-        Err(ReadError::new(self.line(), TrajectoryFileProblem::Xml { what: reason.into() }))
+        Err(ReadError::new(self.line(), TrajectoryFileProblem::Xml { reason: reason.into() }))
     }
 
     /// Returns the next node. After an end node, the caller must call [`Xml::leave`] and
