@@ -62,8 +62,8 @@ pub(crate) fn check_hardest_braking(num: Option<&Num>, parameters: &Parameters) 
 }
 
 /// Returns `value`, or an error if it is not finite.
-pub(crate) fn finite(value: f64, what: &'static str, time: Time) -> Result<f64, DriverError> {
-    if value.is_finite() { Ok(value) } else { Err(DriverError::NotFinite { what, time }) }
+pub(crate) fn finite(value: f64, quantity: &'static str, time: Time) -> Result<f64, DriverError> {
+    if value.is_finite() { Ok(value) } else { Err(DriverError::NotFinite { quantity, time }) }
 }
 
 /// Returns an error if any input is not finite. Comparisons and `min` would treat NaN as a safe
@@ -91,10 +91,10 @@ fn check_neighbour(neighbour: Option<&Neighbour>, time: Time) -> Result<(), Driv
 }
 
 /// Returns an error if any of the values is not finite.
-fn all_finite<const N: usize>(values: [f64; N], what: &'static str, time: Time) -> Result<(), DriverError> {
+fn all_finite<const N: usize>(values: [f64; N], quantity: &'static str, time: Time) -> Result<(), DriverError> {
     // A finite sum has finite terms. The sum of huge terms may be infinite.
     let is_finite = values.iter().sum::<f64>().is_finite() || values.iter().all(|value| value.is_finite());
-    if is_finite { Ok(()) } else { Err(DriverError::NotFinite { what, time }) }
+    if is_finite { Ok(()) } else { Err(DriverError::NotFinite { quantity, time }) }
 }
 
 /// The lead vehicle as the input of a car-following model.

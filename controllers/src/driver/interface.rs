@@ -151,10 +151,10 @@ pub enum DriverNote {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriverError {
     /// A quantity is infinite or NaN.
-    #[error("failed to drive: {what} is not finite at {time}")]
+    #[error("failed to drive: {quantity} is not finite at {time}")]
     NotFinite {
         /// Name of the quantity.
-        what: &'static str,
+        quantity: &'static str,
         /// Time of the step that failed.
         time: Time,
     },

@@ -65,7 +65,7 @@ impl EgoInput<'_> {
     /// # Errors
     /// [`ControllerError::NotFinite`] with the name of the quantity.
     pub fn check_finite(&self) -> Result<(), ControllerError> {
-        let refuse = |what| Err(ControllerError::NotFinite { what, time: self.time });
+        let refuse = |quantity| Err(ControllerError::NotFinite { quantity, time: self.time });
         if !self.odometry.speed_mps.is_finite() {
             return refuse("own speed");
         }
@@ -114,10 +114,10 @@ pub struct EgoCommand {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ControllerError {
     /// A number that must be finite is not.
-    #[error("failed to control: {what} is not finite at {time}")]
+    #[error("failed to control: {quantity} is not finite at {time}")]
     NotFinite {
         /// The quantity.
-        what: &'static str,
+        quantity: &'static str,
         /// The time of the control step.
         time: Time,
     },

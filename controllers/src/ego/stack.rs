@@ -119,7 +119,7 @@ impl EgoController for EgoStack {
         }
         self.emergency_braking = braking.is_some();
         if !command.acceleration_mps2.is_finite() {
-            return Err(ControllerError::NotFinite { what: "commanded acceleration", time: input.time });
+            return Err(ControllerError::NotFinite { quantity: "commanded acceleration", time: input.time });
         }
         Ok(command)
     }

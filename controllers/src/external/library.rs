@@ -96,15 +96,15 @@ impl Library {
         let missing = |name: &str| LoadError::Symbol {
             path: path.display().to_string(),
             missing: vec![name.to_owned()],
-            found: Vec::new(),
+            actual: Vec::new(),
         };
         // SAFETY: the header declares the functions with these types. The version is asked for
         // first.
         unsafe {
             let abi = function::<AbiFunction>(&module, NEEDED[0]).ok_or_else(|| missing(NEEDED[0]))?;
-            let found = abi();
-            if found != ABI {
-                return Err(LoadError::Abi { path: path.display().to_string(), found, own: ABI });
+            let actual = abi();
+            if actual != ABI {
+                return Err(LoadError::Abi { path: path.display().to_string(), actual, expected: ABI });
             }
             let stated = |name| function::<TextFunction>(&module, name).and_then(|stated| text(stated()));
             Ok(Self {

@@ -23,12 +23,12 @@ pub(crate) fn this_platform() -> String {
 pub(crate) fn check(path: &Path, needed: &[&str], prefix: &str) -> Result<(), LoadError> {
     let shown = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|source| LoadError::Read { path: shown.clone(), source })?;
-    let not = |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, own: this_platform() };
+    let not = |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, expected: this_platform() };
     let file = object::File::parse(&*bytes).map_err(|error| not(format!("it cannot be parsed ({error})")))?;
     let (arch, os) = (arch(file.architecture()), os(file.format()));
     if arch != ARCH || os != family(OS) {
-        let found = format!("{arch} {os}");
-        return Err(LoadError::Platform { path: shown, found, own: this_platform() });
+        let actual = format!("{arch} {os}");
+        return Err(LoadError::Platform { path: shown, actual, expected: this_platform() });
     }
     if file.kind() != ObjectKind::Dynamic {
         return Err(not(format!("it is {}", kind(file.kind()))));
@@ -47,10 +47,10 @@ pub(crate) fn check(path: &Path, needed: &[&str], prefix: &str) -> Result<(), Lo
         return Ok(());
     }
     let of_interface: Vec<String> = names.iter().filter(|name| name.starts_with(prefix)).cloned().collect();
-    let mut found = if of_interface.is_empty() { names } else { of_interface };
-    found.sort();
-    found.truncate(MAX_LISTED);
-    Err(LoadError::Symbol { path: shown, missing, found })
+    let mut actual = if of_interface.is_empty() { names } else { of_interface };
+    actual.sort();
+    actual.truncate(MAX_LISTED);
+    Err(LoadError::Symbol { path: shown, missing, actual })
 }
 
 /// Returns the name of an architecture, as Rust names it.
