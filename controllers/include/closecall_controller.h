@@ -65,7 +65,7 @@ typedef struct {
     double value;
 } closecall_setting;
 
-/* What a controller is told when it is created. */
+/* The data that a controller receives when it is created. */
 typedef struct {
     double control_step_s;   /* time between two steps (s): 0.04 */
     double lane_width_m;     /* (m) */

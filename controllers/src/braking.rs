@@ -1,9 +1,11 @@
 //! The constant braking that a follower needs behind another vehicle.
 
-/// Lower bound of the room in the calculation (m): without it the required deceleration would diverge.
+/// Lower bound of the room in the calculation (m): without it the required deceleration would
+/// diverge.
 const MIN_ROOM_M: f64 = 0.1;
 
-/// The situation of a vehicle behind a lead vehicle that keeps its speed, or brakes to a standstill.
+/// The situation of a vehicle behind a lead vehicle that keeps its speed, or brakes to a
+/// standstill.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Behind {
     /// Speed of the own vehicle (m/s).
@@ -17,7 +19,8 @@ pub(crate) struct Behind {
 }
 
 impl Behind {
-    /// Returns the constant deceleration that uses up exactly the available room (m/s²), or 0 if none is needed.
+    /// Returns the constant deceleration that uses up exactly the available room (m/s²), or 0 if
+    /// none is needed.
     ///
     /// With the room r, the own speed v, and the speed v_l and braking b_l of the lead vehicle:
     ///

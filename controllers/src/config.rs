@@ -15,7 +15,8 @@ use crate::ego::{EgoSettings, EgoStackConfig};
 #[serde(rename_all = "kebab-case")]
 #[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them, read once")]
 pub enum DriverConfig {
-    /// The controller under test: adaptive cruise control, emergency braking and margin increase system.
+    /// The controller under test: adaptive cruise control, emergency braking and margin increase
+    /// system.
     EgoStack(EgoStackConfig),
     /// A list of times and speeds, followed regardless of the other vehicles.
     Prescribed(PrescribedConfig),
@@ -37,8 +38,8 @@ pub enum CheckedDriver {
 }
 
 impl CheckedDriver {
-    /// Returns the same driver in the mirrored world, in which left and right are exchanged. Most drivers depend only
-    /// on the overtaking side, which they read from the road.
+    /// Returns the same driver in the mirrored world, in which left and right are exchanged. Most
+    /// drivers depend only on the overtaking side, which they read from the road.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         match self {
@@ -62,7 +63,8 @@ pub enum HumanDriver {
 }
 
 impl HumanDriver {
-    /// Returns the same driver with another reaction. Drivers without a reaction time stay as they are.
+    /// Returns the same driver with another reaction. Drivers without a reaction time stay as they
+    /// are.
     #[must_use]
     pub fn reacting(&self, change: ReactionChange) -> Self {
         match self {
@@ -73,8 +75,8 @@ impl HumanDriver {
         }
     }
 
-    /// Returns the typical reaction time (s): the value, or the median if it is drawn in each run. Returns `None` for a driver
-    /// without a reaction time.
+    /// Returns the typical reaction time (s): the value, or the median if it is drawn in each run.
+    /// Returns `None` for a driver without a reaction time.
     pub fn reaction_s(&self) -> Option<f64> {
         match self {
             Self::Prescribed(_) => None,
@@ -84,8 +86,8 @@ impl HumanDriver {
         }
     }
 
-    /// Returns the gap at which the driver follows a vehicle at `speed_mps` in equilibrium (m), or `None` for a driver that does not
-    /// follow.
+    /// Returns the gap at which the driver follows a vehicle at `speed_mps` in equilibrium (m), or
+    /// `None` for a driver that does not follow.
     pub fn settled_gap_m(&self, speed_mps: f64) -> Option<f64> {
         match self {
             Self::Prescribed(_) => None,
@@ -95,7 +97,8 @@ impl HumanDriver {
         }
     }
 
-    /// Builds a new driver for one run. It allocates memory here and in its first step, and none afterwards.
+    /// Builds a new driver for one run. It allocates memory here and in its first step, and none
+    /// afterwards.
     pub fn build(&self) -> Box<dyn Driver> {
         match self {
             Self::Prescribed(profile) => Box::new(profile.driver()),

@@ -1,8 +1,8 @@
 //! Human driver models.
 //!
-//! Each driver except the prescribed one has three layers: *perception* (the true state of traffic, delayed and
-//! imprecise), a car-following *model*, which is a pure algorithm that can be tested alone, and a *driver*, which
-//! adapts the two to the simulation loop.
+//! Each driver except the prescribed one has three layers: *perception* (the true state of traffic,
+//! delayed and imprecise), a car-following *model*, which is a pure algorithm that can be tested
+//! alone, and a *driver*, which adapts the two to the simulation loop.
 
 mod attention;
 mod idm;
@@ -35,19 +35,22 @@ pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedem
 
 use closecall_traffic::{ConfigError, Num, Parameters, Range, Time};
 
-/// Hardest braking of a human driver if the scenario gives none (m/s²): the mean of car drivers in crashes and
-/// near-crashes, whose distribution is normal with a standard deviation of 1.7 (Markkula, Engström, Lodin, Bärgman and
-/// Victor, *A farewell to brake reaction times?*, Accident Analysis and Prevention 95 (2016) 209–226; parameters in the
-/// authors' code, `gmarkkula/RearEndDriverModels`). Range for an ensemble: 4 to 9.
+/// Hardest braking of a human driver if the scenario gives none (m/s²): the mean of car drivers in
+/// crashes and near-crashes, whose distribution is normal with a standard deviation of 1.7
+/// (Markkula, Engström, Lodin, Bärgman and Victor, *A farewell to brake reaction times?*, Accident
+/// Analysis and Prevention 95 (2016) 209–226; parameters in the authors' code,
+/// `gmarkkula/RearEndDriverModels`). Range for an ensemble: 4 to 9.
 const DEFAULT_HARDEST_BRAKING_MPS2: f64 = 6.7;
 
 /// Range of the hardest braking of a human driver (m/s²).
 const HARDEST_BRAKING_RANGE: Range = Range::closed(4.0, 9.0);
 
-/// Deceleration at highway speed with the accelerator released (m/s²): an assumption; 0.4 to 1 are plausible.
+/// Deceleration at highway speed with the accelerator released (m/s²): an assumption; 0.4 to 1 are
+/// plausible.
 pub(crate) const COASTING_DECELERATION_MPS2: f64 = 0.7;
 
-/// Factor by which a driver brakes harder than necessary in order to keep apart: an assumption; 1 to 1.5 are plausible.
+/// Factor by which a driver brakes harder than necessary in order to keep apart: an assumption; 1
+/// to 1.5 are plausible.
 pub(crate) const BRAKING_MARGIN: f64 = 1.2;
 
 /// Speed below which a vehicle counts as standing (m/s): numerical.
@@ -59,14 +62,15 @@ pub(crate) fn check_hardest_braking(num: Option<&Num>, parameters: &Parameters) 
 }
 
 /// Returns `value`, or an error if it is not finite.
-pub(crate) fn finite(value: f64, what: &'static str, time: Time) -> Result<f64, DriverError> {
-    if value.is_finite() { Ok(value) } else { Err(DriverError::NotFinite { what, time }) }
+pub(crate) fn finite(value: f64, quantity: &'static str, time: Time) -> Result<f64, DriverError> {
+    if value.is_finite() { Ok(value) } else { Err(DriverError::NotFinite { quantity, time }) }
 }
 
-/// Returns an error if any input is not finite. Comparisons and `min` would treat NaN as a safe value.
+/// Returns an error if any input is not finite. Comparisons and `min` would treat NaN as a safe
+/// value.
 pub(crate) fn check_finite(input: &DriverInput<'_>) -> Result<(), DriverError> {
-    let (own, near, time) = (input.own, input.neighbours, input.time);
-    all_finite([own.s_m, own.d_m, own.speed_mps, input.lateral_deviation_m], "own state", time)?;
+    let (ego, near, time) = (input.own, input.neighbours, input.time);
+    all_finite([ego.s_m, ego.d_m, ego.speed_mps, input.lateral_deviation_m], "own state", time)?;
     finite(input.desired_speed_offset_mps, "wanted speed", time)?;
     check_neighbour(near.in_path.as_ref(), time)?;
     check_neighbour(near.beyond.as_ref(), time)?;
@@ -87,10 +91,10 @@ fn check_neighbour(neighbour: Option<&Neighbour>, time: Time) -> Result<(), Driv
 }
 
 /// Returns an error if any of the values is not finite.
-fn all_finite<const N: usize>(values: [f64; N], what: &'static str, time: Time) -> Result<(), DriverError> {
+fn all_finite<const N: usize>(values: [f64; N], quantity: &'static str, time: Time) -> Result<(), DriverError> {
     // A finite sum has finite terms. The sum of huge terms may be infinite.
     let is_finite = values.iter().sum::<f64>().is_finite() || values.iter().all(|value| value.is_finite());
-    if is_finite { Ok(()) } else { Err(DriverError::NotFinite { what, time }) }
+    if is_finite { Ok(()) } else { Err(DriverError::NotFinite { quantity, time }) }
 }
 
 /// The lead vehicle as the input of a car-following model.

@@ -1,4 +1,5 @@
-//! The vehicle controllers: the ego stack (ACC, AEB, MIS), the human driver models, and controllers from outside.
+//! The vehicle controllers: the ego stack (ACC, AEB, MIS), the human driver models, and external
+//! controllers.
 //!
 //! ```text
 //!  ground truth ─▶ driver/  perception (delayed, coarse) ─▶ Wiedemann 99 │ IDM │ overtaker │ prescribed profile
@@ -8,14 +9,15 @@
 //!                                           AEB ─┘
 //! ```
 //!
-//! The types keep the ground truth from the ego: an ego controller receives its own odometry and tracks, never the
-//! ground truth. A human driver model receives the ground truth, and itself models delayed perception.
+//! The types keep the ground truth from the ego: an ego controller receives its own odometry and
+//! tracks, never the ground truth. A human driver model receives the ground truth, and itself
+//! models delayed perception.
 //!
-//! [`reference`](mod@reference) holds the performance models of UN Regulation 157. [`external`] loads ego controllers that
-//! are shared libraries or functional mock-up units.
+//! [`reference`](mod@reference) holds the performance models of UN Regulation 157. [`external`]
+//! loads ego controllers that are shared libraries or functional mock-up units.
 //!
-//! The `driver` table of a scenario file is a [`DriverConfig`]. Checking it yields a [`CheckedDriver`], from which each
-//! run builds a new driver.
+//! The `driver` table of a scenario file is a [`DriverConfig`]. Checking it yields a
+//! [`CheckedDriver`], from which each run builds a new driver.
 
 mod braking;
 mod config;

@@ -1,4 +1,5 @@
-//! Recorded traffic: trajectory data, lane changes, criticality, fitted distributions, and encounters to re-enact.
+//! Recorded traffic: trajectory data, lane changes, criticality, fitted distributions, and
+//! encounters to re-enact.
 
 pub mod aerial;
 pub mod criticality;

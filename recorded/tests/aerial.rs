@@ -10,16 +10,17 @@ use closecall_sensors::datasets::Set;
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-fn plane(one: &closecall_recorded::aerial::ImageBox) -> OrientedBox {
-    let [x_m, y_m] = one.centre_px;
-    OrientedBox { x_m, y_m, yaw_rad: one.angle_rad, length_m: one.length_px, width_m: one.width_px }
+fn plane(image_box: &closecall_recorded::aerial::ImageBox) -> OrientedBox {
+    let [x_m, y_m] = image_box.centre_px;
+    OrientedBox { x_m, y_m, yaw_rad: image_box.angle_rad, length_m: image_box.length_px, width_m: image_box.width_px }
 }
 
-/// Returns the share of the visible vehicles of a class that are found, and the share of the found ones that are right.
+/// Returns the share of a class's visible vehicles that are detected, and the share of the
+/// detections that are right.
 fn recall_and_precision(class: VehicleClass, pictures: u32) -> [f64; 2] {
     let mut detector = Detector::shipped(&Backend::Tract).unwrap();
     let options = AerialDatasetOptions { set: Set::HeldOut, pictures, seed: 77 };
-    let (mut wanted, mut found, mut right, mut given) = (0, 0, 0, 0);
+    let (mut wanted, mut detected, mut right, mut given) = (0, 0, 0, 0);
     for index in 0..pictures {
         let (picture, scene, _) = dataset_picture(&options, index).unwrap();
         let [width, height] = [picture.image.width, picture.image.height].map(f64::from);
@@ -30,22 +31,23 @@ fn recall_and_precision(class: VehicleClass, pictures: u32) -> [f64; 2] {
             if !(0.0..width).contains(&x) || !(0.0..height).contains(&y) {
                 continue;
             }
-            let is_found = detections.iter().any(|one| {
-                one.class == class && intersection_over_union(&plane(&one.image_box), &plane(&label.image_box)) >= 0.5
+            let is_found = detections.iter().any(|detection| {
+                detection.class == class
+                    && intersection_over_union(&plane(&detection.image_box), &plane(&label.image_box)) >= 0.5
             });
             wanted += 1;
-            found += usize::from(is_found);
+            detected += usize::from(is_found);
         }
-        for one in detections.iter().filter(|one| one.class == class) {
+        for detection in detections.iter().filter(|detection| detection.class == class) {
             given += 1;
             right += usize::from(picture.labels.iter().any(|label| {
                 class_of(label.id) == class
-                    && intersection_over_union(&plane(&one.image_box), &plane(&label.image_box)) >= 0.5
+                    && intersection_over_union(&plane(&detection.image_box), &plane(&label.image_box)) >= 0.5
             }));
         }
     }
     assert!(wanted > 20, "{wanted}");
-    [found as f64 / wanted as f64, right as f64 / given as f64]
+    [detected as f64 / wanted as f64, right as f64 / given as f64]
 }
 
 #[test]
@@ -61,15 +63,16 @@ fn the_same_picture_gives_the_same_bytes_and_the_same_detections() {
     let options = AerialDatasetOptions { set: Set::HeldOut, pictures: 2, seed: 5 };
     let detect = || {
         let (picture, _, _) = dataset_picture(&options, 1).unwrap();
-        let found = Detector::shipped(&Backend::Tract).unwrap().detect(&picture.image, 0.2).unwrap();
-        (picture.image, found)
+        let detections = Detector::shipped(&Backend::Tract).unwrap().detect(&picture.image, 0.2).unwrap();
+        (picture.image, detections)
     };
     assert_eq!(detect(), detect());
     let (other, _, _) = dataset_picture(&AerialDatasetOptions { seed: 6, ..options }, 1).unwrap();
     assert_ne!(other.image, detect().0);
 }
 
-/// A vehicle at constant speed that changes from the right lane to the left one between 2 and 7 s if `changes`.
+/// A vehicle at constant speed that changes from the right lane to the left one between 2 and 7 s
+/// if `changes`.
 fn vehicle(id: u64, class: VehicleClass, (start_m, speed_mps): (f64, f64), changes: bool) -> Trajectory {
     let point = |k: i64| {
         let time_s = 0.1 * k as f64;
@@ -100,16 +103,16 @@ fn a_flight_follows_all_vehicles_and_the_correction_removes_the_bias_of_trucks()
     let data = TrajectoryData::new("own", Time::from_ms(100), vec![car, truck, lead]);
     let flight =
         fly(&data, &FlightOptions { offset_sigma_m: 0.0, ..FlightOptions::default() }, &Backend::Tract).unwrap();
-    let found = losses(std::slice::from_ref(&flight));
-    for row in &found.rows {
+    let result = losses(std::slice::from_ref(&flight));
+    for row in &result.rows {
         assert!(row.followed.unwrap() > 0.9 && row.id_switches == 0, "{row:?}");
         let peak = row.lane_changes[0];
         assert_eq!((peak.wanted, peak.found, peak.invented), (1, 1, 0), "{row:?}");
     }
-    let [raw, corrected] = [&found.rows[2], &found.rows[3]].map(|row| row.bias_across_m.unwrap());
+    let [raw, corrected] = [&result.rows[2], &result.rows[3]].map(|row| row.bias_across_m.unwrap());
     assert!((0.6..1.4).contains(&raw), "a truck seems to drive about a metre beside its place: {raw}");
     assert!(corrected.abs() < 0.5 * raw, "{corrected} of {raw}");
-    let text = found.to_string();
+    let text = result.to_string();
     assert!(["truck corrected", "thw_s", "ID switches"].iter().all(|words| text.contains(words)), "{text}");
 }
 

@@ -1,4 +1,5 @@
-//! Perception with single stages replaced by the truth, and with injected faults: for finding the stage that a failure is due to.
+//! Perception with single stages replaced by the truth, and with injected faults. It serves to find
+//! the stage that causes a failure.
 
 use closecall_traffic::{CONTROL_STEP, ClassScores};
 
@@ -7,8 +8,8 @@ use crate::faults::Faults;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Detection, Extent, Scene, SeenPart, SensorError};
 
-/// Distance by which a detection may lie outside of the box of its vehicle (m): an assumption, more than the error of any
-/// box and less than the distance of two vehicles.
+/// Distance by which a detection may lie outside of the box of its vehicle (m): an assumption, more
+/// than the error of any box and less than the distance of two vehicles.
 const MATCH_MARGIN_M: f64 = 1.0;
 
 /// The scores of a detection that is certainly no vehicle.
@@ -17,15 +18,18 @@ pub(crate) const BACKGROUND: ClassScores = ClassScores([0.0, 0.0, 0.0, 1.0]);
 /// What of the perception is replaced by the truth, or made worse. Nothing by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Alterations {
-    /// The rear LiDAR measures every vehicle in its line of sight, without noise, losses or weather. Mode `full` only.
+    /// The rear LiDAR measures every vehicle in its line of sight, without noise, losses or
+    /// weather. Mode `full` only.
     pub has_true_points: bool,
-    /// The points of each vehicle form one cluster, whose box is that of the vehicle. Mode `full` only.
+    /// The points of each vehicle form one cluster. Its box is the vehicle's true box. Mode `full`
+    /// only.
     pub has_true_clusters: bool,
     /// The class of each vehicle behind the ego is known.
     pub has_true_class: bool,
     /// No sensor and no tracker needs time.
     pub has_no_latency: bool,
-    /// Additional latency of all sensors (s), an injected fault: it is rounded to the nearest control step of 0.04 s.
+    /// Additional latency of all sensors (s), an injected fault: it is rounded to the nearest
+    /// control step of 0.04 s.
     pub extra_latency_s: f64,
     /// Every vehicle behind the ego is classified as background, an injected fault.
     pub is_class_background: bool,

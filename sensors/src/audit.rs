@@ -1,8 +1,9 @@
-//! Evaluation of tracks against the true scene: identity switches, false tracks, and consistency of the covariance.
+//! Evaluation of tracks against the true scene: identity switches, false tracks, and consistency of
+//! the covariance.
 //!
-//! Nothing here feeds back into perception. The normalised estimation error squared (NEES) of a consistent filter has
-//! the mean 4, the number of dimensions `[x, y, vx, vy]` of the nearest face (Bar-Shalom, Li, Kirubarajan 2001, section
-//! 5.4.2).
+//! Nothing here feeds back into perception. The normalised estimation error squared (NEES) of a
+//! consistent filter has the mean 4, the number of dimensions `[x, y, vx, vy]` of the nearest face
+//! (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.2).
 
 use closecall_traffic::{Source, Track, TrackId, TrackStatus, maths};
 use nalgebra::{Matrix2, Vector2, Vector4};
@@ -10,14 +11,17 @@ use nalgebra::{Matrix2, Vector2, Vector4};
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Scene, SensorError};
 
-/// Maximum distance between the nearest faces of a track and of the vehicle that it is matched with (m).
+/// Maximum distance between the nearest faces of a track and of the vehicle that it is matched with
+/// (m).
 const MATCH_DISTANCE_M: f64 = 3.0;
 
-/// Number of standard deviations of its position within which a track keeps its vehicle, even beyond
-/// [`MATCH_DISTANCE_M`]. A coasting track that comes near another vehicle is therefore not matched with that vehicle.
+/// Number of standard deviations of its position within which a track keeps its vehicle, even
+/// beyond [`MATCH_DISTANCE_M`]. A coasting track that comes near another vehicle is therefore not
+/// matched with that vehicle.
 const KEPT_DEVIATIONS: f64 = 3.0;
 
-/// Upper bound of 95 % of a consistent filter's NEES values: the quantile of χ² with 4 degrees of freedom.
+/// Upper bound of 95 % of a consistent filter's NEES values: the quantile of χ² with 4 degrees of
+/// freedom.
 pub const NEES_QUANTILE_95: f64 = 9.488;
 
 /// The vehicle that one track is matched with.
@@ -43,7 +47,8 @@ pub struct TrackAudit {
     false_ids: Vec<TrackId>,
     /// The NEES of each match of a confirmed track with a vehicle, in order of time.
     pub nees: Vec<f64>,
-    /// The NEES of `[x, vx]` and of `[y, vy]` for the same matches. Each has the mean 2 for a consistent filter.
+    /// The NEES of `[x, vx]` and of `[y, vy]` for the same matches. Each has the mean 2 for a
+    /// consistent filter.
     pub nees_by_axis: Vec<[f64; 2]>,
     /// Number of times that a vehicle's track changed its id.
     pub id_switches: u64,
@@ -81,7 +86,8 @@ impl TrackAudit {
         Ok(())
     }
 
-    /// Returns the number of confirmed tracks that were classified as a vehicle while they matched none.
+    /// Returns the number of confirmed tracks that were classified as a vehicle while they matched
+    /// none.
     pub fn false_tracks(&self) -> usize {
         self.false_ids.len()
     }
@@ -91,7 +97,8 @@ impl TrackAudit {
         self.mean_over_steps(self.nees.iter().sum())
     }
 
-    /// Returns the root mean square error of the speed (m/s). Returns `None` before the first match.
+    /// Returns the root mean square error of the speed (m/s). Returns `None` before the first
+    /// match.
     pub fn speed_rmse_mps(&self) -> Option<f64> {
         self.mean_over_steps(self.speed_error_sum_m2ps2).map(f64::sqrt)
     }
@@ -135,7 +142,8 @@ fn axis_nees(track: &Track, error: &Vector4<f64>, axis: usize) -> f64 {
     inverse.map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0])
 }
 
-/// Returns the vehicle that a track is matched with: the former one while it is near enough, else the nearest one.
+/// Returns the vehicle that a track is matched with: the vehicle of the previous match while it is
+/// near enough, else the nearest vehicle.
 fn owner(owners: &[TrackOwner], track: &Track, others: &[OtherVehicle]) -> Option<usize> {
     let keep_distance_m = KEPT_DEVIATIONS * (track.covariance[(0, 0)] + track.covariance[(1, 1)]).sqrt();
     let before = owners.iter().find(|entry| entry.id == track.id).map(|entry| entry.actor);
@@ -154,13 +162,13 @@ fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
 
 /// Returns the error of a track's position and velocity in the ego's frame.
 ///
-/// The position is that of the nearest face along the vehicle and that of the centre across it. The face is what the
-/// sensor measures and what defines gaps, so half of the difference between the lengths is taken out of the centres'
-/// error.
+/// The position is the nearest face along the vehicle and the centre across it. The sensor measures
+/// the face, and the face defines gaps. The error of the centres therefore loses half of the
+/// difference between the lengths.
 fn face_error(track: &Track, other: &OtherVehicle) -> Vector4<f64> {
     let half_difference_m = 0.5 * (track.length_m - other.length_m);
-    // A vehicle behind the ego shows its front. A rear sensor has seen only the front of a vehicle that is alongside by
-    // now.
+    // A vehicle behind the ego shows its front. A rear sensor has seen only the front of a vehicle
+    // that is alongside by now.
     let shift_m = if other.x_m < 0.0 || track.source == Source::Rear { half_difference_m } else { -half_difference_m };
     Vector4::new(
         track.x_m() + shift_m * other.cos - other.x_m,

@@ -1,4 +1,5 @@
-//! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor model.
+//! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor
+//! model.
 
 use crate::tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
 use closecall_traffic::{Check, Choice, ConfigError, Parameters, Problem};
@@ -22,8 +23,8 @@ const MIN_LIDAR_HEIGHT_M: f64 = 0.1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorMode {
-    /// LiDAR point clouds behind the ego, clustered, classified and tracked; object-level sensors ahead and to the
-    /// sides. This is the chain that is judged.
+    /// LiDAR point clouds behind the ego, clustered, classified and tracked; object-level sensors
+    /// ahead and to the sides. This is the chain that is judged.
     #[default]
     Full,
     /// Object-level sensors in all directions: the fast approximation, for sweeps.
@@ -61,12 +62,12 @@ pub struct SensorsConfig {
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
-    /// Further rear LiDARs, at most three, each with a name, a kind and a mounting of its own: mode `full`. The tracker is corrected
-    /// with the boxes of all. Default: none.
+    /// Further rear LiDARs, at most three, each with a name, a kind and a mounting of its own: mode
+    /// `full`. The tracker is corrected with the boxes of all. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub additional_rear_lidars: Vec<LidarConfig>,
-    /// The LiDAR that looks ahead in place of the radar, in mode `full`. Its faults are those of `fault.front-lidar`. Default: none;
-    /// the radar looks ahead.
+    /// The LiDAR that looks ahead in place of the radar, in mode `full`. `fault.front-lidar` gives
+    /// its faults. Default: none; the radar looks ahead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front_lidar: Option<LidarConfig>,
     /// The rear camera, whose network classifies each cluster of the rear LiDAR.
@@ -139,14 +140,15 @@ impl Check for SensorsConfig {
 }
 
 impl SensorsConfig {
-    /// Checks the further rear LiDARs, whose names differ from those of the `known` ones.
+    /// Checks the further rear LiDARs, whose names must differ from the names of the `configured`
+    /// LiDARs.
     fn check_additional(
         &self,
-        known: [Option<Lidar>; 2],
+        configured: [Option<Lidar>; 2],
         parameters: &Parameters,
     ) -> Result<[Option<Lidar>; MAX_ADDITIONAL_LIDARS], ConfigError> {
         const KEY: &str = "additional-rear-lidars";
-        let mut names: Vec<&str> = known.iter().flatten().map(Lidar::name).collect();
+        let mut names: Vec<&str> = configured.iter().flatten().map(Lidar::name).collect();
         if let [rear, front] = names[..]
             && rear == front
         {
@@ -238,8 +240,9 @@ impl Sensors {
         Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
     }
 
-    /// Returns the same sensors without those that look back, in mode [`SensorMode::Full`]: for a controller that does not use them.
-    /// In the other modes they cost next to nothing, and stay.
+    /// Returns the same sensors without the sensors that look back, in mode [`SensorMode::Full`]:
+    /// for a controller that does not use them. In the other modes they cost next to nothing, and
+    /// stay.
     #[must_use]
     pub fn without_rear(self) -> Self {
         Self { has_rear: false, ..self }
@@ -296,20 +299,23 @@ impl Sensors {
         Ok(())
     }
 
-    /// Returns the same sensors with an object-level sensor behind that has one range for all vehicles, and knows their classes up
-    /// to `class_range_m` (m): what the fit to the full chain is made with.
+    /// Returns the same sensors with an object-level sensor behind that has one range for all
+    /// vehicles, and knows their classes up to `class_range_m` (m): the fit to the full chain uses
+    /// this sensor.
     #[must_use]
     pub fn without_range_fit(self, class_range_m: f64) -> Self {
         Self { rear_object: self.rear_object.without_fit(class_range_m), ..self }
     }
 
-    /// Returns the same sensors with an object-level sensor behind that has these errors for all vehicles.
+    /// Returns the same sensors with an object-level sensor behind that has these errors for all
+    /// vehicles.
     #[must_use]
     pub fn with_rear_errors(self, errors: FittedErrors) -> Self {
         Self { rear_object: self.rear_object.with_errors(errors), ..self }
     }
 
-    /// Returns the same sensors with an object-level sensor behind that has another fit than that which ships.
+    /// Returns the same sensors with an object-level sensor behind that has another fit than that
+    /// which ships.
     #[must_use]
     pub fn with_rear_fit(self, fit: &'static RearFit) -> Self {
         Self { rear_object: self.rear_object.with_fit(fit), ..self }
@@ -394,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn the_clustering_is_that_of_all_lidars() {
+    fn the_clustering_applies_to_all_lidars() {
         let method = |text: &str| -> Vec<ClusteringMethod> {
             let full = check(text).unwrap().full_model();
             full.rear_lidars().chain(full.front_lidar).map(|lidar| lidar.clustering).collect()

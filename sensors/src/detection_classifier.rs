@@ -1,4 +1,4 @@
-//! Sensors that classify what others have detected.
+//! Sensors that classify the detections of other sensors.
 
 use crate::{Detection, Health, RearImage, Scene, SensorError};
 

@@ -6,10 +6,10 @@ use closecall_traffic::Time;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SensorError {
     /// A quantity that must be finite is not.
-    #[error("failed to measure: {what} is not finite at {time}")]
+    #[error("failed to measure: {quantity} is not finite at {time}")]
     NotFinite {
         /// The quantity.
-        what: &'static str,
+        quantity: &'static str,
         /// The scene's time.
         time: Time,
     },

@@ -1,10 +1,12 @@
 //! The LiDAR that looks ahead: the chain of the rear LiDAR on a scene turned by half a turn.
 //!
-//! It measures the rears of the vehicles ahead, with their plates. The boxes are classified by their shape alone: no camera looks
-//! ahead. Three things differ from a chain made for this direction. While a vehicle ahead changes lanes, its lateral position is that
-//! of the middle of its rear, up to half a length times the sine of its heading from its centre. The processing allows for what of a
-//! vehicle's *front* may remain unseen. The tracker takes a vehicle that the ego closes on for one that has to react, and expects a
-//! change of its motion sooner than that of a vehicle ahead.
+//! It measures the rears of the vehicles ahead, with their plates. The boxes are classified by
+//! their shape alone: no camera looks ahead. Three things differ from a chain made for this
+//! direction. While a vehicle ahead changes lanes, its lateral position is the middle of its rear,
+//! which lies up to half a length times the sine of the heading from its centre. The processing
+//! allows for hidden parts of a vehicle's *front*. The tracker assumes that a vehicle that the ego
+//! closes on has to react. It expects a change of motion sooner than the driver of a vehicle ahead
+//! makes one.
 
 use crate::tracking::{TrackList, TrackerModel};
 use closecall_traffic::Source;
@@ -21,7 +23,7 @@ use crate::{Alterations, Health, Scene, SceneVehicle, SensorError};
 /// The front LiDAR with its processing.
 pub(crate) struct FrontLidar {
     chain: LidarChain,
-    /// Memory of the vehicles of the scene, and of the one that the ego believes.
+    /// Memory of the vehicles of the scene, and of the vehicles of the scene that the ego believes.
     memory: [Vec<SceneVehicle>; 2],
 }
 
@@ -42,8 +44,8 @@ impl FrontLidar {
     /// # Errors
     /// [`SensorError`] if a model fails.
     pub(crate) fn step(&mut self, [scene, believed]: [&Scene<'_>; 2], list: &mut TrackList) -> Result<(), SensorError> {
-        let [one, other] = std::mem::take(&mut self.memory);
-        let turned = [HalfTurn::of(scene, one), HalfTurn::of(believed, other)];
+        let [scene_memory, believed_memory] = std::mem::take(&mut self.memory);
+        let turned = [HalfTurn::of(scene, scene_memory), HalfTurn::of(believed, believed_memory)];
         let [scene, believed] = [&turned[0], &turned[1]].map(HalfTurn::scene);
         let altered = &Alterations::default();
         self.chain.detect(Seen { scene: &scene, believed: &believed, others: &[], altered }, None)?;

@@ -1,6 +1,8 @@
-//! Perception with the full rear chain (scan, boxes, classes, tracks), and object-level sensors ahead and to the sides.
+//! Perception with the full rear chain (scan, boxes, classes, tracks), and object-level sensors
+//! ahead and to the sides.
 //!
-//! The ego's own motion is known without error, unless the scenario gives it one ([`crate::faults`]).
+//! The ego's own motion is known without error, unless the scenario gives it one
+//! ([`crate::faults`]).
 
 use crate::tracking::{TrackList, TrackerModel};
 use closecall_traffic::Track;
@@ -43,7 +45,8 @@ impl FullModel {
 /// Number of tracks of all sensors together for which memory is reserved.
 const RESERVED_TRACKS: usize = 64;
 
-/// Perception by LiDAR point clouds behind the ego, and by object-level sensors in the other directions.
+/// Perception by LiDAR point clouds behind the ego, and by object-level sensors in the other
+/// directions.
 pub struct FullPerception {
     front: ObjectSensor,
     front_lidar: Option<FrontLidar>,
@@ -79,7 +82,7 @@ impl FullPerception {
         Self { classifier: Some(classifier), ..self }
     }
 
-    /// Returns the same sensors without those that look back.
+    /// Returns the same sensors without the sensors that look back.
     #[must_use]
     pub(crate) fn without_rear(self) -> Self {
         Self { rear: None, classifier: None, ..self }

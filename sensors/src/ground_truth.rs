@@ -1,7 +1,8 @@
 //! Perception without errors, which separates faults of the controller from faults of the sensors.
 //!
-//! The tracks are exact, confirmed at once, and of certain class. Only their distance is limited, so that a function
-//! that engages on a confirmed track behind the ego does not engage on a vehicle a kilometre away.
+//! The tracks are exact, confirmed at once, and of certain class. Only their distance is limited: a
+//! function that engages on a confirmed track behind the ego must not engage on a vehicle a
+//! kilometre away.
 
 use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{ClassScores, Source, Track, TrackId, TrackStatus};
@@ -12,14 +13,14 @@ use crate::{Perception, Scene, SensorError, SensorHealth};
 
 /// Distance from centre to centre along the ego's axis up to which vehicles are reported (m).
 ///
-/// It is the nominal range of the rear LiDAR and more than that of the front radar.
+/// It is the nominal range of the rear LiDAR and exceeds the range of the front radar.
 const RANGE_M: f64 = 200.0;
 
 /// Perception that reports a perfect track of every vehicle within 200 m ahead and behind.
 ///
-/// A track's source follows from the vehicle's position: front if it is wholly ahead of the ego, rear if wholly behind,
-/// surround if alongside. A track's id is the actor's index in the scenario, and stays the same when the source
-/// changes.
+/// A track's source follows from the vehicle's position: front if the vehicle is entirely ahead of
+/// the ego, rear if it is entirely behind, surround if it is alongside. A track's id is the actor's
+/// index in the scenario, and stays the same when the source changes.
 #[derive(Clone, Debug, Default)]
 pub struct GroundTruth {
     others: Vec<OtherVehicle>,
@@ -113,7 +114,8 @@ mod tests {
         let scene = Scene { time: Time::ZERO, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         let mut perception = GroundTruth::new();
         let track = &perception.step(&scene).unwrap()[0];
-        // 100 m back on a circle with a radius of 500 m: 9.9 m to the left, turned by 0.2 rad relative to the ego.
+        // 100 m back on a circle with a radius of 500 m: 9.9 m to the left, turned by 0.2 rad
+        // relative to the ego.
         assert!(track.y_m() > 9.0, "{}", track.y_m());
         assert!((track.heading_rad + 0.2).abs() < 1e-9);
         assert!((maths::hypot(track.vx_mps(), track.vy_mps()) - 36.0).abs() < 1e-9);

@@ -1,4 +1,4 @@
-//! A scene turned by half a turn: what lies ahead of the ego lies behind it.
+//! A scene turned by half a turn: objects ahead of the ego are then behind it.
 //!
 //! ```text
 //!   scene       ── ego ▶ ── lead ▶ ──▶ s          s' ◀── ◀ lead ── ◀ ego ──       the same vehicles
@@ -6,8 +6,9 @@
 //!   turned      ── lead ◀ ── ego ◁ ──▶ s'         the ego drives backward, and the lead vehicle is behind it
 //! ```
 //!
-//! A LiDAR that looks ahead then needs no model of its own: the sensor at the rear of the turned ego is that at its front. The turn
-//! is exact on a straight and on a curved road. It changes no distance, no angle between two things, and no time.
+//! A LiDAR that looks ahead then needs no model of its own: the sensor at the rear of the turned
+//! ego is the sensor at the front of the true ego. The turn is exact on a straight and on a curved
+//! road. It changes no distance, no angle between two things, and no time.
 
 use std::f64::consts::PI;
 
@@ -24,7 +25,8 @@ pub(crate) struct HalfTurn {
 }
 
 impl HalfTurn {
-    /// Returns the turned scene. `others` is memory for its vehicles, such as [`HalfTurn::into_memory`] returns it.
+    /// Returns the turned scene. `others` is memory for its vehicles, such as
+    /// [`HalfTurn::into_memory`] returns it.
     pub(crate) fn of(scene: &Scene<'_>, mut others: Vec<SceneVehicle>) -> Self {
         let turned = |vehicle: &SceneVehicle| {
             let VehicleState { s_m, d_m, heading_rad, .. } = vehicle.state;
@@ -68,7 +70,8 @@ impl HalfTurn {
 pub(crate) fn turn_back(track: &mut Track) {
     track.state = -track.state;
     track.lane.reverse();
-    // The direction of a box is that of its longer axis: the tracker takes a vehicle to point along the road.
+    // The direction of a box is the direction of its longer axis: the tracker assumes that a
+    // vehicle points along the road.
     track.heading_rad -= (track.heading_rad / PI).round() * PI;
 }
 
@@ -97,7 +100,7 @@ mod tests {
             assert!((before.x_m + after.x_m).abs() < 1e-6, "{before:?} {after:?}");
             assert!((before.y_m + after.y_m).abs() < 1e-6, "{before:?} {after:?}");
             assert!((before.road_yaw_rad - after.road_yaw_rad).abs() < 1e-9);
-            // The left rail of the one is the right rail of the other.
+            // The left rail of one scene is the right rail of the other.
             let [left_m, right_m] = road.guard_rail_offsets_m();
             assert_eq!(seen.road.guard_rail_offsets_m(), [right_m, left_m]);
             // Turned twice, everything is where it was.

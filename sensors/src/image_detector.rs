@@ -1,4 +1,5 @@
-//! The pipeline `mask-rcnn` in the simulation loop: images at a fixed rate, whose results arrive later.
+//! The pipeline `mask-rcnn` in the simulation loop: images at a fixed rate, whose results arrive
+//! later.
 //!
 //! ```text
 //!   scan k:      detections ─▶ linked to the objects of the scan before
@@ -7,8 +8,8 @@
 //!   scan k + n:  evidence of each object ◀───────────────────────────────────────────────┘
 //! ```
 //!
-//! The evidence of an object remains until that of the next image. Each worker thread keeps one network, as for the crop
-//! classifier.
+//! The evidence of an object remains until the next image gives new evidence. Each worker thread
+//! keeps one network, as for the crop classifier.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -22,8 +23,9 @@ use crate::image_evidence::{Evidence, Exposed, ImageResult, associate, moved};
 use crate::worker_classifier::{CHANNEL, HeldImage, inference_backend};
 use crate::{Detection, Extent, Health, NoiseKey, RearImage, Scene, SensorError};
 
-/// Distance along and across the ego's axis by which an object may move between two scans that detect it (m), as in the memory of
-/// the crop classifier: a closing speed of 50 m/s over one control step, and a lane change over two.
+/// Distance along and across the ego's axis by which an object may move between two scans that
+/// detect it (m), as in the memory of the crop classifier: a closing speed of 50 m/s over one
+/// control step, and a lane change over two.
 const GATE_M: [f64; 2] = [2.0, 1.0];
 /// Time after which an object that was not detected is forgotten.
 const KEPT_FOR: Time = Time::from_ms(200);
@@ -35,7 +37,7 @@ thread_local! {
 
 /// An object that the LiDAR has detected in successive scans.
 #[derive(Clone, Copy, Debug)]
-struct Known {
+struct KnownObject {
     id: u64,
     face_m: [f64; 2],
     seen_at: Time,
@@ -58,17 +60,18 @@ pub(crate) struct ImageDetector {
     exposures: Stream,
     faults: FaultList<CameraFault>,
     held: Option<HeldImage>,
-    /// Number of latest successive scans in which the camera delivered no image, or the same one again.
+    /// Number of latest successive scans in which the camera delivered no image, or the same one
+    /// again.
     failed_scans: u32,
     next_image: Option<Time>,
     next_id: u64,
-    known: Vec<Known>,
+    objects: Vec<KnownObject>,
     pending: VecDeque<Pending>,
-    /// What the camera alone has seen in the image whose result arrived with the latest scan.
+    /// Vehicles that only the camera sees, in the image whose result arrived with the latest scan.
     alone: Vec<Detection>,
     /// The object of each detection of the latest scan.
     ids: Vec<u64>,
-    /// Whether a detection of the latest scan has been linked to each object of the earlier ones.
+    /// Whether a detection of the latest scan has been linked to each object of the earlier scans.
     is_taken: Vec<bool>,
     /// The latest image with its instances.
     latest: Option<RearImage>,
@@ -85,7 +88,7 @@ impl ImageDetector {
             failed_scans: 0,
             next_image: None,
             next_id: 0,
-            known: Vec::new(),
+            objects: Vec::new(),
             pending: VecDeque::new(),
             alone: Vec::new(),
             ids: Vec::new(),
@@ -94,30 +97,31 @@ impl ImageDetector {
         }
     }
 
-    /// Links the detections of a scan to the known objects. A detection without one is a new object.
+    /// Links the detections of a scan to the known objects. A detection without such an object is a
+    /// new object.
     fn link(&mut self, time: Time, detections: &[Detection]) {
-        self.known.retain(|known| time - known.seen_at <= KEPT_FOR);
-        let before = self.known.len();
+        self.objects.retain(|object| time - object.seen_at <= KEPT_FOR);
+        let before = self.objects.len();
         self.is_taken.clear();
         self.is_taken.resize(before, false);
         self.ids.clear();
         for detection in detections {
             let face_m = [detection.face_x_m, detection.face_y_m];
-            let apart = |known: &Known| [0, 1].map(|axis| (known.face_m[axis] - face_m[axis]).abs());
-            let free = self.known[..before].iter().enumerate().filter(|(index, _)| !self.is_taken[*index]);
-            let near = free.filter(|(_, known)| apart(known).iter().zip(GATE_M).all(|(m, gate_m)| *m <= gate_m));
-            let sum = |known: &Known| apart(known).iter().sum::<f64>();
-            let nearest = near.min_by(|one, other| sum(one.1).total_cmp(&sum(other.1))).map(|(index, _)| index);
+            let apart = |object: &KnownObject| [0, 1].map(|axis| (object.face_m[axis] - face_m[axis]).abs());
+            let free = self.objects[..before].iter().enumerate().filter(|(index, _)| !self.is_taken[*index]);
+            let near = free.filter(|(_, object)| apart(object).iter().zip(GATE_M).all(|(m, gate_m)| *m <= gate_m));
+            let sum = |object: &KnownObject| apart(object).iter().sum::<f64>();
+            let nearest = near.min_by(|a, b| sum(a.1).total_cmp(&sum(b.1))).map(|(index, _)| index);
             let index = nearest.unwrap_or_else(|| {
-                self.known.push(Known { id: self.next_id, face_m, seen_at: time, evidence: None });
+                self.objects.push(KnownObject { id: self.next_id, face_m, seen_at: time, evidence: None });
                 self.next_id += 1;
-                self.known.len() - 1
+                self.objects.len() - 1
             });
             if let Some(taken) = self.is_taken.get_mut(index) {
                 *taken = true;
             }
-            (self.known[index].face_m, self.known[index].seen_at) = (face_m, time);
-            self.ids.push(self.known[index].id);
+            (self.objects[index].face_m, self.objects[index].seen_at) = (face_m, time);
+            self.ids.push(self.objects[index].id);
         }
     }
 
@@ -151,9 +155,9 @@ impl ImageDetector {
     fn receive(&mut self, scene: &Scene<'_>) {
         self.alone.clear();
         while let Some(pending) = self.pending.pop_front_if(|pending| pending.due <= scene.time) {
-            for known in &mut self.known {
-                if let Some(place) = pending.ids.iter().position(|id| *id == known.id) {
-                    known.evidence = pending.result.evidence[place];
+            for object in &mut self.objects {
+                if let Some(place) = pending.ids.iter().position(|id| *id == object.id) {
+                    object.evidence = pending.result.evidence[place];
                 }
             }
             self.alone.clear();
@@ -180,8 +184,8 @@ impl DetectionClassifier for ImageDetector {
         }
         self.receive(scene);
         for (detection, id) in detections.iter_mut().zip(&self.ids) {
-            let known = self.known.iter().find(|known| known.id == *id);
-            let Some(evidence) = known.and_then(|known| known.evidence) else { continue };
+            let object = self.objects.iter().find(|object| object.id == *id);
+            let Some(evidence) = object.and_then(|object| object.evidence) else { continue };
             detection.class = fuse(&detection.class, &evidence.scores);
             if let (Extent::Assumed, Some(width_m)) = (detection.width, evidence.width_m) {
                 (detection.width_m, detection.width) = (width_m, Extent::Seen);

@@ -1,4 +1,5 @@
-//! The association of the instances in an image with the LiDAR's detections, and what each says of the other.
+//! The association of the instances in an image with the LiDAR's detections, and the evidence of
+//! each about the other.
 //!
 //! ```text
 //!   instances of the image ──┐                     ┌▶ seen by both: scores, and width from the mask
@@ -12,30 +13,36 @@ use closecall_traffic::{ClassScores, Time, maths};
 
 use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, SeenPart};
 
-/// Share of the smaller of two boxes that both have in common, from which an instance and a detection belong together (assumption:
-/// a cluster may be a part of the vehicle, and the length of its box is often assumed).
+/// Least overlap at which an instance and a detection belong together, as a share of the smaller
+/// box (assumption: a cluster may be a part of the vehicle, and the length of its box is often
+/// assumed).
 const MIN_OVERLAP: f64 = 0.5;
 /// Such a share above which an instance is not the camera's alone (assumption).
 const TOUCHING: f64 = 0.2;
-/// Intersection over union from which two instances are the same vehicle, with two classes: that of a match in COCO.
+/// Least intersection over union at which two instances are the same vehicle with two classes: the
+/// value of a match in COCO.
 const SAME_INSTANCE: f64 = 0.5;
-/// Score from which an instance that no cluster belongs to counts as a vehicle: more likely than not.
+/// Score from which an instance that no cluster belongs to counts as a vehicle: more likely than
+/// not.
 const MIN_ALONE_SCORE: f64 = 0.5;
-/// Share of a detection's box in the image that the boxes of nearer ones may cover, if the image shows it (assumption).
+/// Share of a detection's box in the image that the boxes of nearer detections may cover, if the
+/// image shows it (assumption).
 const MAX_HIDDEN: f64 = 0.3;
 /// Range of plausible widths of a vehicle from its mask (m).
 const WIDTHS_M: std::ops::RangeInclusive<f64> = 0.5..=2.8;
-/// Standard deviations of the lowest row of a mask and of its edges (px), and of the pitch of the body (rad): assumptions, a sampled
-/// pixel, and half of the pitch of hard braking.
+/// Standard deviations of the lowest row of a mask and of its edges (px), and of the pitch of the
+/// body (rad): assumptions. They are one sampled pixel, and half of the pitch of hard braking.
 const ROW_SD_PX: f64 = 3.0;
 const EDGE_SD_PX: f64 = 3.0;
 const PITCH_SD_RAD: f64 = 0.005;
-/// Distance up to which the place of an instance on the road is used (m): at 60 m, its standard deviation is 15 m.
+/// Distance up to which the place of an instance on the road is used (m): at 60 m, its standard
+/// deviation is 15 m.
 const MAX_ALONE_M: f64 = 60.0;
-/// A detection of the camera alone counts as much as a cluster of so many points. The tracker takes the scores of such a cluster with full weight.
+/// A detection of the camera alone counts as much as a cluster of so many points. The tracker takes
+/// the scores of such a cluster with full weight.
 const ALONE_POINTS: usize = 12;
 
-/// What the image says of a detection.
+/// The evidence of the image about a detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Evidence {
     /// Scores of the classes from the image alone.
@@ -47,9 +54,9 @@ pub(crate) struct Evidence {
 /// The result of one image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ImageResult {
-    /// For each detection, what the image says of it; `None` if it says nothing.
+    /// For each detection, the evidence of the image; `None` if it says nothing.
     pub(crate) evidence: Vec<Option<Evidence>>,
-    /// What the camera alone has seen, in the ego's frame at the exposure.
+    /// Vehicles that only the camera sees, in the ego's frame at the exposure.
     pub(crate) alone: Vec<Detection>,
 }
 
@@ -65,13 +72,15 @@ pub(crate) fn associate(
     let bounds: Vec<Option<[f64; 4]>> =
         detections.iter().map(|detection| camera.detection_bounds(&scene.ego, detection)).collect();
     let evidence = detections.iter().enumerate().map(|(index, detection)| {
-        let own = bounds[index].filter(|_| !is_beside_road(detection, &lane))?;
-        match best(instances, &own) {
-            Some(found) => Some(Evidence {
-                scores: scores(instances, found),
-                width_m: width_m(camera, &scene.ego, found, detection),
+        let detection_px = bounds[index].filter(|_| !is_beside_road(detection, &lane))?;
+        match best(instances, &detection_px) {
+            Some(instance) => Some(Evidence {
+                scores: scores(instances, instance),
+                width_m: width_m(camera, &scene.ego, instance, detection),
             }),
-            None if own[2] - own[0] >= network.min_shown_px && !is_hidden(index, &own, detections, &bounds) => {
+            None if detection_px[2] - detection_px[0] >= network.min_shown_px
+                && !is_hidden(index, &detection_px, detections, &bounds) =>
+            {
                 missed_scores(network.missed).map(|scores| Evidence { scores, width_m: None })
             }
             None => None,
@@ -80,23 +89,25 @@ pub(crate) fn associate(
     let evidence = evidence.collect();
     let is_alone = |instance: &&Instance| {
         let others = bounds.iter().flatten();
-        instance.score >= MIN_ALONE_SCORE && others.into_iter().all(|own| overlap(&instance.box_px, own) < TOUCHING)
+        instance.score >= MIN_ALONE_SCORE
+            && others.into_iter().all(|box_px| overlap(&instance.box_px, box_px) < TOUCHING)
     };
     let alone = instances.iter().filter(is_alone).filter_map(|instance| alone(camera, scene, instance, &lane));
     ImageResult { evidence, alone: alone.collect() }
 }
 
-/// Returns the scores of a detection that the image would show as a vehicle, and does not, if the network misses this share of the vehicles.
-/// Returns `None` if it may miss all.
+/// Returns the scores of a detection that the image would show as a vehicle, and does not, if the
+/// network misses this share of the vehicles. Returns `None` if it may miss all.
 fn missed_scores(missed: f64) -> Option<ClassScores> {
     let vehicle = missed / (3.0 * missed + 1.0);
     (missed < 1.0).then_some(ClassScores([vehicle, vehicle, vehicle, 1.0 / (3.0 * missed + 1.0)]))
 }
 
-/// Returns the instance that a box in the image belongs to: that of the largest intersection over union.
-fn best<'a>(instances: &'a [Instance], own: &[f64; 4]) -> Option<&'a Instance> {
-    let near = instances.iter().filter(|instance| overlap(&instance.box_px, own) >= MIN_OVERLAP);
-    near.max_by(|one, other| union_share(&one.box_px, own).total_cmp(&union_share(&other.box_px, own)))
+/// Returns the instance that a box in the image belongs to: the instance with the largest
+/// intersection over union.
+fn best<'a>(instances: &'a [Instance], detection_px: &[f64; 4]) -> Option<&'a Instance> {
+    let near = instances.iter().filter(|instance| overlap(&instance.box_px, detection_px) >= MIN_OVERLAP);
+    near.max_by(|a, b| union_share(&a.box_px, detection_px).total_cmp(&union_share(&b.box_px, detection_px)))
 }
 
 /// Returns the intersection over union of two boxes.
@@ -106,10 +117,11 @@ fn union_share(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     common / (area(a) + area(b) - common).max(f64::MIN_POSITIVE)
 }
 
-/// Returns the scores of an instance: those of all instances that show the same vehicle, and the rest for background.
-fn scores(instances: &[Instance], found: &Instance) -> ClassScores {
+/// Returns the scores of an instance: the scores of all instances that show the same vehicle, and
+/// the rest for background.
+fn scores(instances: &[Instance], matched: &Instance) -> ClassScores {
     let mut scores = [0.0_f64; 4];
-    for instance in instances.iter().filter(|other| union_share(&other.box_px, &found.box_px) >= SAME_INSTANCE) {
+    for instance in instances.iter().filter(|other| union_share(&other.box_px, &matched.box_px) >= SAME_INSTANCE) {
         let class = &mut scores[instance.class as usize];
         *class = class.max(instance.score);
     }
@@ -120,21 +132,23 @@ fn scores(instances: &[Instance], found: &Instance) -> ClassScores {
 }
 
 /// Returns whether nearer detections hide the box of one in the image.
-fn is_hidden(index: usize, own: &[f64; 4], detections: &[Detection], bounds: &[Option<[f64; 4]>]) -> bool {
+fn is_hidden(index: usize, detection_px: &[f64; 4], detections: &[Detection], bounds: &[Option<[f64; 4]>]) -> bool {
     let area = |[left, top, right, bottom]: &[f64; 4]| (right - left) * (bottom - top);
     let distance = |at: usize| maths::hypot(detections[at].face_x_m, detections[at].face_y_m);
     bounds.iter().enumerate().any(|(other, bounds)| {
         other != index
             && distance(other) < distance(index)
-            && bounds
-                .is_some_and(|bounds| overlap(&bounds, own) * area(&bounds).min(area(own)) > MAX_HIDDEN * area(own))
+            && bounds.is_some_and(|bounds| {
+                overlap(&bounds, detection_px) * area(&bounds).min(area(detection_px)) > MAX_HIDDEN * area(detection_px)
+            })
     })
 }
 
-/// Returns the width of a vehicle from its mask (m), if the image does not cut it off and the width is plausible.
+/// Returns the width of a vehicle from its mask (m), if the image does not cut it off and the width
+/// is plausible.
 ///
-/// The outer edge of the mask is that of the front face. The inner edge, towards the middle of the image, is that of the rear, if the
-/// side between them is seen.
+/// The outer edge of the mask is the edge of the front face. The inner edge, towards the middle of
+/// the image, is the edge of the rear if the side between them is seen.
 fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detection: &Detection) -> Option<f64> {
     let [left, _, right, _] = instance.mask.extent_px()?;
     if left < 1.0 || right > f64::from(crate::camera::WIDTH_PX) - 1.0 {
@@ -149,7 +163,8 @@ fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detecti
     WIDTHS_M.contains(&width_m).then_some(width_m)
 }
 
-/// Returns the detection of an instance that the camera alone sees: where the lowest row of its mask meets a flat road.
+/// Returns the detection of an instance that the camera alone sees: where the lowest row of its
+/// mask meets a flat road.
 fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &LaneGeometry) -> Option<Detection> {
     let [left, _, right, bottom] = instance.mask.extent_px()?;
     if bottom > f64::from(crate::camera::HEIGHT_PX) - 1.0 {

@@ -1,5 +1,5 @@
-//! What the ego vehicle perceives: models of its rear LiDAR, rear camera and object-level sensors, and the tracker
-//! behind the rear LiDAR.
+//! The perception of the ego vehicle: models of its rear LiDAR, rear camera and object-level
+//! sensors, and the tracker behind the rear LiDAR.
 //!
 //! ```text
 //!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ clusters ─▶ boxes ┐

@@ -6,15 +6,18 @@
 //!              tracks of step k + L ◀─ prediction by L steps ◀─ tracker ◀───┘
 //! ```
 //!
-//! The processing latency is L whole control steps. The tracks are predicted by the latency to the present. A sensor whose rate is
-//! below that of the control loop scans in some of the steps only; in the others its tracks are predicted further.
+//! The processing latency is L whole control steps. The tracks are predicted by the latency to the
+//! present. A sensor whose rate is below that of the control loop scans in some of the steps only;
+//! in the other steps its tracks are predicted further.
 //!
-//! Several sensors share the tracker, not the clusters: each scan is clustered on its own, in the ego's frame at its end, and the
-//! tracker is corrected with the boxes of all sensors in the order of their times (Darms, Rybski, Baker and Urmson 2009, "Obstacle
-//! detection and tracking for the Urban Challenge"). What a box may have missed follows from the sensor that measured it (spacing of
-//! its columns and layers, hidden edges, ends of its field of view), which merged points no longer tell; and a sensor that is late,
-//! slow, dead or badly mounted disturbs no other one's boxes. The alternative, one cloud of all points (the concatenation of
-//! Autoware), gives denser clusters where fields of view overlap.
+//! Several sensors share the tracker, not the clusters: each scan is clustered on its own, in the
+//! ego's frame at its end, and the tracker is corrected with the boxes of all sensors in the order
+//! of their times (Darms, Rybski, Baker and Urmson 2009, "Obstacle detection and tracking for the
+//! Urban Challenge"). The parts that a box may have missed follow from the sensor that measured it
+//! (spacing of its columns and layers, hidden edges, ends of its field of view). Merged points no
+//! longer show the sensor. A sensor that is late, slow, dead or badly mounted disturbs no boxes of
+//! other sensors. The alternative, one cloud of all points (the concatenation of Autoware), gives
+//! denser clusters where fields of view overlap.
 
 use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use closecall_traffic::Time;
@@ -37,16 +40,16 @@ use sensor::{ChainSensor, NewScan};
 /// Number of LiDARs of a chain, at most.
 const MAX_LIDARS: usize = 1 + MAX_ADDITIONAL_LIDARS;
 
-/// What a chain sees in one step.
+/// The result of a chain in one step.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<'a> {
     /// The scene.
     pub(crate) scene: &'a Scene<'a>,
     /// The scene as the ego believes it to be.
     pub(crate) believed: &'a Scene<'a>,
-    /// The other vehicles of the latter.
+    /// The other vehicles of the scene that the ego believes.
     pub(crate) others: &'a [OtherVehicle],
-    /// What of the chain is replaced by the truth.
+    /// The stages of the chain that the truth replaces.
     pub(crate) altered: &'a Alterations,
 }
 
@@ -65,8 +68,8 @@ pub(crate) struct LidarChain {
 }
 
 impl LidarChain {
-    /// Creates the chain of these sensors before its first step. `channel` has the names of the random streams of the first one, and
-    /// of its faults.
+    /// Creates the chain of these sensors before its first step. `channel` has the names of the
+    /// random streams of the first sensor, and of its faults.
     pub(crate) fn new(
         lidars: impl IntoIterator<Item = Lidar>,
         tracker: TrackerModel,
@@ -76,8 +79,8 @@ impl LidarChain {
         let sensor = |(index, lidar): (usize, Lidar)| match index {
             0 => ChainSensor::new(lidar, key, channel),
             _ => {
-                let own = channel.map(|channel| format!("{channel}/{}", lidar.name()));
-                ChainSensor::new(lidar, key, [&own[0], &own[1]])
+                let names = channel.map(|channel| format!("{channel}/{}", lidar.name()));
+                ChainSensor::new(lidar, key, [&names[0], &names[1]])
             }
         };
         let sensors: Vec<ChainSensor> = lidars.into_iter().enumerate().map(sensor).collect();
@@ -100,8 +103,8 @@ impl LidarChain {
         self
     }
 
-    /// Scans the scene with each sensor whose scan is due, and appends its detections to the queue of pending scans. The classifier
-    /// sees the boxes of all these sensors at once.
+    /// Scans the scene with each sensor whose scan is due, and appends its detections to the queue
+    /// of pending scans. The classifier sees the boxes of all these sensors at once.
     ///
     /// # Errors
     /// [`SensorError`] if a model fails.
@@ -128,9 +131,9 @@ impl LidarChain {
                 classifier.classify(seen.scene, &mut self.all)?;
                 let mut classified = self.all.drain(..);
                 for (_, scan) in several.iter_mut() {
-                    scan.detections.iter_mut().zip(&mut classified).for_each(|(slot, found)| *slot = found);
+                    scan.detections.iter_mut().zip(&mut classified).for_each(|(slot, detection)| *slot = detection);
                 }
-                // What only the camera sees belongs to no LiDAR: it comes with the first.
+                // Camera-only detections belong to no LiDAR. They come with the first LiDAR.
                 if let [(_, scan), ..] = several {
                     scan.detections.extend_from_slice(classifier.seen_alone());
                 }
@@ -143,8 +146,8 @@ impl LidarChain {
         Ok(())
     }
 
-    /// Passes the scans whose latency has elapsed to the tracker: one of each sensor in each step, if no fault delays them.
-    /// `rear_x_m` is the position of the ego's rear end (m).
+    /// Passes the scans whose latency has elapsed to the tracker: one of each sensor in each step,
+    /// if no fault delays them. `rear_x_m` is the position of the ego's rear end (m).
     pub(crate) fn update_tracker(&mut self, rear_x_m: f64, list: &mut TrackList) {
         while let Some(time) = self.earliest_due() {
             let mut idle: [Option<RearView>; MAX_LIDARS] = [None; MAX_LIDARS];

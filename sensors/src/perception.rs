@@ -52,7 +52,8 @@ impl FieldOfView {
         Self { half_angle_tan, range_m, inset_m: 0.0, left_m: 0.0, azimuth_rad: 0.0 }
     }
 
-    /// Returns whether a point is in view that lies behind the bumper and to the left of the ego's centre line by these distances (m).
+    /// Returns whether a point is in view that lies behind the bumper and to the left of the ego's
+    /// centre line by these distances (m).
     pub fn contains(&self, back_m: f64, left_m: f64) -> bool {
         let view = RearView {
             half_angle_tan: self.half_angle_tan,
@@ -70,12 +71,13 @@ impl FieldOfView {
 pub struct MountedLidar<'a> {
     /// Name of the sensor.
     pub name: &'static str,
-    /// Whether it looks ahead. Its points and boxes are then in the frame of an ego that is turned by half a turn: x and y have the
-    /// opposite sign.
+    /// Whether it looks ahead. Its points and boxes are then in the frame of an ego that is turned
+    /// by half a turn: x and y have the opposite sign.
     pub looks_ahead: bool,
     /// The sensor with its latest points and boxes.
     pub lidar: &'a RearLidar,
-    /// The boxes of the latest scan, with the camera's class scores if a camera has classified them.
+    /// The boxes of the latest scan, with the camera's class scores if a camera has classified
+    /// them.
     pub detections: &'a [Detection],
 }
 
@@ -84,9 +86,10 @@ pub struct MountedLidar<'a> {
 pub struct RearImage {
     /// Time of the exposure.
     pub time: Time,
-    /// Time of the scene that the image shows: that of the exposure, unless the camera is frozen.
+    /// Time of the scene that the image shows: the time of the exposure, unless the camera is
+    /// frozen.
     pub shown_time: Time,
-    /// What the network has found, in its order.
+    /// The instances of the network, in its order.
     pub instances: Vec<Instance>,
 }
 
@@ -97,14 +100,15 @@ pub trait Perception: Send {
     /// Measures the scene and returns the tracks of all sensors: front, surround and rear.
     ///
     /// # Errors
-    /// Returns [`SensorError`] if a model fails. The run then ends with an error, never with a result.
+    /// Returns [`SensorError`] if a model fails. The run then ends with an error, never with a
+    /// result.
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError>;
 
     /// Returns the health of the sensors after the latest step.
     fn health(&self) -> SensorHealth;
 
-    /// Returns the LiDARs with their latest points and boxes: that which looks ahead, and those that look back in the order of the
-    /// scenario. Returns none if none are simulated.
+    /// Returns the LiDARs with their latest points and boxes: the LiDAR that looks ahead, then the
+    /// LiDARs that look back in the order of the scenario. Returns none if none are simulated.
     fn lidars(&self) -> Vec<MountedLidar<'_>> {
         Vec::new()
     }
@@ -114,12 +118,14 @@ pub trait Perception: Send {
         self.lidars().into_iter().find(|lidar| !lidar.looks_ahead)
     }
 
-    /// Returns the latest image of the rear camera that a network has evaluated as a whole. Returns `None` if no network does.
+    /// Returns the latest image of the rear camera that a network has evaluated as a whole. Returns
+    /// `None` if no network does.
     fn rear_image(&self) -> Option<&RearImage> {
         None
     }
 
-    /// Returns the fields of view of the rear sensors. Returns none if their limits are not simulated.
+    /// Returns the fields of view of the rear sensors. Returns none if their limits are not
+    /// simulated.
     fn rear_fields(&self) -> Vec<FieldOfView> {
         Vec::new()
     }

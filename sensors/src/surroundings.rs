@@ -1,4 +1,5 @@
-//! The other vehicles in the ego's frame, computed once per step and shared by all object-level models.
+//! The other vehicles in the ego's frame, computed once per step and shared by all object-level
+//! models.
 
 use closecall_traffic::{Appearance, VehicleClass, maths};
 
@@ -32,11 +33,16 @@ pub(crate) struct OtherVehicle {
     pub(crate) speed_mps: f64,
 }
 
-/// Returns an error if a vehicle's state is not finite, so that no sensor turns it into a measurement that looks safe.
+/// Returns an error if a vehicle's state is not finite, so that no sensor turns it into a
+/// measurement that looks safe.
 fn check_finite(vehicle: &SceneVehicle, scene: &Scene<'_>) -> Result<(), SensorError> {
     let state = &vehicle.state;
     let sum = state.s_m + state.d_m + state.heading_rad + state.speed_mps;
-    if sum.is_finite() { Ok(()) } else { Err(SensorError::NotFinite { what: "a vehicle's state", time: scene.time }) }
+    if sum.is_finite() {
+        Ok(())
+    } else {
+        Err(SensorError::NotFinite { quantity: "a vehicle's state", time: scene.time })
+    }
 }
 
 /// Replaces the contents of `others` with the scene's other vehicles, and returns the ego's frame.
@@ -55,7 +61,8 @@ pub(crate) fn transform_scene<'a>(
         let heading_rad = point.road_yaw_rad + state.heading_rad;
         let (sin, cos) = maths::sin_cos(heading_rad);
         let (road_sin, road_cos) = maths::sin_cos(state.heading_rad);
-        // On the inside of a bend, a vehicle passes more metres of the reference line than it drives.
+        // On the inside of a bend, a vehicle passes more metres of the reference line than it
+        // drives.
         let path_scale = 1.0 - curvature_per_m * state.d_m;
         others.push(OtherVehicle {
             actor: vehicle.actor,

@@ -1,7 +1,8 @@
 //! The camera's classifier in the simulation loop, with one network per worker thread.
 //!
-//! A network takes long to set up and is locked while it runs. A run never changes its thread, so each thread keeps one
-//! network and uses it for all of its runs. The network is stateless: earlier runs do not change its results.
+//! A network takes long to set up and is locked while it runs. A run never changes its thread, so
+//! each thread keeps one network and uses it for all of its runs. The network is stateless: earlier
+//! runs do not change its results.
 
 use std::cell::RefCell;
 use std::sync::OnceLock;
@@ -53,7 +54,8 @@ pub(crate) struct WorkerClassifier {
     faults: FaultList<CameraFault>,
     /// The latest image before the camera froze.
     held: Option<HeldImage>,
-    /// Number of latest successive steps in which the camera delivered no image, or the same one again.
+    /// Number of latest successive steps in which the camera delivered no image, or the same one
+    /// again.
     failed_steps: u32,
 }
 
@@ -99,7 +101,8 @@ impl WorkerClassifier {
 
 impl DetectionClassifier for WorkerClassifier {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        // The key is drawn even if nothing is detected, so that both arms of a pair get the same exposures.
+        // The key is drawn even if nothing is detected, so that both arms of a pair get the same
+        // exposures.
         let key = ExposureKey::draw(&mut self.exposures);
         let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
         let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));

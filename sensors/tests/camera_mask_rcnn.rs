@@ -1,6 +1,8 @@
-//! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in the same images, and other networks are refused.
+//! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in the same images,
+//! and other networks are refused.
 //!
-//! Needs the shared library of the `onnxruntime` wheel. Python was given whole images, and Rust the pixels that the network reads.
+//! Needs the shared library of the `onnxruntime` wheel. Python was given whole images, and Rust the
+//! pixels that the network reads.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -11,7 +13,8 @@ use closecall_sensors::camera::{
 };
 use closecall_traffic::VehicleClass;
 
-/// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of two masks.
+/// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of
+/// two masks.
 const BOX_PX: f64 = 0.5;
 const SCORE: f64 = 1e-3;
 const MASK_OVERLAP: f64 = 0.98;
@@ -22,21 +25,21 @@ fn backend() -> Option<Backend> {
     closecall_testing::onnxruntime().map(|library: PathBuf| Backend::OnnxRuntime(library))
 }
 
-fn mask_overlap(one: &Mask, other: &Mask) -> f64 {
-    let (one, other) = (one.pixels(), other.pixels());
-    let count = |both: &dyn Fn(bool, bool) -> bool| one.iter().zip(&other).filter(|(a, b)| both(**a, **b)).count();
+fn mask_overlap(first: &Mask, second: &Mask) -> f64 {
+    let (first, second) = (first.pixels(), second.pixels());
+    let count = |both: &dyn Fn(bool, bool) -> bool| first.iter().zip(&second).filter(|(a, b)| both(**a, **b)).count();
     let union = count(&|a, b| a || b);
     if union == 0 { 1.0 } else { count(&|a, b| a && b) as f64 / union as f64 }
 }
 
-fn assert_same(found: &Instance, (sides, score, cells): (&[f64], f64, &[f32])) {
-    for (own, wanted) in found.box_px.iter().zip(sides) {
-        assert!((own - wanted).abs() <= BOX_PX, "{:?} instead of {sides:?}", found.box_px);
+fn assert_same(instance: &Instance, (sides, score, cells): (&[f64], f64, &[f32])) {
+    for (side, wanted) in instance.box_px.iter().zip(sides) {
+        assert!((side - wanted).abs() <= BOX_PX, "{:?} instead of {sides:?}", instance.box_px);
     }
-    assert!((found.score - score).abs() <= SCORE, "{} instead of {score}", found.score);
+    assert!((instance.score - score).abs() <= SCORE, "{} instead of {score}", instance.score);
     let area: [f64; 4] = sides.try_into().expect("four sides");
     let wanted = Mask::new(area, [CELLS, CELLS], cells.to_vec()).expect("a mask");
-    let share = mask_overlap(&found.mask, &wanted);
+    let share = mask_overlap(&instance.mask, &wanted);
     assert!(share >= MASK_OVERLAP, "masks overlap by {share}");
 }
 
@@ -57,12 +60,12 @@ fn rust_and_python_find_the_same() {
     for (rgb, answer) in pictures.zip(&answers) {
         let numbers = |key: &str| -> Vec<f64> { serde_json::from_value(answer[key].clone()).unwrap() };
         let picture = Image { width: width as u32, height: height as u32, rgb: rgb.to_vec() };
-        let found = detector.detect(&picture).unwrap();
-        assert_eq!(detector.detect(&picture).unwrap(), found, "the same picture gives the same bits");
+        let instances = detector.detect(&picture).unwrap();
+        assert_eq!(detector.detect(&picture).unwrap(), instances, "the same picture gives the same bits");
         let (labels, scores) = (numbers("labels"), numbers("scores"));
-        assert_eq!(found.len(), scores.len());
+        assert_eq!(instances.len(), scores.len());
         let boxes: Vec<Vec<f64>> = serde_json::from_value(answer["boxes"].clone()).unwrap();
-        for (index, instance) in found.iter().enumerate() {
+        for (index, instance) in instances.iter().enumerate() {
             assert_eq!(instance.class as usize + 1, labels[index] as usize);
             assert_same(instance, (&boxes[index], scores[index], masks.next().unwrap()));
             compared += usize::from(instance.score > 0.5);
@@ -72,7 +75,7 @@ fn rust_and_python_find_the_same() {
 }
 
 #[test]
-fn a_network_with_another_layout_is_refused_with_what_it_has_and_what_is_wanted() {
+fn a_network_with_another_layout_is_refused_with_both_layouts() {
     let Some(backend) = backend() else { return };
     let error = InstanceDetector::new(SHIPPED_MODEL, None, &backend).unwrap_err().to_string();
     for part in [
@@ -90,7 +93,8 @@ fn a_network_with_another_layout_is_refused_with_what_it_has_and_what_is_wanted(
 /// The first pixel of the picture for other networks: red, green and blue.
 const FIRST_PIXEL: [u8; 3] = [51, 102, 204];
 
-/// Returns what a network of `xtask/training/mask_rcnn_layouts.py` finds in a black picture whose first pixel is [`FIRST_PIXEL`].
+/// Returns the instances that a network of `xtask/training/mask_rcnn_layouts.py` finds in a black
+/// picture whose first pixel is [`FIRST_PIXEL`].
 fn found_by(file: &str, input: MaskRcnnInput, backend: &Backend) -> Vec<Instance> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mask_rcnn_layouts");
     let bytes = std::fs::read(folder.join(file)).unwrap();
@@ -102,22 +106,22 @@ fn found_by(file: &str, input: MaskRcnnInput, backend: &Backend) -> Vec<Instance
     detector.detect(&Image { width: width as u32, height: height as u32, rgb }).unwrap()
 }
 
-fn assert_found(found: &[Instance], scores: [f64; 3]) {
+fn assert_found(instances: &[Instance], scores: [f64; 3]) {
     let classes = [VehicleClass::Car, VehicleClass::Truck, VehicleClass::Motorcycle];
-    assert_eq!(found.iter().map(|instance| instance.class).collect::<Vec<_>>(), classes);
-    for (instance, score) in found.iter().zip(scores) {
+    assert_eq!(instances.iter().map(|instance| instance.class).collect::<Vec<_>>(), classes);
+    for (instance, score) in instances.iter().zip(scores) {
         assert!((instance.score - score).abs() < 1e-4, "{} instead of {score}", instance.score);
     }
-    assert_eq!(found[1].box_px, [700.0, 380.0, 800.0, 480.0]);
+    assert_eq!(instances[1].box_px, [700.0, 380.0, 800.0, 480.0]);
 }
 
 #[test]
 fn the_layout_of_the_model_zoo_is_read_and_gets_blue_green_and_red_less_their_means() {
     let Some(backend) = backend() else { return };
-    let found = found_by("model-zoo.onnx", MaskRcnnInput::BgrMean, &backend);
+    let instances = found_by("model-zoo.onnx", MaskRcnnInput::BgrMean, &backend);
     // The network adds the means again.
-    assert_found(&found, [0.8, 0.4, 0.2]);
-    let inside = found[1].mask.pixels().iter().filter(|inside| **inside).count();
+    assert_found(&instances, [0.8, 0.4, 0.2]);
+    let inside = instances[1].mask.pixels().iter().filter(|inside| **inside).count();
     assert_eq!(inside, 100 * 100, "cells of 28 x 28 fill the box");
     let wrong = found_by("model-zoo.onnx", MaskRcnnInput::Rgb, &backend);
     assert!((wrong[0].score - 0.8).abs() > 0.1, "the input matters");
@@ -126,12 +130,13 @@ fn the_layout_of_the_model_zoo_is_read_and_gets_blue_green_and_red_less_their_me
 #[test]
 fn the_layout_of_torchvision_is_read_with_a_batch_and_with_masks_of_the_size_of_the_image() {
     let Some(backend) = backend() else { return };
-    let found = found_by("torchvision.onnx", MaskRcnnInput::Rgb, &backend);
-    assert_found(&found, [0.2, 0.4, 0.8]);
-    assert_eq!(found[0].mask.extent_px(), Some([0.0, 0.0, 1280.0, 800.0]));
+    let instances = found_by("torchvision.onnx", MaskRcnnInput::Rgb, &backend);
+    assert_found(&instances, [0.2, 0.4, 0.8]);
+    assert_eq!(instances[0].mask.extent_px(), Some([0.0, 0.0, 1280.0, 800.0]));
 }
 
-/// Returns the error of a network whose file is `bytes`, with these values for the colours of a pixel.
+/// Returns the error of a network whose file is `bytes`, with these values for the colours of a
+/// pixel.
 fn error_of(bytes: &[u8], input: MaskRcnnInput, backend: &Backend) -> String {
     let labels = LabelMap::parse("3=car 8=truck 4=motorcycle").unwrap();
     let detector = InstanceDetector::new(bytes, Some(&labels), backend).unwrap();
@@ -141,7 +146,7 @@ fn error_of(bytes: &[u8], input: MaskRcnnInput, backend: &Backend) -> String {
     detector.detect(&picture).unwrap_err().to_string()
 }
 
-/// Returns the bytes of a file with the first occurrence of a number replaced by another one.
+/// Returns the bytes of a file with the first occurrence of a number replaced by another number.
 fn replaced(bytes: &[u8], from: f32, to: f32) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let place = bytes.windows(4).position(|window| window == from.to_le_bytes()).expect("the number");

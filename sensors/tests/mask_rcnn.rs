@@ -1,4 +1,5 @@
-//! The pipeline `mask-rcnn` in the chain of the rear sensors: latency, faults of the camera, and what only one sensor sees.
+//! Tests the pipeline `mask-rcnn` in the chain of the rear sensors: latency, faults of the camera,
+//! and vehicles that only one sensor sees.
 //!
 //! Needs the shared library of the `onnxruntime` wheel.
 
@@ -55,7 +56,8 @@ fn vehicle(actor: usize, class: VehicleClass, s_m: f64) -> SceneVehicle {
     SceneVehicle { actor, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
 }
 
-/// Runs a second and a half with a truck whose front is 30 m behind the ego's middle. Returns the detections of each step, and the health.
+/// Runs a second and a half with a truck whose front is 30 m behind the ego's middle. Returns the
+/// detections of each step, and the health.
 fn follow(mut perception: Box<dyn Perception>) -> (Vec<Vec<Detection>>, Health) {
     let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
     let mut detections = Vec::new();
@@ -73,8 +75,8 @@ fn follow(mut perception: Box<dyn Perception>) -> (Vec<Vec<Detection>>, Health) 
     (detections, perception.health().rear)
 }
 
-/// Runs `steps` control steps. `others` returns the vehicles of each, from the time (s). Returns the LiDAR's detections of each step, to which
-/// those of the camera alone belong.
+/// Runs `steps` control steps. `others` returns the vehicles of each, from the time (s). Returns
+/// the LiDAR's detections of each step, including the camera-only detections.
 fn run(sensors: &str, lidar: &str, steps: i64, others: impl Fn(f64) -> Vec<SceneVehicle>) -> Vec<Vec<Detection>> {
     let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
     let mut perception = perception(sensors, faults("", lidar));
@@ -88,7 +90,8 @@ fn run(sensors: &str, lidar: &str, steps: i64, others: impl Fn(f64) -> Vec<Scene
     (0..steps).map(step).collect()
 }
 
-/// Returns a vehicle whose front is `gap_m` behind the middle of the ego after `time_s`, at a lateral position of `y_m` from the ego.
+/// Returns a vehicle whose front is `gap_m` behind the middle of the ego after `time_s`, at a
+/// lateral position of `y_m` from the ego.
 fn behind(class: VehicleClass, time_s: f64, [gap_m, y_m]: [f64; 2], closing_mps: f64) -> SceneVehicle {
     let mut other = vehicle(class as usize + 1, class, 500.0 + 30.0 * time_s - gap_m);
     other.state.s_m -= 0.5 * other.vehicle.dimensions.length_m;
@@ -99,12 +102,12 @@ fn behind(class: VehicleClass, time_s: f64, [gap_m, y_m]: [f64; 2], closing_mps:
 /// Returns the detection nearest to a lateral position (m), which is one metre away at most.
 fn at_side(detections: &[Detection], y_m: f64) -> &Detection {
     let off_m = |seen: &&Detection| (seen.face_y_m - y_m).abs();
-    let nearest = detections.iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)));
+    let nearest = detections.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
     nearest.filter(|seen| off_m(seen) < 1.0).expect("a detection there")
 }
 
 #[test]
-fn the_image_that_is_shown_has_what_the_detector_finds_in_the_scene() {
+fn the_shown_image_has_the_instances_that_the_detector_finds_in_the_scene() {
     let Some(library) = closecall_testing::onnxruntime() else { return };
     set_inference_backend(Backend::OnnxRuntime(library.clone()));
     let config: SensorsConfig = toml::from_str(SENSORS).expect("valid settings and scenes");
@@ -121,18 +124,18 @@ fn the_image_that_is_shown_has_what_the_detector_finds_in_the_scene() {
     assert_eq!((shown.time, shown.shown_time), (Time::ZERO, Time::ZERO));
     // The noise is another, so that boxes differ by little.
     let scene = Scene { time: Time::ZERO, ..scene };
-    let found = detector.detect(&scene, ExposureKey(7), None).expect("an image that can be evaluated");
-    let sure = found.iter().filter(|instance| instance.score > 0.9);
+    let instances = detector.detect(&scene, ExposureKey(7), None).expect("an image that can be evaluated");
+    let sure = instances.iter().filter(|instance| instance.score > 0.9);
     let mut compared = 0;
     for instance in sure {
         let off_px = |other: &closecall_sensors::camera::Instance| {
-            instance.box_px.iter().zip(other.box_px).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+            instance.box_px.iter().zip(other.box_px).map(|(side, other)| (side - other).abs()).fold(0.0, f64::max)
         };
         let same = |other: &&closecall_sensors::camera::Instance| other.class == instance.class && off_px(other) < 4.0;
         assert!(shown.instances.iter().any(|other| same(&other)), "{instance:?} is not among {:?}", shown.instances);
         compared += 1;
     }
-    assert!(compared >= 2, "{found:?}");
+    assert!(compared >= 2, "{instances:?}");
 }
 
 #[test]
@@ -140,7 +143,8 @@ fn a_late_result_applies_to_the_vehicles_and_not_to_their_places() {
     if !has_backend() {
         return;
     }
-    // A truck takes the place that a car had at the exposure, while both change lanes and close in. The result arrives after 0.6 s.
+    // A truck takes the place that a car had at the exposure, while both change lanes and close in.
+    // The result arrives after 0.6 s.
     let arrives = 15;
     let changed_m = |time_s: f64| 3.75 * (time_s / 0.6).min(1.0);
     let others = |time_s: f64| {
@@ -166,7 +170,7 @@ fn a_late_result_applies_to_the_vehicles_and_not_to_their_places() {
 }
 
 #[test]
-fn without_lidar_a_closing_vehicle_stands_where_it_was_at_the_exposure() {
+fn without_lidar_a_closing_vehicle_is_where_it_was_at_the_exposure() {
     if !has_backend() {
         return;
     }
@@ -180,8 +184,8 @@ fn without_lidar_a_closing_vehicle_stands_where_it_was_at_the_exposure() {
         let [alone] = &seen[step][..] else { panic!("step {step}: {:?}", seen[step]) };
         let exposed = step - latency_steps;
         assert_eq!(alone.time, CONTROL_STEP * exposed as i64);
-        // The ego has driven on by 6 m since then. An image of the arrival would show the vehicle 2.8 m nearer, and its place without the
-        // ego's motion would be 6 m off.
+        // The ego has driven on by 6 m since then. An image of the arrival would show the vehicle
+        // 2.8 m nearer, and its place without the ego's motion would be 6 m off.
         let expected_m = -(gap_m(exposed) + 30.0 * CONTROL_STEP.s() * latency_steps as f64);
         let off_m = alone.face_x_m - expected_m;
         assert!(off_m.abs() < 3.0, "step {step}: {off_m} m off: {alone:?}");
@@ -195,7 +199,7 @@ fn truck_score(detections: &[Detection]) -> f64 {
 }
 
 #[test]
-fn the_result_arrives_with_its_latency_and_applies_to_what_was_there() {
+fn the_result_arrives_with_its_latency_and_applies_to_the_objects_in_its_image() {
     if !has_backend() {
         return;
     }
@@ -233,7 +237,8 @@ fn dirt_before_the_lens_hides_the_vehicle() {
     let (dirty, health) = follow(perception(SENSORS, faults("dirt = 1.0", "")));
     let dirty = truck_score(&dirty[30]);
     assert_eq!(health, Health::Ok, "no monitor notices dirt");
-    // The image speaks against the vehicle, and for it when it is clean; the shape alone stands between both.
+    // The image speaks against the vehicle, and for it when it is clean; the shape alone stands
+    // between both.
     assert!(dirty < off && off < clean, "{dirty}, {off}, {clean}");
 }
 

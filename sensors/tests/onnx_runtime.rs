@@ -1,6 +1,8 @@
-//! ONNX Runtime loaded into this process and in Python give the same probabilities for the same crops.
+//! ONNX Runtime loaded into this process and in Python give the same probabilities for the same
+//! crops.
 //!
-//! Needs the shared library of the `onnxruntime` wheel: `CLOSECALL_ONNXRUNTIME=…/onnxruntime/capi/libonnxruntime.so.1.x.y`.
+//! Needs the shared library of the `onnxruntime` wheel:
+//! `CLOSECALL_ONNXRUNTIME=…/onnxruntime/capi/libonnxruntime.so.1.x.y`.
 
 #[path = "onnx_golden/agreement.rs"]
 mod onnx_golden;

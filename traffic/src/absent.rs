@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// The reason why a metric or a margin has no value.
 ///
-/// This is not an error: it says that the quantity is not defined in this situation. A computation that fails is an
-/// error, so that it can never look safe.
+/// This is not an error: it says that the quantity is not defined in this situation. A computation
+/// that fails is an error, so that it can never look safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
 pub enum Absent {
@@ -51,7 +51,7 @@ pub enum Absent {
     /// The vehicle behind never crossed the lane marking.
     #[error("the marking was never crossed")]
     NeverCrossed,
-    /// The data do not contain what the value needs.
+    /// The data does not contain the input of the value.
     #[error("not recorded")]
     NotRecorded,
     /// The recorded value is beyond what a vehicle can do.

@@ -23,8 +23,8 @@ impl ActorId {
     /// Creates an identifier from a name.
     ///
     /// # Errors
-    /// [`InvalidActorId`] if `name` is empty, does not start with a letter, or contains characters other than `a-z`,
-    /// `0-9` and `-`.
+    /// [`InvalidActorId`] if `name` is empty, does not start with a letter, or contains characters
+    /// other than `a-z`, `0-9` and `-`.
     pub fn new(name: &str) -> Result<Self, InvalidActorId> {
         if is_kebab_name(name) { Ok(Self(name.into())) } else { Err(InvalidActorId { name: name.to_owned() }) }
     }
@@ -35,7 +35,8 @@ impl ActorId {
     }
 }
 
-/// Returns true if `name` consists of lower-case letters, digits and hyphens, and starts with a letter.
+/// Returns true if `name` consists of lower-case letters, digits and hyphens, and starts with a
+/// letter.
 pub(crate) fn is_kebab_name(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')

@@ -26,8 +26,8 @@ impl WriteError {
     }
 }
 
-/// Writes texts, such as charts, into a folder, which is created if it does not exist. Each path belongs to the text of the same
-/// index, and is given to `written` afterwards.
+/// Writes texts, such as charts, into a folder, which is created if it does not exist. Each path
+/// belongs to the text of the same index. `written` receives the path afterwards.
 ///
 /// # Errors
 /// [`WriteError`] if the folder or a file cannot be written.
@@ -47,7 +47,8 @@ pub fn write_texts(
 /// Writes a file as [`write_atomically`] does, and names it if that fails.
 ///
 /// # Errors
-/// [`WriteError`] if the folder or the file cannot be written; a file of that name is then unchanged.
+/// [`WriteError`] if the folder or the file cannot be written; a file of that name is then
+/// unchanged.
 pub fn write_file(
     path: &Path,
     content: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
@@ -55,12 +56,14 @@ pub fn write_file(
     write_atomically(path, content).map_err(|source| WriteError::new(path, source))
 }
 
-/// Writes the file `path` through `content`: first under a temporary name in the same folder, then by a rename.
+/// Writes the file `path` through `content`: first under a temporary name in the same folder, then
+/// by a rename.
 ///
 /// On return, both the content and the name have been synchronized to the disk.
 ///
 /// # Errors
-/// Returns the error of `content`, or an I/O error. A file that existed at `path` before then stays untouched.
+/// Returns the error of `content`, or an I/O error. A file that existed at `path` before then stays
+/// untouched.
 pub fn write_atomically<E: From<io::Error>>(
     path: &Path,
     content: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), E>,
@@ -74,7 +77,8 @@ pub fn write_atomically<E: From<io::Error>>(
     Ok(sync_folder(folder)?)
 }
 
-/// Checks that a file can be created at `path`, so that a long computation does not fail only when it saves its result.
+/// Checks that a file can be created at `path`, so that a long computation does not fail only when
+/// it saves its result.
 ///
 /// # Errors
 /// [`WriteError`] if no file can be created in the folder of `path`.
@@ -82,7 +86,7 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     temporary_in(parent_folder(path)).map(drop).map_err(|source| WriteError::new(path, source))
 }
 
-/// Returns true if `name` is that of a temporary file, left by a program that was killed while it wrote.
+/// Returns true if `name` is the name of a temporary file that a killed program left behind.
 pub fn is_temporary(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
 }
@@ -92,9 +96,11 @@ pub fn parent_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Creates a temporary file whose permissions follow the umask, like those of any other new file.
+/// Creates a temporary file whose permissions follow the umask, like the permissions of any other
+/// new file.
 ///
-/// The default of `tempfile` is read and write access for the owner alone, which the renamed file would keep.
+/// The default of `tempfile` is read and write access for the owner alone, which the renamed file
+/// would keep.
 fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     #[cfg(unix)]

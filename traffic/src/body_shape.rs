@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_belongs_to_the_class_that_lists_it_and_its_name_is_the_one_in_files() {
+    fn every_shape_belongs_to_the_class_that_lists_it_and_has_the_name_in_files() {
         for class in VehicleClass::ALL {
             for shape in BodyShape::of_class(class) {
                 assert_eq!(shape.class(), class);

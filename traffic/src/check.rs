@@ -13,7 +13,8 @@ pub trait Check {
     /// Resolves parameters and checks every value against its range.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first wrong key, with its path below this configuration, its value, and what is allowed.
+    /// [`ConfigError`] for the first wrong key, with its path below this configuration, its value,
+    /// and what is allowed.
     fn check(&self, parameters: &Parameters) -> Result<Self::Checked, ConfigError>;
 }
 
@@ -75,12 +76,12 @@ pub enum Problem {
     WrongKind {
         /// The name found.
         name: ParameterName,
-        /// What the parameter gives.
+        /// The value of the parameter.
         found: String,
-        /// What the key needs.
+        /// The kind of value that the key needs.
         needed: &'static str,
     },
-    /// A label is not in the list of allowed ones.
+    /// A label is not in the list of allowed labels.
     #[error("is `{value}`, but one of {allowed} is needed{}", hint(value, allowed))]
     UnknownWord {
         /// The label found.
@@ -127,7 +128,7 @@ pub enum Problem {
 pub struct ConfigError {
     /// The path to the key.
     pub path: KeyPath,
-    /// What is wrong with its value.
+    /// The fault of its value.
     pub problem: Problem,
 }
 
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_says_where_and_what() {
+    fn an_error_names_the_place_and_the_fault() {
         let error = Range::UNIT.check(1.5, "existence").unwrap_err().within("driver").within_index(2).within("actor");
         assert_eq!(error.to_string(), "`actor[2].driver.existence` is 1.5, but a number from 0 to 1 is needed");
     }

@@ -1,22 +1,22 @@
 //! Transforms between road coordinates and the ego's vehicle frame, and assigns positions to lanes.
 //!
-//! A road has the curvature κ at its left edge. The ego is at (s₀, d₀). In axes that are aligned with the road's
-//! direction at the ego, the road point (s, d) lies at (a, b) relative to the ego:
+//! A road has the curvature κ at its left edge. The ego is at (s₀, d₀). In axes that are aligned
+//! with the road's direction at the ego, the road point (s, d) lies at (a, b) relative to the ego:
 //!
 //! ```text
 //!   a = (1/κ − d)·sin Δ                        Δ = κ·(s − s₀)
 //!   b = d − d₀ + (1/κ − d)·(1 − cos Δ)
 //! ```
 //!
-//! The code writes 1 − cos Δ as 2·sin²(Δ/2), which loses no digits if κ is small. Every position is formed relative to
-//! the ego, so a run at s = 100 km is as exact as one at s = 0. A rotation by the ego's heading relative to the road
-//! turns (a, b) into (x, y).
+//! The code writes 1 − cos Δ as 2·sin²(Δ/2), which loses no digits if κ is small. Every position is
+//! formed relative to the ego, so a run at s = 100 km is as exact as one at s = 0. A rotation by
+//! the ego's heading relative to the road turns (a, b) into (x, y).
 
 use crate::maths::erfc;
 use crate::{Lane, Road, Side, VehicleState, maths};
 
-/// Number of standard deviations from a lane's edge beyond which a vehicle is certainly on one side of it (the
-/// neglected probability is below 3e-7).
+/// Number of standard deviations from a lane's edge beyond which a vehicle is certainly on one side
+/// of it (the neglected probability is below 3e-7).
 const CERTAIN_DEVIATIONS: f64 = 5.0;
 
 /// The ego's vehicle frame at one instant.
@@ -80,7 +80,8 @@ impl<'a> EgoFrame<'a> {
         (self.s_m + arc_length_m, self.lateral_position_m(x_m, y_m))
     }
 
-    /// Returns the length of path that a vehicle at `d_m` covers per metre of the reference line (m/m).
+    /// Returns the length of path that a vehicle at `d_m` covers per metre of the reference line
+    /// (m/m).
     pub fn path_scale(&self, d_m: f64) -> f64 {
         1.0 - self.road.curvature_per_m() * d_m
     }
@@ -92,23 +93,25 @@ impl<'a> EgoFrame<'a> {
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
         let curvature = self.road.curvature_per_m();
-        // The line through the ego parallel to the road's edge has this curvature. The quotient below is the exact
-        // lateral offset from a circle, and equals `across_m` for a straight line.
+        // The line through the ego parallel to the road's edge has this curvature. The quotient
+        // below is the exact lateral offset from a circle, and equals `across_m` for a straight
+        // line.
         let line_per_m = curvature / (1.0 - curvature * self.d_m);
         let offset_m = (2.0 * across_m - line_per_m * (along_m * along_m + across_m * across_m))
             / (1.0 + maths::hypot(line_per_m * along_m, 1.0 - line_per_m * across_m));
         self.d_m + offset_m
     }
 
-    /// Returns the probabilities that a vehicle is in the lane left of the ego's, in the ego's lane, and in the lane
-    /// right of the ego's.
+    /// Returns the probabilities that a vehicle is in the lane left of the ego's, in the ego's
+    /// lane, and in the lane right of the ego's.
     ///
-    /// A vehicle counts as being in a lane if its centre is. The centre lies at `d_m` with the standard deviation
-    /// `sd_m`.
+    /// A vehicle counts as being in a lane if its centre is. The centre lies at `d_m` with the
+    /// standard deviation `sd_m`.
     pub fn lane_probabilities(&self, d_m: f64, sd_m: f64) -> [f64; 3] {
         let width_m = self.road.lane_width_m();
         let left_edge_m = self.road.lane_centre_m(self.lane) + 0.5 * width_m;
-        // Probabilities that the centre lies to the right of each of the four edges of these lanes, from left to right.
+        // Probabilities that the centre lies to the right of each of the four edges of these lanes,
+        // from left to right.
         let right_of = [1.0, 0.0, -1.0, -2.0].map(|lanes| normal_cdf(left_edge_m + lanes * width_m - d_m, sd_m));
         let in_lane = |index: usize, exists: bool| if exists { right_of[index] - right_of[index + 1] } else { 0.0 };
         [
@@ -119,8 +122,8 @@ impl<'a> EgoFrame<'a> {
     }
 }
 
-/// Returns the probability that a normal deviate with mean 0 and standard deviation `sd` (0 or more) is at most
-/// `margin`.
+/// Returns the probability that a normal deviate with mean 0 and standard deviation `sd` (0 or
+/// more) is at most `margin`.
 fn normal_cdf(margin: f64, sd: f64) -> f64 {
     if margin >= CERTAIN_DEVIATIONS * sd {
         1.0
@@ -150,13 +153,13 @@ mod tests {
             let road = Road::straight(3).with_curvature(curvature);
             let state = VehicleState { s_m: 100.0, ..ego(own_d, heading) };
             let point = EgoFrame::new(&road, &state).point(100.0 + ds, d);
-            let own = road.plane_pose(100.0, own_d, heading);
+            let ego = road.plane_pose(100.0, own_d, heading);
             let other = road.plane_pose(100.0 + ds, d, 0.0);
-            let (sin, cos) = maths::sin_cos(own.yaw_rad);
-            let (dx, dy) = (other.x_m - own.x_m, other.y_m - own.y_m);
+            let (sin, cos) = maths::sin_cos(ego.yaw_rad);
+            let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
             prop_assert!((point.x_m - (dx * cos + dy * sin)).abs() < 1e-7);
             prop_assert!((point.y_m - (dy * cos - dx * sin)).abs() < 1e-7);
-            prop_assert!((point.road_yaw_rad - (other.yaw_rad - own.yaw_rad)).abs() < 1e-12);
+            prop_assert!((point.road_yaw_rad - (other.yaw_rad - ego.yaw_rad)).abs() < 1e-12);
         }
 
         #[test]

@@ -1,4 +1,4 @@
-//! Files are opened so that none hangs the program, fills its memory, or leads to another file.
+//! Opens files safely: no file hangs the program, fills its memory, or leads to another file.
 //!
 //! | at the path is | an input | a file of a campaign's folder |
 //! |---|---|---|
@@ -11,7 +11,8 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// Largest text that is read as a whole (bytes). An assumption: 100 times the largest file that a command writes as one text.
+/// Largest text that is read as a whole (bytes). An assumption: 100 times the largest file that a
+/// command writes as one text.
 const MOST_TEXT_BYTES: u64 = 256 << 20;
 
 /// The mark by which some editors begin a file: U+FEFF in UTF-8.
@@ -20,7 +21,8 @@ const BYTE_ORDER_MARK: char = '\u{feff}';
 /// Opens an input for reading.
 ///
 /// # Errors
-/// The error of the system, or [`ErrorKind::InvalidInput`] if the path leads to something that is neither a file nor a folder.
+/// The error of the system, or [`ErrorKind::InvalidInput`] if the path leads to something that is
+/// neither a file nor a folder.
 pub fn open(path: &Path) -> io::Result<File> {
     let is_stream = cfg!(unix) && ["/dev/stdin", "/dev/fd", "/dev/null", "/proc"].iter().any(|at| path.starts_with(at));
     if is_stream { File::open(path) } else { checked(path, OpenOptions::new().read(true), false) }
@@ -29,7 +31,8 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// Opens a file of a campaign's folder with these options.
 ///
 /// # Errors
-/// The error of the system, or [`ErrorKind::InvalidInput`] if something else than a file is at the path, such as a link.
+/// The error of the system, or [`ErrorKind::InvalidInput`] if something else than a file is at the
+/// path, such as a link.
 pub fn open_in_folder(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     checked(path, options, true)
 }
@@ -68,15 +71,16 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
 
     use rustix::fs::OFlags;
 
-    // Opening a named pipe waits for another program, unless the system is told not to. A file is not affected.
+    // Opening a named pipe waits for another program, unless the system is told not to. A file is
+    // not affected.
     let flags = if is_in_folder { OFlags::NONBLOCK | OFlags::NOFOLLOW } else { OFlags::NONBLOCK };
     let flags = i32::try_from(flags.bits()).map_err(io::Error::other)?;
-    let refused = |what: &str| io::Error::new(ErrorKind::InvalidInput, format!("it is {what}, and no file"));
+    let refused = |kind: &str| io::Error::new(ErrorKind::InvalidInput, format!("it is {kind}, and no file"));
     let file = match options.custom_flags(flags).open(path) {
         Ok(file) => file,
         Err(_) if is_in_folder && path.is_symlink() => return Err(refused("a symbolic link")),
         // A named pipe that is opened for writing, or a socket.
-        Err(error) => return Err(what_is(path).map_or(error, refused)),
+        Err(error) => return Err(special_kind(path).map_or(error, refused)),
     };
     let kind = file.metadata()?.file_type();
     match () {
@@ -86,13 +90,13 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
     }
 }
 
-/// Returns what is at a path that cannot be opened, if it is neither a file nor a folder.
+/// Returns the kind of thing at a path that cannot be opened, if it is neither a file nor a folder.
 #[cfg(unix)]
-fn what_is(path: &Path) -> Option<&'static str> {
+fn special_kind(path: &Path) -> Option<&'static str> {
     use std::os::unix::fs::FileTypeExt as _;
     let kind = path.metadata().ok()?.file_type();
     let kinds = [(kind.is_fifo(), "a named pipe"), (kind.is_socket(), "a socket")];
-    kinds.into_iter().find_map(|(is_it, what)| is_it.then_some(what))
+    kinds.into_iter().find_map(|(is_kind, kind)| is_kind.then_some(kind))
 }
 
 #[cfg(not(unix))]

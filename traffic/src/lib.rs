@@ -1,13 +1,14 @@
 //! The data types that the crates of Closecall share, the criticality metrics, and statistics.
 //!
-//! This crate defines every type that crosses a boundary between crates: time, identifiers, the road, vehicles and
-//! their states, recorded trajectories, the tracks that a sensor reports, the parameters of a scenario, and seeded
-//! random streams. It depends on none of the other crates, except for the mathematical functions.
+//! This crate defines every type that crosses a boundary between crates: time, identifiers, the
+//! road, vehicles and their states, recorded trajectories, the tracks that a sensor reports, the
+//! parameters of a scenario, and seeded random streams. It depends on none of the other crates,
+//! except for the mathematical functions.
 //!
 //! # Conventions
 //!
-//! All quantities are in SI units. The name of every public field carries its unit (`speed_mps`, `gap_m`). Three frames
-//! are used:
+//! All quantities are in SI units. The name of every public field carries its unit (`speed_mps`,
+//! `gap_m`). Three frames are used:
 //!
 //! ```text
 //!  road frame       s along the road, d to the left; d = 0 is the left edge of the leftmost lane,
@@ -16,14 +17,14 @@
 //!  plane            x, y of a flat Cartesian plane, in which the road frame's s = 0 points along +x
 //! ```
 //!
-//! Gaps are measured bumper to bumper. A metric or margin that does not exist is an [`Absent`] with its reason, never a
-//! sentinel number.
+//! Gaps are measured bumper to bumper. A metric or margin that does not exist is an [`Absent`] with
+//! its reason, never a sentinel number.
 //!
 //! # Glossary
-//! The paper is the one that Closecall's margin increase system follows. ISO 15622 is the standard for adaptive cruise
-//! control (ACC). UN R157 is the UN Regulation on automated lane keeping systems (ALKS). "-" means that the source has
-//! no such term, or that none is claimed here. The paper's letters appear in formulas and in references to its figures
-//! only.
+//! *The paper* is the paper that Closecall's margin increase system follows. ISO 15622 is the
+//! standard for adaptive cruise control (ACC). UN R157 is the UN Regulation on automated lane
+//! keeping systems (ALKS). "-" means that the source has no such term, or that none is claimed
+//! here. The paper's letters appear in formulas and in references to its figures only.
 //!
 //! | paper | name here | ISO 15622 / UN R157 | meaning |
 //! |---|---|---|---|

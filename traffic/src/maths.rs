@@ -1,12 +1,15 @@
 //! Mathematical functions whose results have the same bits on every processor and system.
 //!
-//! `f64::sin` and its like are calls of the C library, which may have several versions of a function and select one by what the processor can do.
-//! The GNU C library selects by fused multiply-add and AVX2. The last digits of the versions differ. The functions of this module are those of the
-//! crate [`libm`], which consists of IEEE 754 operations only. `.ci/clippy.toml` forbids the others in the whole workspace.
+//! `f64::sin` and similar functions call the C library. That library may have several versions of a
+//! function, and select one by the features of the processor. The GNU C library selects by fused
+//! multiply-add and AVX2. The last digits of the versions differ. The functions of this module come
+//! from the crate [`libm`], which consists of IEEE 754 operations only. `.ci/clippy.toml` forbids
+//! the others in the whole workspace.
 //!
-//! Functions whose results are exact, such as `sqrt`, `floor` and `mul_add`, are those of the standard library: IEEE 754 leaves no choice.
+//! Functions with exact results, such as `sqrt`, `floor` and `mul_add`, come from the standard
+//! library: IEEE 754 leaves no choice.
 
-/// Defines functions by those of `libm` for double and for single precision.
+/// Defines functions by the functions of `libm` for double and for single precision.
 macro_rules! define {
     ($($(#[$doc:meta])+ $name:ident($($argument:ident),+) = $double:ident, $single:ident;)+) => {
         mod sealed {
@@ -114,7 +117,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn sine_and_cosine_together_are_those_of_the_single_functions(x_rad in -50.0..50.0_f64) {
+        fn sine_and_cosine_together_equal_the_single_functions(x_rad in -50.0..50.0_f64) {
             let (sine, cosine): (f64, f64) = sin_cos(x_rad);
             prop_assert_eq!((sine.to_bits(), cosine.to_bits()), (sin(x_rad).to_bits(), cos(x_rad).to_bits()));
             let x_rad = x_rad as f32;
@@ -125,7 +128,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::disallowed_methods, reason = "the functions of the standard library are the reference")]
-    fn the_names_are_those_of_the_standard_library() {
+    fn the_names_agree_with_the_standard_library() {
         let close = |ours: f64, reference: f64| assert!((ours - reference).abs() < 1e-15, "{ours} {reference}");
         let (x, y) = (0.7_f64, 0.4_f64);
         close(sin(x), x.sin());

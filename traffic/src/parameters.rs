@@ -48,10 +48,11 @@ impl Parameters {
         self.0.iter()
     }
 
-    /// Returns the number that `num` stands for, checked against `range`.
+    /// Returns the number of `num`, given or sampled, checked against `range`.
     ///
     /// # Errors
-    /// [`ConfigError`] at `key` if the parameter does not exist or gives a label, or if the number is out of range.
+    /// [`ConfigError`] at `key` if the parameter does not exist or gives a label, or if the number
+    /// is out of range.
     pub fn number(&self, num: &Num, key: &str, range: Range) -> Result<f64, ConfigError> {
         let value = match num {
             Num::Fixed(value) => *value,
@@ -67,7 +68,8 @@ impl Parameters {
         range.check(value, key)
     }
 
-    /// Returns the number that `num` stands for, checked against `range`, or `default` if there is none.
+    /// Returns the number of `num`, given or sampled, checked against `range`, or `default` if
+    /// there is none.
     ///
     /// # Errors
     /// As [`Self::number`].
@@ -75,10 +77,11 @@ impl Parameters {
         num.map_or(Ok(default), |num| self.number(num, key, range))
     }
 
-    /// Returns the label that `choice` stands for.
+    /// Returns the label of `choice`, given or sampled.
     ///
     /// # Errors
-    /// [`ConfigError`] at `key` if the parameter does not exist or gives a number, or if `T` does not know its label.
+    /// [`ConfigError`] at `key` if the parameter does not exist or gives a number, or if `T` does
+    /// not know its label.
     pub fn word<T: DeserializeOwned + Clone>(&self, choice: &Choice<T>, key: &str) -> Result<T, ConfigError> {
         let name = match choice {
             Choice::Fixed(word) => return Ok(word.clone()),
@@ -112,7 +115,8 @@ impl Parameters {
     }
 }
 
-/// Extracts the list of labels from serde's message "unknown variant `x`, expected one of `a`, `b`".
+/// Extracts the list of labels from serde's message "unknown variant `x`, expected one of `a`,
+/// `b`".
 fn expected_words(error: &value::Error) -> String {
     let text = error.to_string();
     match text.split_once("expected ") {

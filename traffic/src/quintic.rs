@@ -1,13 +1,14 @@
 //! Quintic polynomials: smooth transitions between two states.
 
-/// Peak of the second derivative of the minimum-jerk path, 10/√3: on a lane change by `width` within `duration`, the
-/// lateral acceleration peaks at 5.77·width/duration².
+/// Peak of the second derivative of the minimum-jerk path, 10/√3: on a lane change by `width`
+/// within `duration`, the lateral acceleration peaks at 5.77·width/duration².
 pub const MINIMUM_JERK_PEAK: f64 = 5.773_502_691_896_258;
 
-/// Returns the share of a minimum-jerk path that is covered at the share `u` of its length: 10u³ − 15u⁴ + 6u⁵.
+/// Returns the share of a minimum-jerk path that is covered at the share `u` of its length: 10u³ −
+/// 15u⁴ + 6u⁵.
 ///
-/// Arguments below 0 and above 1 are taken as 0 and 1. Source: Flash and Hogan, *Journal of Neuroscience* 5 (1985)
-/// 1688–1703.
+/// Arguments below 0 count as 0, and arguments above 1 as 1. Source: Flash and Hogan, *Journal of
+/// Neuroscience* 5 (1985) 1688–1703.
 pub fn minimum_jerk(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
@@ -24,7 +25,8 @@ pub struct Quintic {
 }
 
 impl Quintic {
-    /// Creates the quintic that leads from the state `from` to the state `to` over `length` (above 0).
+    /// Creates the quintic that leads from the state `from` to the state `to` over `length` (above
+    /// 0).
     pub fn between(from: [f64; 3], to: [f64; 3], length: f64) -> Self {
         let [start, start_first, start_second] = [from[0], from[1] * length, from[2] * length * length];
         let [end, end_first, end_second] = [to[0], to[1] * length, to[2] * length * length];
@@ -50,7 +52,8 @@ impl Quintic {
         self.length
     }
 
-    /// Returns the value, the first and the second derivative at `x`, which lies between 0 and the length.
+    /// Returns the value, the first and the second derivative at `x`, which lies between 0 and the
+    /// length.
     pub fn at(&self, x: f64) -> [f64; 3] {
         let p = x / self.length;
         let [c0, c1, c2, c3, c4, c5] = self.coefficients;

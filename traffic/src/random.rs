@@ -1,8 +1,10 @@
 //! Normal and exponential random numbers that have the same bits on every processor.
 //!
-//! The method is ZIGNOR (J. A. Doornik, "An improved ziggurat method to generate normal random samples", 2005), as in the crate `rand_distr` 0.6, with
-//! its tables. The numbers are those of `rand_distr`, which a test compares. That crate calls the logarithm and the exponential function of the C
-//! library, whose last digits depend on the processor; here they are those of [`crate::maths`].
+//! The method is ZIGNOR (J. A. Doornik, "An improved ziggurat method to generate normal random
+//! samples", 2005), as in the crate `rand_distr` 0.6, with its tables. A test compares the numbers
+//! with the numbers of `rand_distr`. That crate calls the logarithm and the exponential function of
+//! the C library, whose last digits depend on the processor. Here both functions come from
+//! [`crate::maths`].
 //!
 //! ```text
 //!  density
@@ -94,7 +96,8 @@ impl Distribution<f64> for Exp1 {
     }
 }
 
-/// Right ends of the boxes of the normal distribution, from the lowest on. The first is the width of a box with the area of the lowest and its tail.
+/// Right ends of the boxes of the normal distribution, from the lowest on. The first is the width
+/// of a box with the area of the lowest and its tail.
 #[rustfmt::skip]
 static NORMAL_X: [f64; BOXES + 1] = [
     3.91075795953709, 3.654152885361009, 3.4492782985609645, 3.320244733839166, 3.224575052047029, 3.14788928951715,
@@ -212,22 +215,22 @@ mod tests {
     use super::*;
     use crate::Stream;
 
-    /// Compares draws with those of `rand_distr`, whose logarithm may differ in the last digit.
+    /// Compares draws with the draws of `rand_distr`, whose logarithm may differ in the last digit.
     fn assert_same(ours: impl Distribution<f64>, reference: impl Distribution<f64>, tail: f64) {
-        let [mut one, mut other] = [7, 7].map(Stream::seed_from_u64);
+        let [mut a, mut b] = [7, 7].map(Stream::seed_from_u64);
         for draw in 0..3_000_000 {
-            let (x, expected) = (one.sample(&ours), other.sample(&reference));
+            let (x, expected) = (a.sample(&ours), b.sample(&reference));
             let is_tail = x.abs() > tail;
             assert!(
                 x == expected || is_tail && (x - expected).abs() < 4.0 * f64::EPSILON * x.abs(),
                 "{draw}: {x} {expected}"
             );
         }
-        assert_eq!(one, other);
+        assert_eq!(a, b);
     }
 
     #[test]
-    fn numbers_are_those_of_rand_distr() {
+    fn numbers_equal_rand_distr() {
         assert_same(StandardNormal, rand_distr::StandardNormal, NORMAL_X[1]);
         assert_same(Exp1, rand_distr::Exp1, EXPONENTIAL_X[1]);
     }

@@ -8,7 +8,8 @@
 //!              ─────────────────────────────  right edge at d = −n·w
 //! ```
 //!
-//! The reference line is d = 0: an arc of constant curvature, positive if the road bends to the left.
+//! The reference line is d = 0: an arc of constant curvature, positive if the road bends to the
+//! left.
 
 use std::fmt;
 
@@ -111,7 +112,8 @@ pub struct Road {
     overtaking_side: Side,
     guard_rails: bool,
     roadside: Roadside,
-    /// Whether the road runs against the traffic, so that its left edge is the right edge of the traffic.
+    /// Whether the road runs against the traffic, so that its left edge is the right edge of the
+    /// traffic.
     is_reversed: bool,
 }
 
@@ -140,11 +142,12 @@ impl Check for RoadConfig {
 impl Road {
     /// Widths of a lane that the models cover (m).
     pub const LANE_WIDTH_M: Range = Range::closed(2.5, 5.0);
-    /// Curvatures that the models cover (1/m): 400 m is the smallest radius at which the small-angle lane geometry still holds.
+    /// Curvatures that the models cover (1/m): 400 m is the smallest radius at which the
+    /// small-angle lane geometry still holds.
     pub const CURVATURE_PER_M: Range = Range::closed(-0.0025, 0.0025);
 
-    /// Creates a straight road of `lanes` lanes (clamped to 1 to 8), each 3.75 m wide, with a speed limit of 36.1 m/s,
-    /// overtaking on the left and no guard rails.
+    /// Creates a straight road of `lanes` lanes (clamped to 1 to 8), each 3.75 m wide, with a speed
+    /// limit of 36.1 m/s, overtaking on the left and no guard rails.
     pub fn straight(lanes: u8) -> Self {
         Self {
             lanes: lanes.clamp(1, 8),
@@ -170,24 +173,27 @@ impl Road {
         Self { lane_width_m: lane_width_m.clamp(2.5, 5.0), ..self }
     }
 
-    /// Returns the mirror image of a straight road: vehicles overtake on the other side, and lane 1 corresponds to the
-    /// former last lane. Returns `None` for a curved road, because positions are measured along its left edge, which is
-    /// the right edge of the mirror image.
+    /// Returns the mirror image of a straight road: vehicles overtake on the other side, and lane 1
+    /// corresponds to the original's last lane. Returns `None` for a curved road, because positions
+    /// are measured along its left edge, which is the right edge of the mirror image.
     pub fn mirrored(self) -> Option<Self> {
         let overtaking_side = self.overtaking_side.opposite();
         (self.curvature_per_m == 0.0).then_some(Self { overtaking_side, ..self })
     }
 
-    /// Returns the same road in the opposite direction: s runs against the traffic, and d = 0 is the right edge of the traffic.
+    /// Returns the same road in the opposite direction: s runs against the traffic, and d = 0 is
+    /// the right edge of the traffic.
     #[must_use]
     pub fn reversed(self) -> Self {
-        // The former right edge has another curvature than the left edge, and bends to the other side if passed the other way.
+        // The original's right edge has another curvature than its left edge. Passed the other way,
+        // it bends to the other side.
         let curvature_per_m = -self.curvature_per_m / (1.0 - self.curvature_per_m * self.right_edge_m());
         let overtaking_side = self.overtaking_side.opposite();
         Self { curvature_per_m, overtaking_side, is_reversed: !self.is_reversed, ..self }
     }
 
-    /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point (`s_m`, `d_m`) of this road.
+    /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point
+    /// (`s_m`, `d_m`) of this road.
     pub fn reversed_position_m(&self, s_m: f64, d_m: f64) -> (f64, f64) {
         let right_edge_m = self.right_edge_m();
         (-s_m * (1.0 - self.curvature_per_m * right_edge_m), right_edge_m - d_m)
@@ -198,7 +204,8 @@ impl Road {
         self.is_reversed
     }
 
-    /// Returns the distances of the faces of the guard rails from the left and from the right edge of the road (m).
+    /// Returns the distances of the faces of the guard rails from the left and from the right edge
+    /// of the road (m).
     pub fn guard_rail_offsets_m(&self) -> [f64; 2] {
         match self.is_reversed {
             false => [LEFT_OFFSET_M, RIGHT_OFFSET_M],
@@ -236,7 +243,7 @@ impl Road {
         self.guard_rails
     }
 
-    /// Returns what else stands along the road.
+    /// Returns the other objects along the road.
     pub fn roadside(&self) -> &Roadside {
         &self.roadside
     }
@@ -258,7 +265,8 @@ impl Road {
         -(f64::from(lane.0) - 0.5) * self.lane_width_m
     }
 
-    /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that edge.
+    /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that
+    /// edge.
     pub fn lane_at(&self, d_m: f64) -> Lane {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=7 before the cast")]
         let before = (-d_m / self.lane_width_m).clamp(0.0, f64::from(self.lanes) - 1.0) as u8;
@@ -278,7 +286,8 @@ impl Road {
         -f64::from(self.lanes) * self.lane_width_m
     }
 
-    /// Returns the pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the road.
+    /// Returns the pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the
+    /// road.
     pub fn plane_pose(&self, s_m: f64, d_m: f64, heading_rad: f64) -> PlanePose {
         let curvature = self.curvature_per_m;
         if curvature == 0.0 {
@@ -293,7 +302,8 @@ impl Road {
         }
     }
 
-    /// Returns the road coordinates s and d (m) of a point in the plane; unique within half a turn of s = 0.
+    /// Returns the road coordinates s and d (m) of a point in the plane; unique within half a turn
+    /// of s = 0.
     pub fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
         let curvature = self.curvature_per_m;
         if curvature == 0.0 {

@@ -1,4 +1,4 @@
-//! What stands along a road besides guard rails: signs, gantries and trees at equal distances.
+//! Objects along a road besides guard rails: signs, gantries and trees at equal distances.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,8 @@ const SPACING_M: Range = Range::closed(5.0, 10_000.0);
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct RoadsideConfig {
-    /// Distance between two signs beside the right edge, which face the traffic with retro-reflective sheeting (m). Default: no signs.
+    /// Distance between two signs beside the right edge, which face the traffic with
+    /// retro-reflective sheeting (m). Default: no signs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sign_spacing_m: Option<Num>,
     /// Distance between two gantries over the road, with signs (m). Default: no gantries.
@@ -57,8 +58,9 @@ impl Check for RoadsideConfig {
     }
 }
 
-/// Distance of the near edge of a sign, and of the legs of a gantry, from the edge of the road (m): a hard shoulder of 2.5 m, and the
-/// clearance of 1.5 m (assumption within the usual cross-sections of German motorways, RAA 2008).
+/// Distance of the near edge of a sign, and of the legs of a gantry, from the edge of the road (m):
+/// a hard shoulder of 2.5 m, and the clearance of 1.5 m (assumption within the usual cross-sections
+/// of German motorways, RAA 2008).
 pub const BESIDE_M: f64 = 4.0;
 /// Width and height of a sign (m), and height of its lower edge (m) (assumption).
 pub const SIGN_M: [f64; 3] = [1.0, 1.0, 1.5];
@@ -66,19 +68,21 @@ pub const SIGN_M: [f64; 3] = [1.0, 1.0, 1.5];
 pub const SHEET_M: f64 = 0.02;
 /// Half of the width of the post of a sign, and of a leg of a gantry (m).
 pub const LEG_HALF_M: [f64; 2] = [0.04, 0.2];
-/// Heights of the lower and of the upper edge of a gantry's signs (m): above the clearance of 4.7 m (assumption).
+/// Heights of the lower and of the upper edge of a gantry's signs (m): above the clearance of 4.7 m
+/// (assumption).
 pub const GANTRY_M: [f64; 2] = [5.0, 6.5];
-/// Distance of the stem of a tree from the edge of the road, half of its width, and its height (m) (assumption).
+/// Distance of the stem of a tree from the edge of the road, half of its width, and its height (m)
+/// (assumption).
 pub const TREE_M: [f64; 3] = [7.5, 0.2, 6.0];
 
-/// Returns the lateral position of the traffic's outer edge of a road (m), and the direction from there away from the road: -1 to
-/// the right, or 1 on a reversed road, whose outer edge is d = 0.
+/// Returns the lateral position of the traffic's outer edge of a road (m), and the direction from
+/// there away from the road: -1 to the right, or 1 on a reversed road, whose outer edge is d = 0.
 pub fn outer_edge(road: &Road) -> (f64, f64) {
     if road.is_reversed() { (0.0, 1.0) } else { (road.right_edge_m(), -1.0) }
 }
 
-/// Returns the positions along the road (m) of the things of a kind from `reach_m` behind `s_m` on. They are multiples of their
-/// spacing, wherever the ego is.
+/// Returns the positions along the road (m) of the things of a kind from `reach_m` behind `s_m` on.
+/// They are multiples of their spacing, wherever the ego is.
 pub fn positions_m(spacing_m: Option<f64>, s_m: f64, reach_m: f64) -> impl Iterator<Item = f64> {
     let spacing_m = spacing_m.unwrap_or(f64::INFINITY);
     let first = ((s_m - reach_m) / spacing_m).ceil();

@@ -1,23 +1,25 @@
-//! Whether two paths lead to the same file, so that no command overwrites one of its inputs.
+//! Tells whether two paths lead to the same file. Commands use it to protect their inputs from
+//! being overwritten.
 
 use std::path::{Path, PathBuf};
 
-/// Returns true if two paths lead to the same file, be it by a link or another folder. The file need not exist if its
-/// folder does.
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
+/// Returns true if two paths lead to the same file, be it by a link or another folder. The file
+/// need not exist if its folder does.
+pub fn is_same_file(first: &Path, second: &Path) -> bool {
     #[cfg(unix)]
-    if let (Ok(one), Ok(other)) = (one.metadata(), other.metadata()) {
+    if let (Ok(first), Ok(second)) = (first.metadata(), second.metadata()) {
         use std::os::unix::fs::MetadataExt as _;
         // Two names of one file, by a hard link.
-        return (one.dev(), one.ino()) == (other.dev(), other.ino());
+        return (first.dev(), first.ino()) == (second.dev(), second.ino());
     }
-    one == other || matches!((canonical(one), canonical(other)), (Some(one), Some(other)) if one == other)
+    first == second || matches!((canonical(first), canonical(second)), (Some(first), Some(second)) if first == second)
 }
 
 /// A file that a command writes, with the option that names it.
 pub type Output<'a> = (&'static str, Option<&'a Path>);
 
-/// Checks that no output is one of the inputs, under whatever path, and that no two outputs are the same file.
+/// Checks that no output is one of the inputs, under whatever path, and that no two outputs are the
+/// same file.
 ///
 /// # Errors
 /// The options of the output that would do so.

@@ -1,7 +1,8 @@
 //! Seeded random streams, one for each purpose.
 //!
-//! A stream is keyed by (campaign seed, sample, actor, channel) and by nothing else. An additional actor or sensor
-//! therefore does not shift the numbers that the others draw, and both arms of a paired sample draw the same numbers.
+//! A stream is keyed by (campaign seed, sample, actor, channel) and by nothing else. An additional
+//! actor or sensor therefore does not shift the numbers that the others draw, and both arms of a
+//! paired sample draw the same numbers.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +12,8 @@ use crate::ActorId;
 /// A deterministic stream of random numbers: ChaCha with 8 rounds.
 pub type Stream = ChaCha8Rng;
 
-/// The context string of the key derivation: it separates these keys from any other use of the hash, and versions them.
+/// The context string of the key derivation: it separates these keys from any other use of the
+/// hash, and versions them.
 const DOMAIN: &str = "closecall 2026 random stream v1";
 
 /// Returns the random stream of one purpose.

@@ -1,13 +1,15 @@
-//! Text of others, as it may be shown: on a terminal, in HTML, Markdown and XML.
+//! Makes foreign text safe to show on a terminal and in HTML, Markdown and XML.
 //!
-//! A controller chooses what its messages hold, and a folder's author what its names hold. Control characters move the cursor of a
-//! terminal and hide text, and characters for bidirectional text change the order in which a line is read. Each of them is shown as its
-//! number instead, in the notation of JSON: `\u001b`. A line of JSON therefore keeps its meaning.
+//! A controller chooses the text of its messages, and the author of a folder chooses the names in
+//! it. Control characters move the cursor of a terminal and hide text, and characters for
+//! bidirectional text change the order in which a line is read. Each of them is shown as its number
+//! instead, in the notation of JSON: `\u001b`. A line of JSON therefore keeps its meaning.
 
 use std::borrow::Cow;
 
-/// Returns true if a character is shown as its number: a control character other than tab and line feed, or a character that changes the
-/// direction of text (Unicode UAX #9, section 2) or the end of a line (U+2028, U+2029).
+/// Returns true if a character is shown as its number: a control character other than tab and line
+/// feed, or a character that changes the direction of text (Unicode UAX #9, section 2) or the end
+/// of a line (U+2028, U+2029).
 const fn is_hidden(c: char) -> bool {
     match c {
         '\t' | '\n' => false,
@@ -17,7 +19,8 @@ const fn is_hidden(c: char) -> bool {
     }
 }
 
-/// Returns the text with its control and bidirectional characters as numbers. A carriage return before a line feed stays.
+/// Returns the text with its control and bidirectional characters as numbers. A carriage return
+/// before a line feed stays.
 pub fn shown(text: &str) -> Cow<'_, str> {
     if !text.contains(is_hidden) {
         return Cow::Borrowed(text);

@@ -1,6 +1,6 @@
 //! Simulated time as an integer number of nanoseconds.
 //!
-//! Sums of integer steps are exact, so that a run of 6,000 steps of 10 ms ends at exactly 60 s.
+//! Sums of integer steps are exact: a run of 6,000 steps of 10 ms ends at exactly 60 s.
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Mul, Rem, Sub};
@@ -30,7 +30,8 @@ impl Time {
         Self(ms * 1_000_000)
     }
 
-    /// Creates the time nearest to `seconds` (s). Saturates at the limits of the type; NaN gives zero.
+    /// Creates the time nearest to `seconds` (s). Saturates at the limits of the type; NaN gives
+    /// zero.
     pub fn from_s(seconds: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, which is what is documented")]
         Self((seconds * NS_PER_S).round() as i64)

@@ -39,7 +39,8 @@ pub enum TrackStatus {
 pub struct ClassScores(pub [f64; 4]);
 
 impl ClassScores {
-    /// Index of the background's score; those of the vehicle classes have the numbers of [`VehicleClass`] as indices.
+    /// Index of the background's score; the scores of the vehicle classes have the numbers of
+    /// [`VehicleClass`] as indices.
     pub const BACKGROUND: usize = VehicleClass::ALL.len();
     /// The scores if nothing is known: all equal.
     pub const UNKNOWN: Self = Self([0.25; 4]);
@@ -67,8 +68,9 @@ impl ClassScores {
         best
     }
 
-    /// Returns whether the object is at least as likely a vehicle as not, and one vehicle class is more probable than the
-    /// background. Equal scores carry no information and are not those of a vehicle.
+    /// Returns whether the object is at least as likely a vehicle as not, and one vehicle class is
+    /// more probable than the background. Equal scores carry no information, and do not count as a
+    /// vehicle.
     pub fn is_vehicle(&self) -> bool {
         self.vehicle() >= 0.5 && self.0[self.best_vehicle_class() as usize] > self.0[Self::BACKGROUND]
     }
@@ -85,11 +87,12 @@ pub struct Track {
     pub status: TrackStatus,
     /// The time at which the state holds.
     pub time: Time,
-    /// `[x, y, vx, vy]` of the centre of the box (m, m, m/s, m/s); velocity over ground along the axes of the ego.
+    /// `[x, y, vx, vy]` of the centre of the box (m, m, m/s, m/s); velocity over ground along the
+    /// axes of the ego.
     pub state: Vector4<f64>,
     /// Covariance matrix of `state`.
     pub covariance: Matrix4<f64>,
-    /// Heading relative to that of the ego (rad).
+    /// Heading relative to the ego's heading (rad).
     pub heading_rad: f64,
     /// Length of the box (m).
     pub length_m: f64,
@@ -99,7 +102,8 @@ pub struct Track {
     pub class: ClassScores,
     /// Probability that the track belongs to a real object.
     pub existence: f64,
-    /// Probabilities of being in the lane left of the ego, in the lane of the ego, and in the lane right of it.
+    /// Probabilities of being in the lane left of the ego, in the lane of the ego, and in the lane
+    /// right of it.
     pub lane: [f64; 3],
 }
 

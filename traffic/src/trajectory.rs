@@ -9,7 +9,8 @@ pub struct TrajectoryPoint {
     pub time: Time,
     /// Position of the centre along the road (m).
     pub s_m: f64,
-    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost lane (m).
+    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost
+    /// lane (m).
     pub d_m: f64,
     /// Speed along the road (m/s).
     pub speed_mps: f64,
@@ -28,7 +29,8 @@ pub struct TrajectoryPoint {
 pub struct Trajectory {
     /// Number of this piece of a track, unique within a trajectory file.
     pub track_id: u64,
-    /// Number of the vehicle in the trajectory file. The pieces of a track that was interrupted share it.
+    /// Number of the vehicle in the trajectory file. The pieces of a track that was interrupted
+    /// share it.
     pub vehicle_id: u64,
     /// Class of the vehicle.
     pub class: VehicleClass,
@@ -53,8 +55,8 @@ impl Trajectory {
 
     /// Returns the point nearest to `time`, or `None` if the trajectory does not cover it.
     ///
-    /// The trajectory covers half of the point spacing beyond each end, so that every time between two frames rounds to
-    /// a frame.
+    /// The trajectory covers half of the point spacing beyond each end, so that every time between
+    /// two frames rounds to a frame.
     pub fn at(&self, time: Time) -> Option<&TrajectoryPoint> {
         let (first, last) = self.span()?;
         let steps = self.points.len() as i64 - 1;

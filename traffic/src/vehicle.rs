@@ -64,7 +64,8 @@ pub struct Dimensions {
 const WHEELBASE_SHARE: f64 = 0.6;
 
 impl Dimensions {
-    /// Returns the distance from the rear axle to the front axle (m). The centre of the box lies half of it ahead of the rear axle.
+    /// Returns the distance from the rear axle to the front axle (m). The centre of the box lies
+    /// half of it ahead of the rear axle.
     pub fn wheelbase_m(&self) -> f64 {
         WHEELBASE_SHARE * self.length_m
     }
@@ -83,7 +84,8 @@ pub struct Appearance {
     pub plate: Plate,
 }
 
-/// The state of the front registration plate of a vehicle: its retro-reflection carries the detection of dark cars.
+/// The state of the front registration plate of a vehicle: its retro-reflection carries the
+/// detection of dark cars.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Plate {
@@ -114,14 +116,17 @@ pub struct VehicleConfig {
     pub paint_reflectivity: Option<Num>,
     /// Colour of the paint, sRGB; grey if absent.
     pub paint_rgb: Option<[u8; 3]>,
-    /// Body shape, which must belong to the class. If it is given, length, width and height are those that are usual for
-    /// it, unless they are given, too; `saloon`, `tarpaulin-trailer` or `naked-bike` if absent.
+    /// Body shape, which must belong to the class. If it is given, length, width and height are
+    /// those that are usual for it, unless they are given, too; `saloon`, `tarpaulin-trailer` or
+    /// `naked-bike` if absent.
     pub body_shape: Option<Choice<BodyShape>>,
-    /// State of the front registration plate: `clean`, `dirty` or `none`; `clean` if absent. The worse of this state and of the
-    /// one that `sensors.rear-lidar.plates` gives to all vehicles counts.
+    /// State of the front registration plate: `clean`, `dirty` or `none`; `clean` if absent. The
+    /// worse of this state and of the one that `sensors.rear-lidar.plates` gives to all vehicles
+    /// counts.
     pub plate: Option<Choice<Plate>>,
-    /// Fleet of the library from which paint, colour, body shape with its height, and plate are drawn in each sample, such as
-    /// `germany`. What else is given here is kept. If absent, nothing is drawn.
+    /// Fleet of the library from which paint, colour, body shape with its height, and plate are
+    /// drawn in each sample, such as `germany`. What else is given here is kept. If absent, nothing
+    /// is drawn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fleet: Option<String>,
     /// Deceleration at which the brake light switches on (m/s²), 0.7 to 1.3; 0.7 if absent.
@@ -143,8 +148,9 @@ pub struct Vehicle {
     pub brake_light_from_mps2: f64,
 }
 
-/// Range of the deceleration (m/s²) at which the brake light of a vehicle that slows down without its friction brakes
-/// switches on: it may from the first value on, and must from the second on (UN R13-H, 5.2.22.4).
+/// Range of the deceleration (m/s²) at which the brake light of a vehicle that slows down without
+/// its friction brakes switches on: it may from the first value on, and must from the second on (UN
+/// R13-H, 5.2.22.4).
 const BRAKE_LIGHT_MPS2: [f64; 2] = [0.7, 1.3];
 
 impl Vehicle {
@@ -273,7 +279,8 @@ impl Indicator {
     }
 }
 
-/// The position and motion of a vehicle in the road frame. The reference point is the centre of its box.
+/// The position and motion of a vehicle in the road frame. The reference point is the centre of its
+/// box.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleState {
     /// Position along the road (m).

@@ -1,7 +1,8 @@
-//! Measures the time that the camera needs for one track: preparing an exposure, rendering a crop, and classifying it.
+//! Measures the time that the camera needs for one track: preparing an exposure, rendering a crop,
+//! and classifying it.
 //!
-//! Command: `cargo bench -p closecall-xtask --bench camera`. The classifier runs on ONNX Runtime instead of tract if
-//! `ORT_DYLIB_PATH` gives the path of its library.
+//! Command: `cargo bench -p closecall-xtask --bench camera`. The classifier runs on ONNX Runtime
+//! instead of tract if `ORT_DYLIB_PATH` gives the path of its library.
 
 use std::hint::black_box;
 
@@ -28,8 +29,8 @@ fn crops(criterion: &mut Criterion) {
     let camera = RearCamera::new(CameraConfig::default().check(&Parameters::default()).expect("defaults are valid"));
     let (road, others) = (Road::straight(3), vehicles());
     let ego = SceneVehicle { state: VehicleState { s_m: 500.0, ..others[0].state }, ..others[0] };
-    let found = GroundBox { x_m: -35.0, y_m: 0.0, heading_rad: 0.0, length_m: 4.6, width_m: 1.85, height_m: 1.5 };
-    let window = camera.project(&ego, &found).expect("in view");
+    let vehicle = GroundBox { x_m: -35.0, y_m: 0.0, heading_rad: 0.0, length_m: 4.6, width_m: 1.85, height_m: 1.5 };
+    let window = camera.project(&ego, &vehicle).expect("in view");
     // As many pixels as the Mask R-CNN reads, but evenly spread over the image.
     let [columns, rows] = [(320, WIDTH_PX), (144, HEIGHT_PX)]
         .map(|(count, extent)| (0..count).map(|place| place * i32::from(extent) / count).collect::<Vec<i32>>());

@@ -1,5 +1,6 @@
-//! Measures the time of one LiDAR scan and of its processing, and the share of each part in a perception step without
-//! the camera. A rear vehicle is 3, 30 or 100 m behind the ego, and two more vehicles are in view.
+//! Measures the time of one LiDAR scan and of its processing, and the share of each part in a
+//! perception step without the camera. A rear vehicle is 3, 30 or 100 m behind the ego, and two
+//! more vehicles are in view.
 //!
 //! Command: `cargo bench -p closecall-xtask --bench lidar`.
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
@@ -34,8 +35,8 @@ fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicl
     SceneVehicle { actor, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
 }
 
-/// Returns the rear vehicle in the ego's lane, a truck in the right lane 40 m behind the ego, and a car in the left
-/// lane 60 m behind it.
+/// Returns the rear vehicle in the ego's lane, a truck in the right lane 40 m behind the ego, and a
+/// car in the left lane 60 m behind it.
 fn others(gap_m: f64) -> [SceneVehicle; 3] {
     [
         vehicle(1, VehicleClass::Car, REAR_S_M - gap_m - 2.3, EGO_D_M),
@@ -64,7 +65,8 @@ fn full() -> FullPerception {
     FullPerception::new(&sensors().full_model(), &key)
 }
 
-/// The rear LiDAR's tracker, which receives the same detections in each scan while the ego drives on.
+/// The rear LiDAR's tracker, which receives the same detections in each scan while the ego drives
+/// on.
 struct TrackerLoop {
     tracker: Tracker,
     list: TrackList,
@@ -135,8 +137,8 @@ fn mean_us(mut part: impl FnMut()) -> f64 {
     start.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS)
 }
 
-/// Prints the mean time of each part, and its share in a perception step without the camera. The step includes the
-/// radars.
+/// Prints the mean time of each part, and its share in a perception step without the camera. The
+/// step includes the radars.
 fn shares(_: &mut Criterion) {
     let road = Road::straight(3);
     println!("\n{STEPS} steps each: time [us] and share of a whole perception step");
@@ -160,8 +162,8 @@ fn shares(_: &mut Criterion) {
             let scene = Scene { time, ego, ..self::scene(&road, &others) };
             black_box(whole.step(&scene).expect("finite").len());
         });
-        let of = |part_us: f64| format!("{part_us:>6.1} ({:>2.0} %)", 100.0 * part_us / whole_us);
-        let parts = [scan_us, cluster_us, detect_us - cluster_us, track_us].map(of);
+        let share = |part_us: f64| format!("{part_us:>6.1} ({:>2.0} %)", 100.0 * part_us / whole_us);
+        let parts = [scan_us, cluster_us, detect_us - cluster_us, track_us].map(share);
         println!("{gap_m:>3} m  {}  {whole_us:>6.1}", parts.join("   "));
     }
 }

@@ -1,4 +1,5 @@
-//! Measures what a recording of a paired sample costs, apart: the film that is kept while it runs, and the file that is written from it.
+//! Measures the two costs of a recording of a paired sample: of the film that is kept during the
+//! run, and of the file that is written from it.
 //!
 //! Command: `cargo bench -p closecall-xtask --bench recording`.
 

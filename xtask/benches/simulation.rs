@@ -1,7 +1,9 @@
-//! Measures simulated seconds per wall-clock second on one core, for each depth of the sensor simulation.
+//! Measures simulated seconds per wall-clock second on one core, for each depth of the sensor
+//! simulation.
 //!
-//! Run with `cargo bench -p closecall-xtask --bench simulation`. Criterion reports the throughput in "elements", which are simulated
-//! milliseconds. The line printed before each benchmark gives simulated seconds per wall-clock second.
+//! Run with `cargo bench -p closecall-xtask --bench simulation`. Criterion reports the throughput
+//! in "elements", which are simulated milliseconds. The line printed before each benchmark gives
+//! simulated seconds per wall-clock second.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figure")]
 

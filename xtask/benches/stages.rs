@@ -1,8 +1,10 @@
-//! Measures the stages of the closed loop: neighbours and margins, drivers with motion and contacts of all vehicles, single drivers, object-level
-//! sensors, and the ego stack with and without its margin increase system.
+//! Measures the stages of the closed loop: neighbours and margins, drivers with motion and contacts
+//! of all vehicles, single drivers, object-level sensors, and the ego stack with and without its
+//! margin increase system.
 //!
-//! Command: `cargo bench -p closecall-xtask --bench stages`. The time of a stage is that of one of its steps: 100 Hz for neighbours, drivers and motion, 25 Hz
-//! for sensors, ego stack and report.
+//! Command: `cargo bench -p closecall-xtask --bench stages`. The time of a stage is the time of one
+//! of its steps: 100 Hz for neighbours, drivers and motion, 25 Hz for sensors, ego stack and
+//! report.
 
 use std::hint::black_box;
 use std::path::Path;

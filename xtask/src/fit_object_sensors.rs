@@ -5,9 +5,10 @@
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --errors       # the errors alone, with the ranges as built
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --validate --seed 1
 //!
-//! A fit takes some minutes. The sensor has its figures after the next build. With `--validate`, the errors, delays and misses of the
-//! sensor are measured beside those of the full chain, written into the file as `[validation]`, and every difference that
-//! matters is printed. The results depend on the seed and on the number of approaches, and not on the number of threads.
+//! A fit takes some minutes. The next build puts the figures into the sensor. With `--validate`,
+//! the program measures the errors, delays and misses of the sensor and of the full chain. It
+//! writes them into the file as `[validation]`, and prints every difference that matters. The
+//! results depend on the seed and on the number of approaches, and not on the number of threads.
 
 #![expect(clippy::print_stdout, reason = "a command prints its result")]
 
@@ -66,56 +67,56 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let known = match &args.fit {
+    let fitted = match &args.fit {
         Some(path) => std::fs::read_to_string(path)
             .map_err(|error| error.to_string())
             .and_then(|text| RearFit::parse(&text).map_err(|error| error.to_string()))
             .map_err(|error| format!("failed to read {}: {error}", path.display()))?,
         None => RearFit::shipped()?.clone(),
     };
-    let found = match (args.validate, args.errors) {
-        (true, _) => validated(&plan, known)?,
-        (_, true) => fit_errors(&plan, &known)?,
+    let model = match (args.validate, args.errors) {
+        (true, _) => validated(&plan, fitted)?,
+        (_, true) => fit_errors(&plan, &fitted)?,
         _ => fit(&plan)?,
     };
-    at_bounds(&found).iter().for_each(|warning| println!("warning: {warning}"));
-    let text = format!("{HEAD}{}", toml::to_string(&found)?);
+    at_bounds(&model).iter().for_each(|warning| println!("warning: {warning}"));
+    let text = format!("{HEAD}{}", toml::to_string(&model)?);
     write_file(&args.output, |file| file.write_all(text.as_bytes()))?;
     println!("written: {}", args.output.display());
     Ok(())
 }
 
-/// Returns the fit with its tracks measured beside those of the full chain.
+/// Returns the fit with measurements of its tracks and of the full chain's tracks.
 fn validated(plan: &FitPlan<'_>, fit: RearFit) -> Result<RearFit, Box<dyn std::error::Error>> {
     let measured = measure(plan, Some(&fit), |_, _, _| true)?;
     let table = table(plan, &measured);
     print(&measured);
-    for it in differences(&table) {
-        let [visibility_m, rain_mm_per_h] = it.weather;
+    for row in differences(&table) {
+        let [visibility_m, rain_mm_per_h] = row.weather;
         println!(
             "differs: {}, paint {}, visibility {visibility_m} m, rain {rain_mm_per_h} mm/h: {} {} in the full chain, {} at object level",
-            it.class.name(),
-            it.paint,
-            it.figure,
-            it.full,
-            it.object
+            row.class.name(),
+            row.paint,
+            row.figure,
+            row.full,
+            row.object
         );
     }
     Ok(RearFit { validation: Some(table), ..fit })
 }
 
-/// Prints what was measured: root mean square errors along (m), across (m) and of the speed (m/s) up to 50 m and beyond, their
-/// correlation times (s), delays (s), misses, and lags (s).
+/// Prints what was measured: root mean square errors along (m), across (m) and of the speed (m/s)
+/// up to 50 m and beyond, their correlation times (s), delays (s), misses, and lags (s).
 fn print(measured: &[Measured]) {
-    for it in measured {
-        let (class, paint, [visibility_m, rain_mm_per_h]) = it.at;
+    for row in measured {
+        let (class, paint, [visibility_m, rain_mm_per_h]) = row.at;
         println!("{}, paint {paint}, visibility {visibility_m} m, rain {rain_mm_per_h} mm/h", class.name());
         for chain in [Chain::Full, Chain::Object] {
-            let of = it.of(chain);
-            let [near, far] = of.near_far_sd;
+            let errors = row.of(chain);
+            let [near, far] = errors.near_far_sd;
             println!(
                 "  {chain:?}: near {near:.3?}, far {far:.3?}, time {:.1?}, after {:.2?}, missed {:.3} (longest {:.2} s), coasting {:.3}, lag {:.2?}",
-                of.time_s, of.after_s, of.missed, of.longest_gap_s, of.coasting, of.lag_s
+                errors.time_s, errors.after_s, errors.missed, errors.longest_gap_s, errors.coasting, errors.lag_s
             );
         }
     }

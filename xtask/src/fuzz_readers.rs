@@ -1,19 +1,22 @@
-//! Feeds damaged files to the readers of trajectory data, and looks for panics, hangs and invalid results.
+//! Feeds damaged files to the readers of trajectory data, and looks for panics, hangs and invalid
+//! results.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- fuzz-readers commonroad 120
 //! cargo run --release -p closecall-xtask -- fuzz-readers all 60 7
 //! ```
 //!
-//! Arguments: the reader (`ngsim`, `csv`, `highd`, `exid`, `commonroad`, `in-car`, or `all` for one after the other),
-//! the seconds per reader, and a seed (default 0). The fuzzer starts from the small files in `scenarios/fuzz`. It
-//! changes single bytes, replaces fields, swaps columns, repeats and deletes lines, copies and deletes blocks, replaces
-//! separators, and cuts off ends. It compresses a quarter of the results with gzip, and damages half of those again. It
-//! needs no special compiler.
+//! Arguments: the reader (`ngsim`, `csv`, `highd`, `exid`, `commonroad`, `in-car`, or `all` for one
+//! after the other), the seconds per reader, and a seed (default 0). The fuzzer starts from the
+//! small files in `scenarios/fuzz`. It changes single bytes, replaces fields, swaps columns,
+//! repeats and deletes lines, copies and deletes blocks, replaces separators, and cuts off ends. It
+//! compresses a quarter of the results with gzip, and damages half of those again. It needs no
+//! special compiler.
 //!
-//! It reports: a panic; more than two seconds for one file of some kilobytes; a number that is not finite; a track that
-//! is empty, lacks line numbers or is not evenly spaced; two tracks with one number; an error that does not name the
-//! file. It then writes the damaged file and prints its path.
+//! It reports: a panic; more than two seconds for one file of some kilobytes; a number that is not
+//! finite; a track that is empty, lacks line numbers or is not evenly spaced; two tracks with one
+//! number; an error that does not name the file. It then writes the damaged file and prints its
+//! path.
 
 use std::io::{Cursor, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -102,15 +105,15 @@ impl Random {
 /// Returns the ranges of the parts of `bytes` between separators.
 fn parts(bytes: &[u8], is_separator: impl Fn(u8) -> bool) -> Vec<std::ops::Range<usize>> {
     let mut start = 0;
-    let mut found = Vec::new();
+    let mut ranges = Vec::new();
     for (index, byte) in bytes.iter().enumerate() {
         if is_separator(*byte) {
-            found.push(start..index);
+            ranges.push(start..index);
             start = index + 1;
         }
     }
-    found.push(start..bytes.len());
-    found
+    ranges.push(start..bytes.len());
+    ranges
 }
 
 /// Damages `bytes` once, in a random way.
@@ -155,10 +158,10 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
         9 => swap_columns(bytes, random),
         10 => {
             let fields = parts(bytes, |byte| b",; \n<>".contains(&byte));
-            let (one, other) = (random.pick(&fields).cloned(), random.pick(&fields).cloned());
-            if let (Some(one), Some(other)) = (one, other) {
-                let text = bytes[one].to_vec();
-                bytes.splice(other, text);
+            let (first, second) = (random.pick(&fields).cloned(), random.pick(&fields).cloned());
+            if let (Some(first), Some(second)) = (first, second) {
+                let text = bytes[first].to_vec();
+                bytes.splice(second, text);
             }
         }
         _ => {
@@ -175,12 +178,12 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
 }
 
 fn swap_columns(bytes: &mut Vec<u8>, random: &mut Random) {
-    let (one, other) = (random.below(18), random.below(18));
+    let (first, second) = (random.below(18), random.below(18));
     let mut out = Vec::with_capacity(bytes.len());
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         let mut fields: Vec<&[u8]> = line.split(|byte| *byte == b',').collect();
-        if one.max(other) < fields.len() {
-            fields.swap(one, other);
+        if first.max(second) < fields.len() {
+            fields.swap(first, second);
         }
         out.extend_from_slice(&fields.join(&b','));
     }
@@ -356,7 +359,7 @@ pub(crate) fn main(args: Vec<String>) -> ExitCode {
         eprintln!("usage: fuzz-readers {}|all SECONDS [SEED]", READERS.join("|"));
         return ExitCode::from(2);
     };
-    let readers: Vec<&str> = READERS.into_iter().filter(|known| reader == "all" || reader == known).collect();
+    let readers: Vec<&str> = READERS.into_iter().filter(|name| reader == "all" || reader == name).collect();
     let mut is_fine = !readers.is_empty();
     for reader in readers {
         match fuzz(reader, seconds, seed) {

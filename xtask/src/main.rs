@@ -1,4 +1,5 @@
-//! The programs that keep the repository true: they write what is committed, validate the models, and measure. Users need none of them.
+//! The programs that keep the repository true: they write committed files, validate the models, and
+//! measure. Users need none of them.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- --help
@@ -37,7 +38,7 @@ use std::process::{ExitCode, Termination};
 use clap::Parser;
 use root::ROOT;
 
-/// Writes, validates and measures what the repository states.
+/// Writes, validates and measures the statements of the repository.
 #[derive(Parser)]
 #[command(name = "xtask")]
 enum Task {
@@ -71,7 +72,7 @@ enum Task {
     ValidateMarginIncrease(Words),
     /// Measures the peak memory of campaigns
     ValidateMemory(Words),
-    /// Measures what the margin increase system promises and keeps
+    /// Measures the promises of the margin increase system and its results
     ValidateMis(Words),
     /// Compares the object-level sensors with the full chain
     ValidateObjectSensors(validate_object_sensors::Args),

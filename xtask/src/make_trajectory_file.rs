@@ -6,9 +6,10 @@
 //! /usr/bin/time -v closecall traffic inspect /tmp/big.csv
 //! ```
 //!
-//! Layouts: `plain` (sorted by vehicle), `plain-by-time`, `ngsim` (18 columns in feet, sorted by vehicle). Each vehicle
-//! is on the road for 60 s at 10 Hz, and one vehicle in three changes lanes once on a quintic path. The size is a
-//! number of bytes, optionally with `MB` or `GB`. The same arguments yield the same bytes.
+//! Layouts: `plain` (sorted by vehicle), `plain-by-time`, `ngsim` (18 columns in feet, sorted by
+//! vehicle). Each vehicle is on the road for 60 s at 10 Hz, and one vehicle in three changes lanes
+//! once on a quintic path. The size is a number of bytes, optionally with `MB` or `GB`. The same
+//! arguments yield the same bytes.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};

@@ -1,12 +1,14 @@
-//! Draws the regimes of the Wiedemann 99 model in the plane of speed difference and gap, and the trajectory of a follower.
+//! Draws the regimes of the Wiedemann 99 model in the plane of speed difference and gap, and the
+//! trajectory of a follower.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- plot-regimes docs/reference/wiedemann99-regimes.svg
 //! ```
 //!
-//! The colours show the regime that the model itself reports, for a driver with the defaults of Vissim behind a lead vehicle
-//! at 30 m/s, before the driver has perceived anything. The lines are the thresholds of the model. The trajectory is that of
-//! a driver that approaches the lead vehicle at 36 m/s, with an actuator lag of 0.15 s, over two minutes.
+//! The colours show the regime that the model itself reports, for a driver with the defaults of
+//! Vissim behind a lead vehicle at 30 m/s, before the driver has perceived anything. The lines are
+//! the thresholds of the model. The trajectory shows a driver that approaches the lead vehicle at
+//! 36 m/s, with an actuator lag of 0.15 s, over two minutes.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -48,15 +50,16 @@ fn regime(driver: &Wiedemann99, opening_mps: f64, gap_m: f64) -> Regime {
     model.regime()
 }
 
-/// Splits a row of cells into stretches with the same regime. Returns two opposite corners and the regime of each.
+/// Splits a row of cells into stretches with the same regime. Returns two opposite corners and the
+/// regime of each.
 fn stretches(driver: &Wiedemann99, gap_m: f64) -> Vec<([(f64, f64); 2], Regime)> {
     let mut stretches: Vec<([(f64, f64); 2], Regime)> = Vec::new();
     for opening_mps in steps(OPENING_MPS, CELL.0) {
         let end = (opening_mps + CELL.0, gap_m + CELL.1);
-        let here = regime(driver, opening_mps + 0.5 * CELL.0, gap_m + 0.5 * CELL.1);
+        let cell_regime = regime(driver, opening_mps + 0.5 * CELL.0, gap_m + 0.5 * CELL.1);
         match stretches.last_mut() {
-            Some((corners, last)) if *last == here => corners[1] = end,
-            _ => stretches.push(([(opening_mps, gap_m), end], here)),
+            Some((corners, last)) if *last == cell_regime => corners[1] = end,
+            _ => stretches.push(([(opening_mps, gap_m), end], cell_regime)),
         }
     }
     stretches
@@ -67,7 +70,8 @@ fn steps((from, to): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
     (0..).map(move |index| from + f64::from(index) * step).take_while(move |value| *value < to)
 }
 
-/// Returns the speed difference (m/s) and the gap (m) at each step of a driver that approaches from behind.
+/// Returns the speed difference (m/s) and the gap (m) at each step of a driver that approaches from
+/// behind.
 fn approach(driver: &Wiedemann99) -> Vec<(f64, f64)> {
     let mut model = Wiedemann99Model::new(driver);
     let (mut gap_m, mut speed_mps, mut actual_mps2) = (GAP_M.1, DESIRED_MPS, 0.0);
@@ -86,12 +90,12 @@ fn approach(driver: &Wiedemann99) -> Vec<(f64, f64)> {
 /// Returns the label of each threshold, and its points in the plane.
 fn thresholds(driver: &Wiedemann99) -> Vec<(&'static str, Vec<(f64, f64)>)> {
     let model = Wiedemann99Model::new(driver);
-    let over_speed = |of: fn(&closecall_controllers::Thresholds) -> f64| {
-        let point = |opening: f64| (opening, of(&model.thresholds(LEAD_MPS - opening, &lead(GAP_M.0))));
+    let over_speed = |threshold: fn(&closecall_controllers::Thresholds) -> f64| {
+        let point = |opening: f64| (opening, threshold(&model.thresholds(LEAD_MPS - opening, &lead(GAP_M.0))));
         steps(OPENING_MPS, CELL.0).map(point).filter(|(_, gap)| (GAP_M.0..GAP_M.1).contains(gap)).collect()
     };
-    let over_gap = |of: fn(&closecall_controllers::Thresholds) -> f64| {
-        let point = |gap: f64| (of(&model.thresholds(LEAD_MPS, &lead(gap))), gap);
+    let over_gap = |threshold: fn(&closecall_controllers::Thresholds) -> f64| {
+        let point = |gap: f64| (threshold(&model.thresholds(LEAD_MPS, &lead(gap))), gap);
         let inside = |(opening, _): &(f64, f64)| (OPENING_MPS.0..OPENING_MPS.1).contains(opening);
         steps(GAP_M, CELL.1).map(point).filter(inside).collect()
     };
@@ -136,7 +140,7 @@ fn draw(chart: &mut Plane<'_>, driver: &Wiedemann99) -> Result<(), Box<dyn Error
     let cells: Vec<_> = steps(GAP_M, CELL.1).flat_map(|gap_m| stretches(driver, gap_m)).collect();
     for (regime, name, colour) in REGIMES {
         let style = colour.filled();
-        let of_regime = cells.iter().filter(|(_, found)| *found == regime);
+        let of_regime = cells.iter().filter(|(_, cell_regime)| *cell_regime == regime);
         chart
             .draw_series(of_regime.map(|(corners, _)| Rectangle::new(*corners, style)))?
             .label(name)

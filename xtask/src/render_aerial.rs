@@ -1,4 +1,5 @@
-//! Renders a data set of labelled aerial pictures: `render_aerial training|held-out PICTURES SEED DIR`.
+//! Renders a data set of labelled aerial pictures:
+//! `render_aerial training|held-out PICTURES SEED DIR`.
 
 use std::path::Path;
 

@@ -1,12 +1,13 @@
-//! Says what the aerial acquisition loses: each trajectory file is watched by a camera that follows its traffic, and what the
-//! detector and the tracker make of it is compared with the truth.
+//! Measures the losses of the aerial acquisition: a camera follows the traffic of each trajectory
+//! file, and the program compares the tracks of detector and tracker with the truth.
 //!
 //! ```text
 //! validate_aerial DIR FILE… [--off-nadir DEGREES] [--altitude M] [--seed N]
 //! ```
 //!
-//! For each file it writes a folder with `NAME-truth.csv`, `NAME-aerial-raw.csv` and `NAME-aerial-corrected.csv`, which
-//! `closecall traffic lane-changes` reads, and `NAME-truth.png`, a picture from the middle of the flight; and prints the losses over all files.
+//! For each file it writes a folder with `NAME-truth.csv`, `NAME-aerial-raw.csv` and
+//! `NAME-aerial-corrected.csv`, which `closecall traffic lane-changes` reads, and `NAME-truth.png`,
+//! a picture from the middle of the flight; and prints the losses over all files.
 #![expect(clippy::print_stdout, reason = "its output is what it is for")]
 
 use std::path::{Path, PathBuf};

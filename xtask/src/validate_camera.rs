@@ -1,13 +1,14 @@
-//! Measures what a real lens, a rolling shutter and a dark sky do to the classifier: its accuracy on held-out crops of the same
-//! scenes, with each of them.
+//! Measures the effect of a real lens, a rolling shutter and a dark sky on the classifier: its
+//! accuracy on held-out crops of the same scenes, with each of them.
 //!
 //! ```text
 //! cargo run --release -p closecall-xtask -- validate-camera [SCENES] [SEED]
 //! ```
 //!
-//! The network has been trained with an ideal lens, a global shutter and the sky over a town. The table has a row for each option of
-//! `sensors.rear-camera`: the number of crops, the share of them that the network classifies as it should, the same for vehicles
-//! by day and at night, each with its 95 % interval. A crop whose vehicle an option moves out of the image is missing from its row.
+//! The network has been trained with an ideal lens, a global shutter and the sky over a town. The
+//! table has a row for each option of `sensors.rear-camera`: the number of crops, the share that
+//! the network classifies correctly, and the same for vehicles by day and at night, each with its
+//! 95 % interval. A crop whose vehicle an option moves out of the image is missing from its row.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::error::Error;
@@ -20,10 +21,10 @@ use closecall_traffic::{Check, ClassScores, Num, Parameters};
 
 /// Number of scenes if none is given.
 const SCENES: u32 = 1_000;
-/// Seed if none is given. The shipped network was judged with another one.
+/// Seed if none is given. The shipped network was judged with another seed.
 const SEED: u64 = 2026;
 
-/// The crops of one kind that were classified, and how many of them rightly.
+/// The number of classified crops of one kind, and the number of correct results.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     crops: usize,
@@ -90,7 +91,8 @@ fn best(scores: &ClassScores) -> usize {
     (0..scores.len()).fold(0, |best, label| if scores[label] > scores[best] { label } else { best })
 }
 
-/// Classifies the crops of a folder: all of them, those of vehicles by day, and those of vehicles at night.
+/// Classifies the crops of a folder: all crops, the crops of vehicles by day, and the crops of
+/// vehicles at night.
 fn tallies(folder: &Path, classifier: &mut Classifier) -> Result<[Tally; 3], Box<dyn Error>> {
     let (rgb, csv) = (std::fs::read(folder.join("crops.rgb"))?, std::fs::read_to_string(folder.join("crops.csv"))?);
     let mut tallies = [Tally::default(); 3];

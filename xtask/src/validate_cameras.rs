@@ -1,10 +1,12 @@
-//! Compares the two pipelines of the rear camera, the crop classifier and the Mask R-CNN, on the same samples.
+//! Compares the two pipelines of the rear camera, the crop classifier and the Mask R-CNN, on the
+//! same samples.
 //!
 //!     cargo run --release -p closecall-xtask -- validate-cameras --onnxruntime PATH -n 200
 //!
-//! Prints for each scenario and pipeline the collisions, the engagements, the distance at which the rear vehicle is classified, and the
-//! processor time, and lists every sample whose verdict differs with its reason. In `empty-wet-road` there is no rear vehicle: each
-//! engagement is wrong. 200 samples of `low-thw-overtake` take a quarter of an hour of processor time.
+//! Prints for each scenario and pipeline the collisions, the engagements, the distance at which the
+//! rear vehicle is classified, and the processor time, and lists every sample whose verdict differs
+//! with its reason. In `empty-wet-road` there is no rear vehicle: each engagement is wrong. 200
+//! samples of `low-thw-overtake` take a quarter of an hour of processor time.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::error::Error;
@@ -49,7 +51,8 @@ pub(crate) struct Args {
 /// What one run showed.
 struct Run {
     verdict: Verdict,
-    /// Distance from the ego's middle back to the front of the rear vehicle when a track of it is first confirmed and classified (m).
+    /// Distance from the ego's middle back to the front of the rear vehicle when a track of it is
+    /// first confirmed and classified (m).
     classified_m: Option<f64>,
     simulated_s: f64,
     /// Processor time of the thread (s).
@@ -106,8 +109,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn print_row(name: &str, runs: &[Run]) {
-    let count = |of: fn(&Run) -> bool| runs.iter().filter(|run| of(run)).count();
-    let total = |of: fn(&Run) -> f64| runs.iter().map(of).sum::<f64>();
+    let count = |holds: fn(&Run) -> bool| runs.iter().filter(|run| holds(run)).count();
+    let total = |value: fn(&Run) -> f64| runs.iter().map(value).sum::<f64>();
     let classified = count(|run| run.classified_m.is_some());
     println!(
         "  {name}: {} collisions, engaged in {}, classified in {classified} at {:.1} m on average, {:.2} s of processor time per sample, \

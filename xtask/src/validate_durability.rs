@@ -1,14 +1,16 @@
-//! Checks that interrupted and partitioned campaigns give the same `outcomes.parquet` as an undisturbed one.
+//! Checks that interrupted and partitioned campaigns give the same `outcomes.parquet` as an
+//! undisturbed one.
 //!
-//! A campaign of 10,000 paired samples is killed five times at random moments and resumed, once with one job and once with
-//! two. Another one is split into three partitions, as for three machines, and merged.
+//! A campaign of 10,000 paired samples is killed five times at random moments and resumed, once
+//! with one job and once with two. Another one is split into three partitions, as for three
+//! machines, and merged.
 //!
 //! ```sh
 //! cargo build --release && cargo run --release -p closecall-xtask -- validate-durability [SAMPLES] [SEED]
 //! ```
 //!
-//! The seed determines the moments, relative to the duration of the undisturbed campaign. Whether a moment falls into a
-//! sample, a line of the journal or a report depends on the machine.
+//! The seed determines the moments, relative to the duration of the undisturbed campaign. Whether a
+//! moment falls into a sample, a line of the journal or a report depends on the machine.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -44,8 +46,8 @@ impl Setup {
         if status.success() { Ok(started.elapsed()) } else { Err(format!("{status}: {more:?}").into()) }
     }
 
-    /// Starts a campaign once for each span and kills it after that span, then resumes it to its end. Returns how often it was
-    /// killed before it had ended.
+    /// Starts a campaign once for each span and kills it after that span, then resumes it to its
+    /// end. Returns how often it was killed before it had ended.
     fn run_killed(&self, out: &Path, jobs: &str, spans: &[Duration]) -> Result<u32, Box<dyn Error>> {
         let more = ["--jobs", jobs, "--resume"];
         let mut killed = 0;
@@ -99,9 +101,9 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
     ))?;
     let mut rng = stream(seed, 0, &ActorId::new("validation")?, "kill");
     let mut same = true;
-    let mut compare = |what: &str, found: String| {
-        same &= found == expected;
-        say(format_args!("{what}: {}", if found == expected { "the same" } else { "DIFFERENT" }))
+    let mut compare = |subject: &str, text: String| {
+        same &= text == expected;
+        say(format_args!("{subject}: {}", if text == expected { "the same" } else { "DIFFERENT" }))
     };
     for jobs in ["1", "2"] {
         let spans: Vec<Duration> = (0..KILLS).map(|_| took.mul_f64(0.5 * rng.random::<f64>())).collect();

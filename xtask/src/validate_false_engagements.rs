@@ -1,17 +1,19 @@
-//! Measures how often the margin increase system engages without a rear vehicle, on a wet road with spray and guard rails.
+//! Measures how often the margin increase system engages without a rear vehicle, on a wet road with
+//! spray and guard rails.
 //!
 //! ```text
 //! cargo run --release -p closecall-xtask -- validate-false-engagements [HOURS] [SEED] [with|without]
 //! ```
 //!
-//! Runs the scenario `empty-wet-road` with all sensors, once with the rear camera's classifier and once without it, for at
-//! least HOURS simulated hours each (default: 10). Without the classifier, only the shapes in the LiDAR's data decide what is
-//! a vehicle. The program counts engagements and false confirmed tracks that were classified as vehicles, with exact Poisson
-//! intervals of their rates (Garwood 1936). Ten hours of both variants take about 40 minutes on two cores; each variant can
+//! Runs the scenario `empty-wet-road` with all sensors, once with the rear camera's classifier and
+//! once without it, for at least HOURS simulated hours each (default: 10). Without the classifier,
+//! only the shapes in the LiDAR's data identify a vehicle. The program counts engagements and false
+//! confirmed tracks that were classified as vehicles, with exact Poisson intervals of their rates
+//! (Garwood 1936). Ten hours of both variants take about 40 minutes on two cores; each variant can
 //! be run alone.
 //!
-//! The validation passes (exit code 0) if the 95 % upper bound of the rate of engagements with the classifier is below 1 per
-//! hour.
+//! The validation passes (exit code 0) if the 95 % upper bound of the rate of engagements with the
+//! classifier is below 1 per hour.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::path::Path;
@@ -36,7 +38,7 @@ const SECONDS_PER_HOUR: f64 = 3_600.0;
 
 /// Counts over one or more runs.
 #[derive(Clone, Debug, Default)]
-struct Found {
+struct Counts {
     samples: u64,
     simulated_s: f64,
     engagements: u64,
@@ -44,7 +46,7 @@ struct Found {
     false_tracks: u64,
 }
 
-impl Found {
+impl Counts {
     fn plus(self, other: Self) -> Self {
         Self {
             samples: self.samples + other.samples,
@@ -81,19 +83,19 @@ impl Observer for Counter {
         }
     }
 
-    fn event(&mut self, _: Time, what: &RunEvent) {
-        let engages = matches!(what, RunEvent::EgoStateChanged { to: EgoState::Increasing, .. });
+    fn event(&mut self, _: Time, event: &RunEvent) {
+        let engages = matches!(event, RunEvent::EgoStateChanged { to: EgoState::Increasing, .. });
         self.engagements += u64::from(engages);
     }
 }
 
-fn run(file: &ScenarioFile, seed: u64, sample: u64) -> Found {
+fn run(file: &ScenarioFile, seed: u64, sample: u64) -> Counts {
     let sampling = Sampling { seed, design: Design::Random, samples: sample + 1 };
     let scenario = concrete(file, sampling, sample).expect("a valid sample");
     let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(SensorMode::Full) };
     let mut counter = Counter::default();
     let outcome = simulate(&scenario, RunKey { seed, sample }, &arm, &mut counter).expect("an outcome");
-    Found {
+    Counts {
         samples: 1,
         simulated_s: outcome.duration.s(),
         engagements: counter.engagements,
@@ -102,8 +104,8 @@ fn run(file: &ScenarioFile, seed: u64, sample: u64) -> Found {
     }
 }
 
-/// Returns exact bounds of a rate per hour (Garwood 1936): the lower and upper end of the two-sided interval, and the
-/// one-sided upper bound.
+/// Returns exact bounds of a rate per hour (Garwood 1936): the lower and upper end of the two-sided
+/// interval, and the one-sided upper bound.
 fn rate_bounds(events: u64, hours: f64) -> [f64; 3] {
     let quantile = |freedom: u64, probability: f64| {
         let chi_squared = ChiSquared::new(freedom as f64).expect("positive degrees of freedom");
@@ -114,27 +116,29 @@ fn rate_bounds(events: u64, hours: f64) -> [f64; 3] {
     [low, quantile(2 * (events + 1), 1.0 - tail), quantile(2 * (events + 1), CONFIDENCE)]
 }
 
-fn print(what: &str, events: u64, hours: f64) -> f64 {
+fn print(label: &str, events: u64, hours: f64) -> f64 {
     let [low, high, bound] = rate_bounds(events, hours);
     println!(
-        "  {what:<40} {events:>6}  {:>8.3} per hour  (95 %: {low:.3} to {high:.3}; one-sided bound {bound:.3})",
+        "  {label:<40} {events:>6}  {:>8.3} per hour  (95 %: {low:.3} to {high:.3}; one-sided bound {bound:.3})",
         events as f64 / hours
     );
     bound
 }
 
-/// Runs as many samples as the hours need, prints the counts, and returns the upper bound of the rate of engagements.
+/// Runs as many samples as the hours need, prints the counts, and returns the upper bound of the
+/// rate of engagements.
 fn study(name: &str, settings: &[Setting], hours: f64, seed: u64) -> f64 {
     let path = Path::new(crate::ROOT).join("scenarios/library/empty-wet-road.toml");
     let file = ScenarioFile::load(&path, settings).expect("a valid scenario");
     let first = concrete(&file, Sampling { seed, design: Design::Random, samples: 1 }, 0).expect("a valid sample");
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
     let samples = (hours * SECONDS_PER_HOUR / first.duration.s()).ceil() as u64;
-    let found = (0..samples).into_par_iter().map(|sample| run(&file, seed, sample)).reduce(Found::default, Found::plus);
-    println!("{name}: {} samples, {:.2} simulated hours, seed {seed}", found.samples, found.hours());
-    let bound = print("engagements", found.engagements, found.hours());
-    print("false confirmed tracks taken for vehicles", found.false_vehicles, found.hours());
-    print("false confirmed tracks of any class", found.false_tracks, found.hours());
+    let total =
+        (0..samples).into_par_iter().map(|sample| run(&file, seed, sample)).reduce(Counts::default, Counts::plus);
+    println!("{name}: {} samples, {:.2} simulated hours, seed {seed}", total.samples, total.hours());
+    let bound = print("engagements", total.engagements, total.hours());
+    print("false confirmed tracks taken for vehicles", total.false_vehicles, total.hours());
+    print("false confirmed tracks of any class", total.false_tracks, total.hours());
     bound
 }
 

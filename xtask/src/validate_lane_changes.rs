@@ -4,18 +4,20 @@
 //! CLOSECALL_DATA=DIR cargo run --release -p closecall-xtask -- validate-lane-changes
 //! ```
 //!
-//! `DIR` contains `ngsim_us101` (trajectories of NGSIM US-101, DOI 10.21949/1504477, in the plain layout, and
-//! `reference_lane_changes.csv`), `ngsim_i80_pairs` and `gps_lane_changes` (T. Driessen, S. Prasad, P. Bazilinskyy, J.
-//! de Winter, AHFE 2022).
+//! `DIR` contains `ngsim_us101` (trajectories of NGSIM US-101, DOI 10.21949/1504477, in the plain
+//! layout, and `reference_lane_changes.csv`), `ngsim_i80_pairs` and `gps_lane_changes` (T.
+//! Driessen, S. Prasad, P. Bazilinskyy, J. de Winter, AHFE 2022).
 //!
-//! - US-101: recall over the clear lane changes with 2 s of track on both sides, and precision against all listed ones,
-//!   with exact intervals. The figures are given for all files together, for each file, and for halves of the vehicles
-//!   and of the time. Agreement of the halves shows that the criteria are not tuned to one of them.
-//! - I-80: vehicles that follow another one in the same lane for 30 to 74 s. Every lane change that the peak criterion
-//!   finds there by the lateral shift alone, without the recorded lane, is wrong.
-//! - GPS: one car on Dutch motorways, four receivers at 1 Hz, lateral offset to the map-matched road, 58 lane changes
-//!   annotated on video. A detected lane change agrees with an annotated one if it has the same direction and its
-//!   middle is within 5 s.
+//! - US-101: recall over the clear lane changes with 2 s of track on both sides, and precision
+//!   against all listed lane changes, with exact intervals. The figures are given for all files
+//!   together, for each file, and for halves of the vehicles and of the time. Agreement of the
+//!   halves shows that the criteria are not tuned to one of them.
+//! - I-80: vehicles that follow another vehicle in the same lane for 30 to 74 s. Every lane change
+//!   that the peak criterion finds there by the lateral shift alone, without the recorded lane, is
+//!   wrong.
+//! - GPS: one car on Dutch motorways, four receivers at 1 Hz, lateral offset to the map-matched
+//!   road, 58 lane changes annotated on video. A detected lane change agrees with an annotated one
+//!   if it has the same direction and its middle is within 5 s.
 #![expect(clippy::print_stdout, reason = "its output is what it is for")]
 
 use std::path::{Path, PathBuf};
@@ -27,7 +29,8 @@ use closecall_recorded::lane_change::{
 use closecall_recorded::trajectory_data::{LaneMarkings, TrajectoryData, read};
 use closecall_traffic::{Dimensions, Lane, Side, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-/// The name of a subset of the data, and a predicate that selects lane changes by track number and time (s).
+/// The name of a subset of the data, and a predicate that selects lane changes by track number and
+/// time (s).
 type Part = (&'static str, fn(u64, f64) -> bool);
 
 const PARTS: [Part; 5] = [
@@ -56,28 +59,28 @@ fn us101(folder: &Path) {
     let data_sets: Vec<TrajectoryData> = paths.iter().map(|path| read(path).expect("a trajectory file")).collect();
     for criterion in [Criterion::Peak, Criterion::Distance] {
         println!("US-101, {} criterion", criterion.name());
-        let found: Vec<Vec<LaneChange>> = data_sets.iter().map(|data| found(data, criterion)).collect();
+        let changes: Vec<Vec<LaneChange>> = data_sets.iter().map(|data| detect_changes(data, criterion)).collect();
         for part in PARTS {
             let mut total = Score::default();
-            for (data, found) in data_sets.iter().zip(&found) {
-                total.add(&scored(data, found, &references, part.1));
+            for (data, changes) in data_sets.iter().zip(&changes) {
+                total.add(&scored(data, changes, &references, part.1));
             }
             print(part.0, &total);
         }
-        for (data, found) in data_sets.iter().zip(&found) {
-            print(&data.name, &scored(data, found, &references, |_, _| true));
+        for (data, changes) in data_sets.iter().zip(&changes) {
+            print(&data.name, &scored(data, changes, &references, |_, _| true));
         }
     }
 }
 
-fn found(data: &TrajectoryData, criterion: Criterion) -> Vec<LaneChange> {
+fn detect_changes(data: &TrajectoryData, criterion: Criterion) -> Vec<LaneChange> {
     let detector = LaneChangeDetector::new(LaneReliability::Reliable, &data.markings);
     data.trajectories.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect()
 }
 
 fn scored(
     data: &TrajectoryData,
-    found: &[LaneChange],
+    detected: &[LaneChange],
     references: &[ReferenceChange],
     belongs: fn(u64, f64) -> bool,
 ) -> Score {
@@ -85,9 +88,9 @@ fn scored(
         .iter()
         .filter(|listed| listed.recording_id == data.name && belongs(listed.track_id, listed.time_s))
         .collect();
-    let found: Vec<LaneChange> =
-        found.iter().filter(|change| belongs(change.track_id, change.crossing_s)).cloned().collect();
-    score(&found, &listed, &spans(&data.trajectories))
+    let detected: Vec<LaneChange> =
+        detected.iter().filter(|change| belongs(change.track_id, change.crossing_s)).cloned().collect();
+    score(&detected, &listed, &spans(&data.trajectories))
 }
 
 fn spans(tracks: &[Trajectory]) -> TrackSpans {
@@ -99,7 +102,8 @@ fn print(part: &str, score: &Score) {
     println!("  {:<12} precision {}, times within {:.2} s", "", score.precision, score.max_time_error_s);
 }
 
-/// Counts the vehicles for which the peak criterion invents a lane change, among vehicles that keep their lane.
+/// Counts the vehicles for which the peak criterion invents a lane change, among vehicles that keep
+/// their lane.
 fn i80(path: &Path) {
     let packed = std::fs::File::open(path).expect("the pairs");
     let mut reader = csv::Reader::from_reader(flate2::read::MultiGzDecoder::new(packed));
@@ -143,11 +147,12 @@ struct Fix {
     speed_mps: f64,
 }
 
-/// Maximum time between the middles of an annotated and a detected lane change that count as the same (s).
+/// Maximum time between the middles of an annotated and a detected lane change that count as the
+/// same (s).
 const SAME_S: f64 = 5.0;
 
-/// Minimum step of the lateral offset that is attributed to the map match instead of the car (m): two lanes in a
-/// second.
+/// Minimum step of the lateral offset that is attributed to the map match instead of the car (m):
+/// two lanes in a second.
 const MAP_JUMP_M: f64 = 5.0;
 
 /// Maximum time between two position fixes of one track (s).
@@ -156,8 +161,8 @@ const GAP_S: f64 = 2.5;
 /// Lane width on Dutch motorways (m).
 const DUTCH_LANE_M: f64 = 3.5;
 
-/// Assumed distance from the matched road to the left edge of the lane grid, in lane widths. The matched road is taken
-/// for the middle of a lane; the data does not say of which one.
+/// Assumed distance from the matched road to the left edge of the lane grid, in lane widths. The
+/// matched road counts as the middle of a lane; the data does not say which lane.
 const LANES_TO_THE_LEFT: f64 = 5.5;
 
 fn gps(folder: &Path) {
@@ -173,19 +178,19 @@ fn gps(folder: &Path) {
         println!("  {receiver}: {} fixes in {} pieces, {} changes covered", fixes.len(), tracks.len(), covered.len());
         for criterion in [Criterion::Peak, Criterion::Distance] {
             let detector = LaneChangeDetector::new(LaneReliability::Unreliable, &LaneMarkings::default());
-            let found: Vec<LaneChange> =
+            let detected: Vec<LaneChange> =
                 tracks.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect();
-            print_gps(criterion, &covered, &found);
-            print_missed(&covered, &found, &tracks);
+            print_gps(criterion, &covered, &detected);
+            print_missed(&covered, &detected, &tracks);
         }
     }
 }
 
-fn print_gps(criterion: Criterion, covered: &[&Annotated], found: &[LaneChange]) {
-    let recalled = covered.iter().filter(|annotated| found.iter().any(|change| same(change, annotated))).count();
-    let right = found.iter().filter(|change| covered.iter().any(|annotated| same(change, annotated))).count();
+fn print_gps(criterion: Criterion, covered: &[&Annotated], detected: &[LaneChange]) {
+    let recalled = covered.iter().filter(|annotated| detected.iter().any(|change| same(change, annotated))).count();
+    let right = detected.iter().filter(|change| covered.iter().any(|annotated| same(change, annotated))).count();
     let recall = HitRate { hits: recalled as u64, of: covered.len() as u64 };
-    let precision = HitRate { hits: right as u64, of: found.len() as u64 };
+    let precision = HitRate { hits: right as u64, of: detected.len() as u64 };
     println!("    {:<9} recall {recall}", criterion.name());
     println!("    {:<9} precision {precision}", "");
 }
@@ -194,12 +199,12 @@ fn same(change: &LaneChange, annotated: &Annotated) -> bool {
     change.direction == annotated.direction && (change.midpoint_s - annotated.time_s).abs() <= SAME_S
 }
 
-/// Counts why lane changes were missed, by the movement of the recorded position from 4 s before to 4 s after the
-/// annotation.
-fn print_missed(covered: &[&Annotated], found: &[LaneChange], tracks: &[Trajectory]) {
+/// Counts why lane changes were missed, by the movement of the recorded position from 4 s before to
+/// 4 s after the annotation.
+fn print_missed(covered: &[&Annotated], detected: &[LaneChange], tracks: &[Trajectory]) {
     const AROUND_S: f64 = 4.0;
     let (mut jump, mut against, mut small, mut other) = (0, 0, 0, 0);
-    for annotated in covered.iter().filter(|annotated| !found.iter().any(|change| same(change, annotated))) {
+    for annotated in covered.iter().filter(|annotated| !detected.iter().any(|change| same(change, annotated))) {
         let [from_s, to_s] = [annotated.time_s - AROUND_S, annotated.time_s + AROUND_S];
         let Some(track) = tracks.iter().find(|track| covers(track, from_s, to_s)) else {
             jump += 1;
@@ -248,7 +253,8 @@ fn fixes(path: &Path) -> Vec<Fix> {
     rows.filter_map(fix).collect()
 }
 
-/// Splits position fixes into tracks without gaps and without jumps of the map match. The offset grows to the right.
+/// Splits position fixes into tracks without gaps and without jumps of the map match. The offset
+/// grows to the right.
 fn tracks(fixes: &[Fix]) -> Vec<Trajectory> {
     let pieces = fixes.chunk_by(|a, b| {
         b.time_s > a.time_s && b.time_s - a.time_s <= GAP_S && (b.offset_m - a.offset_m).abs() <= MAP_JUMP_M

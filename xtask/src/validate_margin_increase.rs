@@ -1,20 +1,24 @@
-//! Measures the share of collisions for several bounds and critical gaps of the margin increase system.
+//! Measures the share of collisions for several bounds and critical gaps of the margin increase
+//! system.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- validate-margin-increase [SAMPLES] [SEED]
 //! ```
 //!
-//! Every sample runs with the cruise control alone (`acc`) and with the margin increase system (`mis`), with true tracks.
-//! Four tables result:
+//! Every sample runs with the cruise control alone (`acc`) and with the margin increase system
+//! (`mis`), with true tracks. Four tables result:
 //!
 //! 1. `low-thw-overtake`: the bound on the system's braking, and the critical gap d_c
 //! 2. `low-thw-overtake`: the bound, if the rear driver reacts slowly
-//! 3. `overtake-without-brake`: the bound, if the rear driver reacts slowly and the lead vehicle does not brake
-//! 4. `low-thw-overtake`: the lateral acceleration that the rear driver accepts in evasive steering, without the system
+//! 3. `overtake-without-brake`: the bound, if the rear driver reacts slowly and the lead vehicle
+//!    does not brake
+//! 4. `low-thw-overtake`: the lateral acceleration that the rear driver accepts in evasive
+//!    steering, without the system
 //!
-//! A share of collisions has its 95 % interval (Clopper and Pearson) beside it. The speed deficit is the largest amount by
-//! which the ego is slower than the lead vehicle in a run; the tables give the value that 95 % of the samples stay below. The default is 1000 samples of seed 1, a tuning seed.
-//! The documentation of `closecall_controllers` (`controllers/src/ego/mis/mod.rs`,
+//! A share of collisions has its 95 % interval (Clopper and Pearson) beside it. The speed deficit
+//! is the largest amount by which the ego is slower than the lead vehicle in a run; the tables give
+//! the value that 95 % of the samples stay below. The default is 1000 samples of seed 1, a tuning
+//! seed. The documentation of `closecall_controllers` (`controllers/src/ego/mis/mod.rs`,
 //! `controllers/src/driver/overtaker/config.rs`) cites these figures.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 

@@ -5,14 +5,16 @@
 //! cargo build --release && cargo run --release -p closecall-xtask -- validate-memory modes
 //! ```
 //!
-//! The second command runs short paired campaigns in each mode, with one and with two threads, with and without recordings. It first reads the
-//! program once, so that the kernel has all of it at hand. That is the worst case: the kernel then maps the surroundings of each page that is used.
+//! The second command runs short paired campaigns in each mode, with one and with two threads, with
+//! and without recordings. It first reads the whole program into the kernel's cache. This is the
+//! worst case: the kernel then maps the surroundings of each page that is used.
 //!
-//! The first command measures the growth with the samples.
-//! The scenario is `low-thw-overtake` with object-level sensors, cut to 2 s, so that a million samples take minutes. The
-//! memory that a campaign needs for a sample does not depend on the sample's duration. The campaign writes all files of its
-//! folder; within 2 s hardly anything happens, so that there is nothing to record, and the campaign says that the encounter did not happen.
-//! The peak is the kernel's value of resident memory (`VmHWM`), read until the program ends; Linux only.
+//! The first command measures the growth with the samples. The scenario is `low-thw-overtake` with
+//! object-level sensors, cut to 2 s: a million samples then take minutes. The memory that a
+//! campaign needs for a sample does not depend on the sample's duration. The campaign writes all
+//! files of its folder; within 2 s hardly anything happens. There is nothing to record, and the
+//! campaign says that the encounter did not happen. The peak is the kernel's value of resident
+//! memory (`VmHWM`), read until the program ends; Linux only.
 
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
@@ -30,7 +32,7 @@ const MB_PER_KIB: f64 = 1.024e-3;
 const MODES: [(&str, u64); 3] = [("ground-truth", 100), ("object", 100), ("full", 8)];
 /// Numbers of threads.
 const JOBS: [u32; 2] = [1, 2];
-/// Recordings: none, and three of samples that are there whatever happens in them.
+/// Recordings: none, and three of random samples, which do not depend on the outcomes.
 const RECORDINGS: [&str; 2] = ["random:0", "random:3"];
 /// Exit code of a campaign in which the encounter did not happen.
 const DID_NOT_HAPPEN: i32 = 7;

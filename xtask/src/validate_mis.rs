@@ -1,20 +1,25 @@
-//! Compares what the margin increase system predicts with what it achieves, in the library's overtaking scenarios.
+//! Compares the predictions of the margin increase system with its results, in the library's
+//! overtaking scenarios.
 //!
 //! ```text
 //! cargo run --release -p closecall-xtask -- validate-mis [SAMPLES] [SEED] [ground-truth|object|full] [CURVES.svg]
 //! ```
 //!
-//! For each scenario and each band of approach speed, the program counts the samples in which the system engages, those in
-//! which it then states that a gain of 2 s in the front time headway is within reach (a promise), and those of them in which
-//! the gain is 1.9 s or more when the rear vehicle reaches the critical distance. The promise assumes that the lead and the
-//! rear vehicle keep their behaviour. If the lead vehicle brakes before the rear vehicle has arrived, or the rear vehicle
-//! turns away and the system releases, the promise is void: these samples are counted separately.
+//! For each scenario and each band of approach speed, the program counts the samples in which the
+//! system engages. It counts the engagements in which the system states that a gain of 2 s in the
+//! front time headway is within reach (a promise). It also counts the promises after which the gain
+//! is 1.9 s or more when the rear vehicle reaches the critical distance. The promise assumes that
+//! the lead and the rear vehicle keep their behaviour. If the lead vehicle brakes before the rear
+//! vehicle has arrived, or the rear vehicle turns away and the system releases, the promise is
+//! void: these samples are counted separately.
 //!
-//! If a file name is given, the program draws, for each band, the probability that the system has engaged before the rear
-//! vehicle has come to a given gap: with true tracks a step at 100 m, with simulated perception a curve.
+//! If a file name is given, the program draws, for each band, the probability that the system has
+//! engaged before the rear vehicle has come to a given gap: with true tracks this is a step at 100
+//! m, with simulated perception a curve.
 //!
-//! With true tracks, the validation passes (exit code 0) if no promise was broken. Three scenarios of 1000 samples take a
-//! minute on two cores with true tracks; with all sensors, 40 samples take about as long.
+//! With true tracks, the validation passes (exit code 0) if no promise was broken. Three scenarios
+//! of 1000 samples take a minute on two cores with true tracks; with all sensors, 40 samples take
+//! about as long.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::error::Error;
@@ -120,12 +125,12 @@ fn run_all(file: &ScenarioFile, mode: SensorMode, samples: u64, seed: u64) -> Ve
 
 /// Prints the counts of a band, and returns the number of broken promises in it.
 fn print(name: &str, seen: &[&Seen]) -> usize {
-    let engaged = seen.iter().filter(|one| one.engaged_at_m.is_some()).count();
-    let promised: Vec<_> = seen.iter().filter(|one| one.promised).collect();
-    let kept: Vec<_> = promised.iter().filter(|one| !one.called_off).collect();
-    let reached = |one: &&&&&Seen| one.gained_s.is_some_and(|gained_s| gained_s >= GOAL_S - SHORT_BY_S);
+    let engaged = seen.iter().filter(|run| run.engaged_at_m.is_some()).count();
+    let promised: Vec<_> = seen.iter().filter(|run| run.promised).collect();
+    let kept: Vec<_> = promised.iter().filter(|run| !run.called_off).collect();
+    let reached = |run: &&&&&Seen| run.gained_s.is_some_and(|gained_s| gained_s >= GOAL_S - SHORT_BY_S);
     let reached = kept.iter().filter(reached).count();
-    let least_s = kept.iter().filter_map(|one| one.gained_s).fold(f64::INFINITY, f64::min);
+    let least_s = kept.iter().filter_map(|run| run.gained_s).fold(f64::INFINITY, f64::min);
     let least = if least_s.is_finite() { format!("{least_s:.2}") } else { "-".to_owned() };
     let share = if engaged > 0 { 100.0 * promised.len() as f64 / engaged as f64 } else { 0.0 };
     println!(
@@ -141,7 +146,7 @@ fn print(name: &str, seen: &[&Seen]) -> usize {
 /// Returns the name and the samples of each band.
 fn bands(seen: &[Seen]) -> Vec<(String, Vec<&Seen>)> {
     let band = |edges: &[f64]| {
-        let inside = |one: &&Seen| edges[0] <= one.approach_kmh && one.approach_kmh < edges[1];
+        let inside = |run: &&Seen| edges[0] <= run.approach_kmh && run.approach_kmh < edges[1];
         (format!("{:.0}-{:.0} km/h", edges[0], edges[1].min(50.0)), seen.iter().filter(inside).collect())
     };
     EDGES_KMH.windows(2).map(band).collect()
@@ -166,7 +171,7 @@ fn draw(path: &Path, title: &str, seen: &[Seen]) -> Result<(), Box<dyn Error>> {
     {
         let colour = Palette99::pick(place).to_rgba();
         let share = |gap_m: f64| {
-            let engaged = samples.iter().filter(|one| one.engaged_at_m.is_some_and(|at_m| at_m >= gap_m)).count();
+            let engaged = samples.iter().filter(|run| run.engaged_at_m.is_some_and(|at_m| at_m >= gap_m)).count();
             engaged as f64 / samples.len() as f64
         };
         let points = (0..=240).map(|step| 120.0 - 0.5 * f64::from(step)).map(|gap_m| (gap_m, share(gap_m)));

@@ -1,10 +1,13 @@
-//! Compares the verdicts of the object-level sensors with those of the full chain, sample by sample.
+//! Compares the verdicts of the object-level sensors with the verdicts of the full chain, sample by
+//! sample.
 //!
 //!     cargo run --release -p closecall-xtask -- validate-object-sensors -n 1000
 //!
-//! Prints Cohen's κ and the collision rates in clear air, rain (10 mm/h), fog (visibility 100 m) and at night, and lists every sample on
-//! which the modes differ with its reason. The exit code is 1 if some κ is below 0.8 or undefined because no run or every run collides, if
-//! rates differ by more than 2 percentage points, and if no condition has the name that is asked for. A thousand samples take about half an hour on two cores.
+//! Prints Cohen's κ and the collision rates in clear air, rain (10 mm/h), fog (visibility 100 m)
+//! and at night, and lists every sample on which the modes differ with its reason. The exit code is
+//! 1 in three cases: some κ is below 0.8, or undefined because no run or every run collides; rates
+//! differ by more than 2 percentage points; no condition has the given name. A thousand samples
+//! take about half an hour on two cores.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::fmt::{self, Display, Formatter};
@@ -86,7 +89,8 @@ fn compare(args: &Args) -> Result<Comparison, Box<dyn std::error::Error>> {
 }
 
 impl Compared {
-    /// Returns whether the verdicts agree. Without κ, chance alone explains them, and nothing is known.
+    /// Returns whether the verdicts agree. Without κ, chance alone explains them, and nothing is
+    /// known.
     fn agrees(&self) -> bool {
         let [object, full] = self.agreement.rates();
         self.agreement.kappa().is_some_and(|kappa| kappa >= MIN_KAPPA) && (object - full).abs() <= MAX_DIFFERENCE
@@ -96,8 +100,9 @@ impl Compared {
 impl Comparison {
     /// Returns whether something was compared, and agrees in each condition.
     fn agrees(&self) -> bool {
-        let is_compared = |of: &Compared| !of.agreement.pairs.is_empty();
-        !self.conditions.is_empty() && self.conditions.iter().all(|of| is_compared(of) && of.agrees())
+        let is_compared = |condition: &Compared| !condition.agreement.pairs.is_empty();
+        !self.conditions.is_empty()
+            && self.conditions.iter().all(|condition| is_compared(condition) && condition.agrees())
     }
 }
 
@@ -157,11 +162,11 @@ mod tests {
     }
 
     #[test]
-    fn what_chance_explains_or_was_not_compared_does_not_agree() {
+    fn agreement_by_chance_or_without_a_comparison_does_not_count() {
         let verdict =
             |has_collided| Verdict { has_collided, engaged_at_s: None, released_at_s: None, min_gap_rear_m: None };
         let pair = |object, full| Pair { sample: 0, rear: None, object: verdict(object), full: verdict(full) };
-        let of = |conditions: &[&[Pair]]| Comparison {
+        let comparison = |conditions: &[&[Pair]]| Comparison {
             scenario: String::new(),
             samples: 0,
             seed: 0,
@@ -170,11 +175,14 @@ mod tests {
                 .map(|pairs| Compared { name: "night", agreement: Agreement { pairs: pairs.to_vec() } })
                 .collect(),
         };
-        assert!(of(&[&[pair(true, true), pair(false, false)]]).agrees());
-        assert!(!of(&[&[pair(false, false)]]).agrees(), "no run collides");
-        assert!(!of(&[&[pair(true, true)]]).agrees(), "every run collides");
-        assert!(!of(&[&[pair(true, true), pair(false, false)], &[]]).agrees(), "no sample in the second condition");
-        assert!(!of(&[]).agrees(), "no condition");
-        assert!(!of(&[&[pair(true, false), pair(false, true)]]).agrees());
+        assert!(comparison(&[&[pair(true, true), pair(false, false)]]).agrees());
+        assert!(!comparison(&[&[pair(false, false)]]).agrees(), "no run collides");
+        assert!(!comparison(&[&[pair(true, true)]]).agrees(), "every run collides");
+        assert!(
+            !comparison(&[&[pair(true, true), pair(false, false)], &[]]).agrees(),
+            "no sample in the second condition"
+        );
+        assert!(!comparison(&[]).agrees(), "no condition");
+        assert!(!comparison(&[&[pair(true, false), pair(false, true)]]).agrees());
     }
 }

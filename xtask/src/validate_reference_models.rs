@@ -1,8 +1,9 @@
 //! Compares the reference models of UN Regulation 157 with published outcomes of cut-ins.
 //!
-//! Usage: `cargo run --release -p closecall-xtask -- validate-reference-models FILE.csv[.gz]`. The table has the columns of
-//! `docs/reference/controllers.md`; rows of models other than `CC_human_driver` and `FSM` are left out. Exit code 1 if fewer than 99 % of
-//! the cases of a model have the same outcome, or if the table has no case of one.
+//! Usage: `cargo run --release -p closecall-xtask -- validate-reference-models FILE.csv[.gz]`. The
+//! table has the columns of `docs/reference/controllers.md`; rows of models other than
+//! `CC_human_driver` and `FSM` are left out. Exit code 1 if fewer than 99 % of the cases of a model
+//! have the same outcome, or if the table has no case of a model.
 
 use std::error::Error;
 use std::fs::File;
@@ -23,7 +24,7 @@ const MODELS: [&str; 2] = ["CC_human_driver", "FSM"];
 const COLUMNS: [&str; 6] =
     ["model", "ego_speed_kmh", "cut_in_speed_kmh", "front_distance_m", "lateral_speed_mps", "crash"];
 
-/// The number of cases of one model, and of those with the same outcome.
+/// The number of cases of one model, and the number with the same outcome.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Agreement {
     pub(crate) cases: u64,
@@ -36,9 +37,9 @@ pub(crate) fn main(words: Vec<String>) -> Result<ExitCode, Box<dyn Error>> {
     let file = File::open(path).map_err(|error| format!("failed to open {}: {error}", path.display()))?;
     let is_packed = path.extension().is_some_and(|extension| extension == "gz");
     let source: Box<dyn Read> = if is_packed { Box::new(MultiGzDecoder::new(file)) } else { Box::new(file) };
-    let found = compare(source).map_err(|error| format!("{}: {error}", path.display()))?;
+    let agreements = compare(source).map_err(|error| format!("{}: {error}", path.display()))?;
     let mut is_good = true;
-    for (name, Agreement { cases, same }) in MODELS.into_iter().zip(found) {
+    for (name, Agreement { cases, same }) in MODELS.into_iter().zip(agreements) {
         writeln!(stdout(), "{name}: {same} of {cases} cases with the same outcome")?;
         is_good &= cases > 0 && same as f64 >= NEEDED_SHARE * cases as f64;
     }
@@ -53,7 +54,7 @@ pub(crate) fn compare(source: impl Read) -> Result<[Agreement; 2], Box<dyn Error
     for (column, name) in columns.iter_mut().zip(COLUMNS) {
         *column = headers.iter().position(|header| header == name).ok_or_else(|| format!("no column `{name}`"))?;
     }
-    let mut found = [Agreement::default(); 2];
+    let mut agreements = [Agreement::default(); 2];
     for row in table.records() {
         let row = row?;
         let Some(model) = MODELS.iter().position(|name| *name == &row[columns[0]]) else { continue };
@@ -62,10 +63,10 @@ pub(crate) fn compare(source: impl Read) -> Result<[Agreement; 2], Box<dyn Error
             0 => cut_in.ends_in_collision(&mut CarefulDriver::default()),
             _ => cut_in.ends_in_collision(&mut FuzzySafetyModel::default()),
         };
-        found[model].cases += 1;
-        found[model].same += u64::from(collides == (number(&row, columns[5])? != 0.0));
+        agreements[model].cases += 1;
+        agreements[model].same += u64::from(collides == (number(&row, columns[5])? != 0.0));
     }
-    Ok(found)
+    Ok(agreements)
 }
 
 /// Returns the cut-in of a row.

@@ -1,14 +1,16 @@
-//! Measures how often the campaign's statistics are right, on a scenario with a known probability of a collision.
+//! Measures how often the campaign's statistics are correct, on a scenario with a known probability
+//! of a collision.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- validate-statistics 1000
 //! ```
 //!
-//! Runs the given number of campaigns (default: 1,000), each with its own seed, on `tests/fixtures/known-probability.toml`,
-//! whose collision probability is 0.05 by construction. The validation fails (exit code 1) if the exact 95 % intervals
-//! contain the true probability in less than 93.5 % of the campaigns, or if the sequential mode, evaluated after every
-//! sample, is ever wrong in more than 5 % of them. The limit of the gate equals the true probability, which is the hardest
-//! case.
+//! Runs the given number of campaigns (default: 1,000), each with its own seed, on
+//! `tests/fixtures/known-probability.toml`, whose collision probability is 0.05 by construction.
+//! The validation fails (exit code 1) if the exact 95 % intervals contain the true probability in
+//! less than 93.5 % of the campaigns, or if the sequential mode, evaluated after every sample, is
+//! ever wrong in more than 5 % of them. The limit of the gate equals the true probability, which is
+//! the hardest case.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -38,8 +40,8 @@ const CONFIDENCE: f64 = 0.95;
 const FIXED: u64 = 200;
 /// Largest number of samples of a sequential campaign, which stops when it is certain.
 const MOST: u64 = 2_000;
-/// Smallest share of campaigns whose interval must contain the true probability: two standard errors of 1,000 campaigns
-/// below 95 %.
+/// Smallest share of campaigns whose interval must contain the true probability: two standard
+/// errors of 1,000 campaigns below 95 %.
 const LEAST_COVERAGE: f64 = 0.935;
 
 /// The result of one campaign.

@@ -1,21 +1,23 @@
-//! Validates the tracking by the rear sensors: its range, its accuracy and the consistency of its covariance, over many
-//! approaches of a vehicle from behind.
+//! Validates the tracking by the rear sensors: its range, its accuracy and the consistency of its
+//! covariance, over many approaches of a vehicle from behind.
 //!
 //! ```text
 //! cargo run --release -p closecall-xtask -- validate-tracking [SEED]
 //! ```
 //!
-//! In each approach a vehicle drives in the ego's lane, 10 to 60 km/h faster than the ego. The output has one line for
-//! each type of target, with these columns:
-//! - the bumper-to-bumper distances at which 95 %, 50 % and 5 % of the approaches had a confirmed track;
+//! In each approach a vehicle drives in the ego's lane, 10 to 60 km/h faster than the ego. The
+//! output has one line for each type of target, with these columns:
+//! - the bumper-to-bumper distances at which 95 %, 50 % and 5 % of the approaches had a confirmed
+//!   track;
 //! - the root mean square error of the speed, once the vehicle has been tracked for 1 s;
-//! - the mean normalised estimation error squared (NEES), which is 4 if the covariance is consistent;
+//! - the mean normalised estimation error squared (NEES), which is 4 if the covariance is
+//!   consistent;
 //! - the number of identity switches;
 //! - the number of confirmed tracks without a vehicle;
 //! - the share of the steps with a confirmed track in which the track is classified as a vehicle.
 //!
-//! No constant was tuned on the default seed, 2026: those of the scanner were chosen with seed 11, those of the tracker
-//! with other seeds.
+//! No constant was tuned on the default seed, 2026: the constants of the scanner were chosen with
+//! seed 11, and the constants of the tracker with other seeds.
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use closecall_sensors::{NoiseKey, Scene, SceneVehicle, SensorMode, Sensors, SensorsConfig, TrackAudit};
@@ -56,9 +58,10 @@ struct CaseResult {
     confirmed_at_m: Vec<f64>,
     audit: TrackAudit,
     false_tracks: usize,
-    /// Number of steps in which the confirmed track is classified as a vehicle, and of all steps with a confirmed
-    /// track.
-    classified_as_vehicle: (u64, u64),
+    /// Number of steps with a confirmed track.
+    confirmed_steps: u64,
+    /// Number of these steps in which the track is classified as a vehicle.
+    vehicle_steps: u64,
 }
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64, speed_mps: f64) -> SceneVehicle {
@@ -89,7 +92,8 @@ fn approach(case: &Case, sensors: &Sensors, [seed, sample]: [u64; 2], result: &m
     let mut rear = vehicle(1, case.class, 0.0, EGO_MPS + closing_mps);
     rear.vehicle.appearance.paint_reflectivity = case.paint;
     let [ego_m, rear_m] = [ego, rear].map(|vehicle| vehicle.vehicle.dimensions.length_m);
-    // The offset varies the distances at which each side of the alternating mirror scans the vehicle.
+    // The offset varies the distances at which each side of the alternating mirror scans the
+    // vehicle.
     rear.state.s_m = ego.state.s_m - touching_distance_m(ego_m, rear_m) - START_GAP_M - 0.37 * sample as f64;
     let (mut audit, mut settled, mut confirmed_scans) = (TrackAudit::default(), TrackAudit::default(), 0);
     let mut confirmed_at_m = 0.0;
@@ -110,8 +114,8 @@ fn approach(case: &Case, sensors: &Sensors, [seed, sample]: [u64; 2], result: &m
                 confirmed_at_m = gap_m;
             }
             confirmed_scans += 1;
-            result.classified_as_vehicle.0 += u64::from(track.class.vehicle() > 0.5);
-            result.classified_as_vehicle.1 += 1;
+            result.vehicle_steps += u64::from(track.class.vehicle() > 0.5);
+            result.confirmed_steps += 1;
         }
         if confirmed_scans > SETTLING_SCANS {
             settled.observe(tracks, &scene).expect("finite");
@@ -157,7 +161,6 @@ pub(crate) fn main(words: Vec<String>) {
 fn print(case: &Case, result: &mut CaseResult) {
     result.confirmed_at_m.sort_by(f64::total_cmp);
     let at = |share: f64| result.confirmed_at_m[(share * (RUNS - 1) as f64).round() as usize];
-    let (vehicle, of) = result.classified_as_vehicle;
     println!(
         "{:26} {:5.0} m {:5.0} m {:5.0} m {:5.2} m/s {:5.2} {:8} {:6} {:8.3}",
         case.name,
@@ -168,6 +171,6 @@ fn print(case: &Case, result: &mut CaseResult) {
         result.audit.mean_nees().unwrap_or(f64::NAN),
         result.audit.id_switches,
         result.false_tracks,
-        vehicle as f64 / of.max(1) as f64,
+        result.vehicle_steps as f64 / result.confirmed_steps.max(1) as f64,
     );
 }

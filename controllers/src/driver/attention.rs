@@ -1,9 +1,10 @@
-//! Lapses of attention: a driver who looks away observes nothing new, and assumes that traffic continues unchanged.
+//! Lapses of attention: a driver who looks away observes nothing new, and assumes that traffic
+//! continues unchanged.
 //!
-//! Eyes off the road for more than 2 s in total double the risk of a crash or near-crash (Klauer et al., *The Impact of
-//! Driver Inattention on Near-Crash/Crash Risk*, DOT HS 810 594, 2006, as later work quotes it). A lapse does not depend on the traffic: it begins at a
-//! time that the scenario gives, or at random times with a given mean interval, drawn from the driver's own random
-//! stream.
+//! Eyes off the road for more than 2 s in total double the risk of a crash or near-crash (Klauer et
+//! al., *The Impact of Driver Inattention on Near-Crash/Crash Risk*, DOT HS 810 594, 2006, as later
+//! work quotes it). A lapse does not depend on the traffic: it begins at a time that the scenario
+//! gives, or at random times with a given mean interval, drawn from the driver's own random stream.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, StandardNormal, Stream, Time, maths};
 use rand::{RngExt, distr::Distribution};
@@ -13,7 +14,8 @@ use serde::{Deserialize, Serialize};
 /// Longest duration of a lapse (s): a limit of the configuration.
 const MAX_LAPSE_S: f64 = 30.0;
 
-/// Lapses of attention as a scenario file describes them. Exactly one of `at-s` and `every-s` is given.
+/// Lapses of attention as a scenario file describes them. Exactly one of `at-s` and `every-s` is
+/// given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LapseConfig {
@@ -21,10 +23,11 @@ pub struct LapseConfig {
     pub at_s: Option<Num>,
     /// Mean time from the end of one random lapse to the start of the next (s).
     pub every_s: Option<Num>,
-    /// Duration for which the driver looks away (s): 0 to 30. With `duration-sigma`, the median of it.
+    /// Duration for which the driver looks away (s): 0 to 30. With `duration-sigma`, the median of
+    /// it.
     pub duration_s: Num,
-    /// Standard deviation of the logarithm of the duration, which is then drawn anew for each lapse: 0 to 2. Default:
-    /// each lapse has the same duration.
+    /// Standard deviation of the logarithm of the duration, which is then drawn anew for each
+    /// lapse: 0 to 2. Default: each lapse has the same duration.
     pub duration_sigma: Option<Num>,
 }
 
@@ -69,8 +72,8 @@ impl Check for LapseConfig {
     }
 }
 
-/// Checks the lapses of a driver. They need a driver with a reaction time (`perceives`): a driver without one uses the
-/// true state of traffic at each step.
+/// Checks the lapses of a driver. They need a driver with a reaction time (`perceives`): a driver
+/// without one uses the true state of traffic at each step.
 pub(crate) fn check_lapse(
     lapse: Option<&LapseConfig>,
     perceives: bool,

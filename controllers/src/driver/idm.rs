@@ -1,13 +1,13 @@
 //! The Intelligent Driver Model (IDM), the second and simpler car-following model.
 //!
-//! Treiber, Hennecke and Helbing, *Congested traffic states in empirical observations and microscopic simulations*,
-//! Physical Review E 62 (2000) 1805–1824, equations 1 and 2:
+//! Treiber, Hennecke and Helbing, *Congested traffic states in empirical observations and
+//! microscopic simulations*, Physical Review E 62 (2000) 1805–1824, equations 1 and 2:
 //!
 //! a = A·(1 − (v/v₀)⁴ − (s*/g)²) with s* = s₀ + max(0, v·T + v·(v − v_l)/(2·√(A·B)))
 //!
-//! Here v is the own speed, v₀ the desired speed, v_l the speed of the lead vehicle and g the gap; [`IdmConfig`]
-//! defines the parameters, whose defaults are those of that paper. Above v₀, the free term brakes with B at most; the published term grows with the fourth
-//! power of the speed.
+//! Here v is the own speed, v₀ the desired speed, v_l the speed of the lead vehicle and g the gap;
+//! [`IdmConfig`] defines the parameters, whose defaults come from that paper. Above v₀, the free
+//! term brakes with B at most; the published term grows with the fourth power of the speed.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
 use schemars::JsonSchema;
@@ -23,14 +23,16 @@ use super::{Driver, DriverAction, DriverError, DriverInput, Lead, Looks, check_f
 /// Largest comfortable deceleration that a scenario may give (m/s²): a limit of the configuration.
 const MAX_COMFORTABLE_BRAKING_MPS2: f64 = 8.0;
 
-/// Smallest gap that enters the interaction term (m): numerical; at a gap of zero the term diverges.
+/// Smallest gap that enters the interaction term (m): numerical; at a gap of zero the term
+/// diverges.
 const MIN_GAP_M: f64 = 0.1;
 
 /// The Intelligent Driver Model as a scenario file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct IdmConfig {
-    /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial speed.
+    /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial
+    /// speed.
     pub desired_speed_mps: Option<Num>,
     /// Time gap T (s). Default: 1.5.
     pub time_gap_s: Option<Num>,
@@ -40,7 +42,8 @@ pub struct IdmConfig {
     pub acceleration_mps2: Option<Num>,
     /// Comfortable deceleration B (m/s²). Default: 1.67.
     pub comfortable_braking_mps2: Option<Num>,
-    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a reaction time.
+    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a
+    /// reaction time.
     pub brake_build_up_mps3: Option<Num>,
     /// Hardest braking (m/s²): 4 to 9. Default: 6.7.
     pub hardest_braking_mps2: Option<Num>,
@@ -124,7 +127,8 @@ impl Idm {
         }
     }
 
-    /// Returns the acceleration at `speed_mps` behind `lead` (m/s²). Braking is limited to the hardest of the driver.
+    /// Returns the acceleration at `speed_mps` behind `lead` (m/s²). Braking is limited to the
+    /// hardest of the driver.
     pub fn acceleration_mps2(&self, speed_mps: f64, desired_mps: f64, lead: Option<&Lead>) -> f64 {
         let ratio = if desired_mps > 0.0 { speed_mps / desired_mps } else { f64::from(u8::from(speed_mps > 0.0)) };
         let interaction = lead.map_or(0.0, |lead| {
@@ -191,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_equilibrium_gap_is_the_published_one() {
+    fn the_equilibrium_gap_is_the_published_gap() {
         let idm = IdmConfig::default().check(&Parameters::default()).unwrap();
         // Equilibrium gap (Treiber 2000, equation 5): (s0 + v·T)/√(1 − (v/v0)⁴).
         let gap_m = (2.0 + 20.0 * 1.5) / (1.0 - (20.0_f64 / 33.3).powi(4)).sqrt();

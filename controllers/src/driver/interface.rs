@@ -1,7 +1,7 @@
 //! The interface between human drivers and the simulation loop.
 //!
-//! The loop gives a driver the true state of the surrounding vehicles. The driver itself models how a human perceives
-//! that state: with a delay and imprecisely.
+//! The loop gives a driver the true state of the surrounding vehicles. The driver itself models how
+//! a human perceives that state: with a delay and imprecisely.
 
 use closecall_traffic::{Indicator, Lane, Road, Stream, Time, Vehicle, VehicleClass, VehicleState};
 
@@ -10,7 +10,8 @@ use closecall_traffic::{Indicator, Lane, Road, Stream, Time, Vehicle, VehicleCla
 pub struct Neighbour {
     /// Index in the scenario's list of actors.
     pub actor: usize,
-    /// Bumper-to-bumper gap to the driver's vehicle, ahead or behind (m). Negative if the two overlap longitudinally.
+    /// Bumper-to-bumper gap to the driver's vehicle, ahead or behind (m). Negative if the two
+    /// overlap longitudinally.
     pub gap_m: f64,
     /// Speed along the road (m/s).
     pub speed_mps: f64,
@@ -30,7 +31,8 @@ pub struct Neighbour {
     pub lateral_offset_m: f64,
 }
 
-/// The vehicles nearest to a driver in one lane. A vehicle counts as being in each lane that its box overlaps.
+/// The vehicles nearest to a driver in one lane. A vehicle counts as being in each lane that its
+/// box overlaps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LaneNeighbours {
     /// The nearest vehicle that is entirely ahead.
@@ -46,25 +48,29 @@ pub struct LaneNeighbours {
 pub struct Neighbours {
     /// In the lane that contains the centre of the driver's vehicle.
     pub own: LaneNeighbours,
-    /// In the lane to the left; `None` if there is no such lane, or if the driver does not look there.
+    /// In the lane to the left; `None` if there is no such lane, or if the driver does not look
+    /// there.
     pub left: Option<LaneNeighbours>,
-    /// In the lane to the right; `None` if there is no such lane, or if the driver does not look there.
+    /// In the lane to the right; `None` if there is no such lane, or if the driver does not look
+    /// there.
     pub right: Option<LaneNeighbours>,
-    /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on
-    /// would hit it.
+    /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally:
+    /// driving straight on would hit it.
     pub in_path: Option<Neighbour>,
-    /// The second leader: the nearest vehicle in the path that is ahead of the one ahead (the nearer of the lead vehicle in
-    /// the own lane and the one in the path). The driver may see it through the windows between. `None` if there is none, or
-    /// if the driver does not look that far.
+    /// The second leader: the nearest vehicle in the path beyond the vehicle ahead. The vehicle
+    /// ahead is the nearer of the lead vehicle in the own lane and the vehicle in the path. The
+    /// driver may see it through the windows between. `None` if there is none, or if the driver
+    /// does not look that far.
     pub beyond: Option<Neighbour>,
 }
 
-/// The neighbours that a driver takes into account, beside those in its own lane and in its path.
+/// The neighbours that a driver takes into account, beside the neighbours in its own lane and in
+/// its path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Looks {
     /// Those in the lanes to the left and to the right.
     pub adjacent: bool,
-    /// The vehicle beyond the one ahead.
+    /// The vehicle beyond the vehicle ahead.
     pub beyond: bool,
 }
 
@@ -97,14 +103,15 @@ pub struct DriverInput<'a> {
 }
 
 impl DriverInput<'_> {
-    /// Returns the present desired speed of a driver with the long-term desired speed `long_term_mps` (m/s). It is at
-    /// least half of the long-term one.
+    /// Returns the present desired speed of a driver with the long-term desired speed
+    /// `long_term_mps` (m/s). It is at least half of the long-term one.
     pub(crate) fn desired_now_mps(&self, long_term_mps: f64) -> f64 {
         (long_term_mps + self.desired_speed_offset_mps).max(0.5 * long_term_mps)
     }
 }
 
-/// A command to begin a lane change now. The plant follows a smooth path to the centre of the target lane.
+/// A command to begin a lane change now. The plant follows a smooth path to the centre of the
+/// target lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneChange {
     /// Target lane.
@@ -118,7 +125,8 @@ pub struct LaneChange {
 pub struct DriverAction {
     /// Commanded acceleration (m/s²); must be finite.
     pub acceleration_mps2: f64,
-    /// A lane change to begin, or a new target for the one in progress (an abort is a lane change back).
+    /// A lane change to begin, or a new target for the lane change in progress (an abort is a lane
+    /// change back).
     pub lane_change: Option<LaneChange>,
     /// Direction indicator to show.
     pub indicator: Indicator,
@@ -143,10 +151,10 @@ pub enum DriverNote {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriverError {
     /// A quantity is infinite or NaN.
-    #[error("failed to drive: {what} is not finite at {time}")]
+    #[error("failed to drive: {quantity} is not finite at {time}")]
     NotFinite {
         /// Name of the quantity.
-        what: &'static str,
+        quantity: &'static str,
         /// Time of the step that failed.
         time: Time,
     },

@@ -1,21 +1,24 @@
 //! Human lane keeping: the vehicle weaves around the path that the driver intends to take.
 //!
-//! The lateral deviation from the intended path is white noise in the steering, filtered by three lags. The lags are
-//! fitted to the trajectory data US-101 (NGSIM, 120 vehicles that stay in one lane for at least 8 s at more than 8 m/s,
-//! within 1.2 m of its centre; mean speed 14 m/s). There the variogram of the lateral position, half of the mean
-//! squared difference, is 0.0105, 0.0224, 0.0315, 0.049, 0.0685 and 0.080 m² at 1, 2, 3, 5, 8 and 12 s. With a standard
-//! deviation of 0.284 m, the lags below reproduce it within 17 %. At 1 s the variogram of the model is lower: that of
-//! the data contains measurement errors that no vehicle drives. The standard deviation is a parameter of each driver
-//! (`sdlp-m`).
+//! The lateral deviation from the intended path is white noise in the steering, filtered by three
+//! lags. The lags are fitted to the trajectory data US-101 (NGSIM, 120 vehicles that stay in one
+//! lane for at least 8 s at more than 8 m/s, within 1.2 m of its centre; mean speed 14 m/s). There
+//! the variogram of the lateral position, half of the mean squared difference, is 0.0105, 0.0224,
+//! 0.0315, 0.049, 0.0685 and 0.080 m² at 1, 2, 3, 5, 8 and 12 s. With a standard deviation of 0.284
+//! m, the lags below reproduce it within 17 %. At 1 s the variogram of the model is lower: the
+//! variogram of the data contains measurement errors that no vehicle drives. The standard deviation
+//! is a parameter of each driver (`sdlp-m`).
 //!
-//! The deviation is a function of the distance driven, as the path of a lane change is: a driver who brakes stays on
-//! the path, and a vehicle at standstill does not move sideways. The lags hold at 30 m/s. No trajectory data at hand
-//! show how drivers weave at that speed; that they steer there as quickly as on US-101 is an assumption. As a function
-//! of distance, the lateral acceleration then has a standard deviation of 0.3 m/s² (at 30 m/s, with 0.2 m of
-//! deviation). With the recorded 14 m/s as reference speed it would be 1.3 m/s², which is unrealistic.
+//! The deviation is a function of the distance driven, as the path of a lane change is: a driver
+//! who brakes stays on the path, and a vehicle at standstill does not move sideways. The lags hold
+//! at 30 m/s. No trajectory data at hand show how drivers weave at that speed; it is an assumption
+//! that they steer there as quickly as on US-101. As a function of distance, the lateral
+//! acceleration then has a standard deviation of 0.3 m/s² (at 30 m/s, with 0.2 m of deviation).
+//! With the recorded 14 m/s as reference speed it would be 1.3 m/s², which is unrealistic.
 //!
-//! A run starts on the intended path without deviation, because the scenario gives the initial positions. After three
-//! times the longest lag, the deviation has its stationary standard deviation.
+//! A run starts on the intended path without deviation, because the scenario gives the initial
+//! positions. After three times the longest lag, the deviation has its stationary standard
+//! deviation.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Side, Stream};
 use schemars::JsonSchema;
@@ -33,9 +36,9 @@ const REFERENCE_SPEED_MPS: f64 = 30.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LaneKeepingConfig {
-    /// Standard deviation of the lateral position, SDLP (m): 0 to 0.5. Sober drivers on highways: about 0.2 m, an
-    /// assumption (Verster and Roth, *International Journal of General Medicine* 4 (2011) 359–371, describe the measure;
-    /// the value was not found in a text at hand).
+    /// Standard deviation of the lateral position, SDLP (m): 0 to 0.5. Sober drivers on highways:
+    /// about 0.2 m, an assumption (Verster and Roth, *International Journal of General Medicine* 4
+    /// (2011) 359–371, describe the measure; the value was not found in a text at hand).
     pub sdlp_m: Num,
 }
 
@@ -54,14 +57,15 @@ impl Check for LaneKeepingConfig {
 }
 
 impl LaneKeeping {
-    /// Returns the standard deviation of the lateral acceleration due to weaving at this speed (m/s²).
+    /// Returns the standard deviation of the lateral acceleration due to weaving at this speed
+    /// (m/s²).
     pub fn lateral_acceleration_sd_mps2(&self, speed_mps: f64) -> f64 {
         let [_, second_per_s2] = derivative_sds(LAGS_S);
         self.sdlp_m * second_per_s2 * (speed_mps / REFERENCE_SPEED_MPS).powi(2)
     }
 
-    /// Creates the weaving of one run, or `None` if the driver does not weave. It is mirrored if traffic overtakes on
-    /// the right.
+    /// Creates the weaving of one run, or `None` if the driver does not weave. It is mirrored if
+    /// traffic overtakes on the right.
     pub fn weave(&self, overtaking_side: Side, rng: Stream) -> Option<Weave> {
         let sign = match overtaking_side {
             Side::Left => 1.0,
@@ -90,7 +94,8 @@ pub struct Deviation {
 }
 
 impl Weave {
-    /// Returns the deviation after the distance `distance_m`, which must not decrease from call to call.
+    /// Returns the deviation after the distance `distance_m`, which must not decrease from call to
+    /// call.
     pub fn at(&mut self, distance_m: f64) -> Deviation {
         let [value, first, second] = self.noise.at(distance_m / REFERENCE_SPEED_MPS).map(|part| self.sign * part);
         Deviation {
@@ -114,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn the_variogram_agrees_with_that_of_us_101() {
+    fn the_variogram_agrees_with_us_101() {
         const RECORDED_M2: [(f64, f64); 6] =
             [(1.0, 0.0105), (2.0, 0.0224), (3.0, 0.0315), (5.0, 0.049), (8.0, 0.0685), (12.0, 0.080)];
         let mut weave = weave(0.284, 1, Side::Left).unwrap();
@@ -124,7 +129,7 @@ mod tests {
         for (lag_s, recorded_m2) in RECORDED_M2 {
             let lag_steps = (lag_s / step_s) as usize;
             let pairs = offsets_m.iter().zip(&offsets_m[lag_steps..]);
-            let squares: f64 = pairs.map(|(one, other)| (one - other) * (one - other)).sum();
+            let squares: f64 = pairs.map(|(a, b)| (a - b) * (a - b)).sum();
             let variogram_m2 = 0.5 * squares / (offsets_m.len() - lag_steps) as f64;
             let ratio = variogram_m2 / recorded_m2;
             assert!((0.81..1.17).contains(&ratio), "at {lag_s} s: {variogram_m2} m², recorded {recorded_m2} m²");

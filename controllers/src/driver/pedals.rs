@@ -1,4 +1,4 @@
-//! How fast a human driver applies the brake.
+//! The rate at which a human driver applies the brake.
 //!
 //! ```text
 //!  acceleration ▲
@@ -8,27 +8,31 @@
 //!               └──────────────▶ time
 //! ```
 //!
-//! A driver releases the accelerator at once. From the deceleration that this gives, braking builds up at a limited rate: UN Regulation 157 (annex 4, appendix 3) lets its competent human driver reach
-//! 0.774 g within 0.6 s. The value was read in open implementations (ec-jrc/JRC-FSM, esmini), not in the regulation.
-//! Range for an ensemble: 5 to 25 m/s³. In crashes and near-crashes the rate grows with urgency, in the median 3.4·g/τ
-//! for a time to collision τ: 17 m/s³ at 2 s (Markkula et al., Accident Analysis and Prevention 95 (2016) 209–226,
-//! parameters in the authors' code). Drivers often take more than a second to reach emergency deceleration (Ising et al.,
-//! Proceedings of the Human Factors and Ergonomics Society 56 (2012)).
+//! A driver releases the accelerator at once. From the resulting deceleration, braking builds up at
+//! a limited rate: UN Regulation 157 (annex 4, appendix 3) lets its competent human driver reach
+//! 0.774 g within 0.6 s. The value was read in open implementations (ec-jrc/JRC-FSM, esmini), not
+//! in the regulation. Range for an ensemble: 5 to 25 m/s³. In crashes and near-crashes the rate
+//! grows with urgency, in the median 3.4·g/τ for a time to collision τ: 17 m/s³ at 2 s (Markkula et
+//! al., Accident Analysis and Prevention 95 (2016) 209–226, parameters in the authors' code).
+//! Drivers often take more than a second to reach emergency deceleration (Ising et al., Proceedings
+//! of the Human Factors and Ergonomics Society 56 (2012)).
 //!
-//! The reaction time ends when the braking begins. The release of either pedal is not limited: no source was found.
+//! The reaction time ends when the braking begins. The release of either pedal is not limited: no
+//! source was found.
 
 use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
 
 use super::COASTING_DECELERATION_MPS2;
 
-/// Largest rate at which a driver builds up braking if the scenario gives none (m/s³) (UN Regulation 157).
+/// Largest rate at which a driver builds up braking if the scenario gives none (m/s³) (UN
+/// Regulation 157).
 pub(crate) const DEFAULT_BRAKE_BUILD_UP_MPS3: f64 = 12.65;
 
 /// Range of the rate at which a driver builds up braking (m/s³).
 const BRAKE_BUILD_UP_RANGE: Range = Range::closed(1.0, 100.0);
 
-/// Checks the rate at which a driver builds up braking (m/s³). A driver without a reaction time (`perceives` is false)
-/// is not limited, and has none.
+/// Checks the rate at which a driver builds up braking (m/s³). A driver without a reaction time
+/// (`perceives` is false) is not limited, and has none.
 pub(crate) fn check_brake_build_up(
     rate: Option<&Num>,
     perceives: bool,
@@ -59,7 +63,8 @@ impl Pedals {
         Self { build_up_mps3, last: None }
     }
 
-    /// Returns `requested_mps2`, or the strongest braking that the driver can have built up by `now` (m/s²).
+    /// Returns `requested_mps2`, or the strongest braking that the driver can have built up by
+    /// `now` (m/s²).
     pub(crate) fn apply_mps2(&mut self, requested_mps2: f64, now: Time) -> f64 {
         let (time, last_mps2) = self.last.unwrap_or((now, 0.0));
         let strongest_mps2 = last_mps2.min(-COASTING_DECELERATION_MPS2) - self.build_up_mps3 * (now - time).s();

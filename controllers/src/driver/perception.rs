@@ -1,44 +1,49 @@
-//! What a human driver perceives: the surroundings with a delay, and less precisely than they are.
+//! The perception of a human driver: the surroundings with a delay, and imprecisely.
 //!
 //! ```text
 //!   truth ─▶ memory of observations ─▶ one reaction time ago ─▶ looming threshold ─▶ extrapolated to now ─▶ Lead
 //!            (≤ 100 Hz, 3 s)                                    brake light          (own motion known)
 //! ```
 //!
-//! - *Delay.* The driver knows the surroundings as they were one reaction time ago. Drivers compensate for part of that
-//!   delay: they know their own motion at once, and assume that other vehicles continue as perceived (temporal
-//!   anticipation; Treiber, Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*,
-//!   Physica A 360 (2006) 71–88). Only a change in the motion of another vehicle is perceived late.
-//! - *Urgency.* The shorter the perceived time to collision with the vehicle ahead, the shorter is the reaction time
-//!   (Summala 2000; see [`reaction`](super::reaction)).
-//! - *Looming threshold.* A driver can tell how large a speed difference is only if the visual angle of the vehicle ahead
-//!   changes faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident
-//!   Analysis and Prevention 28 (1996) 415–421). In reconstructed crashes drivers reacted at 0.012 to 0.04 rad/s (Maddox
-//!   and Kiefer 2012). A fixed threshold is a simplification: accumulated evidence reproduces the distribution of
-//!   reactions better (Xue et al., Accident Analysis and Prevention 118 (2018) 114–124). Below the threshold, the driver
-//!   assumes that the vehicle ahead keeps the
-//!   speed last noticed, initially the driver's own speed. The driver always knows the effect of its own accelerator
-//!   and brake. Once noticed, the difference is attended to until it falls below 0.0006 rad/s. That
-//!   value is an assumption; it is usually attributed to Michaels (*Perceptual factors in car following*, Proc. 2nd Int.
-//!   Symp. on the Theory of Road Traffic Flow, 1963), whose text was not at hand. Range: 0.0003 to 0.001 rad/s.
-//! - *Brake light.* The brake light is perceived with the same delay as everything else. The deceleration itself is
-//!   perceived only gradually, from the change of speed. Until then, a driver who sees the brake light go on assumes a
-//!   moderate deceleration.
-//! - *Second leader.* A driver also sees the next vehicle beyond the one ahead: through the windows of a car, past a
-//!   motorcycle, and behind a truck only where its rear reaches past the truck. It perceives position and speed of the second
-//!   leader as it does those of the vehicle ahead, and expects the vehicle ahead to brake once it perceives the brake light of
-//!   the second leader (spatial anticipation; Treiber, Kesting and Helbing 2006). The sensitivity to the second leader is
-//!   half of the one to the vehicle ahead (Hoogendoorn and Ossen 2006; see [`PerceptionConfig`]).
-//! - *Leader that leaves.* A lane change takes seconds, and the driver foresees its end. Once the vehicle ahead is out of the
-//!   lane, the driver reacts to the next vehicle at once, with what it knows about that one, if it was in view one reaction
-//!   time ago.
-//! - *Evidence.* A driver may accumulate looming evidence instead of using the threshold and the brake light:
-//!   see [`evidence`].
+//! - *Delay.* The driver knows the surroundings as they were one reaction time ago. Drivers
+//!   compensate for part of that delay: they know their own motion at once, and assume that other
+//!   vehicles continue as perceived (temporal anticipation; Treiber, Kesting and Helbing, *Delays,
+//!   inaccuracies and anticipation in microscopic traffic models*, Physica A 360 (2006) 71–88).
+//!   Only a change in the motion of another vehicle is perceived late.
+//! - *Urgency.* The shorter the perceived time to collision with the vehicle ahead, the shorter is
+//!   the reaction time (Summala 2000; see [`reaction`](super::reaction)).
+//! - *Looming threshold.* A driver can tell how large a speed difference is only if the visual
+//!   angle of the vehicle ahead changes faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of
+//!   relative velocity between vehicles*, Accident Analysis and Prevention 28 (1996) 415–421). In
+//!   reconstructed crashes drivers reacted at 0.012 to 0.04 rad/s (Maddox and Kiefer 2012). A fixed
+//!   threshold is a simplification: accumulated evidence reproduces the distribution of reactions
+//!   better (Xue et al., Accident Analysis and Prevention 118 (2018) 114–124). Below the threshold,
+//!   the driver assumes that the vehicle ahead keeps the speed last noticed, initially the driver's
+//!   own speed. The driver always knows the effect of its own accelerator and brake. Once the
+//!   driver has noticed the difference, it attends to it until the difference falls below 0.0006
+//!   rad/s. That value is an assumption; it is usually attributed to Michaels (*Perceptual factors
+//!   in car following*, Proc. 2nd Int. Symp. on the Theory of Road Traffic Flow, 1963), whose text
+//!   was not at hand. Range: 0.0003 to 0.001 rad/s.
+//! - *Brake light.* The brake light is perceived with the same delay as everything else. The
+//!   deceleration itself is perceived only gradually, from the change of speed. Until then, a
+//!   driver who sees the brake light go on assumes a moderate deceleration.
+//! - *Second leader.* A driver also sees the next vehicle beyond the vehicle ahead: through the
+//!   windows of a car, past a motorcycle, and behind a truck only where its rear reaches past the
+//!   truck. The driver perceives position and speed of the second leader as of the vehicle ahead.
+//!   Once the driver perceives the brake light of the second leader, it expects the vehicle ahead
+//!   to brake (spatial anticipation; Treiber, Kesting and Helbing 2006). The sensitivity to the
+//!   second leader is half of the sensitivity to the vehicle ahead (Hoogendoorn and Ossen 2006; see
+//!   [`PerceptionConfig`]).
+//! - *Leader that leaves.* A lane change takes seconds, and the driver foresees its end. Once the
+//!   vehicle ahead is out of the lane, the driver reacts to the next vehicle at once, with its
+//!   knowledge of that vehicle, if that vehicle was in view one reaction time ago.
+//! - *Evidence.* A driver may accumulate looming evidence instead of using the threshold and the
+//!   brake light: see [`evidence`].
 
 mod acceleration;
 mod config;
 mod evidence;
-mod known;
+mod known_vehicle;
 mod observation;
 
 pub(crate) use config::check_perception;
@@ -47,7 +52,7 @@ pub use evidence::{Evidence, EvidenceConfig};
 
 use closecall_traffic::{Lane, PHYSICS_STEP, Side, Stream, Time};
 
-use self::known::{KnownVehicle, PerceivedMotion};
+use self::known_vehicle::{KnownVehicle, PerceivedMotion};
 use self::observation::{Observation, ObservedVehicle};
 use super::attention::{Attention, Lapse};
 use super::reaction::{MAX_REACTION_S, shortened_by_urgency};
@@ -56,15 +61,16 @@ use super::{DriverInput, Lead};
 /// Slowest change of the visual angle that a driver can scale (rad/s) (Hoffmann and Mortimer 1996).
 const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
 
-/// Slowest change of the visual angle that is still noticed by a driver who already attends to it (rad/s): an
-/// assumption; 0.0003 to 0.001 are plausible.
+/// Slowest change of the visual angle that is still noticed by a driver who already attends to it
+/// (rad/s): an assumption; 0.0003 to 0.001 are plausible.
 const ATTENDED_THRESHOLD_RADPS: f64 = 0.0006;
 
-/// Smallest gap by which a difference of speeds is divided (m): numerical; at a gap of zero the ratio diverges.
+/// Smallest gap by which a difference of speeds is divided (m): numerical; at a gap of zero the
+/// ratio diverges.
 const MIN_GAP_M: f64 = 0.1;
 
-/// Number of stored observations: those within the longest reaction time, at most one in each physics step, plus one at
-/// either end.
+/// Number of stored observations: the observations within the longest reaction time, at most one in
+/// each physics step, plus one at either end.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive constant")]
 const MEMORY_CAPACITY: usize = (MAX_REACTION_S / PHYSICS_STEP.s()).round() as usize + 2;
 
@@ -84,7 +90,8 @@ pub(crate) struct PerceivedVehicle {
 }
 
 impl PerceivedVehicle {
-    /// Returns true if the vehicle would hit or be hit by that of the driver, if both kept their lateral positions.
+    /// Returns true if this vehicle and the driver's vehicle would touch with their present lateral
+    /// positions.
     pub(crate) fn is_in_path(&self, input: &DriverInput<'_>) -> bool {
         (self.d_m - input.own.d_m).abs() < 0.5 * (input.vehicle.dimensions.width_m + self.width_m)
     }
@@ -105,7 +112,8 @@ pub(crate) struct PerceivedScene {
     pub(crate) ahead: Option<PerceivedVehicle>,
     /// The second leader: the next vehicle in the path.
     pub(crate) beyond: Option<PerceivedVehicle>,
-    /// The observed side and the lane there, next to the driver's lane at the observation; `None` if there is none.
+    /// The observed side and the lane there, next to the driver's lane at the observation; `None`
+    /// if there is none.
     adjacent: Option<(Side, PerceivedLane)>,
     /// The driver's lane at the observation.
     pub(crate) lane: Lane,
@@ -135,13 +143,13 @@ pub(crate) struct Perception {
     /// Index of the observation in use, counted from the oldest.
     current: usize,
     settings: PerceptionSettings,
-    /// What the driver knows about the vehicle ahead and about the second leader.
-    known: [Option<KnownVehicle>; 2],
+    /// The driver's knowledge of the vehicle ahead and of the second leader.
+    leaders: [Option<KnownVehicle>; 2],
 }
 
 impl Perception {
-    /// Creates the perception of a driver with the reaction time `reaction_s` (s). `side` is the side whose adjacent
-    /// lane the driver observes, if any.
+    /// Creates the perception of a driver with the reaction time `reaction_s` (s). `side` is the
+    /// side whose adjacent lane the driver observes, if any.
     pub(crate) fn new(reaction_s: f64, side: Option<Side>) -> Self {
         Self {
             reaction_s,
@@ -152,7 +160,7 @@ impl Perception {
             oldest: 0,
             current: 0,
             settings: PerceptionSettings::default(),
-            known: [None; 2],
+            leaders: [None; 2],
         }
     }
 
@@ -171,9 +179,11 @@ impl Perception {
         self.side = Some(side);
     }
 
-    /// Stores an observation of the present, unless the driver looks away, and returns what the driver perceives now.
+    /// Stores an observation of the present, unless the driver looks away, and returns the driver's
+    /// present perception.
     pub(crate) fn observe(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> PerceivedScene {
-        // The first step is always observed: without any observation there is nothing to extrapolate from.
+        // The first step is always observed: without any observation there is nothing to
+        // extrapolate from.
         if !self.attention.is_looking_away(input.time, rng) || self.memory.is_empty() {
             self.store(input);
         }
@@ -225,8 +235,8 @@ impl Perception {
         }
     }
 
-    /// Returns the vehicle ahead and the second leader of an observation. If the second leader is the vehicle ahead by now, it
-    /// takes that place at once.
+    /// Returns the vehicle ahead and the second leader of an observation. If the second leader is
+    /// the vehicle ahead by now, it takes that place at once.
     fn leaders(&self, observation: &Observation) -> [Option<ObservedVehicle>; 2] {
         if !self.settings.looks_beyond() {
             return [observation.ahead, None];
@@ -238,7 +248,7 @@ impl Perception {
         }
     }
 
-    /// Updates what the driver knows about the `leaders`, and returns them as perceived.
+    /// Updates the driver's knowledge of the `leaders`, and returns them as perceived.
     fn perceive(
         &mut self,
         leaders: [Option<ObservedVehicle>; 2],
@@ -246,20 +256,21 @@ impl Perception {
         extrapolation: &Extrapolation,
         now: Time,
     ) -> [Option<PerceivedVehicle>; 2] {
-        let before = self.known;
-        let known = leaders.map(|leader| {
+        let before = self.leaders;
+        let tracked = leaders.map(|leader| {
             leader.map(|observed| {
-                let same = before.into_iter().flatten().find(|known| known.actor == observed.actor);
-                let mut known = same.unwrap_or_else(|| KnownVehicle::new(&observed, observation, now));
-                let perceived = known.perceive(&observed, observation, self.settings.evidence, now);
-                (known, extrapolation.braking_ahead(&observed, &perceived))
+                let same = before.into_iter().flatten().find(|vehicle| vehicle.actor == observed.actor);
+                let mut vehicle = same.unwrap_or_else(|| KnownVehicle::new(&observed, observation, now));
+                let perceived = vehicle.perceive(&observed, observation, self.settings.evidence, now);
+                (vehicle, extrapolation.braking_ahead(&observed, &perceived))
             })
         });
-        self.known = known.map(|leader| leader.map(|(known, _)| known));
-        known.map(|leader| leader.map(|(_, perceived)| perceived))
+        self.leaders = tracked.map(|leader| leader.map(|(vehicle, _)| vehicle));
+        tracked.map(|leader| leader.map(|(_, perceived)| perceived))
     }
 
-    /// Makes the driver expect that the vehicle ahead brakes if the second leader shows its brake light.
+    /// Makes the driver expect that the vehicle ahead brakes if the second leader shows its brake
+    /// light.
     fn anticipate(&self, ahead: &mut PerceivedVehicle, beyond: &PerceivedVehicle) {
         if beyond.brake_light {
             let expected_mps2 = self.settings.anticipation * beyond.lead.acceleration_mps2.min(0.0);
@@ -269,8 +280,8 @@ impl Perception {
     }
 }
 
-/// Displacement over `time_s` due to an acceleration, relative to motion at constant speed (m). A braking vehicle stops
-/// at standstill; it does not roll backwards.
+/// Displacement over `time_s` due to an acceleration, relative to motion at constant speed (m). A
+/// braking vehicle stops at standstill; it does not roll backwards.
 fn accelerated_displacement_m(speed_mps: f64, acceleration_mps2: f64, time_s: f64) -> f64 {
     if speed_mps + acceleration_mps2 * time_s >= 0.0 {
         0.5 * acceleration_mps2 * time_s * time_s
@@ -287,8 +298,8 @@ struct Extrapolation {
 }
 
 impl Extrapolation {
-    /// Perceived speed of a vehicle in the adjacent lane (m/s): its own, or the driver's if no difference is noticed.
-    /// The driver looks there too briefly to attend to a difference.
+    /// Perceived speed of a vehicle in the adjacent lane (m/s): its own, or the driver's if no
+    /// difference is noticed. The driver looks there too briefly to attend to a difference.
     fn adjacent_speed_mps(&self, observed: &ObservedVehicle) -> f64 {
         let notices = observed.visual_angle_rate_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
         if notices { observed.speed_mps } else { self.own_speed_then_mps }

@@ -1,7 +1,8 @@
-//! Reaction time of a driver: a fixed value, a parameter, or drawn once per run from the driver's own random stream.
+//! Reaction time of a driver: a fixed value, a parameter, or drawn once per run from the driver's
+//! own random stream.
 //!
-//! Green (*How long does it take to stop?*, Transportation Human Factors 2 (2000) 195–216) gives these brake reaction
-//! times:
+//! Green (*How long does it take to stop?*, Transportation Human Factors 2 (2000) 195–216) gives
+//! these brake reaction times:
 //!
 //! | situation | mean |
 //! |---|---|
@@ -9,10 +10,11 @@
 //! | unexpected but common, such as the brake lights of the vehicle ahead | about 1.25 s |
 //! | surprise, such as an object that moves into the path | about 1.5 s |
 //!
-//! Urgency shortens them: at a short time to the stop line the median is *rather below* 1.0 s instead of 1.25 s, and at a time
-//! to collision of about 4 s the mean is 1.0 to 1.3 s instead of 1.5 s (Summala, *Brake reaction times and driver behavior
-//! analysis*, ibid. 217–226, abstract). [`shortened_by_urgency`] says how. Green gives no distribution. The log-normal form is
-//! an assumption, and so is a σ of 0.3 to 0.4.
+//! Urgency shortens them: at a short time to the stop line the median is *rather below* 1.0 s
+//! instead of 1.25 s, and at a time to collision of about 4 s the mean is 1.0 to 1.3 s instead of
+//! 1.5 s (Summala, *Brake reaction times and driver behavior analysis*, ibid. 217–226, abstract).
+//! [`shortened_by_urgency`] defines the reaction time in between. Green gives no distribution. The
+//! log-normal form is an assumption, and so is a σ of 0.3 to 0.4.
 
 use std::fmt;
 
@@ -26,18 +28,20 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// Longest reaction time (s): an assumption. The memory of the perception has this length.
 pub(crate) const MAX_REACTION_S: f64 = 3.0;
 
-/// Share of the reaction time that is left in an urgent situation (-): 1.0 s of 1.25 s, and in the mean of its range 1.15 s of
-/// 1.5 s (Summala 2000). Range: 0.67 to 0.87.
+/// Share of the reaction time that is left in an urgent situation (-): 1.0 s of 1.25 s, and in the
+/// mean of its range 1.15 s of 1.5 s (Summala 2000). Range: 0.67 to 0.87.
 const URGENT_SHARE: f64 = 0.8;
 
 /// 1/TTC of an urgent situation (1/s): a time to collision of 4 s (Summala 2000).
 const URGENT_PER_S: f64 = 0.25;
 
-/// 1/TTC up to which a situation is not urgent (1/s): from it on, drivers begin ordinary braking (Kiefer et al. 2003).
+/// 1/TTC up to which a situation is not urgent (1/s): at this value, drivers begin ordinary braking
+/// (Kiefer et al. 2003).
 const ORDINARY_PER_S: f64 = 0.10;
 
-/// Returns the reaction time of a driver to whom the vehicle ahead comes nearer at this 1/TTC: `reaction_s` up to the value at
-/// which drivers brake in ordinary driving, [`URGENT_SHARE`] of it in an urgent situation, and linear between them (s).
+/// Returns the reaction time (s) of a driver at this 1/TTC to the vehicle ahead: `reaction_s` up to
+/// the value at which drivers brake in ordinary driving, [`URGENT_SHARE`] of it in an urgent
+/// situation, and linear in between.
 pub(crate) fn shortened_by_urgency(reaction_s: f64, inverse_ttc_per_s: f64) -> f64 {
     let urgency = ((inverse_ttc_per_s - ORDINARY_PER_S) / (URGENT_PER_S - ORDINARY_PER_S)).clamp(0.0, 1.0);
     reaction_s * (1.0 - urgency * (1.0 - URGENT_SHARE))
@@ -53,7 +57,8 @@ pub struct LogNormalConfig {
     pub sigma: Num,
 }
 
-/// A reaction time as a scenario file describes it: a number, `"$parameter"`, or `{ log-normal = { median, sigma } }`.
+/// A reaction time as a scenario file describes it: a number, `"$parameter"`, or
+/// `{ log-normal = { median, sigma } }`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReactionConfig {
@@ -141,12 +146,12 @@ pub enum Reaction {
 pub enum ReactionChange {
     /// The driver reacts at once to what it sees, and never looks away.
     AtOnce,
-    /// The driver reacts this much later (s), but at most 3 s after what it sees.
+    /// The driver reacts this much later (s), but at most 3 s after the event.
     Later(f64),
 }
 
 impl Reaction {
-    /// Returns the value, or the median of the drawn ones (s).
+    /// Returns the value, or the median of the drawn values (s).
     pub(crate) fn typical_s(self) -> f64 {
         match self {
             Self::Fixed(value) => value,

@@ -1,14 +1,15 @@
-//! Coloured noise with zero mean, as smooth as human steering and acceleration: white noise filtered by three
-//! first-order lags.
+//! Coloured noise with zero mean, as smooth as human steering and acceleration: white noise
+//! filtered by three first-order lags.
 //!
 //! ```text
 //!  white noise ─▶ 1/(1 + s·T₁) ─▶ 1/(1 + s·T₂) ─▶ 1/(1 + s·T₃) ─▶ value with two continuous derivatives
 //! ```
 //!
-//! Value, first and second derivative together form a Markov process with the state matrix A. They are sampled at knots
-//! a time h apart, with the exact transition Φ = exp(A·h) and covariance Q = P − Φ·P·Φᵀ, where P is the stationary
-//! covariance (Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, ch. 4). A quintic polynomial
-//! interpolates between two knots; it meets value and derivatives at both.
+//! Value, first and second derivative together form a Markov process with the state matrix A. They
+//! are sampled at knots a time h apart, with the exact transition Φ = exp(A·h) and covariance Q = P
+//! − Φ·P·Φᵀ, where P is the stationary covariance (Maybeck, *Stochastic Models, Estimation, and
+//! Control*, vol. 1, 1979, ch. 4). A quintic polynomial interpolates between two knots; it meets
+//! value and derivatives at both.
 
 use closecall_traffic::{Quintic, StandardNormal, Stream};
 use nalgebra::{Matrix3, Vector3};
@@ -36,8 +37,8 @@ pub(crate) struct SmoothNoise {
 }
 
 impl SmoothNoise {
-    /// Creates noise with the lags `lags_s` (s), each above 0, that starts at zero with zero derivatives. Its standard
-    /// deviation reaches `sd` after a few times the longest lag.
+    /// Creates noise with the lags `lags_s` (s), each above 0, that starts at zero with zero
+    /// derivatives. Its standard deviation reaches `sd` after a few times the longest lag.
     pub(crate) fn from_rest(sd: f64, lags_s: [f64; 3], rng: Stream) -> Self {
         let covariance = stationary_covariance(lags_s);
         let transition = (dynamics(lags_s) * KNOT_SPACING_S).exp();
@@ -54,7 +55,8 @@ impl SmoothNoise {
         noise
     }
 
-    /// Returns value, first and second derivative at `time_s`, which must not decrease from call to call.
+    /// Returns value, first and second derivative at `time_s`, which must not decrease from call to
+    /// call.
     pub(crate) fn at(&mut self, time_s: f64) -> [f64; 3] {
         while time_s > self.knot_s + KNOT_SPACING_S {
             self.knot_s += KNOT_SPACING_S;
@@ -70,7 +72,8 @@ impl SmoothNoise {
     }
 }
 
-/// Returns the standard deviations of the first (1/s) and second (1/s²) derivative of noise with standard deviation 1.
+/// Returns the standard deviations of the first (1/s) and second (1/s²) derivative of noise with
+/// standard deviation 1.
 pub(crate) fn derivative_sds(lags_s: [f64; 3]) -> [f64; 2] {
     let covariance = stationary_covariance(lags_s);
     [1, 2].map(|order| covariance[(order, order)].sqrt())
@@ -81,20 +84,23 @@ fn draw(rng: &mut Stream) -> Vector3<f64> {
     Vector3::from_fn(|_, _| StandardNormal.sample(rng))
 }
 
-/// Returns the state matrix A of the three lags, for the state (value, first derivative, second derivative).
+/// Returns the state matrix A of the three lags, for the state (value, first derivative, second
+/// derivative).
 fn dynamics(lags_s: [f64; 3]) -> Matrix3<f64> {
     let [a0, a1, a2] = characteristic(lags_s);
     Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, -a0, -a1, -a2)
 }
 
-/// Returns the coefficients (a₀, a₁, a₂) of the characteristic polynomial s³ + a₂·s² + a₁·s + a₀, whose roots are −1/T.
+/// Returns the coefficients (a₀, a₁, a₂) of the characteristic polynomial s³ + a₂·s² + a₁·s + a₀,
+/// whose roots are −1/T.
 fn characteristic(lags_s: [f64; 3]) -> [f64; 3] {
     let [p, q, r] = lags_s.map(|lag_s| 1.0 / lag_s);
     [p * q * r, p * q + q * r + r * p, p + q + r]
 }
 
-/// Returns the stationary covariance of value, first and second derivative for noise of variance 1. It follows from the
-/// moments of the spectrum: those of orders 0, 2 and 4 are in the ratio a₂/a₀ : 1 : a₁.
+/// Returns the stationary covariance of value, first and second derivative for noise of variance 1.
+/// It follows from the moments of the spectrum: the moments of orders 0, 2 and 4 are in the ratio
+/// a₂/a₀ : 1 : a₁.
 fn stationary_covariance(lags_s: [f64; 3]) -> Matrix3<f64> {
     let [a0, a1, a2] = characteristic(lags_s);
     let first = a0 / a2;
@@ -102,8 +108,8 @@ fn stationary_covariance(lags_s: [f64; 3]) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -first, 0.0, first, 0.0, -first, 0.0, second)
 }
 
-/// Returns the lower triangular L with L·Lᵀ = `covariance`. If the covariance is not positive definite, L is NaN, which
-/// the check of the driver's input refuses.
+/// Returns the lower triangular L with L·Lᵀ = `covariance`. If the covariance is not positive
+/// definite, L is NaN, which the check of the driver's input refuses.
 fn lower_triangle(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     covariance.cholesky().map_or_else(|| Matrix3::repeat(f64::NAN), |cholesky| cholesky.l())
 }
@@ -131,8 +137,9 @@ mod tests {
             squares.iter_mut().zip(now).for_each(|(sum, value)| *sum += value * value / f64::from(steps));
         }
         let expected = 0.2 * 0.2 * stationary_covariance(LAGS_S).diagonal();
-        // 40,000 s are some 10,000 times the longest lag: the sample variance is accurate to 3 %. Between the knots,
-        // the second derivative of the quintic varies slightly less than that of the noise.
+        // 40,000 s are some 10,000 times the longest lag: the sample variance is accurate to 3 %.
+        // Between the knots, the second derivative of the quintic varies slightly less than the
+        // second derivative of the noise.
         assert!((squares[0] / expected[0] - 1.0).abs() < 0.05, "{squares:?} {expected}");
         assert!((squares[1] / expected[1] - 1.0).abs() < 0.05, "{squares:?} {expected}");
         assert!((0.8..1.05).contains(&(squares[2] / expected[2])), "{squares:?} {expected}");

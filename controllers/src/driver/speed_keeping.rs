@@ -1,10 +1,11 @@
 //! Human speed keeping: the desired speed fluctuates around its long-term value.
 //!
-//! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*, Operations Research
-//! 7 (1959) 86–106) measured the standard deviation of the acceleration of free drivers, "acceleration noise", as about
-//! 0.1 m/s² on a good road (the method is theirs; the value was not found in a text at hand). Here the desired speed is white noise filtered by three lags. The longest lag stands for a
-//! driver who checks the speedometer only occasionally. The driver model decides how closely the vehicle follows the
-//! desired speed.
+//! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*,
+//! Operations Research 7 (1959) 86–106) measured the standard deviation of the acceleration of free
+//! drivers, "acceleration noise", as about 0.1 m/s² on a good road (the method is theirs; the value
+//! was not found in a text at hand). Here the desired speed is white noise filtered by three lags.
+//! The longest lag models a driver who checks the speedometer only occasionally. The driver model
+//! decides how closely the vehicle follows the desired speed.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream, Time};
 use schemars::JsonSchema;
@@ -19,7 +20,8 @@ const LAGS_S: [f64; 3] = [10.0, 1.0, 1.0];
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SpeedKeepingConfig {
-    /// Standard deviation of the rate of change of the desired speed (m/s²): 0 to 0.5; about 0.1 for humans.
+    /// Standard deviation of the rate of change of the desired speed (m/s²): 0 to 0.5; about 0.1
+    /// for humans.
     pub acceleration_noise_mps2: Num,
 }
 
@@ -48,15 +50,16 @@ impl SpeedKeeping {
     }
 }
 
-/// Generates the fluctuation of one driver's desired speed during a run. It starts at zero, because the scenario gives
-/// the initial speeds.
+/// Generates the fluctuation of one driver's desired speed during a run. It starts at zero, because
+/// the scenario gives the initial speeds.
 #[derive(Clone, Debug)]
 pub struct DesiredSpeedNoise {
     noise: SmoothNoise,
 }
 
 impl DesiredSpeedNoise {
-    /// Returns the offset of the desired speed at `time`, which must not decrease from call to call (m/s).
+    /// Returns the offset of the desired speed at `time`, which must not decrease from call to call
+    /// (m/s).
     pub fn at(&mut self, time: Time) -> f64 {
         let [offset_mps, ..] = self.noise.at(time.s());
         offset_mps

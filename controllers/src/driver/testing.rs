@@ -5,7 +5,8 @@ use closecall_traffic::{Indicator, Road, Time, Vehicle, VehicleClass, VehicleSta
 use super::reaction::ReactionConfig;
 use super::{DriverInput, FollowConfig, Lead, Neighbour, Neighbours, OvertakerConfig, Wiedemann99Config};
 
-/// Returns a driver who pulls out at a time headway of `cut_out_thw_s` and follows with this cc1 (s).
+/// Returns a driver who pulls out at a time headway of `cut_out_thw_s` and follows with this cc1
+/// (s).
 pub(super) fn overtaker_config(cut_out_thw_s: f64, cc1_s: f64) -> OvertakerConfig {
     OvertakerConfig {
         cut_out_thw_s: cut_out_thw_s.into(),
@@ -36,7 +37,8 @@ pub(super) fn car_ahead(lead: Lead, brake_light: bool) -> Neighbour {
     }
 }
 
-/// Passes `check` the input of a car that drives at 30 m/s in the middle of three lanes and keeps its lane.
+/// Passes `check` the input of a car that drives at 30 m/s in the middle of three lanes and keeps
+/// its lane.
 pub(super) fn with_input<T>(time: Time, neighbours: &Neighbours, check: impl FnOnce(&DriverInput<'_>) -> T) -> T {
     check(&DriverInput {
         time,

@@ -2,34 +2,38 @@
 //!
 //! The commanded acceleration drives the closing speed towards the value that the gap allows:
 //!
-//! a = (v_allowed(e) + v_F − v_E)/T, with the gap error e = g − max(T·v_E, g₀). Here v_E and v_F are the speeds of the
-//! ego and of the lead vehicle, T is the time gap, g the gap and g₀ the standstill gap.
+//! a = (v_allowed(e) + v_F − v_E)/T, with the gap error e = g − max(T·v_E, g₀). Here v_E and v_F
+//! are the speeds of the ego and of the lead vehicle, T is the time gap, g the gap and g₀ the
+//! standstill gap.
 //!
-//! Near the desired gap v_allowed = λ·e. This is the constant time gap law, whose platoons are string stable for T
-//! above twice the lag of the actuators (Swaroop and Rajagopal, *A review of constant time headway policy for automatic
-//! vehicle following*, IEEE ITSC 2001). Far from the desired gap v_allowed grows only with √e, as with constant
-//! comfortable braking, so that the ego uses up a surplus gap before it brakes. The ego does not accelerate to close in
-//! faster than a few metres per second.
+//! Near the desired gap v_allowed = λ·e. This is the constant time gap law, whose platoons are
+//! string stable for T above twice the lag of the actuators (Swaroop and Rajagopal, *A review of
+//! constant time headway policy for automatic vehicle following*, IEEE ITSC 2001). Far from the
+//! desired gap v_allowed grows only with √e, as with constant comfortable braking, so that the ego
+//! uses up a surplus gap before it brakes. The ego does not accelerate to close in faster than a
+//! few metres per second.
 //!
-//! If the lead vehicle brakes so that the ego will need all of the braking that the cruise control has
-//! ([`Front::required_braking_mps2`]), the ego begins with it at once instead of waiting until the gap is used up.
+//! If the lead vehicle brakes so that the ego will need all of the braking that the cruise control
+//! has ([`Front::required_braking_mps2`]), the ego begins with it at once instead of waiting until
+//! the gap is used up.
 //!
 //! # Limits
-//! ISO 15622 limits deceleration (average over 2 s) and the jerk with which braking builds up. Both limits fall linearly
-//! between two speeds:
+//! ISO 15622 limits deceleration (average over 2 s) and the jerk with which braking builds up. Both
+//! limits fall linearly between two speeds:
 //!
 //! | speed | deceleration | jerk |
 //! |---|---|---|
 //! | up to 5 m/s | 5 m/s² | 5 m/s³ |
 //! | from 20 m/s on | 3.5 m/s² | 2.5 m/s³ |
 //!
-//! The text of the standard was not at hand. Open-source driver assistance that implements it states the limits
-//! (comma.ai opendbc; sunnypilot). The standard averages the deceleration over 2 s; here the limit holds at every
-//! instant. The standard limits the build-up of braking only; that braking and acceleration are also released and built
-//! up at no more than this jerk is an assumption. Emergency braking is exempt.
+//! The text of the standard was not at hand. Open-source driver assistance that implements it
+//! states the limits (comma.ai opendbc; sunnypilot). The standard averages the deceleration over 2
+//! s; here the limit holds at every instant. The standard limits the build-up of braking only; it
+//! is an assumption that the same jerk limits the release of braking and the build-up and release
+//! of acceleration. Emergency braking is exempt.
 //!
-//! ISO 15622 also asks for a time gap of 0.8 s or more. The shorter gaps that the paper studies are the paper's
-//! assumption; no production system may keep them.
+//! ISO 15622 also asks for a time gap of 0.8 s or more. The paper assumes shorter gaps; no
+//! production system may keep them.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
@@ -41,13 +45,16 @@ use crate::reference::following_gap_m;
 
 /// Slowest speed at which a gap counts as a time gap (m/s): numerical.
 const SLOWEST_MPS: f64 = 1.0;
-/// λ: allowed closing speed per metre of gap error near the desired gap (1/s): an assumption; 0.1 to 0.5 are plausible.
+/// λ: allowed closing speed per metre of gap error near the desired gap (1/s): an assumption; 0.1
+/// to 0.5 are plausible.
 const ALLOWED_CLOSING_PER_M: f64 = 0.3;
 
-/// Braking with which the ego closes a long gap to the lead vehicle (m/s²): an assumption; 1 to 2 are plausible.
+/// Braking with which the ego closes a long gap to the lead vehicle (m/s²): an assumption; 1 to 2
+/// are plausible.
 const APPROACH_BRAKING_MPS2: f64 = 1.5;
 
-/// Closing speed above which the ego does not accelerate any more (m/s): an assumption; 2 to 6 are plausible.
+/// Closing speed above which the ego does not accelerate any more (m/s): an assumption; 2 to 6 are
+/// plausible.
 const MAX_CLOSING_UP_MPS: f64 = 4.0;
 
 /// A limit of ISO 15622 that changes linearly between two speeds.
@@ -81,10 +88,12 @@ impl SpeedLimited {
 /// Strongest acceleration (m/s²): an assumption. ISO 15622 allows 2 from 20 m/s on, and more below.
 const MAX_ACCELERATION_MPS2: f64 = 1.5;
 
-/// Shortest time constant of the control law (s): three times the lag of the actuators, for stability.
+/// Shortest time constant of the control law (s): three times the lag of the actuators, for
+/// stability.
 const MIN_TIME_CONSTANT_S: f64 = 0.45;
 
-/// Time constant with which the speed approaches the set speed (s): an assumption; 1 to 4 are plausible.
+/// Time constant with which the speed approaches the set speed (s): an assumption; 1 to 4 are
+/// plausible.
 const SPEED_TIME_CONSTANT_S: f64 = 2.0;
 
 /// Adaptive cruise control as a scenario file describes it.
@@ -168,7 +177,8 @@ impl Acc {
         }
     }
 
-    /// Returns the acceleration at `speed_mps` behind `lead`, on a road with the speed limit `limit_mps` (m/s²).
+    /// Returns the acceleration at `speed_mps` behind `lead`, on a road with the speed limit
+    /// `limit_mps` (m/s²).
     pub(crate) fn acceleration_mps2(&self, speed_mps: f64, limit_mps: f64, lead: Option<&Front>) -> f64 {
         let set_mps = self.set_speed_mps.unwrap_or(limit_mps);
         let mut desired = (set_mps - speed_mps) / SPEED_TIME_CONSTANT_S;
@@ -189,15 +199,16 @@ impl Acc {
         desired.clamp(-MAX_BRAKING_MPS2.at(speed_mps), MAX_ACCELERATION_MPS2)
     }
 
-    /// Returns the acceleration nearest to `requested_mps2` that the jerk limit allows `step_s` after the acceleration
-    /// `last_mps2` was commanded (m/s²).
+    /// Returns the acceleration nearest to `requested_mps2` that the jerk limit allows `step_s`
+    /// after the acceleration `last_mps2` was commanded (m/s²).
     pub(crate) fn limit_jerk_mps2(requested_mps2: f64, last_mps2: f64, speed_mps: f64, step_s: f64) -> f64 {
         let change_mps2 = MAX_JERK_MPS3.at(speed_mps) * step_s;
         requested_mps2.clamp(last_mps2 - change_mps2, last_mps2 + change_mps2)
     }
 }
 
-/// Returns the closing speed that the gap error `error_m` allows (m/s); negative if the gap is too short.
+/// Returns the closing speed that the gap error `error_m` allows (m/s); negative if the gap is too
+/// short.
 fn allowed_closing_mps(error_m: f64) -> f64 {
     // Gap error at which the straight line and the parabola of constant braking touch.
     let touch_m = APPROACH_BRAKING_MPS2 / (ALLOWED_CLOSING_PER_M * ALLOWED_CLOSING_PER_M);
@@ -230,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn the_limits_are_those_of_iso_15622() {
+    fn the_limits_follow_iso_15622() {
         for (speed_mps, braking_mps2, jerk_mps3) in
             [(0.0, 5.0, 5.0), (5.0, 5.0, 5.0), (20.0, 3.5, 2.5), (40.0, 3.5, 2.5)]
         {
@@ -257,8 +268,9 @@ mod tests {
         acceleration_mps2: f64,
     }
 
-    /// Simulates an ego from a gap (m) and speed (m/s) behind a vehicle at 30 m/s, with the limit of the jerk and the lag of
-    /// the actuators. `request` returns the requested acceleration (m/s²) for a gap and a speed.
+    /// Simulates an ego from a gap (m) and speed (m/s) behind a vehicle at 30 m/s, with the limit
+    /// of the jerk and the lag of the actuators. `request` returns the requested acceleration
+    /// (m/s²) for a gap and a speed.
     fn behind_30_mps((mut gap, mut speed): (f64, f64), request: impl Fn(f64, f64) -> f64) -> Followed {
         let (mut least, mut command, mut actual) = (f64::INFINITY, 0.0, 0.0);
         for step in 0..9000 {
@@ -276,16 +288,16 @@ mod tests {
     proptest! {
         #[test]
         fn a_longer_gap_never_requests_more_braking(
-            gap in 0.0..150.0, more in 0.0..20.0, lead in 0.0..40.0, own in 0.0..40.0,
+            gap in 0.0..150.0, more in 0.0..20.0, lead in 0.0..40.0, ego_mps in 0.0..40.0,
         ) {
-            let near = ACC.acceleration_mps2(own, 36.0, Some(&Front::new(gap, lead)));
-            let far = ACC.acceleration_mps2(own, 36.0, Some(&Front::new(gap + more, lead)));
+            let near = ACC.acceleration_mps2(ego_mps, 36.0, Some(&Front::new(gap, lead)));
+            let far = ACC.acceleration_mps2(ego_mps, 36.0, Some(&Front::new(gap + more, lead)));
             prop_assert!(far >= near);
         }
 
-        /// Simulates the closed loop with the lag of the actuators from many initial states. There is no collision, the least
-        /// gap is at least 0.4 of the desired one if any braking within the limits achieves that, and the gap settles at
-        /// the desired one without oscillation.
+        /// Simulates the closed loop with the lag of the actuators from many initial states. There
+        /// is no collision, the least gap is at least 0.4 of the desired one if any braking within
+        /// the limits achieves that, and the gap settles at the desired one without oscillation.
         #[test]
         fn the_gap_settles_without_oscillation(thw in 0.5..0.9, start in 0.6..3.0, slower in -3.0..3.0) {
             let acc = Acc { time_gap_s: thw, ..ACC };

@@ -1,12 +1,12 @@
 //! Automatic emergency braking: brakes only if the required deceleration demands it.
 //!
-//! The required deceleration is the constant deceleration with which the ego just keeps a small gap to the lead
-//! vehicle, if that vehicle continues to brake as it does now
+//! The required deceleration is the constant deceleration with which the ego just keeps a small gap
+//! to the lead vehicle, if that vehicle continues to brake as it does now
 //! ([`Front::required_braking_mps2`]).
 //!
-//! The system starts to brake if the required deceleration exceeds a threshold. It commands the required deceleration
-//! plus a margin, until the required deceleration is below a lower threshold. The friction limit is applied by the
-//! vehicle model, not here.
+//! The system starts to brake if the required deceleration exceeds a threshold. It commands the
+//! required deceleration plus a margin, until the required deceleration is below a lower threshold.
+//! The friction limit is applied by the vehicle model, not here.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
@@ -17,7 +17,8 @@ use super::surroundings::Front;
 /// Ratio of commanded to required deceleration: an assumption; 1 to 1.5 are plausible.
 const BRAKING_MARGIN: f64 = 1.15;
 
-/// Required deceleration below which emergency braking ends (m/s²): an assumption; 0.5 to 3 are plausible.
+/// Required deceleration below which emergency braking ends (m/s²): an assumption; 0.5 to 3 are
+/// plausible.
 const RELEASE_THRESHOLD_MPS2: f64 = 1.5;
 
 /// Speed below which the ego counts as standing (m/s): numerical.
@@ -30,8 +31,8 @@ const HOLDING_BRAKE_MPS2: f64 = 2.0;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct AebConfig {
-    /// Required deceleration above which it brakes (m/s²); 4 if absent: an assumption. Regulation (EU) 347/2012
-    /// demands at least this much in the emergency phase of heavy vehicles.
+    /// Required deceleration above which it brakes (m/s²); 4 if absent: an assumption. Regulation
+    /// (EU) 347/2012 demands at least this much in the emergency phase of heavy vehicles.
     pub trigger_mps2: Option<Num>,
     /// Strongest braking (m/s²); 9 if absent: an assumption, the friction of a dry road.
     pub max_deceleration_mps2: Option<Num>,
@@ -71,8 +72,8 @@ impl Aeb {
         lead.required_braking_mps2(speed_mps, self.standstill_gap_m)
     }
 
-    /// Returns the braking to apply (m/s²), or `None` if none is due. `was_braking` says whether the system braked at
-    /// the previous step.
+    /// Returns the braking to apply (m/s²), or `None` if none is due. `was_braking` says whether
+    /// the system braked at the previous step.
     pub(crate) fn braking_mps2(&self, was_braking: bool, speed_mps: f64, lead: Option<&Front>) -> Option<f64> {
         let required = lead.map_or(0.0, |lead| self.required_mps2(speed_mps, lead));
         if was_braking && speed_mps < STANDSTILL_MPS {
@@ -111,15 +112,16 @@ mod tests {
     }
 
     proptest! {
-        /// The required braking leaves exactly the standstill gap; checked by time-stepping both vehicles.
+        /// The required braking leaves exactly the standstill gap; checked by time-stepping both
+        /// vehicles.
         #[test]
         fn the_required_braking_just_suffices(
-            gap in 6.0..80.0, own in 5.0..40.0, faster in -5.0..15.0, braking in 0.5..9.0_f64,
+            gap in 6.0..80.0, ego_mps in 5.0..40.0, faster in -5.0..15.0, braking in 0.5..9.0_f64,
         ) {
-            let lead_mps = f64::max(own - faster, 0.5);
-            let required = AEB.required_mps2(own, &lead(gap, lead_mps, -braking));
+            let lead_mps = f64::max(ego_mps - faster, 0.5);
+            let required = AEB.required_mps2(ego_mps, &lead(gap, lead_mps, -braking));
             prop_assume!(required > 0.0 && required < 20.0);
-            let (step, mut e, mut f, mut least) = (1e-3, (0.0, own), (gap, lead_mps), gap);
+            let (step, mut e, mut f, mut least) = (1e-3, (0.0, ego_mps), (gap, lead_mps), gap);
             while e.1 > 0.0 {
                 e = (e.0 + e.1 * step, (e.1 - required * step).max(0.0));
                 f = (f.0 + f.1 * step, (f.1 - braking * step).max(0.0));

@@ -1,9 +1,11 @@
-//! The minimum following distance of UN Regulation 157 (automated lane keeping systems), paragraph 5.2.3.3.
+//! The minimum following distance of UN Regulation 157 (automated lane keeping systems), paragraph
+//! 5.2.3.3.
 //!
-//! The distance is the speed multiplied by a minimum time gap. The text of the regulation was not at hand. A copy of the
-//! paragraph (clause collection of lawinsider.com) shows the first rows of its table: 1.0 s at 7.2 km/h, 1.1 s at 10 km/h, 1.2 s
-//! at 20 km/h. The simulator esmini, which implements the paragraph (`ControllerALKS_R157SM.cpp`), continues them by 0.1 s per
-//! 10 km/h to every higher speed: 1.6 s at 60 km/h, 2.08 s at 30 m/s.
+//! The distance is the speed multiplied by a minimum time gap. The text of the regulation was not
+//! at hand. A copy of the paragraph (clause collection of lawinsider.com) shows the first rows of
+//! its table: 1.0 s at 7.2 km/h, 1.1 s at 10 km/h, 1.2 s at 20 km/h. The simulator esmini, which
+//! implements the paragraph (`ControllerALKS_R157SM.cpp`), continues them by 0.1 s per 10 km/h to
+//! every higher speed: 1.6 s at 60 km/h, 2.08 s at 30 m/s.
 
 /// Speed and time gap of the first row of the table (km/h, s).
 const FIRST_ROW: (f64, f64) = (7.2, 1.0);
@@ -29,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_gap_is_that_of_the_table_and_grows_with_the_speed() {
+    fn the_gap_follows_the_table_and_grows_with_the_speed() {
         for (speed_kmph, time_gap_s) in [(0.0, 1.0), (7.2, 1.0), (10.0, 1.1), (20.0, 1.2), (60.0, 1.6), (108.0, 2.08)] {
             assert!((r157_time_gap_s(speed_kmph / 3.6) - time_gap_s).abs() < 1e-9, "{speed_kmph} km/h");
         }

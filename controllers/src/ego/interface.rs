@@ -1,4 +1,5 @@
-//! The interface between an ego controller and the simulation loop: the input and the command of a control step.
+//! The interface between an ego controller and the simulation loop: the input and the command of a
+//! control step.
 
 use closecall_traffic::{Lane, Road, Time, Track};
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,8 @@ pub struct Odometry {
     pub lane: Lane,
     /// Lateral offset from the centre of that lane (m), positive to the left.
     pub lane_offset_m: f64,
-    /// Length of the ego (m); needed because tracks give the centres of vehicles, while gaps are bumper to bumper.
+    /// Length of the ego (m); needed because tracks give the centres of vehicles, while gaps are
+    /// bumper to bumper.
     pub length_m: f64,
     /// Width of the ego (m).
     pub width_m: f64,
@@ -40,7 +42,8 @@ impl SensorAvailability {
     pub const ALL: Self = Self { front: true, surround: true, rear: true };
 }
 
-/// The input of an ego controller at each control step: its own odometry and tracks, never the ground truth.
+/// The input of an ego controller at each control step: its own odometry and tracks, never the
+/// ground truth.
 #[derive(Clone, Copy, Debug)]
 pub struct EgoInput<'a> {
     /// The time of this step.
@@ -56,12 +59,13 @@ pub struct EgoInput<'a> {
 }
 
 impl EgoInput<'_> {
-    /// Refuses input that is not finite, because comparisons and `min` could otherwise make it look safe.
+    /// Refuses input that is not finite, because comparisons and `min` could otherwise make it look
+    /// safe.
     ///
     /// # Errors
     /// [`ControllerError::NotFinite`] with the name of the quantity.
     pub fn check_finite(&self) -> Result<(), ControllerError> {
-        let refuse = |what| Err(ControllerError::NotFinite { what, time: self.time });
+        let refuse = |quantity| Err(ControllerError::NotFinite { quantity, time: self.time });
         if !self.odometry.speed_mps.is_finite() {
             return refuse("own speed");
         }
@@ -105,14 +109,15 @@ pub struct EgoCommand {
     pub plan: Option<MisPlan>,
 }
 
-/// The error of a controller that failed. Its state is undefined afterwards, and the run ends as an error.
+/// The error of a controller that failed. Its state is undefined afterwards, and the run ends as an
+/// error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ControllerError {
     /// A number that must be finite is not.
-    #[error("failed to control: {what} is not finite at {time}")]
+    #[error("failed to control: {quantity} is not finite at {time}")]
     NotFinite {
         /// The quantity.
-        what: &'static str,
+        quantity: &'static str,
         /// The time of the control step.
         time: Time,
     },
@@ -124,7 +129,8 @@ pub enum ControllerError {
         /// The time of the control step.
         time: Time,
     },
-    /// A controller from outside Closecall did not answer in time, by the wall clock. The same run may succeed on another machine.
+    /// A controller from outside Closecall did not answer in time, by the wall clock. The same run
+    /// may succeed on another machine.
     #[error("failed at {time}: {reason}")]
     Late {
         /// The failure, in words.
@@ -136,10 +142,11 @@ pub enum ControllerError {
 
 /// A controller of the ego, called once per control step (25 Hz) in order of time.
 ///
-/// Implement this trait to test your own controller. A controller receives what a vehicle can know: the odometry of the
-/// ego and the tracks of its sensors. It returns an acceleration and its state. The loop simulates the sensors, the
-/// actuators and all other vehicles. One instance drives one run, so that each sample starts without memory of another.
-/// A controller may fail or even panic: that sample then ends as an error, and the campaign continues.
+/// Implement this trait to test your own controller. A controller receives the knowledge of a real
+/// vehicle: the odometry of the ego and the tracks of its sensors. It returns an acceleration and
+/// its state. The loop simulates the sensors, the actuators and all other vehicles. One instance
+/// drives one run, so that each sample starts without memory of another. A controller may fail or
+/// even panic: that sample then ends as an error, and the campaign continues.
 ///
 /// ```
 /// use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
@@ -161,8 +168,8 @@ pub enum ControllerError {
 /// }
 /// ```
 ///
-/// A complete example with a factory and a campaign is `examples/own_controller.rs`. A controller in another language
-/// runs as a process of its own: `--controller exec:COMMAND`.
+/// A complete example with a factory and a campaign is `examples/own_controller.rs`. A controller
+/// in another language runs as a process of its own: `--controller exec:COMMAND`.
 pub trait EgoController: Send {
     /// Returns the command for the time until the next control step.
     ///
@@ -170,8 +177,9 @@ pub trait EgoController: Send {
     /// [`ControllerError`] if no command could be computed.
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError>;
 
-    /// Ends the run, which has an outcome only if this succeeds. `time` is its end. A controller that is a process checks here that
-    /// the process has given no more answers than it was asked for.
+    /// Ends the run, which has an outcome only if this succeeds. `time` is its end. A controller
+    /// that is a process checks here that the process has given no more answers than it was asked
+    /// for.
     ///
     /// # Errors
     /// [`ControllerError`] if the commands of the run cannot be trusted.

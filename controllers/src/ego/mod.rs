@@ -1,5 +1,5 @@
-//! The ego stack: adaptive cruise control (ACC), automatic emergency braking (AEB), and the margin increase system
-//! (MIS) above them.
+//! The ego stack: adaptive cruise control (ACC), automatic emergency braking (AEB), and the margin
+//! increase system (MIS) above them.
 
 mod acc;
 mod aeb;

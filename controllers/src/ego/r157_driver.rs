@@ -1,20 +1,22 @@
-//! The competent and careful human driver of UN Regulation 157 (performance model of Annex 4, Appendix 3) as the ego.
+//! The competent and careful human driver of UN Regulation 157 (performance model of Annex 4,
+//! Appendix 3) as the ego.
 //!
 //! ```text
 //!  risk ─▶ 0.75 s at 0.4 m/s² (accelerator released) ─▶ braking builds up at 12.65 m/s³ ─▶ 0.774 g, until the risk is over
 //! ```
 //!
-//! The regulation describes a reaction ([`CarefulDriver`](crate::reference::CarefulDriver)), not a way to follow. What the
-//! model leaves open is decided as follows:
+//! The regulation describes a reaction ([`CarefulDriver`](crate::reference::CarefulDriver)), not a
+//! way to follow. The model leaves the following open; here it is decided as follows:
 //!
-//! - Without a risk, the driver follows by the law of [`Acc`](super::Acc), 2 s behind the lead vehicle: the gap from which the
-//!   reference driver starts in JRC-FSM's comparison of following.
-//! - There is a risk if the time to collision with the lead vehicle is at most 2 s (the model's criterion for a cut-in), or
-//!   if the cruise control could not brake hard enough. The text of the regulation on decelerating lead vehicles was not at
-//!   hand.
+//! - Without a risk, the driver follows by the law of [`Acc`](super::Acc), 2 s behind the lead
+//!   vehicle: the gap from which the reference driver starts in JRC-FSM's comparison of following.
+//! - There is a risk if the time to collision with the lead vehicle is at most 2 s (the model's
+//!   criterion for a cut-in), or if the cruise control could not brake hard enough. The text of the
+//!   regulation on decelerating lead vehicles was not at hand.
 //! - The risk is over when the ego is no faster than the lead vehicle, and needs no braking.
 //!
-//! The driver sees the tracks of the ego's sensors, as every controller does. It has no emergency braking system.
+//! The driver sees the tracks of the ego's sensors, as every controller does. It has no emergency
+//! braking system.
 
 use closecall_traffic::Time;
 
@@ -36,7 +38,7 @@ pub struct R157Driver {
 }
 
 impl R157Driver {
-    /// Returns the settings with which the driver follows, made of those of a scenario.
+    /// Returns the settings with which the driver follows, derived from the settings of a scenario.
     #[must_use]
     pub fn settings(settings: EgoSettings) -> EgoSettings {
         EgoSettings { aeb: None, ..settings.with_time_gap(TIME_GAP_S) }

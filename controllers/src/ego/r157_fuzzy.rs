@@ -1,8 +1,9 @@
 //! The fuzzy safety model of UN Regulation 157 as the ego.
 //!
-//! The ego follows by the law of [`Acc`](super::Acc) at the gap at which the model sees no risk, and brakes when and as strongly as
-//! [`FuzzySafetyModel`] says. The delay of the model begins anew with each risk. It has no emergency braking system, and sees
-//! the tracks of the ego's sensors, as every controller does.
+//! The ego follows by the law of [`Acc`](super::Acc) at the gap at which the model sees no risk,
+//! and brakes when and as strongly as [`FuzzySafetyModel`] says. The delay of the model begins anew
+//! with each risk. It has no emergency braking system, and sees the tracks of the ego's sensors, as
+//! every controller does.
 
 use closecall_traffic::Time;
 

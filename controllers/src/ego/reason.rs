@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::SensorAvailability;
 
-/// The reason for the state of the stack: after a change of state, the cause of the change; while following, the
-/// condition that keeps the margin increase system from engaging.
+/// The reason for the state of the stack: after a change of state, the cause of the change; while
+/// following, the condition that keeps the margin increase system from engaging.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
@@ -45,7 +45,8 @@ pub enum Reason {
     RearFollowed,
     /// All conditions for engaging hold, and the goal is in reach.
     Engaged,
-    /// All conditions for engaging hold, but the goal is out of reach; the comfort limit is used in full.
+    /// All conditions for engaging hold, but the goal is out of reach; the comfort limit is used in
+    /// full.
     EngagedGoalOutOfReach,
     /// The rear vehicle crosses the marking in order to overtake.
     RearCrosses,
@@ -118,7 +119,8 @@ impl Reason {
 }
 
 impl SensorAvailability {
-    /// Returns the reason for which a system that needs all sensors is not available; `None` if all sensors work.
+    /// Returns the reason for which a system that needs all sensors is not available; `None` if all
+    /// sensors work.
     pub const fn reason(&self) -> Option<Reason> {
         match self {
             Self { front: false, .. } => Some(Reason::FrontSensorFailed),

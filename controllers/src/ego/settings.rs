@@ -17,8 +17,8 @@ pub struct EgoStackConfig {
     pub aeb: Option<AebConfig>,
     /// The margin increase system.
     pub mis: Option<MisConfig>,
-    /// Whether the ego is in automated mode. If not, the margin increase system never engages; the same control laws
-    /// then represent an attentive driver.
+    /// Whether the ego is in automated mode. If not, the margin increase system never engages; the
+    /// same control laws then represent an attentive driver.
     #[serde(default = "default_automated")]
     pub automated: bool,
 }
@@ -43,35 +43,37 @@ impl EgoSettings {
         Self { mis: None, ..self }
     }
 
-    /// Returns the same stack without the margin increase system, and with another constant time gap (s): the controllers
-    /// `gap-<seconds>`.
+    /// Returns the same stack without the margin increase system, and with another constant time
+    /// gap (s): the controllers `gap-<seconds>`.
     #[must_use]
     pub fn with_time_gap(self, time_gap_s: f64) -> Self {
         Self { acc: Acc { time_gap_s, policy: GapPolicy::Constant, ..self.acc }, ..self.without_mis() }
     }
 
-    /// Returns the same stack without the margin increase system, and with the minimum following distance of UN Regulation
-    /// 157: the controller `r157-gap`.
+    /// Returns the same stack without the margin increase system, and with the minimum following
+    /// distance of UN Regulation 157: the controller `r157-gap`.
     #[must_use]
     pub fn with_r157_gap(self) -> Self {
         Self { acc: Acc { policy: GapPolicy::R157, ..self.acc }, ..self.without_mis() }
     }
 
-    /// Returns the stack of the fuzzy safety model of UN Regulation 157: the same cruise control with the gap of the model,
-    /// and nothing else. The model brakes instead of the emergency braking system: the controller `r157-fsm`.
+    /// Returns the stack of the fuzzy safety model of UN Regulation 157: the same cruise control
+    /// with the gap of the model, and nothing else. The model brakes instead of the emergency
+    /// braking system: the controller `r157-fsm`.
     #[must_use]
     pub fn with_fuzzy_safety(self) -> Self {
         Self { acc: Acc { policy: GapPolicy::FuzzySafety, ..self.acc }, aeb: None, ..self.without_mis() }
     }
 
-    /// Returns the same stack with the extended margin increase system, if it has one at all: the controller `mis-extended`.
+    /// Returns the same stack with the extended margin increase system, if it has one at all: the
+    /// controller `mis-extended`.
     #[must_use]
     pub fn with_extended_mis(self) -> Self {
         Self { mis: self.mis.map(MisSettings::extended), ..self }
     }
 
-    /// Returns the same stack with a margin increase system that plans for the time to closest encounter, if it has one at all: the
-    /// controller `mis-ttce`.
+    /// Returns the same stack with a margin increase system that plans for the time to closest
+    /// encounter, if it has one at all: the controller `mis-ttce`.
     #[must_use]
     pub fn with_ttce_mis(self) -> Self {
         Self { mis: self.mis.map(|mis| MisSettings { horizon: Horizon::Ttce, ..mis }), ..self }

@@ -1,4 +1,5 @@
-//! Two egos that are slower than the rest from the first second on, and know nothing of what is behind them.
+//! Two egos that are slower than the other traffic from the first second on, and know nothing about
+//! the vehicles behind them.
 //!
 //! ```text
 //!  speed  ────╮                                    blind: 1 m/s² until 9.5 m/s slower
@@ -6,19 +7,22 @@
 //!                ╰──────────── start − deficit     beneath: cruise control and emergency braking of the scenario
 //! ```
 //!
-//! They are references, and no systems: whoever is slower has a longer gap ahead, and needs to brake less. What a system prevents counts as its own
-//! only beyond what these prevent at the same cost. A requirement that lets them pass does not test a system that looks back.
+//! They are references, not systems: a slower ego has a longer gap ahead, and needs to brake less.
+//! A system deserves credit only for collisions that it prevents beyond the number that these egos
+//! prevent at the same cost. A requirement that lets them pass does not test a system that looks
+//! back.
 //!
-//! The two rates and deficits are assumptions. `blind` stays just below the 10 m/s by which an ego may be slower (requirement MIS-6) and brakes as
-//! gently as the paper's system. `crawl` is twice as much of both.
+//! The two rates and deficits are assumptions. `blind` stays just below the 10 m/s by which an ego
+//! may be slower (requirement MIS-6) and brakes as gently as the paper's system. `crawl` has twice
+//! both values.
 
 use super::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 
-/// Time in which the ego would reach its speed if the braking were not limited (s): an assumption that keeps the ego from oscillating; 0.2 to 2 are
-/// plausible.
+/// Time in which the ego would reach its speed if the braking were not limited (s): an assumption
+/// that keeps the ego from oscillating; 0.2 to 2 are plausible.
 const RESPONSE_S: f64 = 0.5;
 
-/// How fast and how far an ego slows down.
+/// The deceleration and the final speed deficit of an ego that slows down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slowing {
     /// Largest deceleration (m/s²).

@@ -7,15 +7,16 @@
 //! | hold at a | −a, whatever the ACC requests; a is 0 from the critical gap on |
 //! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
-//! Behind a braking lead vehicle the extended MIS brakes at once, by the constant braking that just suffices, instead of using
-//! up the margin first; only holding has precedence.
+//! Behind a braking lead vehicle the extended MIS brakes at once, by the constant braking that just
+//! suffices, instead of using up the margin first; only holding has precedence.
 //!
-//! The result is the *comfort command*. Emergency braking overrides it if it requests more braking. The jerk limits hold
-//! for the comfort command alone, and each step starts from the comfort command of the step before: while emergency
-//! braking acts, the comfort command goes on beneath it, and once emergency braking ends, the ego follows the comfort
-//! command at once. A ramp that started from the command of emergency braking would keep the ego braking for seconds
-//! after the lead vehicle has stopped braking. After emergency braking the MIS takes no further speed while the gap to the lead
-//! vehicle does not close.
+//! The result is the *comfort command*. Emergency braking overrides it if it requests more braking.
+//! The jerk limits hold for the comfort command alone, and each step starts from the comfort
+//! command of the step before: while emergency braking acts, the comfort command goes on beneath
+//! it, and once emergency braking ends, the ego follows the comfort command at once. A ramp that
+//! started from the command of emergency braking would keep the ego braking for seconds after the
+//! lead vehicle has stopped braking. After emergency braking the MIS takes no further speed while
+//! the gap to the lead vehicle does not close.
 
 use closecall_traffic::Time;
 
@@ -23,16 +24,16 @@ use super::mis::{BRAKE_RELEASE_JERK_MPS3, Mis, Request, Situation};
 use super::surroundings::{Front, LeadVehicleSelector};
 use super::{Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
 
-/// Largest acceleration while the margin is returned (m/s²): an assumption, half of what the ACC may use; plausible are
-/// 0.5 to 1.5.
+/// Largest acceleration while the margin is returned (m/s²): an assumption, half of what the ACC
+/// may use; plausible are 0.5 to 1.5.
 const RELEASE_ACCELERATION_MPS2: f64 = 0.8;
 
-/// Braking of the lead vehicle from which on it counts as braking (m/s²): an assumption, above the ripple of its measured
-/// acceleration; 1 to 3 are plausible.
+/// Braking of the lead vehicle from which on it counts as braking (m/s²): an assumption, above the
+/// ripple of its measured acceleration; 1 to 3 are plausible.
 const LEAD_BRAKES_MPS2: f64 = 1.5;
 
-/// Gap that early braking leaves behind a standing lead vehicle (m): an assumption, equal to the gap of the emergency braking; 1 to 5 are
-/// plausible.
+/// Gap that early braking leaves behind a standing lead vehicle (m): an assumption, equal to the
+/// gap of the emergency braking; 1 to 5 are plausible.
 const STANDSTILL_GAP_M: f64 = 2.0;
 
 /// The built-in ego stack.
@@ -118,7 +119,7 @@ impl EgoController for EgoStack {
         }
         self.emergency_braking = braking.is_some();
         if !command.acceleration_mps2.is_finite() {
-            return Err(ControllerError::NotFinite { what: "commanded acceleration", time: input.time });
+            return Err(ControllerError::NotFinite { quantity: "commanded acceleration", time: input.time });
         }
         Ok(command)
     }

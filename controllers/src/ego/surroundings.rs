@@ -1,7 +1,9 @@
-//! Interpretation of the tracks: the lead vehicle, the rear vehicle, and the occupancy of the passing lane.
+//! Interpretation of the tracks: the lead vehicle, the rear vehicle, and the occupancy of the
+//! passing lane.
 //!
-//! Tracks give the centres of boxes in the vehicle frame of the ego, whereas gaps are bumper to bumper. A track counts
-//! as being in a lane if the tracker gives that lane a probability of at least one half.
+//! Tracks give the centres of boxes in the vehicle frame of the ego, whereas gaps are bumper to
+//! bumper. A track counts as being in a lane if the tracker gives that lane a probability of at
+//! least one half.
 
 use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, touching_distance_m};
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
@@ -13,22 +15,24 @@ use crate::braking::Behind;
 /// Probability from which on a track counts as real, as being in a lane, or as a vehicle.
 const LIKELY: f64 = 0.5;
 
-/// Time constant of the smoothing of the lead vehicle's acceleration (s): an assumption; 0.1 to 0.5 are plausible.
+/// Time constant of the smoothing of the lead vehicle's acceleration (s): an assumption; 0.1 to 0.5
+/// are plausible.
 const ACCELERATION_TIME_CONSTANT_S: f64 = 0.2;
 
-/// Largest plausible acceleration of the lead vehicle (m/s²): an assumption, the friction of a dry road.
+/// Largest plausible acceleration of the lead vehicle (m/s²): an assumption, the friction of a dry
+/// road.
 const MAX_PLAUSIBLE_ACCELERATION_MPS2: f64 = 10.0;
 
-/// Bumper-to-bumper spacing below which two vehicles in the passing lane are in each other's way (m): an
-/// assumption; 5 to 30 are plausible.
+/// Bumper-to-bumper spacing below which two vehicles in the passing lane are in each other's way
+/// (m): an assumption; 5 to 30 are plausible.
 const MIN_SPACING_M: f64 = 15.0;
 
-/// Gap to the ego at which the rear vehicle is expected to enter the passing lane (m): an assumption; 20 to 60
-/// are plausible.
+/// Gap to the ego at which the rear vehicle is expected to enter the passing lane (m): an
+/// assumption; 20 to 60 are plausible.
 const PASSING_LANE_ENTRY_GAP_M: f64 = 40.0;
 
-/// Gap ahead of the ego beyond which the rear vehicle no longer needs the passing lane (m): an assumption;
-/// 5 to 30 are plausible.
+/// Gap ahead of the ego beyond which the rear vehicle no longer needs the passing lane (m): an
+/// assumption; 5 to 30 are plausible.
 const PASSING_LANE_EXIT_GAP_M: f64 = 10.0;
 
 /// The lead vehicle: the vehicle ahead in the lane of the ego.
@@ -45,8 +49,8 @@ pub struct Front {
 }
 
 impl Front {
-    /// Returns the constant braking with which the ego at `speed_mps` just keeps a gap of `standstill_gap_m` to the lead
-    /// vehicle (m/s²); 0 if none is needed.
+    /// Returns the constant braking with which the ego at `speed_mps` just keeps a gap of
+    /// `standstill_gap_m` to the lead vehicle (m/s²); 0 if none is needed.
     pub(crate) fn required_braking_mps2(&self, speed_mps: f64, standstill_gap_m: f64) -> f64 {
         Behind {
             speed_mps,
@@ -66,12 +70,14 @@ impl Front {
     }
 }
 
-/// Largest longitudinal difference between two tracks of one vehicle (m): the errors of length and position together.
+/// Largest longitudinal difference between two tracks of one vehicle (m): the errors of length and
+/// position together.
 const SAME_VEHICLE_LONGITUDINAL_M: f64 = 5.0;
-/// Largest lateral difference between two tracks of one vehicle (m): half of the distance between the centres of two
-/// narrow vehicles side by side.
+/// Largest lateral difference between two tracks of one vehicle (m): half of the distance between
+/// the centres of two narrow vehicles side by side.
 const SAME_VEHICLE_LATERAL_M: f64 = 1.0;
-/// Largest difference of speed between two tracks of one vehicle (m/s): an assumption; 2 to 5 are plausible.
+/// Largest difference of speed between two tracks of one vehicle (m/s): an assumption; 2 to 5 are
+/// plausible.
 const SAME_VEHICLE_SPEED_MPS: f64 = 3.0;
 
 /// A rear vehicle.
@@ -80,9 +86,9 @@ pub(crate) struct RearVehicle {
     pub(crate) track: TrackId,
     /// Gap to the ego (m); negative if the vehicle overlaps the ego lengthwise or is past.
     pub(crate) gap_m: f64,
-    /// Longitudinal position of its centre relative to that of the ego (m), positive ahead.
+    /// Longitudinal position of its centre relative to the ego's centre (m), positive ahead.
     pub(crate) x_m: f64,
-    /// Lateral position of its centre relative to that of the ego (m), positive to the left.
+    /// Lateral position of its centre relative to the ego's centre (m), positive to the left.
     pub(crate) y_m: f64,
     pub(crate) length_m: f64,
     pub(crate) speed_mps: f64,
@@ -101,13 +107,14 @@ impl RearVehicle {
         self.own_lane >= LIKELY
     }
 
-    /// Returns true if the whole vehicle is ahead of the ego. Its overtaking is then complete, whatever the ego does.
+    /// Returns true if the whole vehicle is ahead of the ego. Its overtaking is then complete,
+    /// whatever the ego does.
     pub(crate) fn is_past(&self, odometry: &Odometry) -> bool {
         self.x_m > touching_distance_m(self.length_m, odometry.length_m)
     }
 
-    /// Returns true if `track` belongs to this vehicle, perhaps as seen by another sensor during a lane change. A
-    /// vehicle that drives beside it is further away laterally.
+    /// Returns true if `track` belongs to this vehicle, perhaps as seen by another sensor during a
+    /// lane change. A vehicle that drives beside it is further away laterally.
     fn matches(&self, track: &Track) -> bool {
         let is_near = (track.x_m() - self.x_m).abs() < SAME_VEHICLE_LONGITUDINAL_M
             && (track.y_m() - self.y_m).abs() < SAME_VEHICLE_LATERAL_M;
@@ -124,16 +131,17 @@ pub(crate) enum PassingLane {
     Free,
     /// Another vehicle is in the way.
     Occupied,
-    /// Not known: a sensor is missing, an unconfirmed track is in the way, or the rear vehicle does not approach.
+    /// Not known: a sensor is missing, an unconfirmed track is in the way, or the rear vehicle does
+    /// not approach.
     Unknown,
 }
 
-/// Assumed braking of the vehicles ahead (m/s²): it decides which of them leaves the least room to stop. An
-/// assumption, the mean of emergency braking on a dry road; 6 to 9 are plausible.
+/// Assumed braking of the vehicles ahead (m/s²): it decides which of them leaves the least room to
+/// stop. An assumption, the mean of emergency braking on a dry road; 6 to 9 are plausible.
 const WORST_LEAD_BRAKING_MPS2: f64 = 8.0;
 
-/// Time for which a vehicle that vanished from the lane of the ego is assumed to be there still: an assumption; 0.2 to 1 s are
-/// plausible.
+/// Time for which a vehicle that vanished from the lane of the ego is assumed to be there still: an
+/// assumption; 0.2 to 1 s are plausible.
 const TRACK_MEMORY: Time = Time::from_ms(500);
 
 /// A vehicle ahead, followed over the control steps.
@@ -142,7 +150,7 @@ struct LeadCandidate {
     id: TrackId,
     /// Time of the last observation.
     last_seen: Time,
-    /// Longitudinal position of its centre relative to that of the ego at that time (m).
+    /// Longitudinal position of its centre relative to the ego's centre at that time (m).
     x_m: f64,
     length_m: f64,
     speed_mps: f64,
@@ -175,8 +183,8 @@ impl LeadCandidate {
         }
     }
 
-    /// Returns the vehicle at `now`, observed or predicted: the prediction keeps the acceleration, down to a
-    /// standstill.
+    /// Returns the vehicle at `now`, observed or predicted: the prediction keeps the acceleration,
+    /// down to a standstill.
     fn predict(&self, now: Time, odometry: &Odometry) -> Front {
         let since_s = (now - self.last_seen).s();
         let speed_mps = (self.speed_mps + self.acceleration_mps2 * since_s).max(0.0);
@@ -197,17 +205,17 @@ pub struct LeadVehicleSelector {
 }
 
 impl LeadVehicleSelector {
-    /// Observes the tracks of this step. Returns, of the vehicles ahead in the lane of the ego, the one that leaves the
-    /// ego the least room to stop.
+    /// Observes the tracks of this step. Returns the vehicle ahead in the lane of the ego that
+    /// leaves the ego the least room to stop.
     ///
-    /// This is not always the nearest one: a vehicle that overtakes and is only just past would hide the one behind
-    /// which the ego brakes.
+    /// This is not always the nearest vehicle: a vehicle that has just overtaken would hide the
+    /// vehicle behind which the ego brakes.
     pub fn update(&mut self, input: &EgoInput<'_>) -> Option<Front> {
         let now = input.time;
         for track in input.tracks.iter().filter(|track| track.x_m() > 0.0 && is_established(track) && exists(track)) {
             match self.candidates.iter_mut().find(|candidate| candidate.id == track.id) {
-                // A coasting track carries no new information on the acceleration; for a while the last estimate is
-                // better.
+                // A coasting track carries no new information on the acceleration; for a while the
+                // last estimate is better.
                 Some(candidate)
                     if track.status == TrackStatus::Coasting && now - candidate.last_seen <= TRACK_MEMORY => {}
                 Some(candidate) => candidate.observe(track),
@@ -227,7 +235,8 @@ impl LeadVehicleSelector {
             .min_by(|a, b| room_m(a).total_cmp(&room_m(b)))
     }
 
-    /// Adds a new track. If a track vanished at the same place, the new one takes over its acceleration.
+    /// Adds a new track. If a track vanished at the same place, the new one takes over its
+    /// acceleration.
     fn add(&mut self, track: &Track) {
         let now = track.time;
         let is_predecessor = |candidate: &&mut LeadCandidate| {
@@ -283,8 +292,8 @@ pub(crate) fn rear_vehicle_from(track: &Track, input: &EgoInput<'_>) -> RearVehi
     }
 }
 
-/// Returns the nearest vehicle behind in the lane of the ego. A confirmed and classified track has priority over nearer
-/// ones that are not both.
+/// Returns the nearest vehicle behind in the lane of the ego. A confirmed and classified track has
+/// priority over a nearer track that is unconfirmed or unclassified.
 pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> {
     let behind = |track: &&Track| {
         track.x_m() < 0.0 && track.source != Source::Front && exists(track) && track.lane[OWN_LANE_INDEX] >= LIKELY
@@ -298,12 +307,12 @@ pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> 
     Some(rear_vehicle_from(best, input))
 }
 
-/// Time headway below which a vehicle follows the rear vehicle closely (s): an assumption; 0.9 s is the headway below which
-/// the method calls following critical, and 0.5 to 2 are plausible.
+/// Time headway below which a vehicle follows the rear vehicle closely (s): an assumption; 0.9 s is
+/// the headway below which the method calls following critical, and 0.5 to 2 are plausible.
 const FOLLOWED_HEADWAY_S: f64 = CRITICAL_THW_S;
 
-/// Returns true if an established track follows `rear` closely in the lane of the ego. Its driver sees the ego only when
-/// `rear` has pulled out.
+/// Returns true if an established track follows `rear` closely in the lane of the ego. Its driver
+/// sees the ego only when `rear` has pulled out.
 pub(crate) fn is_followed(input: &EgoInput<'_>, rear: &RearVehicle) -> bool {
     input.tracks.iter().any(|track| {
         let gap_m = rear.x_m - track.x_m() - touching_distance_m(track.length_m, rear.length_m);
@@ -316,8 +325,8 @@ pub(crate) fn is_followed(input: &EgoInput<'_>, rear: &RearVehicle) -> bool {
     })
 }
 
-/// Determines whether the passing lane is free for `rear` to overtake the ego, with all vehicles at constant speed. A
-/// vehicle behind `rear` must keep at least `follower_headway_s` (s) to it.
+/// Determines whether the passing lane is free for `rear` to overtake the ego, with all vehicles at
+/// constant speed. A vehicle behind `rear` must keep at least `follower_headway_s` (s) to it.
 pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle, follower_headway_s: f64) -> PassingLane {
     let side = input.road.overtaking_side();
     if input.road.beside(input.odometry.lane, side).is_none() {
@@ -365,8 +374,8 @@ struct Spacing {
 }
 
 impl Spacing {
-    /// Returns true if a distance that changes linearly from `first_m` to `last_m`, positive ahead, stays large enough on
-    /// one side.
+    /// Returns true if a distance that changes linearly from `first_m` to `last_m`, positive ahead,
+    /// stays large enough on one side.
     fn is_kept(&self, first_m: f64, last_m: f64) -> bool {
         first_m.min(last_m) > self.ahead_m || first_m.max(last_m) < -self.behind_m
     }

@@ -1,4 +1,5 @@
-//! The types of `controllers/include/closecall_controller.h`, which documents their fields and units.
+//! The types of `controllers/include/closecall_controller.h`, which documents their fields and
+//! units.
 
 use std::ffi::{c_char, c_void};
 use std::mem::size_of;
@@ -16,7 +17,7 @@ pub struct Setting {
     pub value: f64,
 }
 
-/// What a controller is told when it is created.
+/// The data that a controller receives when it is created.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct SetupView {
@@ -134,7 +135,8 @@ pub struct Command {
     pub reserved: u32,
 }
 
-// An exception of C++ that leaves a function ends the process, which is defined for `C-unwind` only.
+// An exception of C++ that leaves a function ends the process, which is defined for `C-unwind`
+// only.
 pub(crate) type AbiFunction = unsafe extern "C-unwind" fn() -> u32;
 pub(crate) type CreateFunction = unsafe extern "C-unwind" fn(*const SetupView) -> *mut c_void;
 pub(crate) type StepFunction = unsafe extern "C-unwind" fn(*mut c_void, *const InputView, *mut Command) -> i32;

@@ -1,15 +1,17 @@
-//! The floating-point environment of a thread: rounding mode, treatment of subnormal numbers, and exceptions.
+//! The floating-point environment of a thread: rounding mode, treatment of subnormal numbers, and
+//! exceptions.
 //!
-//! Foreign code may change it and leave it so: with `fesetround`, or with the start-up code that `-ffast-math` links into a library.
-//! The simulation after the call would then compute other numbers. So it is restored after each call.
+//! Foreign code may change it and not restore it: with `fesetround`, or with the start-up code that
+//! `-ffast-math` links into a library. The simulation after the call would then compute other
+//! numbers. The environment is therefore restored after each call.
 
 #![expect(unsafe_code, reason = "the registers of the floating-point environment are read and written")]
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use std::arch::asm;
 
-/// The floating-point environment, which is restored when this value is dropped. On other processors than x86-64 and AArch64,
-/// nothing is kept.
+/// The floating-point environment, which is restored when this value is dropped. On other
+/// processors than x86-64 and AArch64, nothing is kept.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Arithmetic {
     #[cfg(target_arch = "x86_64")]
@@ -55,8 +57,8 @@ impl Drop for Arithmetic {
     #[cfg(target_arch = "x86_64")]
     #[inline(never)]
     fn drop(&mut self) {
-        // SAFETY: the values are those of an earlier moment. A pending exception is cleared first, since loading the control word
-        // would raise it.
+        // SAFETY: the values come from an earlier read of the same registers. A pending exception
+        // is cleared first, since loading the control word would raise it.
         unsafe {
             asm!("fnclex", options(nostack, preserves_flags));
             asm!("fldcw [{}]", in(reg) &raw const self.x87, options(nostack, preserves_flags));
@@ -67,7 +69,7 @@ impl Drop for Arithmetic {
     #[cfg(target_arch = "aarch64")]
     #[inline(never)]
     fn drop(&mut self) {
-        // SAFETY: the value is that of an earlier moment.
+        // SAFETY: the value comes from an earlier read of the same register.
         unsafe { asm!("msr fpcr, {}", in(reg) self.fpcr, options(nostack, preserves_flags)) };
     }
 

@@ -1,5 +1,5 @@
-//! Serves a library or an FMU as a process that speaks the protocol of external processes: one line of JSON for each control
-//! step. `docs/reference/controllers.md` documents the protocol.
+//! Serves a library or an FMU as a process that speaks the protocol of external processes: one line
+//! of JSON for each control step. `docs/reference/controllers.md` documents the protocol.
 
 use std::io::{BufRead, Write};
 
@@ -160,7 +160,8 @@ impl From<Step> for Input {
     }
 }
 
-/// Answers every message of `requests` with a line to `answers`, until there are no more. The table names the variables of an FMU.
+/// Answers every message of `requests` with a line to `answers`, until there are no more. The table
+/// names the variables of an FMU.
 ///
 /// # Errors
 /// The message of the failure, after which the process is to end.
@@ -200,7 +201,8 @@ pub fn serve(
     Ok(())
 }
 
-/// Returns an answer as a line, which repeats the time of its control step (ns). JSON has no number that is not finite: it is written as a word, which the reader refuses by name.
+/// Returns an answer as a line, which repeats the time of its control step (ns). JSON has no number
+/// that is not finite: it is written as a word, which the reader refuses by name.
 fn text(Answer { acceleration_mps2, state }: Answer, time_ns: i64) -> String {
     let number = match acceleration_mps2.is_finite() {
         true => json!(acceleration_mps2).to_string(),

@@ -20,7 +20,8 @@ pub struct NativeController {
 }
 
 impl NativeController {
-    /// Returns a controller for one run with the settings of the scenario's ego stack, and its names of the variables of an FMU.
+    /// Returns a controller for one run with the settings of the scenario's ego stack, and its
+    /// names of the variables of an FMU.
     pub fn new(loaded: Loaded, settings: &EgoSettings, table: &VariableTable) -> Self {
         Self {
             loaded,
@@ -51,7 +52,7 @@ impl EgoController for NativeController {
 pub(crate) struct Session(Option<Box<dyn Run>>);
 
 impl Session {
-    /// Returns the answer to a control step. Creates the controller at the first one.
+    /// Returns the answer to a control step. Creates the controller at the first step.
     pub(crate) fn step(
         &mut self,
         (loaded, table): (&Loaded, &VariableTable),

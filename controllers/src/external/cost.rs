@@ -1,4 +1,4 @@
-//! Measures what a control step of a library or an FMU costs.
+//! Measures the cost of a control step of a library or an FMU.
 
 use std::time::Instant;
 
@@ -8,7 +8,8 @@ use crate::external::fmu::VariableTable;
 use crate::external::loaded::Loaded;
 use serde_json::json;
 
-/// The settings and the road of the measurement: cruise control and emergency braking with their default values.
+/// The settings and the road of the measurement: cruise control and emergency braking with their
+/// default values.
 fn setup() -> Setup {
     let settings = json!({
         "acc": { "set_speed_mps": null, "time_gap_s": 1.0, "standstill_gap_m": 2.0 },
@@ -19,8 +20,8 @@ fn setup() -> Setup {
     Setup { lane_width_m: 3.75, speed_limit_mps: 36.1, lanes: 3, ..Setup::of_settings(&settings) }
 }
 
-/// Returns the mean wall time of a control step with `tracks` tracks (s), over `steps` steps of one run. The time includes the
-/// conversion of the tracks to the form of the interface.
+/// Returns the mean wall time of a control step with `tracks` tracks (s), over `steps` steps of one
+/// run. The time includes the conversion of the tracks to the form of the interface.
 ///
 /// # Errors
 /// The message of the controller if it fails.
@@ -56,10 +57,10 @@ pub fn step_s(loaded: &Loaded, tracks: usize, steps: u32) -> Result<f64, String>
             lane: 2,
             ..*input.values()
         };
-        let mut own = input.into_tracks();
-        own.clear();
-        own.extend(given.iter().copied());
-        input = Input::with(view, own);
+        let mut tracks = input.into_tracks();
+        tracks.clear();
+        tracks.extend(given.iter().copied());
+        input = Input::with(view, tracks);
         std::hint::black_box(run.step(std::hint::black_box(&input))?);
     }
     Ok(started.elapsed().as_secs_f64() / f64::from(steps))

@@ -14,46 +14,46 @@ pub enum LoadError {
         source: io::Error,
     },
     /// The file is no shared library.
-    #[error("{path} is not a shared library: {reason}; expected one for {own}")]
+    #[error("{path} is not a shared library: {reason}; expected one for {expected}")]
     NotALibrary {
         /// The file.
         path: String,
-        /// What it is, or what is wrong.
+        /// The kind of the file, or its fault.
         reason: String,
         /// The platform of this program.
-        own: String,
+        expected: String,
     },
     /// The library is for another platform.
-    #[error("{path} is a library for {found}; expected one for {own}")]
+    #[error("{path} is a library for {actual}; expected one for {expected}")]
     Platform {
         /// The file.
         path: String,
         /// Its platform.
-        found: String,
+        actual: String,
         /// The platform of this program.
-        own: String,
+        expected: String,
     },
     /// The library lacks a function.
-    #[error("{path} does not export {}; {}", listed(missing), exported(found))]
+    #[error("{path} does not export {}; {}", listed(missing), exported(actual))]
     Symbol {
         /// The file.
         path: String,
         /// The missing functions.
         missing: Vec<String>,
         /// The functions of the interface, or others, that it exports.
-        found: Vec<String>,
+        actual: Vec<String>,
     },
     /// The library has another version of the interface.
     #[error(
-        "{path} has version {found} of the interface, this is version {own}: build it again with the header of this program"
+        "{path} has version {actual} of the interface, this is version {expected}: build it again with the header of this program"
     )]
     Abi {
         /// The file.
         path: String,
         /// The version of the library.
-        found: u32,
+        actual: u32,
         /// The version of this program.
-        own: u32,
+        expected: u32,
     },
     /// The system's loader refuses the library.
     #[error("failed to load {path}: {reason}")]
@@ -68,7 +68,7 @@ pub enum LoadError {
     Fmu {
         /// The file.
         path: String,
-        /// What is wrong, and what is expected.
+        /// The fault, and the expected content.
         reason: String,
     },
 }
@@ -84,6 +84,6 @@ fn listed(names: &[String]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-fn exported(found: &[String]) -> String {
-    if found.is_empty() { "it exports nothing".to_owned() } else { format!("it exports {}", listed(found)) }
+fn exported(symbols: &[String]) -> String {
+    if symbols.is_empty() { "it exports nothing".to_owned() } else { format!("it exports {}", listed(symbols)) }
 }

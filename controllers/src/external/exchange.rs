@@ -1,4 +1,4 @@
-//! What a controller is told, and what it answers.
+//! The data that a controller receives, and its answers.
 
 use std::ffi::{CStr, CString};
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::external::abi::{InputView, Setting, SetupView, Track};
 
-/// What a controller is told before its first step.
+/// The data that a controller receives before its first step.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Time between two control steps (s).
@@ -98,8 +98,8 @@ fn flatten(path: &str, value: &Value, numbers: &mut Vec<(String, f64)>) {
     }
 }
 
-/// The input of one control step, in the form of the interface. One value serves all steps of a run, so that its memory is used
-/// again.
+/// The input of one control step, in the form of the interface. One value serves all steps of a
+/// run, so that its memory is used again.
 #[derive(Debug)]
 pub struct Input {
     view: InputView,
@@ -186,7 +186,8 @@ impl Input {
         &self.view
     }
 
-    /// Returns the input in the form of the interface. Its pointer is valid as long as this value is borrowed.
+    /// Returns the input in the form of the interface. Its pointer is valid as long as this value
+    /// is borrowed.
     pub(crate) fn view(&self) -> InputView {
         InputView { track_count: self.tracks.len() as u64, tracks: self.tracks.as_ptr(), ..self.view }
     }
@@ -232,7 +233,8 @@ const STATES: [EgoState; 5] =
 /// The answer of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// The commanded acceleration (m/s²). It may be any number: the closed loop refuses one that is not finite.
+    /// The commanded acceleration (m/s²). It may be any number: the closed loop refuses one that is
+    /// not finite.
     pub acceleration_mps2: f64,
     /// The state.
     pub state: EgoState,

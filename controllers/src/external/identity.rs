@@ -1,10 +1,10 @@
-//! What a loaded controller states about itself, and what drives one run.
+//! The identity that a loaded controller states, and the object that drives one run.
 
 use serde::{Deserialize, Serialize};
 
 use crate::external::exchange::{Answer, Input};
 
-/// What a controller states about itself.
+/// The identity that a controller states.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Its name.

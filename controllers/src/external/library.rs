@@ -1,4 +1,5 @@
-//! A controller that is a shared library with the functions of `controllers/include/closecall_controller.h`.
+//! A controller that is a shared library with the functions of
+//! `controllers/include/closecall_controller.h`.
 
 #![expect(unsafe_code, reason = "functions of a loaded library are called")]
 
@@ -42,7 +43,8 @@ pub(crate) struct Library {
 
 /// Loads a library, with all functions that it needs itself.
 pub(crate) fn open(path: &Path) -> Result<Module, LoadError> {
-    // The loader of the system searches its own folders for a name without a separator, and not the working folder.
+    // The loader of the system searches its own folders for a name without a separator, and not the
+    // working folder.
     let absolute =
         std::path::absolute(path).map_err(|source| LoadError::Read { path: path.display().to_string(), source })?;
     #[cfg(unix)]
@@ -94,14 +96,15 @@ impl Library {
         let missing = |name: &str| LoadError::Symbol {
             path: path.display().to_string(),
             missing: vec![name.to_owned()],
-            found: Vec::new(),
+            actual: Vec::new(),
         };
-        // SAFETY: the header declares the functions with these types. The version is asked for first.
+        // SAFETY: the header declares the functions with these types. The version is asked for
+        // first.
         unsafe {
             let abi = function::<AbiFunction>(&module, NEEDED[0]).ok_or_else(|| missing(NEEDED[0]))?;
-            let found = abi();
-            if found != ABI {
-                return Err(LoadError::Abi { path: path.display().to_string(), found, own: ABI });
+            let actual = abi();
+            if actual != ABI {
+                return Err(LoadError::Abi { path: path.display().to_string(), actual, expected: ABI });
             }
             let stated = |name| function::<TextFunction>(&module, name).and_then(|stated| text(stated()));
             Ok(Self {
@@ -133,7 +136,7 @@ impl Library {
         Ok(LibraryRun { library: self.clone(), controller })
     }
 
-    /// Returns what the library says about its last failure, as the end of a message.
+    /// Returns the library's text about its last failure, as the end of a message.
     fn reason(&self, controller: *mut c_void) -> String {
         // SAFETY: the controller is null, or lives.
         let stated = self.error.and_then(|error| unsafe { text(error(controller)) });
@@ -155,7 +158,8 @@ impl Run for LibraryRun {
         let mut command = Command { acceleration_mps2: f64::NAN, state: 0, reserved: 0 };
         let view = input.view();
         let _kept = Arithmetic::keep();
-        // SAFETY: the controller lives until it is dropped, and both views are valid during the call.
+        // SAFETY: the controller lives until it is dropped, and both views are valid during the
+        // call.
         let result = unsafe { (self.library.step)(self.controller, &view, &mut command) };
         if result != 0 {
             return Err(format!(

@@ -43,7 +43,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// What a scenario says of the variables of an FMU.
+/// The table of a scenario about the variables of an FMU.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Variables {
     /// The names of its table.
@@ -71,13 +71,14 @@ pub fn unload_all() {
     drop(loaded);
 }
 
-/// Unpacks a controller once for all processes that this one starts, if it is an FMU, and returns the folder. Returns `None` if there is
-/// nothing to unpack, or it cannot be unpacked: the process that loads it says why. No code of the file runs.
+/// If the controller is an FMU, unpacks it once for all processes that this process starts, and
+/// returns the folder. Returns `None` if there is nothing to unpack, or it cannot be unpacked: the
+/// process that loads it says why. No code of the file runs.
 pub fn unpack_for_children(kind: Kind, path: &Path) -> Option<PathBuf> {
     if kind == Kind::Fmu { fmu::unpacked_for_children(path) } else { None }
 }
 
-/// Uses the folder into which the process that started this one has unpacked its FMU. The first call counts.
+/// Uses the folder into which the parent process has unpacked its FMU. The first call counts.
 pub fn use_unpacked(folder: PathBuf) {
     fmu::use_unpacked(folder);
 }
@@ -88,25 +89,26 @@ pub fn remove_unpacked() {
 }
 
 impl Loaded {
-    /// Loads a library or an FMU, once for each process. This runs code of the file: only a process that may crash does so.
+    /// Loads a library or an FMU, once for each process. This runs code of the file: only a process
+    /// that may crash does so.
     ///
     /// # Errors
     /// [`LoadError`] if the file cannot be used.
     pub fn open(kind: Kind, path: &Path) -> Result<Self, LoadError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let key = (kind, path.to_owned());
-        if let Some(found) = loaded.get(&key) {
-            return Ok(found.clone());
+        if let Some(library) = loaded.get(&key) {
+            return Ok(library.clone());
         }
-        let found = match kind {
+        let library = match kind {
             Kind::Lib => Self(Inner::Library(Arc::new(Library::load(path)?))),
             Kind::Fmu => Self(Inner::Fmu(Arc::new(Fmu::load(path)?))),
         };
-        loaded.insert(key, found.clone());
-        Ok(found)
+        loaded.insert(key, library.clone());
+        Ok(library)
     }
 
-    /// Returns what the controller states about itself.
+    /// Returns the identity that the controller states.
     pub fn identity(&self) -> Identity {
         match &self.0 {
             Inner::Library(library) => library.identity().clone(),
@@ -125,7 +127,8 @@ impl Loaded {
         }
     }
 
-    /// Creates a controller for one run, or returns why there is none. `table` names the variables of an FMU.
+    /// Creates a controller for one run, or returns why there is none. `table` names the variables
+    /// of an FMU.
     pub(crate) fn start(&self, setup: &Setup, table: &VariableTable) -> Result<Box<dyn Run>, String> {
         match &self.0 {
             Inner::Library(library) => Ok(Box::new(library.start(setup)?)),

@@ -5,16 +5,18 @@
 //!                   └─▶ FMU: set inputs, doStep, get outputs ─┘
 //! ```
 //!
-//! * [`Loaded`] is a library or an FMU that this process has loaded, and creates a controller for each run.
+//! * [`Loaded`] is a library or an FMU that this process has loaded, and creates a controller for
+//!   each run.
 //! * [`NativeController`] adapts such a controller to the closed loop.
 //! * [`bridge`] serves one as a process that speaks the protocol of external processes.
 //! * [`watch`] ends a process whose controller does not answer.
 //!
-//! The code of a library can do anything to the process that loads it. So this crate is used in worker processes, and the
-//! program that starts them learns of a crash from their end.
+//! The code of a library can do anything to the process that loads it. This module therefore runs
+//! in worker processes, and the program that starts them learns of a crash from their end.
 //!
-//! `controllers/include/closecall_controller.h` is the interface of a library. The interface of an FMU is the Functional Mock-up Interface
-//! for co-simulation, versions 2.0 and 3.0 (<https://fmi-standard.org>).
+//! `controllers/include/closecall_controller.h` is the interface of a library. The interface of an
+//! FMU is the Functional Mock-up Interface for co-simulation, versions 2.0 and 3.0
+//! (<https://fmi-standard.org>).
 
 pub mod abi;
 mod arithmetic;

@@ -11,24 +11,24 @@ use crate::external::error::LoadError;
 const MAX_LISTED: usize = 12;
 
 /// Returns the platform of this program.
-pub(crate) fn own() -> String {
+pub(crate) fn this_platform() -> String {
     format!("{ARCH} {OS}")
 }
 
-/// Checks that a file is a shared library for this platform, and that it exports the functions `needed`. `prefix` is the beginning
-/// of the names that a message lists.
+/// Checks that a file is a shared library for this platform, and that it exports the functions
+/// `needed`. `prefix` is the beginning of the names that a message lists.
 ///
 /// # Errors
-/// [`LoadError`] that names what is expected and what was found.
+/// [`LoadError`] that names the expected and the actual content.
 pub(crate) fn check(path: &Path, needed: &[&str], prefix: &str) -> Result<(), LoadError> {
     let shown = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|source| LoadError::Read { path: shown.clone(), source })?;
-    let not = |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, own: own() };
+    let not = |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, expected: this_platform() };
     let file = object::File::parse(&*bytes).map_err(|error| not(format!("it cannot be parsed ({error})")))?;
     let (arch, os) = (arch(file.architecture()), os(file.format()));
     if arch != ARCH || os != family(OS) {
-        let found = format!("{arch} {os}");
-        return Err(LoadError::Platform { path: shown, found, own: own() });
+        let actual = format!("{arch} {os}");
+        return Err(LoadError::Platform { path: shown, actual, expected: this_platform() });
     }
     if file.kind() != ObjectKind::Dynamic {
         return Err(not(format!("it is {}", kind(file.kind()))));
@@ -42,15 +42,15 @@ pub(crate) fn check(path: &Path, needed: &[&str], prefix: &str) -> Result<(), Lo
         .map(|name| if os == "macos" { name.trim_start_matches('_') } else { name }.to_owned())
         .collect();
     let missing: Vec<String> =
-        needed.iter().filter(|name| !names.iter().any(|found| found == *name)).map(ToString::to_string).collect();
+        needed.iter().filter(|name| !names.iter().any(|exported| exported == *name)).map(ToString::to_string).collect();
     if missing.is_empty() {
         return Ok(());
     }
     let of_interface: Vec<String> = names.iter().filter(|name| name.starts_with(prefix)).cloned().collect();
-    let mut found = if of_interface.is_empty() { names } else { of_interface };
-    found.sort();
-    found.truncate(MAX_LISTED);
-    Err(LoadError::Symbol { path: shown, missing, found })
+    let mut actual = if of_interface.is_empty() { names } else { of_interface };
+    actual.sort();
+    actual.truncate(MAX_LISTED);
+    Err(LoadError::Symbol { path: shown, missing, actual })
 }
 
 /// Returns the name of an architecture, as Rust names it.
@@ -75,7 +75,7 @@ fn os(format: BinaryFormat) -> &'static str {
     }
 }
 
-/// Returns the system that stands for all with the same format of files.
+/// Returns one system for all systems with the same file format.
 fn family(os: &str) -> &str {
     match os {
         "macos" | "windows" => os,

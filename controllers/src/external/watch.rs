@@ -1,6 +1,7 @@
 //! Ends a worker process whose controller does not answer.
 //!
-//! A thread that is blocked in foreign code cannot be ended. So the process ends, after it has reported the sample.
+//! A thread that is blocked in foreign code cannot be ended. The process therefore ends after it
+//! has reported the sample.
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::thread;
@@ -16,7 +17,8 @@ static STEP: AtomicI64 = AtomicI64::new(0);
 /// True if the latest call creates a controller.
 static IS_START: AtomicBool = AtomicBool::new(false);
 
-/// Time that the creation of a controller may take at least. It may first have to read its files, as the greeting of a process.
+/// Time that the creation of a controller may take at least. It may first have to read its files,
+/// as the greeting of a process.
 const START_LIMIT: Duration = Duration::from_secs(10);
 
 /// Interval at which the calls are looked at.
@@ -51,8 +53,8 @@ impl Drop for Call {
     }
 }
 
-/// Starts a thread that calls `report` with the time of the control step and the limit, and then ends the process, as soon as a
-/// call takes longer than `limit`.
+/// Starts a thread that calls `report` with the time of the control step and the limit, and then
+/// ends the process, as soon as a call takes longer than `limit`.
 ///
 /// # Errors
 /// The error of the system if the thread cannot be started.

@@ -11,7 +11,8 @@ const RELEASED_ACCELERATOR_MPS2: f64 = 0.4;
 /// Time to collision up to which there is a risk (s) (JRC-FSM).
 pub const CRITICAL_TTC_S: f64 = 2.0;
 
-/// The reaction of the driver to a risk: first the accelerator is released, then the brake is applied.
+/// The reaction of the driver to a risk: first the accelerator is released, then the brake is
+/// applied.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrakingReaction {
     /// Time for which the risk has been perceived (s).
@@ -35,8 +36,8 @@ impl BrakingReaction {
 
 /// The competent and careful human driver of the regulation.
 ///
-/// The driver judges a vehicle that cuts in when the two overlap sideways for the first time: at a time to collision above
-/// 2 s there is no risk.
+/// The driver judges a vehicle that cuts in when the two overlap sideways for the first time: at a
+/// time to collision above 2 s there is no risk.
 #[derive(Clone, Debug, Default)]
 pub struct CarefulDriver {
     reaction: BrakingReaction,
@@ -51,7 +52,8 @@ impl ReferenceModel for CarefulDriver {
         if conflict.is_behind() || conflict.lateral_gap_m > 0.0 {
             return Assessment::Clear;
         }
-        // A driver who has become slower than the other vehicle is as far from a collision as one who closes in as fast.
+        // A driver who has become slower than the other vehicle is as far from a collision as one
+        // who closes in as fast.
         if conflict.gap_m.abs() > CRITICAL_TTC_S * conflict.closing_mps().abs() {
             self.is_over = true;
             return Assessment::Harmless;

@@ -9,8 +9,9 @@
 //!  └───┘
 //! ```
 //!
-//! Geometry, step and duration are those of JRC-FSM (`utility/comparison_cut_in.py`, `utility/movement.py`), so that its
-//! published outcomes are reproduced. Positions advance with the speed at the end of each step.
+//! Geometry, step and duration come from JRC-FSM (`utility/comparison_cut_in.py`,
+//! `utility/movement.py`), to reproduce its published outcomes. Positions advance with the speed at
+//! the end of each step.
 
 use super::{Assessment, Conflict, ReferenceModel};
 
@@ -22,7 +23,8 @@ const STEPS: usize = 350;
 const LENGTH_M: f64 = 4.3;
 /// Width of both vehicles (m) (JRC-FSM).
 const WIDTH_M: f64 = 1.9;
-/// Lateral distance of the centres when the other vehicle has reached its lateral speed (m) (JRC-FSM).
+/// Lateral distance of the centres when the other vehicle has reached its lateral speed (m)
+/// (JRC-FSM).
 const LATERAL_DISTANCE_M: f64 = 1.6 + WIDTH_M;
 /// Lateral acceleration with which the other vehicle begins (m/s²) (JRC-FSM).
 const LATERAL_ACCELERATION_MPS2: f64 = 1.5;
@@ -46,7 +48,7 @@ impl CutIn {
         let start_up = (self.lateral_mps / (LATERAL_ACCELERATION_MPS2 * STEP_S)).ceil() as usize;
         let lateral_at = |step: usize| LATERAL_ACCELERATION_MPS2 * STEP_S * step as f64;
         let lateral_steps = lateral_steps(self.lateral_mps);
-        // The lateral speed at a step, and the one that leads to the next step.
+        // The lateral speed at a step, and the lateral speed that leads to the next step.
         let lateral_mps = |step: usize| match step.checked_sub(start_up) {
             None => lateral_at(step),
             Some(later) if later <= lateral_steps => self.lateral_mps,
@@ -110,7 +112,8 @@ mod tests {
         assert_eq!(collides(CutIn { gap_m: 59.0, ..near }), [false, false]);
         assert_eq!(collides(CutIn { lateral_mps: 0.0, ..near }), [false, false], "the other vehicle stays in its lane");
         assert_eq!(collides(CutIn { gap_m: 5.0, ..near }), [false, false], "passed before it is there");
-        // The fuzzy model sees the vehicle come while the careful driver still waits for it to overlap.
+        // The fuzzy model sees the vehicle come while the careful driver still waits for it to
+        // overlap.
         assert_eq!(collides(CutIn { lateral_mps: 1.5, ..near }), [true, false]);
     }
 }

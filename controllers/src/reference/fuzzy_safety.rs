@@ -1,10 +1,11 @@
 //! The fuzzy safety model: braking in proportion to two fuzzy measures of risk.
 //!
-//! The *proactive* measure PFS asks whether the driver could stop behind a vehicle that brakes hard from now on. The
-//! *critical* measure CFS asks whether the driver avoids a collision with a vehicle that keeps its speed. Each is 0 at
-//! distances at which gentle braking suffices, 1 where hard braking does not, and linear between (Mattas et al., *Fuzzy
-//! surrogate safety metrics for real-time assessment of rear-end collision risk*, Accident Analysis and Prevention 148
-//! (2020) 105794; figures and equations as implemented in JRC-FSM).
+//! The *proactive* measure PFS asks whether the driver can stop behind a vehicle that brakes hard
+//! from now on. The *critical* measure CFS asks whether the driver avoids a collision with a
+//! vehicle that keeps its speed. Each is 0 at distances at which gentle braking suffices, 1 where
+//! hard braking does not, and linear between (Mattas et al., *Fuzzy surrogate safety metrics for
+//! real-time assessment of rear-end collision risk*, Accident Analysis and Prevention 148 (2020)
+//! 105794; figures and equations as implemented in JRC-FSM).
 
 use super::{Assessment, BUILD_UP_MPS3, Conflict, DELAY_S, HARDEST_BRAKING_MPS2, ReferenceModel};
 
@@ -18,7 +19,8 @@ const LEAD_BRAKING_MPS2: f64 = 7.0;
 const STANDSTILL_GAP_M: f64 = 2.0;
 /// Further distance of the proactive measure (m) (JRC-FSM).
 const SAFETY_MARGIN_M: f64 = 2.0;
-/// Advance in time that a vehicle on its way into the lane needs to count as no conflict (s) (JRC-FSM).
+/// Advance in time that a vehicle on its way into the lane needs to count as no conflict (s)
+/// (JRC-FSM).
 const CUT_IN_ADVANCE_S: f64 = 0.1;
 
 /// Returns the gap that the model keeps behind a vehicle at the same speed (m).
@@ -26,7 +28,8 @@ pub(crate) fn following_gap_m(speed_mps: f64) -> f64 {
     proactive_gap_m(speed_mps, speed_mps, COMFORTABLE_BRAKING_MPS2) + SAFETY_MARGIN_M + STANDSTILL_GAP_M
 }
 
-/// Returns the gap at which braking with `braking_mps2` stops the driver behind a vehicle that brakes hard (m).
+/// Returns the gap at which braking with `braking_mps2` stops the driver behind a vehicle that
+/// brakes hard (m).
 fn proactive_gap_m(speed_mps: f64, lead_speed_mps: f64, braking_mps2: f64) -> f64 {
     speed_mps * DELAY_S + speed_mps.powi(2) / (2.0 * braking_mps2) - lead_speed_mps.powi(2) / (2.0 * LEAD_BRAKING_MPS2)
 }
@@ -84,7 +87,8 @@ impl Default for FuzzySafetyModel {
 }
 
 impl FuzzySafetyModel {
-    /// Returns true if a vehicle that is beside the own lane will be in it before the driver has passed.
+    /// Returns true if a vehicle that is beside the own lane will be in it before the driver has
+    /// passed.
     fn enters(conflict: &Conflict) -> bool {
         let towards_mps = conflict.lateral_closing_mps;
         let passing_s = (conflict.gap_m + 2.0 * conflict.half_lengths_m) / conflict.closing_mps();

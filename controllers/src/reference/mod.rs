@@ -1,13 +1,15 @@
-//! The performance models of UN Regulation 157 (annex 4, appendix 3): which conflicts ahead a careful driver resolves.
+//! The performance models of UN Regulation 157 (annex 4, appendix 3): they decide which conflicts
+//! ahead a careful driver resolves.
 //!
 //! ```text
 //!  conflict ─▶ model ─▶ clear │ harmless │ braking
 //! ```
 //!
-//! The regulation knows two: the competent and careful human driver ([`CarefulDriver`]), and the fuzzy safety model
-//! ([`FuzzySafetyModel`]) that a manufacturer may use instead. The equations and figures are those of JRC-FSM, the
-//! implementation of the European Commission's Joint Research Centre (`utility/models.py`, `utility/vehicle.py`,
-//! `utility/fuzzy_functs.py`), because the text of the regulation was not at hand. [`CutIn`] is its test case.
+//! The regulation knows two: the competent and careful human driver ([`CarefulDriver`]), and the
+//! fuzzy safety model ([`FuzzySafetyModel`]) that a manufacturer may use instead. The equations and
+//! figures come from JRC-FSM, the implementation of the European Commission's Joint Research Centre
+//! (`utility/models.py`, `utility/vehicle.py`, `utility/fuzzy_functs.py`), because the text of the
+//! regulation was not at hand. [`CutIn`] is its test case.
 
 mod careful_driver;
 mod cut_in;
@@ -30,7 +32,8 @@ pub(crate) const DELAY_S: f64 = 0.75;
 /// Another vehicle ahead, in the own lane or on its way there, as a reference model sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conflict {
-    /// Gap from the own front bumper to its rear bumper (m); negative while they overlap lengthwise.
+    /// Gap from the own front bumper to its rear bumper (m); negative while they overlap
+    /// lengthwise.
     pub gap_m: f64,
     /// Gap from side to side (m); negative while they overlap sideways.
     pub lateral_gap_m: f64,
@@ -47,7 +50,8 @@ pub struct Conflict {
 }
 
 impl Conflict {
-    /// Returns true if the centre of the other vehicle is behind the own one: it is then no conflict ahead.
+    /// Returns true if the centre of the other vehicle is behind the own one: it is then no
+    /// conflict ahead.
     pub(crate) fn is_behind(&self) -> bool {
         self.gap_m + self.half_lengths_m < 0.0
     }
@@ -58,7 +62,7 @@ impl Conflict {
     }
 }
 
-/// What a reference model makes of a conflict at one step.
+/// The response of a reference model to a conflict at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Assessment {
     /// There is no risk.

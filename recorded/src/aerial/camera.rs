@@ -9,17 +9,19 @@
 //!    nadir    ╲│  ╲ displaced roof
 //! ```
 //!
-//! The ground frame is the road frame taken as a plane: x along the road, y to the left, z up.
+//! The ground frame is the road frame as a plane: x along the road, y to the left, z up.
 //!
-//! Altitude, resolution and lens follow published aerial acquisition: 100 m and images of Full HD (F. Kruber et al., *Vehicle
-//! Position Estimation with Aerial Imagery from Unmanned Aerial Vehicles*, IV 2020), about 0.1 m of ground for each pixel (R.
-//! Krajewski et al., *The highD Dataset*, ITSC 2018). The default covers 0.13 m per pixel, so that a frame takes a tenth of a
+//! Altitude, resolution and lens follow published aerial acquisition: 100 m and images of Full HD
+//! (F. Kruber et al., *Vehicle Position Estimation with Aerial Imagery from Unmanned Aerial
+//! Vehicles*, IV 2020), about 0.1 m of ground for each pixel (R. Krajewski et al., *The highD
+//! Dataset*, ITSC 2018). The default covers 0.13 m per pixel: a frame then takes a tenth of a
 //! second to render and to search.
 
 use closecall_traffic::maths;
 use serde::Serialize;
 
-/// Focal length of a wide-angle lens of 24 mm (35 mm equivalent), as usual drones have it, on [`WIDTH_PX`] columns (px).
+/// Focal length of a wide-angle lens of 24 mm (35 mm equivalent), as usual drones have it, on
+/// [`WIDTH_PX`] columns (px).
 pub const FOCAL_PX: f64 = 24.0 / 36.0 * WIDTH_PX as f64;
 /// Columns of a frame.
 pub const WIDTH_PX: usize = 1_280;
@@ -27,7 +29,8 @@ pub const WIDTH_PX: usize = 1_280;
 pub const HEIGHT_PX: usize = 192;
 /// Usual altitude (m).
 pub const ALTITUDE_M: f64 = 100.0;
-/// Usual angle of the optical axis from the nadir (rad): 25°. The drone hovers beside the road, not above it.
+/// Usual angle of the optical axis from the nadir (rad): 25°. The drone hovers beside the road, not
+/// above it.
 pub const OFF_NADIR_RAD: f64 = 25.0 * std::f64::consts::PI / 180.0;
 
 /// A vector in the ground frame (m).
@@ -59,8 +62,8 @@ pub struct View {
 }
 
 impl View {
-    /// Returns the usual view of a road from its right side, with this angle from the nadir (rad) and altitude (m). The
-    /// optical axis points at `target_m`.
+    /// Returns the usual view of a road from its right side, with this angle from the nadir (rad)
+    /// and altitude (m). The optical axis points at `target_m`.
     pub const fn beside_road(target_m: [f64; 2], altitude_m: f64, off_nadir_rad: f64) -> Self {
         Self {
             target_m,
@@ -105,8 +108,8 @@ impl AerialCamera {
         self.centre_m
     }
 
-    /// Returns the image position of a point (px): column and row, with the middle of the first pixel at 0.5. `None` if the
-    /// point is not in front of the camera.
+    /// Returns the image position of a point (px): column and row, with the middle of the first
+    /// pixel at 0.5. `None` if the point is not in front of the camera.
     pub fn project(&self, point_m: Vec3) -> Option<[f64; 2]> {
         self.project_with_depth(point_m).map(|[column, row, _]| [column, row])
     }
@@ -122,7 +125,8 @@ impl AerialCamera {
         (depth > NEAR_M).then(|| [at(self.right, width), at(self.down, height), depth])
     }
 
-    /// Returns the point of the ground at an image position (m). `None` if the position is at or above the horizon.
+    /// Returns the point of the ground at an image position (m). `None` if the position is at or
+    /// above the horizon.
     pub fn ground_at(&self, [column, row]: [f64; 2]) -> Option<[f64; 2]> {
         let [width, height] = self.view.size_px;
         let (u, v) =
@@ -132,8 +136,8 @@ impl AerialCamera {
         (ray[2] < 0.0).then(|| [self.centre_m[0] + reach * ray[0], self.centre_m[1] + reach * ray[1]])
     }
 
-    /// Returns the vector by which a point at `height_m` above `ground_m` appears displaced on the ground (m):
-    /// (p − c)·h/(H − h), with the nadir c.
+    /// Returns the vector by which a point at `height_m` above `ground_m` appears displaced on the
+    /// ground (m): (p − c)·h/(H − h), with the nadir c.
     pub fn relief_m(&self, ground_m: [f64; 2], height_m: f64) -> [f64; 2] {
         let share = height_m / (self.view.altitude_m - height_m);
         [0, 1].map(|axis| (ground_m[axis] - self.centre_m[axis]) * share)

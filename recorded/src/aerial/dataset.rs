@@ -1,12 +1,14 @@
-//! Data sets of labelled pictures in the layout of DOTA (G.-S. Xia et al., *DOTA: A Large-Scale Dataset for Object Detection in
-//! Aerial Images*, CVPR 2018): `images/NAME.png`, and `labels/NAME.txt` with one line for each vehicle, the four corners of its
-//! oriented box in pixels, its class, and whether it is difficult.
+//! Data sets of labelled pictures in the layout of DOTA (G.-S. Xia et al., *DOTA: A Large-Scale
+//! Dataset for Object Detection in Aerial Images*, CVPR 2018): `images/NAME.png`, and
+//! `labels/NAME.txt` with one line for each vehicle, the four corners of its oriented box in
+//! pixels, its class, and whether it is difficult.
 //!
 //! ```text
 //! 412.3 80.1 449.9 82.0 449.2 96.5 411.6 94.6 car 0
 //! ```
 //!
-//! A vehicle is *difficult* (1) if less than a third of its box shows it. `labels/NAME.json` holds the pose of the camera.
+//! A vehicle is *difficult* (1) if less than a third of its box shows it. `labels/NAME.json` holds
+//! the pose of the camera.
 
 use std::fmt::{self, Write as _};
 use std::path::Path;
@@ -33,7 +35,8 @@ pub const SQUARE: Frame = Frame { size_px: [512, 512], is_across: false };
 pub struct AerialDatasetOptions {
     /// The set to render, training or held-out: their body shapes differ.
     pub set: Set,
-    /// Number of pictures. Every second one is a strip across the road, the others are squares in any direction.
+    /// Number of pictures. Every second one is a strip across the road, the others are squares in
+    /// any direction.
     pub pictures: u32,
     /// Seed of the scenes. 0 is a seed like any other.
     pub seed: u64,
@@ -74,7 +77,8 @@ pub fn dataset_picture(
     Ok((render(&scene, &camera), scene, camera))
 }
 
-/// Renders a data set into `folder`, which is created if it does not exist. The same options give the same bytes.
+/// Renders a data set into `folder`, which is created if it does not exist. The same options give
+/// the same bytes.
 ///
 /// # Errors
 /// [`AerialError`] if a file cannot be encoded or written.
@@ -82,7 +86,7 @@ pub fn render_aerial_dataset(
     options: &AerialDatasetOptions,
     folder: &Path,
 ) -> Result<AerialDatasetSummary, AerialError> {
-    let one = |index: u32| -> Result<AerialDatasetSummary, AerialError> {
+    let write_picture = |index: u32| -> Result<AerialDatasetSummary, AerialError> {
         let (picture, scene, camera) = dataset_picture(options, index)?;
         let name = format!("aerial-{index:06}");
         let (text, summary) = labels_text(&picture, &scene);
@@ -96,7 +100,7 @@ pub fn render_aerial_dataset(
         let path = folder.join(name);
         std::fs::create_dir_all(&path).map_err(|source| AerialError::Folder { path, source })?;
     }
-    let all: Vec<_> = (0..options.pictures).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let all: Vec<_> = (0..options.pictures).into_par_iter().map(write_picture).collect::<Result<_, _>>()?;
     let add = |a: AerialDatasetSummary, b: AerialDatasetSummary| AerialDatasetSummary {
         pictures: a.pictures + 1,
         cars: a.cars + b.cars,

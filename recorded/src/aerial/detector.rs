@@ -1,8 +1,9 @@
 //! The detector of vehicles in aerial pictures: a trained network without anchors.
 //!
-//! `xtask/training/aerial_train.py` trains and exports it, and `models/MODEL_CARD.md` states how well it finds cars and trucks. The
-//! network returns eight numbers for each cell of 8 px: the logits that a car or a truck has its centre there, the offset of the
-//! centre, the logarithms of its sizes, and sine and cosine of twice its angle.
+//! `xtask/training/aerial_train.py` trains and exports it, and `models/MODEL_CARD.md` states how
+//! well it finds cars and trucks. The network returns eight numbers for each cell of 8 px: the
+//! logits that a car or a truck has its centre there, the offset of the centre, the logarithms of
+//! its sizes, and sine and cosine of twice its angle.
 
 use closecall_sensors::camera::{Backend, CHANNELS, Image, Network};
 use closecall_traffic::{VehicleClass, maths};
@@ -51,13 +52,14 @@ impl Detector {
     /// Loads the network that ships with Closecall on this backend.
     ///
     /// # Errors
-    /// [`AerialError::Network`] if the backend cannot be loaded, or if the process uses another one.
+    /// [`AerialError::Network`] if the backend cannot be loaded, or if the process uses another
+    /// backend.
     pub fn shipped(backend: &Backend) -> Result<Self, AerialError> {
         Ok(Self { network: Network::new("aerial-detector.onnx", SHIPPED_DETECTOR, backend)?, planes: Vec::new() })
     }
 
-    /// Returns the vehicles in a picture with a score of at least `from`, the best first. Both sides of the picture are
-    /// multiples of 8 px. The same picture always gives the same bits.
+    /// Returns the vehicles in a picture with a score of at least `from`, the best first. Both
+    /// sides of the picture are multiples of 8 px. The same picture always gives the same bits.
     ///
     /// # Errors
     /// [`AerialError`] if inference fails, or if the output has another shape than expected.
@@ -72,16 +74,17 @@ impl Detector {
         let (shape, output) = self.network.run([1, CHANNELS, height, width], &self.planes)?;
         let expected = [1, OUTPUTS, height / STRIDE, width / STRIDE];
         if shape != expected {
-            return Err(AerialError::Output { found: shape, expected });
+            return Err(AerialError::Output { actual: shape, expected });
         }
         Ok(decode(&output, [height / STRIDE, width / STRIDE], from))
     }
 }
 
-/// Returns the vehicles that an output states: peaks of the score among the eight neighbours, without doubles.
+/// Returns the vehicles that an output states: peaks of the score among the eight neighbours,
+/// without doubles.
 fn decode(output: &[f32], [rows, columns]: [usize; 2], from: f64) -> Vec<ImageDetection> {
     let at = |part: usize, row: usize, column: usize| output[(part * rows + row) * columns + column];
-    let mut found = Vec::new();
+    let mut detections = Vec::new();
     for (kind, class) in CLASSES.into_iter().enumerate() {
         for row in 0..rows {
             for column in 0..columns {
@@ -100,18 +103,18 @@ fn decode(output: &[f32], [rows, columns]: [usize; 2], from: f64) -> Vec<ImageDe
                     width_px: WIDTH_PX * maths::exp(value(5)),
                     angle_rad: 0.5 * maths::atan2(value(6), value(7)),
                 };
-                found.push(ImageDetection { image_box, class, score });
+                detections.push(ImageDetection { image_box, class, score });
             }
         }
     }
-    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    detections.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<ImageDetection> = Vec::new();
-    for one in found {
+    for detection in detections {
         let is_same = |other: &ImageDetection| {
-            intersection_over_union(&one.image_box.plane(), &other.image_box.plane()) >= SAME_VEHICLE
+            intersection_over_union(&detection.image_box.plane(), &other.image_box.plane()) >= SAME_VEHICLE
         };
         if !kept.iter().any(is_same) {
-            kept.push(one);
+            kept.push(detection);
         }
     }
     kept
@@ -143,9 +146,9 @@ mod tests {
         for (part, value) in [(2, 0.25), (3, -0.5), (4, 0.0), (5, 0.5), (6, 1.0), (7, 0.0)] {
             set(part, 1, 2, value);
         }
-        let found = decode(&output, [rows, columns], 0.3);
-        assert_eq!(found.len(), 1);
-        let ImageDetection { image_box, class, score } = found[0];
+        let detections = decode(&output, [rows, columns], 0.3);
+        assert_eq!(detections.len(), 1);
+        let ImageDetection { image_box, class, score } = detections[0];
         assert_eq!((class, image_box.centre_px), (VehicleClass::Truck, [22.0, 8.0]));
         assert!(
             (image_box.length_px - 32.0).abs() < 1e-9 && (image_box.width_px - 16.0 * maths::exp(0.5)).abs() < 1e-9

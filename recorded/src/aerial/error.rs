@@ -37,10 +37,10 @@ pub enum AerialError {
     #[error("failed to run the aerial detector: {0}")]
     Network(#[from] ClassifierError),
     /// The output of the detector has another shape than expected.
-    #[error("failed to read the output of the aerial detector: shape {found:?} instead of {expected:?}")]
+    #[error("failed to read the output of the aerial detector: shape {actual:?} instead of {expected:?}")]
     Output {
         /// The shape of the output.
-        found: Vec<usize>,
+        actual: Vec<usize>,
         /// The expected shape.
         expected: [usize; 4],
     },

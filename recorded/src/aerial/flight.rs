@@ -22,10 +22,12 @@ use crate::aerial::tracker::{AerialTrack, GroundDetection, track};
 
 /// Time between two pictures: every second one of a video of 25 Hz, as highD has it.
 pub const FRAME: Time = Time::from_ms(80);
-/// Assumption: standard deviation, along each axis, of the constant error of georeferencing by control points (m). Published
-/// errors of all causes together are 0.1 m (highD) and 0.2 m (Kruber et al.).
+/// Assumption: standard deviation, along each axis, of the constant error of georeferencing by
+/// control points (m). Published errors of all causes together are 0.1 m (highD) and 0.2 m (Kruber
+/// et al.).
 const OFFSET_SIGMA_M: f64 = 0.1;
-/// Assumption: standard deviation, along each axis, of what stabilisation leaves from picture to picture (m): a quarter of a pixel.
+/// Assumption: standard deviation, along each axis, of what stabilisation leaves from picture to
+/// picture (m): a quarter of a pixel.
 const JITTER_SIGMA_M: f64 = 0.03;
 /// Most lanes that a picture can show.
 const MOST_LANES: u8 = 8;
@@ -82,9 +84,10 @@ impl FlightOptions {
 /// The trajectory data that a flight yields.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// The true movement of the vehicles as far as they are watched.
+    /// The true movement of the watched vehicles, while they are watched.
     pub truth: TrajectoryData,
-    /// What the detector and the tracker make of the pictures, with boxes as they are seen.
+    /// The tracks that the detector and the tracker derive from the pictures, with boxes as they
+    /// are seen.
     pub raw: TrajectoryData,
     /// The same with the perspective bias corrected.
     pub corrected: TrajectoryData,
@@ -97,7 +100,8 @@ pub struct Flight {
 /// Watches the traffic of `data` with a camera that follows it.
 ///
 /// # Errors
-/// [`AerialError`] if an option is out of range, if there is no lane change to watch, or if the detector fails.
+/// [`AerialError`] if an option is out of range, if there is no lane change to watch, or if the
+/// detector fails.
 pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) -> Result<Flight, AerialError> {
     options.check()?;
     let edges_m = edges_m(data);
@@ -111,12 +115,12 @@ pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) ->
         let scenes: Vec<AerialScene> = times.iter().map(|time| scene_at(data, &edges_m, *time, options)).collect();
         let cameras: Vec<AerialCamera> = scenes.iter().map(|scene| camera_above(scene, &edges_m, options)).collect();
         let [raw, corrected] = detections(&scenes, &cameras, backend)?;
-        let (own, others) = errors.split_at(times.len());
-        errors = others;
+        let (span_errors, rest) = errors.split_at(times.len());
+        errors = rest;
         for (frames, all) in [(raw, &mut seen), (corrected, &mut flat)] {
-            let tracks = track(&shifted(frames, own), FRAME.s());
-            let first_id = all.iter().map(|one: &Trajectory| one.track_id).max().unwrap_or(0);
-            all.extend(tracks.iter().map(|one| trajectory(one, first_id, times[0], &edges_m)));
+            let tracks = track(&shifted(frames, span_errors), FRAME.s());
+            let first_id = all.iter().map(|track: &Trajectory| track.track_id).max().unwrap_or(0);
+            all.extend(tracks.iter().map(|track| trajectory(track, first_id, times[0], &edges_m)));
         }
         truth.extend(watched(data, times, &cameras));
         let middle = times.len() / 2;
@@ -134,7 +138,8 @@ pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) ->
     Ok(Flight { truth: named("truth", truth), raw, corrected, frames, example })
 }
 
-/// Returns the vehicles on the ground that each picture shows: as they are seen, and with the bias corrected.
+/// Returns the vehicles on the ground that each picture shows: as they are seen, and with the bias
+/// corrected.
 fn detections(
     scenes: &[AerialScene],
     cameras: &[AerialCamera],
@@ -147,13 +152,13 @@ fn detections(
             None => slot.insert(Detector::shipped(backend)?),
         };
         let picture = render(&scenes[index], &cameras[index]);
-        let found = detector.detect(&picture.image, DETECTED_FROM)?;
+        let detections = detector.detect(&picture.image, DETECTED_FROM)?;
         let ground = |is_corrected: bool| -> Vec<GroundDetection> {
-            let all = found.iter().filter_map(|one| {
-                let seen = raw(&cameras[index], &one.image_box)?;
-                let height_m = one.class.typical_dimensions().height_m;
+            let all = detections.iter().filter_map(|detection| {
+                let seen = raw(&cameras[index], &detection.image_box)?;
+                let height_m = detection.class.typical_dimensions().height_m;
                 let footprint = if is_corrected { corrected(&cameras[index], &seen, height_m) } else { seen };
-                Some(GroundDetection { footprint, class: one.class, score: one.score })
+                Some(GroundDetection { footprint, class: detection.class, score: detection.score })
             });
             all.collect()
         };
@@ -165,7 +170,8 @@ fn detections(
     Ok([seen, flat])
 }
 
-/// Returns the instants of the pictures, all of them multiples of [`FRAME`]: those near a lane change, in spans without gaps.
+/// Returns the instants of the pictures, all of them multiples of [`FRAME`]: those near a lane
+/// change, in spans without gaps.
 fn spans(data: &TrajectoryData, options: &FlightOptions) -> Result<Vec<Vec<Time>>, AerialError> {
     let mut crossings: Vec<Time> = detect(&smooth(data)).iter().map(|change| Time::from_s(change.crossing_s)).collect();
     crossings.sort();
@@ -226,7 +232,8 @@ fn scene_at(data: &TrajectoryData, edges_m: &[f64], time: Time, options: &Flight
     AerialScene { ground, vehicles: vehicles.collect(), light: Light::NOON, key }
 }
 
-/// Returns the positions of the markings of all lanes that have traffic (m), from the left edge of the road on.
+/// Returns the positions of the markings of all lanes that have traffic (m), from the left edge of
+/// the road on.
 fn edges_m(data: &TrajectoryData) -> Vec<f64> {
     let width_m = data.markings.typical_lane_width_m();
     let lanes = data.trajectories.iter().flat_map(|track| &track.points).map(|point| point.lane.0).max();
@@ -259,7 +266,8 @@ fn body(track: &Trajectory, seed: u64) -> Vehicle {
     vehicle
 }
 
-/// Returns the camera above the mean position of the vehicles, which looks at the middle of the road.
+/// Returns the camera above the mean position of the vehicles, which looks at the middle of the
+/// road.
 fn camera_above(scene: &AerialScene, edges_m: &[f64], options: &FlightOptions) -> AerialCamera {
     let count = scene.vehicles.len().max(1) as f64;
     let s_m = scene.vehicles.iter().map(|vehicle| vehicle.at_m[0]).sum::<f64>() / count;
@@ -280,16 +288,17 @@ fn georeferencing(options: &FlightOptions, frames: usize) -> Result<Vec<[f64; 2]
 /// Returns the detections of each picture, displaced by its error of georeferencing (m).
 fn shifted(mut frames: Vec<Vec<GroundDetection>>, errors_m: &[[f64; 2]]) -> Vec<Vec<GroundDetection>> {
     for (detections, [x_m, y_m]) in frames.iter_mut().zip(errors_m) {
-        for one in detections {
-            one.footprint.x_m += x_m;
-            one.footprint.y_m += y_m;
+        for detection in detections {
+            detection.footprint.x_m += x_m;
+            detection.footprint.y_m += y_m;
         }
     }
     frames
 }
 
-/// Returns the trajectory of a track, whose number counts on after those `before`; lanes are those between the known markings.
-fn trajectory(found: &AerialTrack, before: u64, start: Time, edges_m: &[f64]) -> Trajectory {
+/// Returns the trajectory of a track, whose number counts on after those `before`; lanes are those
+/// between the known markings.
+fn trajectory(track: &AerialTrack, before: u64, start: Time, edges_m: &[f64]) -> Trajectory {
     let lane_at = |d_m: f64| {
         let passed = edges_m[1..edges_m.len() - 1].iter().filter(|edge_m| d_m < **edge_m).count();
         Lane(u8::try_from(passed + 1).unwrap_or(u8::MAX))
@@ -305,15 +314,15 @@ fn trajectory(found: &AerialTrack, before: u64, start: Time, edges_m: &[f64]) ->
         lateral_acceleration_mps2: point.acceleration_mps2[1],
         lane: lane_at(point.at_m[1]),
     };
-    let [length_m, width_m] = found.size_m;
-    let dimensions = Dimensions { length_m, width_m, ..found.class.typical_dimensions() };
-    let points = found.points.iter().map(point).collect();
-    let track_id = before + found.id;
-    Trajectory { track_id, vehicle_id: track_id, class: found.class, dimensions, points }
+    let [length_m, width_m] = track.size_m;
+    let dimensions = Dimensions { length_m, width_m, ..track.class.typical_dimensions() };
+    let points = track.points.iter().map(point).collect();
+    let track_id = before + track.id;
+    Trajectory { track_id, vehicle_id: track_id, class: track.class, dimensions, points }
 }
 
-/// Returns the true movement at the instants of the pictures, as far as a vehicle is within them. A vehicle that leaves and
-/// comes back becomes several tracks of the same vehicle.
+/// Returns the true movement of each vehicle at the instants at which it is within the picture. A
+/// vehicle that leaves and comes back becomes several tracks of the same vehicle.
 fn watched(data: &TrajectoryData, times: &[Time], cameras: &[AerialCamera]) -> Vec<Trajectory> {
     let mut pieces = Vec::new();
     for track in data.trajectories.iter().filter(|track| track.class != VehicleClass::Motorcycle) {
@@ -342,5 +351,6 @@ fn is_within(camera: &AerialCamera, point: &TrajectoryPoint) -> bool {
         .is_some_and(|[column, row]| (MARGIN_PX..width - MARGIN_PX).contains(&column) && (0.0..height).contains(&row))
 }
 
-// The criteria for lane changes use a common clock. The interval of two pictures must not be longer than its period.
+// The criteria for lane changes use a common clock. The interval of two pictures must not be longer
+// than its period.
 const _: () = assert!(FRAME.ns() <= PERIOD.ns());

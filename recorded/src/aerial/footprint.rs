@@ -6,10 +6,11 @@
 //!   roof:            ├─────────────────┤          displaced by δ = r·h/(H − h), larger by H/(H − h)
 //! ```
 //!
-//! Along each axis of a vehicle of size L and height h, the box that is seen on the ground reaches from min(−L/2, δ − kL/2) to
-//! max(L/2, δ + kL/2), with k = H/(H − h). Its centre lies beside that of the footprint, by about δ/2: 1 m for a truck of 4 m that
-//! is seen at 25° from 100 m. [`corrected`] inverts this for the typical height of the class. F. Kruber et al. (IV 2020) correct the
-//! same displacement by the height of their test vehicle.
+//! Along each axis of a vehicle of size L and height h, the box that is seen on the ground reaches
+//! from min(−L/2, δ − kL/2) to max(L/2, δ + kL/2), with k = H/(H − h). Its centre lies about δ/2
+//! beside the centre of the footprint: 1 m for a truck of 4 m that is seen at 25° from 100 m.
+//! [`corrected`] inverts this for the typical height of the class. F. Kruber et al. (IV 2020)
+//! correct the same displacement by the height of their test vehicle.
 
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::maths;
@@ -23,14 +24,16 @@ const STEPS: usize = 12;
 /// Least size that is left of a box (m).
 const SMALLEST_M: f64 = 0.3;
 
-/// Returns the box on the ground that an image box covers, as if the vehicle were flat. `None` if a corner lies above the horizon.
+/// Returns the box on the ground that an image box covers, as if the vehicle were flat. `None` if a
+/// corner lies above the horizon.
 pub fn raw(camera: &AerialCamera, image_box: &ImageBox) -> Option<OrientedBox> {
     let ground = |pixel| camera.ground_at(pixel).map(|[x, y]| Vector2::new(x, y));
     let [a, b, c, d] = image_box.corners_px().map(ground);
     let (a, b, c, d) = (a?, b?, c?, d?);
     let centre = (a + b + c + d) / 4.0;
     let (along, across) = (0.5 * (a + d - b - c), 0.5 * (a + b - c - d));
-    // Front and rear look alike: vehicles are taken to drive along the x axis, whichever way.
+    // Front and rear look alike: vehicles are assumed to drive along the x axis, in either
+    // direction.
     let forward = if along.x < 0.0 { -along } else { along };
     Some(OrientedBox {
         x_m: centre.x,
@@ -41,7 +44,8 @@ pub fn raw(camera: &AerialCamera, image_box: &ImageBox) -> Option<OrientedBox> {
     })
 }
 
-/// Returns the box on the ground that the visible body of a cuboid of this footprint and height covers.
+/// Returns the box on the ground that the visible body of a cuboid of this footprint and height
+/// covers.
 pub fn seen(camera: &AerialCamera, footprint: &OrientedBox, height_m: f64) -> OrientedBox {
     let altitude_m = camera.view().altitude_m;
     let growth = altitude_m / (altitude_m - height_m);
@@ -54,7 +58,8 @@ pub fn seen(camera: &AerialCamera, footprint: &OrientedBox, height_m: f64) -> Or
     OrientedBox { x_m: centre.x, y_m: centre.y, length_m: along.1, width_m: across.1, ..*footprint }
 }
 
-/// Returns the centre and the size of what a footprint of this size and its roof cover along one axis (m).
+/// Returns the centre and the size of the interval that a footprint of this size and its roof cover
+/// along one axis (m).
 fn covered(size_m: f64, displaced_m: f64, growth: f64) -> (f64, f64) {
     let (half, roof) = (0.5 * size_m, 0.5 * size_m * growth);
     let (low, high) = ((-half).min(displaced_m - roof), half.max(displaced_m + roof));
@@ -63,15 +68,15 @@ fn covered(size_m: f64, displaced_m: f64, growth: f64) -> (f64, f64) {
 
 /// Returns the footprint whose visible body covers the box `seen_m`, for a vehicle of this height.
 pub fn corrected(camera: &AerialCamera, seen_m: &OrientedBox, height_m: f64) -> OrientedBox {
-    let mut found = *seen_m;
+    let mut estimate = *seen_m;
     for _ in 0..STEPS {
-        let now = seen(camera, &found, height_m);
-        found.x_m += seen_m.x_m - now.x_m;
-        found.y_m += seen_m.y_m - now.y_m;
-        found.length_m = (found.length_m + seen_m.length_m - now.length_m).max(SMALLEST_M);
-        found.width_m = (found.width_m + seen_m.width_m - now.width_m).max(SMALLEST_M);
+        let now = seen(camera, &estimate, height_m);
+        estimate.x_m += seen_m.x_m - now.x_m;
+        estimate.y_m += seen_m.y_m - now.y_m;
+        estimate.length_m = (estimate.length_m + seen_m.length_m - now.length_m).max(SMALLEST_M);
+        estimate.width_m = (estimate.width_m + seen_m.width_m - now.width_m).max(SMALLEST_M);
     }
-    found
+    estimate
 }
 
 #[cfg(test)]
@@ -95,11 +100,11 @@ mod tests {
     fn the_bias_of_a_truck_is_the_closed_form_and_about_a_metre() {
         let camera = camera();
         let footprint = truck(250.0, -5.0);
-        let found = seen(&camera, &footprint, HEIGHT_M);
+        let apparent = seen(&camera, &footprint, HEIGHT_M);
         let relief_m = ALTITUDE_M * maths::tan(OFF_NADIR_RAD) * HEIGHT_M / (ALTITUDE_M - HEIGHT_M);
         let growth = ALTITUDE_M / (ALTITUDE_M - HEIGHT_M);
         let expected_m = 0.5 * (relief_m + 0.5 * (growth - 1.0) * footprint.width_m);
-        assert!((found.y_m - footprint.y_m - expected_m).abs() < 1e-9, "{found:?}");
+        assert!((apparent.y_m - footprint.y_m - expected_m).abs() < 1e-9, "{apparent:?}");
         assert!((0.9..1.1).contains(&expected_m), "{expected_m}");
         let car = OrientedBox { length_m: 4.6, width_m: 1.85, ..footprint };
         let car_bias_m = seen(&camera, &car, VehicleClass::Car.typical_dimensions().height_m).y_m - car.y_m;
@@ -107,22 +112,23 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_is_what_the_camera_projects() {
+    fn the_seen_footprint_equals_the_camera_projection() {
         let camera = camera();
         for (x_m, y_m) in [(250.0, -5.0), (210.0, -2.0), (295.0, -9.0)] {
             let footprint = truck(x_m, y_m);
             let corners = footprint.corners_m();
             let solid = [0.0, HEIGHT_M].into_iter().flat_map(|z| corners.map(|corner| [corner.x, corner.y, z]));
-            // Extents along the axes of the vehicle of the projections to the ground of all eight corners.
+            // Extents along the axes of the vehicle of the projections to the ground of all eight
+            // corners.
             let shadows: Vec<[f64; 2]> = solid.map(|p| camera.ground_at(camera.project(p).unwrap()).unwrap()).collect();
             let exact = ImageBox::around(&shadows, 0.0).unwrap();
-            let found = seen(&camera, &footprint, HEIGHT_M);
-            // The roof's displacement is that of its middle.
+            let apparent = seen(&camera, &footprint, HEIGHT_M);
+            // The displacement of the roof is the displacement of its middle.
             let differences = [
-                found.x_m - exact.centre_px[0],
-                found.y_m - exact.centre_px[1],
-                found.length_m - exact.length_px,
-                found.width_m - exact.width_px,
+                apparent.x_m - exact.centre_px[0],
+                apparent.y_m - exact.centre_px[1],
+                apparent.length_m - exact.length_px,
+                apparent.width_m - exact.width_px,
             ];
             assert!(differences.iter().all(|difference| difference.abs() < 1e-6), "{differences:?}");
         }
@@ -145,9 +151,9 @@ mod tests {
         let camera = camera();
         let footprint = OrientedBox { length_m: 4.6, width_m: 1.9, ..truck(240.0, -4.0) };
         let pixels = footprint.corners_m().map(|corner| camera.project([corner.x, corner.y, 0.0]).unwrap());
-        let found = raw(&camera, &ImageBox::around(&pixels, 0.0).unwrap()).unwrap();
-        assert!((found.x_m - 240.0).abs() < 0.1 && (found.y_m + 4.0).abs() < 0.05, "{found:?}");
-        assert!((found.length_m - 4.6).abs() < 0.25 && (found.width_m - 1.9).abs() < 0.15, "{found:?}");
-        assert!(found.yaw_rad.abs() < 0.05);
+        let on_ground = raw(&camera, &ImageBox::around(&pixels, 0.0).unwrap()).unwrap();
+        assert!((on_ground.x_m - 240.0).abs() < 0.1 && (on_ground.y_m + 4.0).abs() < 0.05, "{on_ground:?}");
+        assert!((on_ground.length_m - 4.6).abs() < 0.25 && (on_ground.width_m - 1.9).abs() < 0.15, "{on_ground:?}");
+        assert!(on_ground.yaw_rad.abs() < 0.05);
     }
 }

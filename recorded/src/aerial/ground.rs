@@ -1,4 +1,5 @@
-//! The ground as an aerial camera sees it: lanes, markings, shoulders and verges, with patches and grain.
+//! The ground as an aerial camera sees it: lanes, markings, shoulders and verges, with patches and
+//! grain.
 
 /// Width of a marking (m): 0.15 m on German motorways (RMS).
 const MARKING_M: f64 = 0.15;

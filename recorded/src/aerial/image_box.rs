@@ -12,8 +12,8 @@ pub struct ImageBox {
     pub length_px: f64,
     /// Extent across the vehicle (px).
     pub width_px: f64,
-    /// Direction of the vehicle from the columns' axis towards the rows' axis (rad). Front and rear look alike from above, so
-    /// that the angle counts modulo π.
+    /// Direction of the vehicle from the columns' axis towards the rows' axis (rad). Front and rear
+    /// look alike from above, so the angle counts modulo π.
     pub angle_rad: f64,
 }
 
@@ -44,8 +44,8 @@ impl ImageBox {
 
 /// Returns the smallest and the largest value; `None` without values.
 pub(crate) fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    values.fold(None, |found: Option<[f64; 2]>, value| {
-        Some(found.map_or([value, value], |[low, high]| [low.min(value), high.max(value)]))
+    values.fold(None, |extent: Option<[f64; 2]>, value| {
+        Some(extent.map_or([value, value], |[low, high]| [low.min(value), high.max(value)]))
     })
 }
 
@@ -57,9 +57,9 @@ mod tests {
     fn a_box_around_its_own_corners_is_the_same_box() {
         for angle_rad in [0.0, 0.4, 1.5, -2.0] {
             let given = ImageBox { centre_px: [320.0, 90.0], length_px: 40.0, width_px: 15.0, angle_rad };
-            let found = ImageBox::around(&given.corners_px(), angle_rad).unwrap();
-            assert!((found.length_px - 40.0).abs() < 1e-9 && (found.width_px - 15.0).abs() < 1e-9, "{found:?}");
-            assert!((found.centre_px[0] - 320.0).abs() < 1e-9 && (found.centre_px[1] - 90.0).abs() < 1e-9);
+            let fitted = ImageBox::around(&given.corners_px(), angle_rad).unwrap();
+            assert!((fitted.length_px - 40.0).abs() < 1e-9 && (fitted.width_px - 15.0).abs() < 1e-9, "{fitted:?}");
+            assert!((fitted.centre_px[0] - 320.0).abs() < 1e-9 && (fitted.centre_px[1] - 90.0).abs() < 1e-9);
         }
         assert_eq!(ImageBox::around(&[], 0.0), None);
     }

@@ -1,7 +1,8 @@
 //! A Kalman filter along one axis with position, speed and acceleration, and its smoother.
 //!
-//! The acceleration is a random walk: its derivative, the jerk, is white noise. After the last measurement, the smoother of
-//! Rauch, Tung and Striebel (1965) goes back through time, as the acquisition of highD does (R. Krajewski et al., ITSC 2018).
+//! The acceleration is a random walk: its derivative, the jerk, is white noise. After the last
+//! measurement, the smoother of Rauch, Tung and Striebel (1965) goes back through time, as the
+//! acquisition of highD does (R. Krajewski et al., ITSC 2018).
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,4 +1,5 @@
-//! What the aerial acquisition loses: positions, numbers, lane changes and metrics, compared with the truth.
+//! The losses of the aerial acquisition: positions, numbers, lane changes and metrics, compared
+//! with the truth.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -35,7 +36,8 @@ pub struct CriterionLoss {
     pub crossing_s: Option<f64>,
 }
 
-/// One metric, over the lane changes for which both have a value; times to collision only below 10 s.
+/// One metric, over the lane changes for which both have a value; times to collision only below 10
+/// s.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricLoss {
     /// Name of the metric, which ends with its unit.
@@ -89,9 +91,9 @@ pub fn losses(flights: &[Flight]) -> Losses {
     let mut rows = Vec::new();
     for class in [VehicleClass::Car, VehicleClass::Truck] {
         for is_corrected in [false, true] {
-            let found = |flight: &Flight| if is_corrected { flight.corrected.clone() } else { flight.raw.clone() };
+            let estimated = |flight: &Flight| if is_corrected { flight.corrected.clone() } else { flight.raw.clone() };
             let mut sum = Sum::default();
-            flights.iter().for_each(|flight| sum.add(&flight.truth, &found(flight), class));
+            flights.iter().for_each(|flight| sum.add(&flight.truth, &estimated(flight), class));
             rows.push(sum.row(class, is_corrected));
         }
     }
@@ -113,18 +115,18 @@ struct Sum {
 type Followers = BTreeMap<u64, BTreeSet<u64>>;
 
 impl Sum {
-    fn add(&mut self, truth: &TrajectoryData, found: &TrajectoryData, class: VehicleClass) {
+    fn add(&mut self, truth: &TrajectoryData, estimated: &TrajectoryData, class: VehicleClass) {
         let classes: BTreeMap<u64, VehicleClass> =
             truth.trajectories.iter().map(|track| (track.track_id, track.class)).collect();
         let is_wanted = |track: u64| classes.get(&track) == Some(&class);
-        let followers = self.add_positions(truth, found, class);
+        let followers = self.add_positions(truth, estimated, class);
         let owner = |follower: u64| followers.iter().find(|(_, all)| all.contains(&follower)).map(|(track, _)| *track);
         for criterion in CRITERIA {
             let detector = LaneChangeDetector::new(LaneReliability::Reliable, &truth.markings);
             let all = |data: &TrajectoryData| -> Vec<LaneChange> {
                 data.trajectories.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect()
             };
-            let (wanted, given) = (all(truth), all(found));
+            let (wanted, given) = (all(truth), all(estimated));
             let is_same = |a: &LaneChange, b: &LaneChange| same(a, b, &followers);
             let sum = self.changes.entry(criterion).or_default();
             for change in wanted.iter().filter(|change| is_wanted(change.track_id)) {
@@ -138,7 +140,7 @@ impl Sum {
             sum.2 += unknown.filter(|other| !wanted.iter().any(|change| is_same(change, other))).count();
         }
         let evaluated = |data: &TrajectoryData| criticality(&smooth(data), &Judgement::default());
-        let (wanted, given) = (evaluated(truth), evaluated(found));
+        let (wanted, given) = (evaluated(truth), evaluated(estimated));
         for change in wanted.iter().filter(|change| is_wanted(change.lane_change.track_id)) {
             let other = given.iter().find(|other| same(&change.lane_change, &other.lane_change, &followers));
             if let Some(other) = other {
@@ -147,7 +149,7 @@ impl Sum {
         }
     }
 
-    fn add_positions(&mut self, truth: &TrajectoryData, found: &TrajectoryData, class: VehicleClass) -> Followers {
+    fn add_positions(&mut self, truth: &TrajectoryData, estimated: &TrajectoryData, class: VehicleClass) -> Followers {
         let mut followers = Followers::new();
         for track in &truth.trajectories {
             let mut current = None;
@@ -157,7 +159,7 @@ impl Sum {
                 let distance = |other: &closecall_traffic::TrajectoryPoint| {
                     maths::hypot(other.s_m - point.s_m, other.d_m - point.d_m)
                 };
-                let near = found.trajectories.iter().filter_map(|other| {
+                let near = estimated.trajectories.iter().filter_map(|other| {
                     let at = other.at(point.time).filter(|at| distance(at) < SAME_VEHICLE_M)?;
                     Some((other.track_id, at))
                 });
@@ -175,8 +177,8 @@ impl Sum {
         followers
     }
 
-    fn add_metrics(&mut self, truth: &CriticalLaneChange, found: &CriticalLaneChange) {
-        for (index, ((name, wanted, _), (_, given, _))) in truth.named().zip(found.named()).enumerate() {
+    fn add_metrics(&mut self, truth: &CriticalLaneChange, estimated: &CriticalLaneChange) {
+        for (index, ((name, wanted, _), (_, given, _))) in truth.named().zip(estimated.named()).enumerate() {
             let entry = self.metrics.entry(index).or_insert((name, Vec::new(), 0));
             // Almost equal speeds give any time to collision.
             let is_defined = |value: &f64| name != "ttc_s" || *value < ENCOUNTER_HORIZON_S;
@@ -229,10 +231,10 @@ impl Sum {
 }
 
 /// Returns true if a lane change of the truth and one of the tracks are the same.
-fn same(truth: &LaneChange, found: &LaneChange, followers: &Followers) -> bool {
-    followers.get(&truth.track_id).is_some_and(|all| all.contains(&found.track_id))
-        && truth.direction == found.direction
-        && (truth.crossing_s - found.crossing_s).abs() < SAME_CHANGE_S
+fn same(truth: &LaneChange, estimated: &LaneChange, followers: &Followers) -> bool {
+    followers.get(&truth.track_id).is_some_and(|all| all.contains(&estimated.track_id))
+        && truth.direction == estimated.direction
+        && (truth.crossing_s - estimated.crossing_s).abs() < SAME_CHANGE_S
 }
 
 impl fmt::Display for Losses {
@@ -259,9 +261,9 @@ impl fmt::Display for Losses {
         writeln!(f, "\nlane changes     criterion   found     invented  crossing differs by (median)")?;
         for row in &self.rows {
             for loss in &row.lane_changes {
-                let found = format!("{}/{}", loss.found, loss.wanted);
+                let detected = format!("{}/{}", loss.found, loss.wanted);
                 let (name, crossing) = (loss.criterion.name(), number(loss.crossing_s, 2));
-                writeln!(f, "{:<16} {name:<9} {found:>7} {:>12} {crossing:>10} s", label(row), loss.invented)?;
+                writeln!(f, "{:<16} {name:<9} {detected:>7} {:>12} {crossing:>10} s", label(row), loss.invented)?;
             }
         }
         writeln!(f, "\nmetric           of                   n     bias    error  verdict changes")?;

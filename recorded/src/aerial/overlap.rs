@@ -13,7 +13,8 @@ pub fn intersection_over_union(a: &OrientedBox, b: &OrientedBox) -> f64 {
     if union > 0.0 { (common / union).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Cuts a convex polygon by the edges of another one, whose corners are counter-clockwise (Sutherland and Hodgman, 1974).
+/// Cuts a convex polygon by the edges of another polygon, whose corners are counter-clockwise
+/// (Sutherland and Hodgman, 1974).
 fn clipped(mut polygon: Vec<Vector2<f64>>, by: &[Vector2<f64>; 4]) -> Vec<Vector2<f64>> {
     for (index, start) in by.iter().enumerate() {
         let edge = by[(index + 1) % by.len()] - start;
@@ -21,12 +22,12 @@ fn clipped(mut polygon: Vec<Vector2<f64>>, by: &[Vector2<f64>; 4]) -> Vec<Vector
         let mut kept = Vec::with_capacity(polygon.len() + 1);
         for (place, point) in polygon.iter().enumerate() {
             let next = &polygon[(place + 1) % polygon.len()];
-            let (here, there) = (inside(point), inside(next));
-            if here >= 0.0 {
+            let (inside_m, next_inside_m) = (inside(point), inside(next));
+            if inside_m >= 0.0 {
                 kept.push(*point);
             }
-            if here * there < 0.0 {
-                kept.push(point + (next - point) * (here / (here - there)));
+            if inside_m * next_inside_m < 0.0 {
+                kept.push(point + (next - point) * (inside_m / (inside_m - next_inside_m)));
             }
         }
         polygon = kept;
@@ -59,12 +60,12 @@ mod tests {
             (boxed(4.1, 0.0, 0.0), 0.0),
             (boxed(50.0, 0.0, 1.0), 0.0),
         ] {
-            let found = intersection_over_union(&a, &other);
-            assert!((found - expected).abs() < 1e-9, "{other:?}: {found} instead of {expected}");
+            let overlap = intersection_over_union(&a, &other);
+            assert!((overlap - expected).abs() < 1e-9, "{other:?}: {overlap} instead of {expected}");
             assert!((intersection_over_union(&other, &a) - expected).abs() < 1e-9, "symmetric");
         }
         let turned = [boxed(1.0, 1.0, 0.7), boxed(1.5, 0.6, 0.9)];
-        let shifted = turned.map(|one| OrientedBox { x_m: one.x_m + 100.0, y_m: one.y_m - 7.0, ..one });
+        let shifted = turned.map(|shape| OrientedBox { x_m: shape.x_m + 100.0, y_m: shape.y_m - 7.0, ..shape });
         let [first, second] = [turned, shifted].map(|[a, b]| intersection_over_union(&a, &b));
         assert!((first - second).abs() < 1e-9 && first > 0.3);
     }

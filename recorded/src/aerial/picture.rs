@@ -26,8 +26,8 @@ pub struct GroundVehicle {
     pub at_m: [f64; 2],
     /// Heading from the x axis, counter-clockwise (rad).
     pub yaw_rad: f64,
-    /// Colour of all parts that are neither glass nor rubber nor dark plastic, linear red, green and blue; `None` for those of
-    /// the body.
+    /// Colour of all parts that are neither glass nor rubber nor dark plastic, linear red, green
+    /// and blue; `None` for the triangles of the body.
     pub livery: Option<[f64; 3]>,
 }
 
@@ -83,7 +83,8 @@ pub struct Label {
     pub id: u64,
     /// The tight box around the visible body, turned to the heading.
     pub image_box: ImageBox,
-    /// True if at least a third of the box shows the vehicle. Otherwise it lies outside the picture or behind another one.
+    /// True if at least a third of the box shows the vehicle. Otherwise it lies outside the picture
+    /// or behind another vehicle.
     pub is_visible: bool,
 }
 
@@ -156,8 +157,8 @@ fn draw_body(
 fn albedo(vehicle: &GroundVehicle, triangle: &BodyTriangle) -> [f64; 3] {
     /// Reflectance up to which a face is of glass, rubber or dark plastic.
     const DARK: f64 = 0.06;
-    let own = triangle.albedo.map(f64::from);
-    vehicle.livery.filter(|_| own.iter().any(|value| *value > DARK)).unwrap_or(own)
+    let albedo = triangle.albedo.map(f64::from);
+    vehicle.livery.filter(|_| albedo.iter().any(|value| *value > DARK)).unwrap_or(albedo)
 }
 
 /// Returns the colour of a face in the light.
@@ -167,7 +168,7 @@ fn shaded([a, b, c]: [Vec3; 3], albedo: [f64; 3], light: Light) -> [f64; 3] {
     let length = normal.iter().map(|part| part * part).sum::<f64>().sqrt().max(1e-12);
     let to_sun = light.to_sun();
     let facing = (0..3).map(|axis| normal[axis] * to_sun[axis]).sum::<f64>() / length;
-    // The sky lights upward faces fully and upright ones by half.
+    // The sky lights upward faces fully and upright faces by half.
     let sky = (1.0 - light.direct) * (0.5 + 0.5 * normal[2] / length);
     albedo.map(|value| value * (sky + light.direct * facing.max(0.0) / to_sun[2].max(0.2)))
 }

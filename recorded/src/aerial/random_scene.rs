@@ -19,8 +19,8 @@ const MIN_TRUCK_M: f64 = 7.0;
 /// Least distance between vehicles (m).
 const CLEARANCE_M: f64 = 0.4;
 
-/// The sizes of random pictures: the strip in which a road is watched, or a square of about as many pixels for which the
-/// camera looks in any direction.
+/// The sizes of random pictures: the strip in which a road is watched, or a square of about as many
+/// pixels for which the camera looks in any direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Columns and rows (px).
@@ -62,18 +62,26 @@ pub fn random_scene(set: Set, frame: Frame, rng: &mut Stream) -> (AerialScene, A
     let density = rng.random_range(0.02..0.30);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
     let wanted = (density * reach_m).ceil() as u64 + 1;
+    let road = VisibleRoad { middle_m: view.target_m[0], reach_m, lanes, lane_m };
     for id in 0..wanted {
-        place(&mut scene, (set, id), (view.target_m[0], reach_m, lanes, lane_m), rng);
+        place(&mut scene, (set, id), &road, rng);
     }
     (scene, camera)
 }
 
-fn place(
-    scene: &mut AerialScene,
-    (set, id): (Set, u64),
-    (middle_m, reach_m, lanes, lane_m): (f64, f64, u32, f64),
-    rng: &mut Stream,
-) {
+/// The part of the road on which vehicles are placed.
+struct VisibleRoad {
+    /// Position of its middle along the road (m).
+    middle_m: f64,
+    /// Distance from the middle to either end (m).
+    reach_m: f64,
+    lanes: u32,
+    /// Width of a lane (m).
+    lane_m: f64,
+}
+
+fn place(scene: &mut AerialScene, (set, id): (Set, u64), road: &VisibleRoad, rng: &mut Stream) {
+    let VisibleRoad { middle_m, reach_m, lanes, lane_m } = *road;
     let class = if rng.random_bool(0.4) { VehicleClass::Truck } else { VehicleClass::Car };
     let vehicle = random_vehicle(set, class, rng);
     for _ in 0..ATTEMPTS {
@@ -88,8 +96,8 @@ fn place(
         let livery = (class == VehicleClass::Truck && rng.random_bool(0.5))
             .then(|| random_paint(rng).map(|value| (f64::from(value) / 255.0).powi(2)));
         let candidate = GroundVehicle { id, vehicle, at_m, yaw_rad: turned + against, livery };
-        let own = footprint(&candidate);
-        if scene.vehicles.iter().all(|other| footprint(other).distance_m(&own) > CLEARANCE_M) {
+        let outline = footprint(&candidate);
+        if scene.vehicles.iter().all(|other| footprint(other).distance_m(&outline) > CLEARANCE_M) {
             scene.vehicles.push(candidate);
             return;
         }

@@ -1,6 +1,7 @@
 //! Rasterisation of triangles with a depth buffer.
 
-/// A corner of a triangle in the image: column, row (samples), and distance along the optical axis (m).
+/// A corner of a triangle in the image: column, row (samples), and distance along the optical axis
+/// (m).
 pub(crate) type Corner = [f64; 3];
 
 /// What each sample of an image shows.
@@ -22,7 +23,8 @@ impl Samples {
         Self { width, height, nearness: vec![0.0; count], face: vec![0; count], is_shadowed: vec![false; count] }
     }
 
-    /// Draws a face: it covers the samples whose middle it contains, and hides what is farther away.
+    /// Draws a face: it covers the samples whose middle it contains, and hides what is farther
+    /// away.
     pub(crate) fn draw(&mut self, corners: &[Corner; 3], face: u32) {
         self.each_sample(corners, |samples, index, nearness| {
             if nearness > samples.nearness[index] {

@@ -1,8 +1,10 @@
-//! The tracker: Kalman filters along both axes, with association by the overlap of oriented boxes on the ground.
+//! The tracker: Kalman filters along both axes, with association by the overlap of oriented boxes
+//! on the ground.
 //!
-//! Each frame, tracks are predicted. Of all pairs of a predicted box and a detected one, those that overlap most are joined first.
-//! A new track takes the mean speed of the others, because a vehicle moves by most of its length between two frames. After the last
-//! frame, all tracks are smoothed.
+//! Each frame, tracks are predicted. Of all pairs of a predicted box and a detected box, the pair
+//! with the largest overlap is joined first. A new track takes the mean speed of the others,
+//! because a vehicle moves by most of its length between two frames. After the last frame, all
+//! tracks are smoothed.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +22,8 @@ const CONFIRMED_AFTER: usize = 5;
 const LOST_AFTER: usize = 6;
 /// Along the road: vehicles change their acceleration by some m/s² within a second.
 const ALONG: AxisModel = AxisModel { jerk_density: 1.0, sigma_m: 0.3 };
-/// Across the road: a lane change of 5 s has a mean squared jerk of about 0.5 m²/s⁶ for its duration.
+/// Across the road: a lane change of 5 s has a mean squared jerk of about 0.5 m²/s⁶ for its
+/// duration.
 const ACROSS: AxisModel = AxisModel { jerk_density: 0.5, sigma_m: 0.2 };
 
 /// A vehicle on the ground, as a frame shows it.
@@ -106,27 +109,28 @@ impl Track {
     }
 }
 
-/// Follows vehicles over frames that are `dt_s` apart, each with its detections. The tracks are in the order of their numbers.
+/// Follows vehicles over frames that are `dt_s` apart, each with its detections. The tracks are in
+/// the order of their numbers.
 pub fn track(frames: &[Vec<GroundDetection>], dt_s: f64) -> Vec<AerialTrack> {
     let (mut open, mut finished): (Vec<Track>, Vec<Track>) = (Vec::new(), Vec::new());
     let mut next_id = 1;
     for (frame, detections) in frames.iter().enumerate() {
-        let predicted: Vec<[Estimate; 2]> = open.iter().map(|one| predicted(one, dt_s)).collect();
+        let predicted: Vec<[Estimate; 2]> = open.iter().map(|track| predicted(track, dt_s)).collect();
         let joined = associate(&open, &predicted, detections);
         let flow_mps = flow_mps(&open);
         let mut is_free = vec![true; detections.len()];
-        for ((one, estimates), found) in open.iter_mut().zip(predicted).zip(&joined) {
-            let Some(index) = *found else {
-                one.filtered.push(estimates);
-                one.missed += 1;
+        for ((track, estimates), detection) in open.iter_mut().zip(predicted).zip(&joined) {
+            let Some(index) = *detection else {
+                track.filtered.push(estimates);
+                track.missed += 1;
                 continue;
             };
             let OrientedBox { x_m, y_m, .. } = detections[index].footprint;
-            one.filtered.push([ALONG.updated(&estimates[0], x_m), ACROSS.updated(&estimates[1], y_m)]);
-            one.observe(&detections[index]);
+            track.filtered.push([ALONG.updated(&estimates[0], x_m), ACROSS.updated(&estimates[1], y_m)]);
+            track.observe(&detections[index]);
             is_free[index] = false;
         }
-        let (lost, kept): (Vec<Track>, Vec<Track>) = open.into_iter().partition(|one| one.missed >= LOST_AFTER);
+        let (lost, kept): (Vec<Track>, Vec<Track>) = open.into_iter().partition(|track| track.missed >= LOST_AFTER);
         (open, finished) = (kept, finished.into_iter().chain(lost).collect());
         for (detection, _) in detections.iter().zip(&is_free).filter(|(_, is_free)| **is_free) {
             let OrientedBox { x_m, y_m, yaw_rad, .. } = detection.footprint;
@@ -147,9 +151,9 @@ pub fn track(frames: &[Vec<GroundDetection>], dt_s: f64) -> Vec<AerialTrack> {
         }
     }
     finished.extend(open);
-    finished.retain(|one| one.detections >= CONFIRMED_AFTER);
-    finished.sort_by_key(|one| one.id);
-    finished.into_iter().map(|one| one.finished(dt_s)).collect()
+    finished.retain(|track| track.detections >= CONFIRMED_AFTER);
+    finished.sort_by_key(|track| track.id);
+    finished.into_iter().map(|track| track.finished(dt_s)).collect()
 }
 
 fn predicted(track: &Track, dt_s: f64) -> [Estimate; 2] {
@@ -159,18 +163,18 @@ fn predicted(track: &Track, dt_s: f64) -> [Estimate; 2] {
 
 /// Returns the mean speed of the tracks that count (m/s); 0 without any.
 fn flow_mps(open: &[Track]) -> f64 {
-    let known = open.iter().filter(|one| one.detections >= CONFIRMED_AFTER);
-    let speeds: Vec<f64> = known.map(|one| one.filtered[one.filtered.len() - 1][0].mean.y).collect();
+    let confirmed = open.iter().filter(|track| track.detections >= CONFIRMED_AFTER);
+    let speeds: Vec<f64> = confirmed.map(|track| track.filtered[track.filtered.len() - 1][0].mean.y).collect();
     speeds.iter().sum::<f64>() / speeds.len().max(1) as f64
 }
 
 /// Returns the detection of each track. No two tracks share one.
 fn associate(open: &[Track], predicted: &[[Estimate; 2]], detections: &[GroundDetection]) -> Vec<Option<usize>> {
     let mut pairs = Vec::new();
-    for (index, (one, estimates)) in open.iter().zip(predicted).enumerate() {
-        let [length_m, width_m] = one.size_m();
+    for (index, (track, estimates)) in open.iter().zip(predicted).enumerate() {
+        let [length_m, width_m] = track.size_m();
         let (x_m, y_m) = (estimates[0].mean.x, estimates[1].mean.x);
-        let expected = OrientedBox { x_m, y_m, yaw_rad: one.yaw_rad, length_m, width_m };
+        let expected = OrientedBox { x_m, y_m, yaw_rad: track.yaw_rad, length_m, width_m };
         for (other, detection) in detections.iter().enumerate() {
             let overlap = intersection_over_union(&expected, &detection.footprint);
             if overlap >= LEAST_OVERLAP {
@@ -216,11 +220,16 @@ mod tests {
     #[test]
     fn a_car_that_passes_a_truck_keeps_its_number_over_missed_frames() {
         let tracks = track(&passing(), DT_S);
-        assert_eq!(tracks.len(), 2, "{:?}", tracks.iter().map(|one| (one.id, one.points.len())).collect::<Vec<_>>());
+        assert_eq!(
+            tracks.len(),
+            2,
+            "{:?}",
+            tracks.iter().map(|track| (track.id, track.points.len())).collect::<Vec<_>>()
+        );
         for (class, speed_mps, y_m) in [(VehicleClass::Truck, 25.0, -5.25), (VehicleClass::Car, 33.0, -1.75)] {
-            let found = tracks.iter().find(|one| one.class == class).unwrap();
-            assert_eq!(found.points.len(), 120);
-            let middle = &found.points[61];
+            let followed = tracks.iter().find(|track| track.class == class).unwrap();
+            assert_eq!(followed.points.len(), 120);
+            let middle = &followed.points[61];
             assert!(
                 (middle.speed_mps[0] - speed_mps).abs() < 0.05 && (middle.at_m[1] - y_m).abs() < 0.01,
                 "{middle:?}"
@@ -234,11 +243,11 @@ mod tests {
         frames[30].push(detection(500.0, -9.0, VehicleClass::Car));
         assert_eq!(track(&frames, DT_S).len(), 2);
         for frame in &mut frames[80..90] {
-            frame.retain(|one| one.class == VehicleClass::Truck);
+            frame.retain(|detection| detection.class == VehicleClass::Truck);
         }
         let tracks = track(&frames, DT_S);
         assert_eq!(tracks.len(), 3);
-        assert_eq!(tracks.iter().map(|one| one.points.last().unwrap().frame).min(), Some(79));
+        assert_eq!(tracks.iter().map(|track| track.points.last().unwrap().frame).min(), Some(79));
         assert_eq!(track(&[], DT_S), Vec::new());
     }
 }

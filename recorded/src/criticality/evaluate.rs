@@ -15,14 +15,16 @@ use super::{
 use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::{LaneChange, detect};
 
-/// Speed below which a vehicle is assumed to point along the road, because its direction of movement is noise (m/s).
+/// Speed below which a vehicle is assumed to point along the road, because its direction of
+/// movement is noise (m/s).
 const HEADING_FROM_MPS: f64 = 1.0;
 
 /// Acceleration beyond which a recorded value is an error (m/s²): no tyre brakes harder.
 const IMPLAUSIBLE_MPS2: f64 = 12.0;
 /// Speed beyond which a recorded value is an error (m/s): 360 km/h.
 const IMPLAUSIBLE_MPS: f64 = 100.0;
-/// Lateral distance within which vehicles are on one carriageway (m). The readers put carriageways 1 km apart.
+/// Lateral distance within which vehicles are on one carriageway (m). The readers put carriageways
+/// 1 km apart.
 const CARRIAGEWAY_M: f64 = 200.0;
 
 /// What counts as critical, beside the thresholds.
@@ -30,7 +32,8 @@ const CARRIAGEWAY_M: f64 = 200.0;
 pub struct Judgement {
     /// Speed limit (m/s); `None` if it is not known.
     pub speed_limit_mps: Option<f64>,
-    /// True if a short TTCE is critical by itself. Otherwise TTCE only decides whether DCE is evaluated.
+    /// True if a short TTCE is critical by itself. Otherwise TTCE only decides whether DCE is
+    /// evaluated.
     pub ttce_alone: bool,
 }
 
@@ -45,30 +48,30 @@ pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<
     evaluated.collect()
 }
 
-/// Returns the first and the last instant of a lane change. The estimated manoeuvre may end before the crossing, or begin after
-/// it: the crossing belongs to the window.
+/// Returns the first and the last instant of a lane change. The estimated manoeuvre may end before
+/// the crossing, or begin after it: the crossing belongs to the window.
 fn window(lane_change: &LaneChange) -> [Time; 2] {
     let LaneChange { start_s, crossing_s, end_s, .. } = *lane_change;
     [Time::from_s(start_s.min(crossing_s)), Time::from_s(end_s.max(crossing_s))]
 }
 
-/// Evaluates the metrics of one lane change from the first to the last instant of a window. Returns `None` if `data` does not
-/// have its track.
+/// Evaluates the metrics of one lane change from the first to the last instant of a window. Returns
+/// `None` if `data` does not have its track.
 fn evaluate(
     data: &SmoothedTrajectoryData,
     lane_change: &LaneChange,
     [start, end]: [Time; 2],
     judgement: &Judgement,
 ) -> Option<Evaluation> {
-    let own_index = data.track_index(lane_change.track_id)?;
-    let own = &data.tracks[own_index].trajectory;
+    let ego_index = data.track_index(lane_change.track_id)?;
+    let ego = &data.tracks[ego_index].trajectory;
     let mut extremes = Extremes::default();
-    for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
-        let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
+    for point in ego.points.iter().filter(|point| point.time >= start && point.time <= end) {
+        let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != ego_index);
         let others = others.map(|&presence| VehicleState::new(data.look_up(presence)));
         let is_opponent = |other: &VehicleState<'_>| (other.point.d_m - point.d_m).abs() < CARRIAGEWAY_M;
         let others: Vec<VehicleState<'_>> = others.filter(is_opponent).collect();
-        extremes.observe(&VehicleState::new((own, point)), &others, Lane(lane_change.to_lane));
+        extremes.observe(&VehicleState::new((ego, point)), &others, Lane(lane_change.to_lane));
     }
     Some(Evaluation { metrics: extremes.metrics(judgement), following: extremes.following() })
 }
@@ -90,7 +93,8 @@ impl<'a> VehicleState<'a> {
         Self { track, point, moving: Moving { shape, vx_mps, vy_mps } }
     }
 
-    /// Returns the gap from this vehicle's front to the rear of `other` (m), or `None` if `other` is not ahead.
+    /// Returns the gap from this vehicle's front to the rear of `other` (m), or `None` if `other`
+    /// is not ahead.
     fn gap_to_m(&self, other: &Self) -> Option<f64> {
         let ahead_m = other.point.s_m - self.point.s_m;
         let gap_m = bumper_gap_m(ahead_m, self.track.dimensions.length_m, other.track.dimensions.length_m);
@@ -108,7 +112,8 @@ struct Extreme {
     time_s: f64,
 }
 
-/// Returns the result of a metric: its most critical value, or the reason `otherwise` if there is none.
+/// Returns the result of a metric: its most critical value, or the reason `otherwise` if there is
+/// none.
 fn metric_record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64) -> bool) -> MetricResult {
     match extreme {
         Some(Extreme { value, opponent, time_s }) => {
@@ -118,8 +123,8 @@ fn metric_record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl 
     }
 }
 
-/// Returns the result of a metric of the vehicle alone, which is critical above `critical`. A value above `limit` is an error
-/// of the recording, and never critical.
+/// Returns the result of a metric of the vehicle alone, which is critical above `critical`. A value
+/// above `limit` is an error of the recording, and never critical.
 fn magnitude_record(extreme: Option<Extreme>, limit: f64, critical: f64) -> MetricResult {
     match extreme {
         Some(extreme) if !(extreme.value <= limit) => MetricResult::Absent { absent: Absent::Implausible },
@@ -160,19 +165,20 @@ struct Extremes {
 }
 
 impl Extremes {
-    /// Updates every extreme with the vehicles at one instant; `target` is the lane that the vehicle changes to.
-    fn observe(&mut self, own: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
-        let time_s = own.point.time.s();
+    /// Updates every extreme with the vehicles at one instant; `target` is the lane that the
+    /// vehicle changes to.
+    fn observe(&mut self, ego: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
+        let time_s = ego.point.time.s();
         let alone = |value| Extreme { value, opponent: None, time_s };
-        keep_larger(&mut self.speed, alone(own.point.speed_mps));
-        keep_larger(&mut self.a_lon, alone(own.point.acceleration_mps2.abs()));
-        keep_larger(&mut self.a_lat, alone(own.point.lateral_acceleration_mps2.abs()));
-        self.observe_headway(own, others, target);
+        keep_larger(&mut self.speed, alone(ego.point.speed_mps));
+        keep_larger(&mut self.a_lon, alone(ego.point.acceleration_mps2.abs()));
+        keep_larger(&mut self.a_lat, alone(ego.point.lateral_acceleration_mps2.abs()));
+        self.observe_headway(ego, others, target);
         for other in others {
             self.has_opponent = true;
             let against = |value| Extreme { value, opponent: Some(other.track.track_id), time_s };
-            keep_smaller(&mut self.distance, against(own.moving.shape.distance_m(&other.moving.shape)));
-            match closest_encounter(&own.moving, &other.moving, ENCOUNTER_HORIZON_S) {
+            keep_smaller(&mut self.distance, against(ego.moving.shape.distance_m(&other.moving.shape)));
+            match closest_encounter(&ego.moving, &other.moving, ENCOUNTER_HORIZON_S) {
                 Ok(encounter) => {
                     keep_smaller(&mut self.ttce, against(encounter.ttce_s));
                     if encounter.ttce_s < CRITICAL_TTCE_S {
@@ -184,21 +190,21 @@ impl Extremes {
         }
     }
 
-    fn observe_headway(&mut self, own: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
+    fn observe_headway(&mut self, ego: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
         let nearest_in = |lane: Lane| {
             let in_lane = others.iter().filter(move |other| other.point.lane == lane);
-            let ahead = in_lane.filter_map(|other| Some((own.gap_to_m(other)?, other)));
+            let ahead = in_lane.filter_map(|other| Some((ego.gap_to_m(other)?, other)));
             ahead.min_by(|a, b| a.0.total_cmp(&b.0))
         };
-        let leads = [nearest_in(own.point.lane), nearest_in(target)];
+        let leads = [nearest_in(ego.point.lane), nearest_in(target)];
         for (gap_m, lead) in leads.iter().flatten() {
-            self.observe_closing(own, lead, *gap_m);
+            self.observe_closing(ego, lead, *gap_m);
         }
         let nearest = leads.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gap_m, lead)) = nearest else { return };
-        match time_headway_s(gap_m, own.point.speed_mps) {
+        match time_headway_s(gap_m, ego.point.speed_mps) {
             Ok(value) => {
-                let (opponent, time_s) = (Some(lead.track.track_id), own.point.time.s());
+                let (opponent, time_s) = (Some(lead.track.track_id), ego.point.time.s());
                 keep_smaller(&mut self.thw, Extreme { value, opponent, time_s });
             }
             Err(_) => self.was_standing_behind_lead = true,
@@ -206,14 +212,14 @@ impl Extremes {
     }
 
     /// Updates TTC and DRAC with a vehicle ahead.
-    fn observe_closing(&mut self, own: &VehicleState<'_>, lead: &VehicleState<'_>, gap_m: f64) {
+    fn observe_closing(&mut self, ego: &VehicleState<'_>, lead: &VehicleState<'_>, gap_m: f64) {
         self.has_lead = true;
-        let against = |value| Extreme { value, opponent: Some(lead.track.track_id), time_s: own.point.time.s() };
-        let (own_mps, lead_mps) = (own.point.speed_mps, lead.point.speed_mps);
-        if let Ok(ttc_s) = time_to_collision_s(gap_m, own_mps, lead_mps) {
+        let against = |value| Extreme { value, opponent: Some(lead.track.track_id), time_s: ego.point.time.s() };
+        let (ego_mps, lead_mps) = (ego.point.speed_mps, lead.point.speed_mps);
+        if let Ok(ttc_s) = time_to_collision_s(gap_m, ego_mps, lead_mps) {
             keep_smaller(&mut self.ttc, against(ttc_s));
         }
-        if let Ok(drac_mps2) = required_deceleration_mps2(gap_m, own_mps, lead_mps, 0.0) {
+        if let Ok(drac_mps2) = required_deceleration_mps2(gap_m, ego_mps, lead_mps, 0.0) {
             keep_larger(&mut self.drac, against(drac_mps2));
         }
     }
@@ -234,7 +240,8 @@ impl Extremes {
             (true, true) => Absent::BeyondHorizon,
             (true, false) => Absent::NotApproaching,
         };
-        // If there are encounters, but none near enough in time, DCE is absent because of the horizon.
+        // If there are encounters, but none near enough in time, DCE is absent because of the
+        // horizon.
         let no_dce = if self.ttce.is_some() { Absent::BeyondHorizon } else { no_ttce };
         Metrics {
             distance_m: metric_record(self.distance, Absent::NoOpponent, |value| value < CRITICAL_DISTANCE_M),
@@ -259,9 +266,9 @@ mod tests {
     fn evaluated(others: Vec<Trajectory>) -> CriticalLaneChange {
         let mut tracks = vec![changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110)];
         tracks.extend(others);
-        let mut found = criticality(&smooth(&trajectory_data_of(tracks)), &Judgement::default());
-        assert_eq!(found.len(), 1);
-        found.remove(0)
+        let mut evaluations = criticality(&smooth(&trajectory_data_of(tracks)), &Judgement::default());
+        assert_eq!(evaluations.len(), 1);
+        evaluations.remove(0)
     }
 
     fn absent(record: MetricResult) -> Option<Absent> {
@@ -352,12 +359,12 @@ mod tests {
         for (k, point) in lead.points.iter_mut().enumerate() {
             point.s_m -= 0.004 * (k * k) as f64;
         }
-        let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
-        let data = smooth(&trajectory_data_of(vec![own, lead]));
+        let ego = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
+        let data = smooth(&trajectory_data_of(vec![ego, lead]));
         let whole = detect(&data).remove(0);
         let thw_s = |change: &LaneChange| {
-            let found = evaluate(&data, change, window(change), &Judgement::default()).unwrap();
-            found.metrics.thw_s.value().unwrap()
+            let evaluation = evaluate(&data, change, window(change), &Judgement::default()).unwrap();
+            evaluation.metrics.thw_s.value().unwrap()
         };
         // The estimated end of a manoeuvre can lie before its crossing.
         let early = LaneChange { end_s: whole.crossing_s - 1.0, ..whole.clone() };
@@ -369,10 +376,10 @@ mod tests {
     #[test]
     fn ttc_and_drac_have_their_closed_form_and_the_crossing_its_own_values() {
         // The lead vehicle in the target lane is 45.5 m ahead at first, and 4 m/s slower.
-        let found = evaluated(vec![straight_track(2, 50.0, 26.0, -1.75, 110)]);
-        let crossing_s = found.lane_change.crossing_s;
+        let evaluation = evaluated(vec![straight_track(2, 50.0, 26.0, -1.75, 110)]);
+        let crossing_s = evaluation.lane_change.crossing_s;
         let gap_m = 45.5 - 4.0 * crossing_s;
-        let value = |name: &str| found.named().find(|(of, ..)| *of == name).unwrap();
+        let value = |name: &str| evaluation.named().find(|(metric, ..)| *metric == name).unwrap();
         let (_, whole, crossing) = value("ttc_s");
         assert!((crossing.value().unwrap() - gap_m / 4.0).abs() < 1e-6, "{crossing:?}");
         assert!(whole.value().unwrap() <= crossing.value().unwrap());
@@ -394,11 +401,11 @@ mod tests {
         let mut cut_off = close.clone();
         cut_off.lane_change.complete = false;
         let changes = [close, evaluated(Vec::new()), cut_off];
-        for (counted, critical, of) in [(Counted::Complete, 1, 2), (Counted::All, 2, 3)] {
-            let found = shares(&changes, counted);
-            let thw = found.metrics.iter().find(|share| share.metric == "thw_s").unwrap();
-            assert_eq!((thw.critical, thw.absent, thw.share), (critical, 1, Some(critical as f64 / of as f64)));
-            assert_eq!((found.lane_changes, found.left_out, found.any), (of, 3 - of, critical));
+        for (counted, critical, total) in [(Counted::Complete, 1, 2), (Counted::All, 2, 3)] {
+            let counts = shares(&changes, counted);
+            let thw = counts.metrics.iter().find(|share| share.metric == "thw_s").unwrap();
+            assert_eq!((thw.critical, thw.absent, thw.share), (critical, 1, Some(critical as f64 / total as f64)));
+            assert_eq!((counts.lane_changes, counts.left_out, counts.any), (total, 3 - total, critical));
         }
         assert_eq!(shares(&[], Counted::All).metrics[0].share, None);
     }

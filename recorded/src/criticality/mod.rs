@@ -1,4 +1,5 @@
-//! Criticality of a lane change: metrics, each with the opponent and the time of its most critical value.
+//! Criticality of a lane change: metrics, each with the opponent and the time of its most critical
+//! value.
 //!
 //! | metric       | meaning                                                 | critical            |
 //! |--------------|---------------------------------------------------------|---------------------|
@@ -10,33 +11,38 @@
 //! | `dce_m`      | distance at closest encounter (DCE), if TTCE < 2.6 s    | < 1.0 m             |
 //! | `ttce_s`     | time to closest encounter (TTCE)                        | only if asked for: < 2.6 s |
 //!
-//! Beside them, two metrics without a threshold: the time to collision `ttc_s` (TTC) and the deceleration rate to avoid a crash
-//! `drac_mps2` (DRAC), both towards the vehicles ahead that count for THW, at constant speeds of both vehicles. All metrics are
-//! also evaluated at the instant of the crossing alone.
+//! In addition, two metrics without a threshold: the time to collision `ttc_s` (TTC) and the
+//! deceleration rate to avoid a crash `drac_mps2` (DRAC), both towards the vehicles ahead that
+//! count for THW, at constant speeds of both vehicles. All metrics are also evaluated at the
+//! instant of the crossing alone.
 //!
 //! # Definitions
 //!
-//! - **Window**: all recorded instants of the common clock from the start to the end of the lane change, and the
-//!   crossing if it lies outside. The most critical of all values in the window, against all opponents, is kept.
-//! - **Opponents**: for distance, TTCE and DCE, all other vehicles present at that instant. For THW, the vehicle ahead
-//!   in the lane of the own centre and the vehicle ahead in the target lane, because the lane change has begun within
-//!   the window; the smaller headway of the two counts. A vehicle is ahead if its centre is ahead of the own centre and
-//!   either its rear is ahead of the own front, or the two boxes overlap across the road. Recorded traffic does contain
-//!   such overlaps; the headway is then 0. A vehicle alongside in the target lane has no headway: distance, TTCE and
-//!   DCE cover it.
-//! - **TTCE and DCE** apply to two oriented boxes at constant velocity, in continuous time. They are absent if the
-//!   vehicles do not approach each other or if the encounter is more than 10 s ahead. DCE is evaluated only if
-//!   TTCE < 2.6 s. A short TTCE is not critical by itself, unless [`Judgement::ttce_alone`] asks for it: vehicles that
-//!   pass each other at a safe distance have one, too.
+//! - **Window**: all recorded instants of the common clock from the start to the end of the lane
+//!   change, and the crossing if it lies outside. The result is the most critical of all values in
+//!   the window, against all opponents.
+//! - **Opponents**: for distance, TTCE and DCE, all other vehicles present at that instant. For
+//!   THW, the vehicle ahead in the lane of the own centre and the vehicle ahead in the target lane,
+//!   because the lane change has begun within the window; the smaller headway of the two counts. A
+//!   vehicle is ahead if its centre is ahead of the own centre and either its rear is ahead of the
+//!   own front, or the two boxes overlap across the road. Recorded traffic does contain such
+//!   overlaps; the headway is then 0. A vehicle alongside in the target lane has no headway:
+//!   distance, TTCE and DCE cover it.
+//! - **TTCE and DCE** apply to two oriented boxes at constant velocity, in continuous time. They
+//!   are absent if the vehicles do not approach each other or if the encounter is more than 10 s
+//!   ahead. DCE is evaluated only if TTCE < 2.6 s. A short TTCE is not critical by itself, unless
+//!   [`Judgement::ttce_alone`] asks for it: vehicles that pass each other at a safe distance have
+//!   one, too.
 //! - **Shares** refer to the complete lane changes, unless [`Counted::All`] asks for all.
-//! - **Magnitudes**: published acceleration thresholds are signed, −8 m/s² for braking; here the magnitude counts.
+//! - **Magnitudes**: published acceleration thresholds are signed, −8 m/s² for braking; here the
+//!   magnitude counts.
 //! - **Speed limit**: 120 km/h if it is not known.
-//! - **Geometry**: the road frame is treated as a plane. Over the 50 m that matter, the bend of a motorway of 1 km
-//!   radius turns two headings apart by 3°.
-//! - Velocities and accelerations are those of the smoothed trajectories ([`crate::filters`]).
+//! - **Geometry**: the road frame is treated as a plane. Over the 50 m that matter, the bend of a
+//!   motorway of 1 km radius turns two headings apart by 3°.
+//! - Velocities and accelerations come from the smoothed trajectories ([`crate::filters`]).
 //!
-//! A metric without a value is absent, with a reason, and never counts as critical. The shares state how many are
-//! absent.
+//! A metric without a value is absent, with a reason, and never counts as critical. The shares
+//! state how many are absent.
 
 mod evaluate;
 mod record;

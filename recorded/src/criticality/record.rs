@@ -76,14 +76,14 @@ impl Metrics {
     }
 }
 
-/// Two further metrics towards the vehicles ahead, for comparison with other publications. They are never critical: the
-/// published method has no threshold for them.
+/// Two further metrics towards the vehicles ahead, for comparison with other publications. They are
+/// never critical: the published method has no threshold for them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FollowingMetrics {
     /// Smallest time to collision (TTC) at constant speeds (s).
     pub ttc_s: MetricResult,
-    /// Largest deceleration rate to avoid a crash (DRAC): the constant deceleration that suffices if the vehicle ahead keeps
-    /// its speed (m/s²).
+    /// Largest deceleration rate to avoid a crash (DRAC): the constant deceleration that suffices
+    /// if the vehicle ahead keeps its speed (m/s²).
     pub drac_mps2: MetricResult,
 }
 
@@ -127,7 +127,8 @@ pub struct CriticalLaneChange {
 }
 
 impl CriticalLaneChange {
-    /// Returns the nine metrics over the whole lane change, each with its name and its value at the crossing.
+    /// Returns the nine metrics over the whole lane change, each with its name and its value at the
+    /// crossing.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, MetricResult, MetricResult)> {
         let whole = Evaluation { metrics: self.metrics, following: self.following };
         whole.named().zip(self.at_crossing.named()).map(|((name, whole), (_, crossing))| (name, whole, crossing))

@@ -1,11 +1,11 @@
-//! The order of lane changes by how critical they are.
+//! The order of lane changes by their criticality.
 
 use std::cmp::Ordering::Equal;
 
 use super::CriticalLaneChange;
 
-/// Returns the lane changes of `track`, or of all tracks, the most critical first. Of two equal ones the later is
-/// first.
+/// Returns the lane changes of `track`, or of all tracks, the most critical first. Of two equal
+/// lane changes the later is first.
 pub fn by_severity(changes: &[CriticalLaneChange], track: Option<u64>) -> Vec<&CriticalLaneChange> {
     let is_wanted = |change: &&CriticalLaneChange| track.is_none_or(|track| change.lane_change.track_id == track);
     let mut wanted: Vec<&CriticalLaneChange> = changes.iter().rev().filter(is_wanted).collect();

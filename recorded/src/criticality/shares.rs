@@ -8,7 +8,8 @@ use super::CriticalLaneChange;
 /// The lane changes that are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Counted {
-    /// Those that were recorded as a whole, shift the vehicle by at least 2.5 m, and overlap with no other one.
+    /// The lane changes that were recorded as a whole, shift the vehicle by at least 2.5 m, and
+    /// overlap with no other lane change.
     #[default]
     Complete,
     /// All.
@@ -24,7 +25,7 @@ pub struct CriticalShare {
     pub critical: usize,
     /// Number of lane changes for which the metric has no value.
     pub absent: usize,
-    /// Critical lane changes as a share of the counted ones (-); `None` if there are none.
+    /// Critical lane changes as a share of the counted lane changes (-); `None` if there are none.
     pub share: Option<f64>,
     /// Exact 95 % interval of the share (Clopper-Pearson) (-).
     pub interval_95: Option<[f64; 2]>,

@@ -1,13 +1,16 @@
 //! Statistics of lane changes: durations, speeds, and correlations with the criticality metrics.
 //!
-//! Durations, speeds and correlations use *complete* lane changes only ([`crate::lane_change`]). The counts include all
-//! lane changes; overlapping and double ones are also counted separately.
+//! Durations, speeds and correlations use *complete* lane changes only ([`crate::lane_change`]).
+//! The counts include all lane changes; overlapping and double lane changes are also counted
+//! separately.
 //!
-//! - **Box plots**: quartiles by linear interpolation ([`quantile`]). Whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey); values
-//!   beyond are outliers.
-//! - **Correlation**: Pearson's r of the values and Spearman's ρ of their ranks (ties share their mean rank). It covers
-//!   the lane changes for which both quantities have a value, and their number is stated. With fewer than 5 pairs, or
-//!   if a quantity does not vary, there is no coefficient.
+//! - **Box plots**: quartiles by linear interpolation ([`quantile`]). Whiskers reach to the
+//!   furthest values within 1.5 interquartile ranges of the box (Tukey); values beyond are
+//!   outliers.
+//! - **Correlation**: Pearson's r of the values and Spearman's ρ of their ranks (ties share their
+//!   mean rank). It covers the lane changes for which both quantities have a value, and their
+//!   number is stated. With fewer than 5 pairs, or if a quantity does not vary, there is no
+//!   coefficient.
 
 use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::{Side, VehicleClass};
@@ -18,7 +21,8 @@ use super::CriticalLaneChange;
 /// Least number of pairs for which a correlation is stated.
 const MIN_PAIRS: usize = 5;
 
-/// Largest length of a whisker in interquartile ranges (J. W. Tukey, Exploratory Data Analysis, 1977).
+/// Largest length of a whisker in interquartile ranges (J. W. Tukey, Exploratory Data Analysis,
+/// 1977).
 const WHISKER_RANGES: f64 = 1.5;
 
 /// The numbers that define a box plot, in the unit of its values.
@@ -63,7 +67,7 @@ pub struct ClassStatistics {
     pub to_the_left: usize,
     /// Number of complete lane changes.
     pub complete: usize,
-    /// Number of lane changes that overlap with another one.
+    /// Number of lane changes that overlap with another lane change.
     pub overlapping: usize,
     /// Number of lane changes that are part of a double one.
     pub double: usize,
@@ -95,7 +99,8 @@ pub struct Correlation {
 pub struct Statistics {
     /// One entry for each vehicle class with lane changes, in the order of `VehicleClass::ALL`.
     pub classes: Vec<ClassStatistics>,
-    /// Duration against speed, then each of the two against every metric in the order of `Metrics::named`.
+    /// Duration against speed, then each of the two against every metric in the order of
+    /// `Metrics::named`.
     pub correlations: Vec<Correlation>,
 }
 
@@ -156,7 +161,8 @@ fn correlation(
     Correlation { of, with, n: a.len(), pearson: pearson(&a, &b), spearman: spearman(&a, &b) }
 }
 
-/// Returns Pearson's correlation coefficient, or `None` with too few pairs or if a quantity does not vary.
+/// Returns Pearson's correlation coefficient, or `None` with too few pairs or if a quantity does
+/// not vary.
 fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     let n = a.len() as f64;
     let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
@@ -166,7 +172,8 @@ fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     (a.len() >= MIN_PAIRS && aa > 0.0 && bb > 0.0).then(|| (ab / (aa.sqrt() * bb.sqrt())).clamp(-1.0, 1.0))
 }
 
-/// Returns Spearman's rank correlation, or `None` with too few pairs or if a quantity does not vary.
+/// Returns Spearman's rank correlation, or `None` with too few pairs or if a quantity does not
+/// vary.
 pub fn spearman(a: &[f64], b: &[f64]) -> Option<f64> {
     pearson(&ranks(a), &ranks(b))
 }
@@ -194,10 +201,10 @@ mod tests {
 
     #[test]
     fn box_plots_match_numpy() {
-        let found = BoxPlot::of(vec![7.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0]).unwrap();
+        let plot = BoxPlot::of(vec![7.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0]).unwrap();
         // NumPy: percentile([1, 2, 3, 4, 5, 6, 7, 30], [25, 50, 75]) = 2.75, 4.5, 6.25.
-        assert_eq!((found.n, found.mean, found.five), (8, 7.25, [1.0, 2.75, 4.5, 6.25, 7.0]));
-        assert_eq!(found.outliers, [30.0]);
+        assert_eq!((plot.n, plot.mean, plot.five), (8, 7.25, [1.0, 2.75, 4.5, 6.25, 7.0]));
+        assert_eq!(plot.outliers, [30.0]);
         assert_eq!(BoxPlot::of(vec![2.0]).unwrap().five, [2.0; 5]);
         assert_eq!(BoxPlot::of(vec![f64::NAN]), None);
     }
@@ -220,13 +227,13 @@ mod tests {
             changing_track(k + 1, (0.0, 40.0 - 2.0 * k as f64), (-5.25, -1.75), (3.0, duration_s), 160)
         };
         let changes = criticality(&smooth(&trajectory_data_of((0..8).map(track).collect())), &Judgement::default());
-        let found = statistics(&changes);
-        let [cars] = &found.classes[..] else { panic!("one class") };
+        let result = statistics(&changes);
+        let [cars] = &result.classes[..] else { panic!("one class") };
         assert_eq!((cars.lane_changes, cars.to_the_left, cars.complete, cars.double), (8, 8, 8, 0));
         assert!((cars.duration_s.as_ref().unwrap().five[2] - 4.75).abs() < 0.2);
-        let first = &found.correlations[0];
+        let first = &result.correlations[0];
         assert_eq!((first.of, first.with, first.n), ("duration_s", "crossing_speed_mps", 8));
         assert!(first.pearson.unwrap() < -0.99 && first.spearman.unwrap() < -0.999);
-        assert_eq!(found.correlations.len(), 15);
+        assert_eq!(result.correlations.len(), 15);
     }
 }

@@ -1,5 +1,5 @@
-//! What a recorded lane change says about a logical scenario: the values of a rear vehicle that approaches another vehicle and
-//! overtakes it.
+//! The values that a recorded lane change gives for a logical scenario: a rear vehicle approaches
+//! another vehicle and overtakes it.
 //!
 //! | value | read from |
 //! |---|---|
@@ -19,8 +19,8 @@ use super::{LEAD_IN, LONGEST_THW_S, NoEncounter};
 use crate::criticality::CriticalLaneChange;
 use crate::filters::{PERIOD, SmoothedTrajectoryData};
 
-/// Closing speed below which the rear vehicle does not approach (m/s): an assumption; 0.3 to 1 are plausible. Human drivers do not
-/// notice a slower approach from 100 m.
+/// Closing speed below which the rear vehicle does not approach (m/s): an assumption; 0.3 to 1 are
+/// plausible. Human drivers do not notice a slower approach from 100 m.
 const MIN_CLOSING_MPS: f64 = 0.5;
 /// Longest front headway at which the ego follows (s), as in `fit`.
 const FOLLOWING_THW_S: f64 = 3.0;
@@ -45,7 +45,8 @@ pub struct ApproachValues {
     pub closing_mps: f64,
     /// Time headway of the rear vehicle at the crossing (s).
     pub crossing_thw_s: f64,
-    /// Time headway of the ego to the lead vehicle (s); `None` if no lead vehicle is recorded within 3 s.
+    /// Time headway of the ego to the lead vehicle (s); `None` if no lead vehicle is recorded
+    /// within 3 s.
     pub front_thw_s: Option<f64>,
     /// Duration of the lane change (s); `None` if it is not recorded as a whole.
     pub duration_s: Option<f64>,
@@ -66,7 +67,7 @@ pub struct Approach {
     pub lead: Option<Party>,
     /// First second of the trajectory data from which values were read.
     pub from_s: f64,
-    /// Last second: that of the crossing.
+    /// Last second: the time of the crossing.
     pub to_s: f64,
     /// Number of lanes of the road.
     pub lanes: u8,
@@ -112,12 +113,12 @@ pub enum NoApproach {
 /// # Errors
 /// [`NoApproach`] if nobody is overtaken.
 pub fn approach(data: &SmoothedTrajectoryData, change: &CriticalLaneChange) -> Result<Approach, NoApproach> {
-    let found = &change.lane_change;
-    let (rear, start) = begin(data, found).ok_or(NoApproach::NobodyAhead)?;
-    let lane = Lane(found.from_lane);
-    let crossing = Time::from_s(found.crossing_s);
+    let lane_change = &change.lane_change;
+    let (rear, start) = begin(data, lane_change).ok_or(NoApproach::NobodyAhead)?;
+    let lane = Lane(lane_change.from_lane);
+    let crossing = Time::from_s(lane_change.crossing_s);
     let ego = next_ahead(data, rear, lane, start).ok_or(NoApproach::NobodyAhead)?;
-    let road = RoadSection::of(data, rear, found).map_err(NoApproach::Road)?;
+    let road = RoadSection::of(data, rear, lane_change).map_err(NoApproach::Road)?;
     let instants = approach_of(data, [rear, ego], lane, [start, crossing]);
     let pairs: Vec<_> = instants.iter().filter_map(|&time| Some((time, rear.at(time)?, ego.at(time)?))).collect();
     let from = pairs.first().map_or(start, |(time, _, _)| *time);
@@ -140,7 +141,7 @@ pub fn approach(data: &SmoothedTrajectoryData, change: &CriticalLaneChange) -> R
         closing_mps,
         crossing_thw_s: crossing_thw_s.ok_or(NoApproach::NotBehind)?,
         front_thw_s: front.map(|(_, thw_s)| thw_s),
-        duration_s: found.complete.then_some(found.duration_s),
+        duration_s: lane_change.complete.then_some(lane_change.duration_s),
     };
     Ok(Approach {
         data_name: data.name.clone(),
@@ -149,10 +150,10 @@ pub fn approach(data: &SmoothedTrajectoryData, change: &CriticalLaneChange) -> R
         rear: party(rear),
         lead: front.map(|(lead, _)| party(lead)),
         from_s: from.s(),
-        to_s: found.crossing_s,
+        to_s: lane_change.crossing_s,
         lanes: road.lanes,
         lane_width_m: road.lane_width_m,
-        home: road.lane(found.from_lane).unwrap_or(Lane(1)),
+        home: road.lane(lane_change.from_lane).unwrap_or(Lane(1)),
         values,
     })
 }
@@ -161,8 +162,9 @@ fn party(track: &Trajectory) -> Party {
     Party { track_id: track.track_id, class: track.class, dimensions: track.dimensions }
 }
 
-/// Returns the instants from which values are read: those up to the crossing at which the ego is the next vehicle ahead of the rear
-/// vehicle, without interruption before the start of the lane change, and at most [`LEAD_IN`] before it.
+/// Returns the instants from which values are read. At these instants, up to the crossing, the ego
+/// is the next vehicle ahead of the rear vehicle, without interruption before the start of the lane
+/// change, and at most [`LEAD_IN`] before it.
 fn approach_of(
     data: &SmoothedTrajectoryData,
     [rear, ego]: [&Trajectory; 2],
@@ -182,9 +184,9 @@ fn approach_of(
 }
 
 /// Returns the time headway of the first track to the second (s), or `None` if it has none.
-fn headway_s([own, ahead]: [&Trajectory; 2], time: Time) -> Option<f64> {
-    let (point, next) = (own.at(time)?, ahead.at(time)?);
-    let gap_m = bumper_gap_m(next.s_m - point.s_m, own.dimensions.length_m, ahead.dimensions.length_m);
+fn headway_s([follower, ahead]: [&Trajectory; 2], time: Time) -> Option<f64> {
+    let (point, next) = (follower.at(time)?, ahead.at(time)?);
+    let gap_m = bumper_gap_m(next.s_m - point.s_m, follower.dimensions.length_m, ahead.dimensions.length_m);
     time_headway_s(gap_m, point.speed_mps).ok()
 }
 
@@ -195,7 +197,8 @@ mod tests {
     use crate::filters::smooth;
     use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
-    /// A vehicle at 30 m/s changes lanes to the left behind a vehicle at `ego_mps`, which follows another one 30 m ahead.
+    /// A vehicle at 30 m/s changes lanes to the left behind a vehicle at `ego_mps`, which follows
+    /// another vehicle 30 m ahead.
     fn recorded(ego_mps: f64) -> Result<Approach, NoApproach> {
         let rear = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let ego = straight_track(2, 40.0, ego_mps, -5.25, 110);
@@ -206,14 +209,14 @@ mod tests {
 
     #[test]
     fn an_approach_has_the_recorded_values() {
-        let found = recorded(25.0).unwrap();
-        let ApproachValues { ego_mps, closing_mps, crossing_thw_s, front_thw_s, .. } = found.values;
-        assert!((ego_mps - 25.0).abs() < 1e-6 && (closing_mps - 5.0).abs() < 1e-6, "{found:?}");
+        let approach = recorded(25.0).unwrap();
+        let ApproachValues { ego_mps, closing_mps, crossing_thw_s, front_thw_s, .. } = approach.values;
+        assert!((ego_mps - 25.0).abs() < 1e-6 && (closing_mps - 5.0).abs() < 1e-6, "{approach:?}");
         // The crossing is at 5.5 s or one frame later, with a gap of 40 − 4.5 − 5·t (m) at 30 m/s.
         assert!((crossing_thw_s - (35.5 - 5.0 * 5.5) / 30.0).abs() < 1.0 / 30.0, "{crossing_thw_s}");
         assert!((front_thw_s.unwrap() - 30.0 / 25.0).abs() < 1e-6);
-        assert_eq!((found.ego.track_id, found.lead.unwrap().track_id, found.rear.track_id), (2, 3, 1));
-        assert!(found.from_s < 3.0 && found.to_s > 5.0 && found.to_s < 6.0, "{found:?}");
+        assert_eq!((approach.ego.track_id, approach.lead.unwrap().track_id, approach.rear.track_id), (2, 3, 1));
+        assert!(approach.from_s < 3.0 && approach.to_s > 5.0 && approach.to_s < 6.0, "{approach:?}");
     }
 
     #[test]

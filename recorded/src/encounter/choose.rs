@@ -21,8 +21,8 @@ pub enum ChoiceError {
     },
 }
 
-/// Returns the most critical lane change of `data`, or of its track `track`, that is an encounter, with a trajectory point
-/// at every `period`.
+/// Returns the most critical lane change of `data`, or of its track `track`, that is an encounter,
+/// with a trajectory point at every `period`.
 ///
 /// # Errors
 /// [`ChoiceError`] if there is none.
@@ -37,7 +37,7 @@ pub fn choose(
     let mut refused = None;
     for change in by_severity(&changes, track) {
         match encounter_of(&change.lane_change) {
-            Ok(found) => return Ok(found),
+            Ok(encounter) => return Ok(encounter),
             Err(source) => refused = refused.or(Some(source)),
         }
     }

@@ -11,14 +11,16 @@ use super::{
 use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::LaneChange;
 
-/// Extracts the encounter around the lane change `change`, with a trajectory point at every `period`.
+/// Extracts the encounter around the lane change `change`, with a trajectory point at every
+/// `period`.
 ///
-/// `all` holds all lane changes of `data`. The period of the common clock must be a multiple of `period`.
+/// `all` holds all lane changes of `data`. The period of the common clock must be a multiple of
+/// `period`.
 ///
 /// # Errors
-/// Returns [`NoEncounter`] if there is no ego or lead vehicle, if the three vehicles are not recorded together for long
-/// enough, if the rear vehicle is not close behind the ego vehicle at the crossing, or if they do not share a valid
-/// road.
+/// Returns [`NoEncounter`] if there is no ego or lead vehicle, if the three vehicles are not
+/// recorded together for long enough, if the rear vehicle is not close behind the ego vehicle at
+/// the crossing, or if they do not share a valid road.
 pub fn encounter(
     data: &SmoothedTrajectoryData,
     change: &LaneChange,
@@ -59,8 +61,9 @@ fn on_clock(time: Time) -> Time {
     Time::from_ns(time.ns().div_euclid(PERIOD.ns()) * PERIOD.ns())
 }
 
-/// Returns the track that changes lanes, and the first instant of the common clock at which it is recorded in its old lane while
-/// it changes lanes. Returns `None` if `data` does not have the track.
+/// Returns the track that changes lanes, and the first instant of the common clock at which it is
+/// recorded in its old lane while it changes lanes. Returns `None` if `data` does not have the
+/// track.
 pub(super) fn begin<'a>(data: &'a SmoothedTrajectoryData, change: &LaneChange) -> Option<(&'a Trajectory, Time)> {
     let track = &data.tracks[data.track_index(change.track_id)?];
     let rear = &track.trajectory;
@@ -78,7 +81,8 @@ struct Roles<'a> {
     ego: &'a Trajectory,
     lead: &'a Trajectory,
     rear: &'a Trajectory,
-    /// First instant of the common clock at which the rear vehicle is recorded while it changes lanes.
+    /// First instant of the common clock at which the rear vehicle is recorded while it changes
+    /// lanes.
     change_start: Time,
 }
 
@@ -95,10 +99,12 @@ impl<'a> Roles<'a> {
         Ok(Self { ego, lead, rear, change_start })
     }
 
-    /// Returns the earliest instant from which the three vehicles keep their order in the lane without interruption.
+    /// Returns the earliest instant from which the three vehicles keep their order in the lane
+    /// without interruption.
     fn start(&self, data: &SmoothedTrajectoryData, change: &LaneChange) -> Result<Time, NoEncounter> {
         let lane = Lane(change.from_lane);
-        let next_id = |own: &Trajectory, time: Time| next_ahead(data, own, lane, time).map(|track| track.track_id);
+        let next_id =
+            |follower: &Trajectory, time: Time| next_ahead(data, follower, lane, time).map(|track| track.track_id);
         let in_order = |time: Time| {
             next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(self.lead.track_id)
         };
@@ -109,7 +115,8 @@ impl<'a> Roles<'a> {
         let recorded_to = [self.ego, self.lead, self.rear].iter().filter_map(|track| Some(track.span()?.1)).min();
         let until = recorded_to.map_or(start, |last| last.min(crossing));
         let (track_id, ego_id, front_id) = (self.rear.track_id, self.ego.track_id, self.lead.track_id);
-        // The crossing may lie between two instants of the clock, up to one period after the last recorded one.
+        // The crossing may lie between two instants of the clock, up to one period after the last
+        // recorded one.
         if until + PERIOD < crossing {
             let missing_s = (crossing - until).s();
             return Err(NoEncounter::EndsBeforeCrossing { track_id, ego_id, front_id, missing_s });
@@ -135,17 +142,18 @@ impl<'a> Roles<'a> {
     }
 }
 
-/// Returns the nearest vehicle ahead of `own` in `lane`, or `None` if there is none or `own` is not in that lane.
+/// Returns the nearest vehicle ahead of `follower` in `lane`, or `None` if there is none or
+/// `follower` is not in that lane.
 pub(super) fn next_ahead<'a>(
     data: &'a SmoothedTrajectoryData,
-    own: &Trajectory,
+    follower: &Trajectory,
     lane: Lane,
     time: Time,
 ) -> Option<&'a Trajectory> {
-    let here: &TrajectoryPoint = own.at(time).filter(|point| point.lane == lane)?;
+    let position: &TrajectoryPoint = follower.at(time).filter(|point| point.lane == lane)?;
     let others = data.present_at(time).iter().map(|&presence| data.look_up(presence));
-    let ahead =
-        others.filter(|(track, point)| track.track_id != own.track_id && point.lane == lane && point.s_m > here.s_m);
+    let ahead = others
+        .filter(|(track, point)| track.track_id != follower.track_id && point.lane == lane && point.s_m > position.s_m);
     ahead.min_by(|a, b| a.1.s_m.total_cmp(&b.1.s_m)).map(|(track, _)| track)
 }
 
@@ -160,7 +168,8 @@ fn participants(
     period: Time,
 ) -> Option<Vec<Participant>> {
     let participant = |track: &Trajectory| {
-        // The crossing is the first instant in the new lane: a vehicle that crosses at the start is already there.
+        // The crossing is the first instant in the new lane: a vehicle that crosses at the start is
+        // already there.
         let within = |change: &&LaneChange| {
             let crossing = Time::from_s(change.crossing_s);
             change.track_id == track.track_id && crossing > frame.start && crossing <= frame.end

@@ -1,4 +1,5 @@
-//! The frame of an encounter: its road and its clock, relative to those of the trajectory data.
+//! The frame of an encounter: its road and its clock, relative to the road and the clock of the
+//! trajectory data.
 
 use std::collections::BTreeSet;
 
@@ -37,32 +38,32 @@ pub(super) struct RoadSection {
 }
 
 impl RoadSection {
-    /// Finds the road on which the vehicle `own` makes the lane change `change`.
+    /// Finds the road on which the vehicle `ego` makes the lane change `change`.
     pub(super) fn of(
         data: &SmoothedTrajectoryData,
-        own: &Trajectory,
+        ego: &Trajectory,
         change: &LaneChange,
     ) -> Result<Self, NoEncounter> {
-        let mut known: BTreeSet<u8> =
+        let mut occupied_lanes: BTreeSet<u8> =
             data.trajectories().flat_map(|track| &track.points).map(|point| point.lane.0).collect();
-        known.extend((1..=u8::MAX).filter(|&lane| data.markings.right_edge_m(Lane(lane)).is_some()));
-        known.extend([change.from_lane, change.to_lane]);
+        occupied_lanes.extend((1..=u8::MAX).filter(|&lane| data.markings.right_edge_m(Lane(lane)).is_some()));
+        occupied_lanes.extend([change.from_lane, change.to_lane]);
         let left = change.from_lane.min(change.to_lane);
-        let first = (1..=left).rev().take_while(|lane| known.contains(lane)).last().unwrap_or(left);
-        let last = (left..=u8::MAX).take_while(|lane| known.contains(lane)).last().unwrap_or(left);
+        let first = (1..=left).rev().take_while(|lane| occupied_lanes.contains(lane)).last().unwrap_or(left);
+        let last = (left..=u8::MAX).take_while(|lane| occupied_lanes.contains(lane)).last().unwrap_or(left);
         let lanes = last - first + 1;
         if lanes > MAX_LANES {
             return Err(NoEncounter::TooManyLanes { track_id: change.track_id, lanes, most: MAX_LANES });
         }
         let lane_width_m = data.markings.typical_lane_width_m();
         let crossed_m = data.markings.right_edge_m(Lane(left));
-        let crossed_m = crossed_m.or_else(|| own.at(Time::from_s(change.crossing_s)).map(|point| point.d_m));
+        let crossed_m = crossed_m.or_else(|| ego.at(Time::from_s(change.crossing_s)).map(|point| point.d_m));
         let left_edge_m = crossed_m.unwrap_or(0.0) + f64::from(left - first + 1) * lane_width_m;
         Ok(Self { first, lanes, lane_width_m, left_edge_m })
     }
 
-    /// Converts lane number `lane` of the trajectory data to a lane of this road. Returns `None` if it is not part of
-    /// it.
+    /// Converts lane number `lane` of the trajectory data to a lane of this road. Returns `None` if
+    /// it is not part of it.
     pub(super) fn lane(&self, lane: u8) -> Option<Lane> {
         let index = lane.checked_sub(self.first)?;
         (index < self.lanes).then(|| Lane(index + 1))
@@ -70,9 +71,11 @@ impl RoadSection {
 }
 
 impl Frame {
-    /// Returns the part of a track that lies within the encounter, in its frame, with a point at every `period`.
+    /// Returns the part of a track that lies within the encounter, in its frame, with a point at
+    /// every `period`.
     ///
-    /// Returns `None` if a point of that part is on another road, or if fewer than two points remain.
+    /// Returns `None` if a point of that part is on another road, or if fewer than two points
+    /// remain.
     pub(super) fn view(&self, track: &Trajectory, period: Time) -> Option<Trajectory> {
         let within = track.points.iter().filter(|point| point.time >= self.start && point.time <= self.end);
         let points: Option<Vec<TrajectoryPoint>> = within.map(|point| self.point(point)).collect();

@@ -1,4 +1,4 @@
-//! An encounter of recorded traffic, and why a lane change is none.
+//! An encounter of recorded traffic, and the reasons why a lane change is no encounter.
 
 use crate::lane_change::LaneChange;
 use closecall_traffic::{Lane, Measured, Time, Trajectory};
@@ -7,12 +7,14 @@ use closecall_traffic::{Lane, Measured, Time, Trajectory};
 pub const LEAD_IN: Time = Time::from_ms(20_000);
 /// Part of an encounter after the lane change ends.
 pub const LEAD_OUT: Time = Time::from_ms(6_000);
-/// Shortest time from the start of an encounter to the crossing: a shorter approach is not informative.
+/// Shortest time from the start of an encounter to the crossing: a shorter approach is not
+/// informative.
 pub const SHORTEST_APPROACH: Time = Time::from_ms(2_000);
-/// Distance to the ego vehicle along the road below which another vehicle belongs to the encounter (m).
+/// Distance to the ego vehicle along the road below which another vehicle belongs to the encounter
+/// (m).
 pub const REACH_M: f64 = 150.0;
-/// Longest time headway of the rear vehicle to the ego vehicle at the crossing (s): beyond it, the rear vehicle is not
-/// considered to change lanes because of the ego vehicle.
+/// Longest time headway of the rear vehicle to the ego vehicle at the crossing (s): beyond it, the
+/// rear vehicle is not considered to change lanes because of the ego vehicle.
 pub const LONGEST_THW_S: f64 = 5.0;
 
 /// Index of the ego vehicle in [`RecordedEncounter::vehicles`].
@@ -54,8 +56,8 @@ pub struct RecordedEncounter {
     pub home: Lane,
     /// Lane that the rear vehicle changes to.
     pub target: Lane,
-    /// The ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle, in order of their track
-    /// ids.
+    /// The ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle, in
+    /// order of their track ids.
     pub vehicles: Vec<Participant>,
 }
 
@@ -71,7 +73,8 @@ impl RecordedEncounter {
     }
 }
 
-/// The reason why a lane change is not an encounter. Track ids and lanes are those of the trajectory data.
+/// The reason why a lane change is not an encounter. Track ids and lanes are as in the trajectory
+/// data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoEncounter {
     /// The trajectory data does not contain the track.

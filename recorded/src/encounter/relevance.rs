@@ -1,14 +1,17 @@
-//! The choice of the most relevant approaches, and how much each of their values varies.
+//! The choice of the most relevant approaches, and the variation of their values.
 //!
-//! **Choice.** Approaches that are critical by at least one metric of the published method precede the others. The first is the most
-//! critical one. Each further one is the one that differs most from all that are chosen: its smallest distance to them is largest,
-//! in the plane of speed, closing speed, headway at the crossing and front headway, each divided by its standard deviation
-//! (T. F. Gonzalez, *Clustering to minimize the maximum intercluster distance*, Theoretical Computer Science 38 (1985) 293–306).
-//! Of two equal ones the earlier in the order of the files and of time is chosen, so that the choice can be repeated.
+//! **Choice.** Approaches that are critical by at least one metric of the published method precede
+//! the others. The first is the most critical approach. Each further approach is the approach that
+//! differs most from all chosen approaches: its smallest distance to them is largest, in the space
+//! of speed, closing speed, headway at the crossing and front headway, each divided by its standard
+//! deviation (T. F. Gonzalez, *Clustering to minimize the maximum intercluster distance*,
+//! Theoretical Computer Science 38 (1985) 293–306). Of two equal approaches, the earlier in the
+//! order of the files and of time is chosen. The choice is therefore reproducible.
 //!
-//! **Variation.** A value varies around what was recorded by the bandwidth of a kernel density estimate,
-//! 0.9·min(σ, IQR/1.34)·n^(−1/5) over all approaches of the files (B. W. Silverman, *Density Estimation for Statistics and Data
-//! Analysis*, 1986, equation 3.31). All scenarios together then sample the estimated density of the recorded approaches.
+//! **Variation.** A value varies around the recorded value by the bandwidth of a kernel density
+//! estimate, 0.9·min(σ, IQR/1.34)·n^(−1/5) over all approaches of the files (B. W. Silverman,
+//! *Density Estimation for Statistics and Data Analysis*, 1986, equation 3.31). All scenarios
+//! together then sample the estimated density of the recorded approaches.
 
 use closecall_traffic::maths;
 use closecall_traffic::statistics::quantiles::quantile;
@@ -16,8 +19,8 @@ use closecall_traffic::statistics::quantiles::quantile;
 use super::Approach;
 use crate::fit::MIN_VALUES;
 
-/// Share of its recorded value by which a quantity varies if there are too few approaches to fit a spread (-): an assumption; 0.05 to
-/// 0.2 are plausible.
+/// Share of its recorded value by which a quantity varies if there are too few approaches to fit a
+/// spread (-): an assumption; 0.05 to 0.2 are plausible.
 const ASSUMED_SHARE: f64 = 0.1;
 /// Ratio of the interquartile range to the standard deviation of a normal distribution (-).
 const IQR_PER_SD: f64 = 1.34;
@@ -73,7 +76,8 @@ pub struct Relevant {
     pub index: usize,
     /// Whether it is critical by at least one metric.
     pub is_critical: bool,
-    /// Its distance to the nearest one that was chosen before it, in standard deviations; `None` for the first.
+    /// Its distance to the nearest earlier chosen approach, in standard deviations; `None` for the
+    /// first.
     pub distance_sd: Option<f64>,
 }
 
@@ -86,10 +90,11 @@ pub fn most_relevant(approaches: &[Approach], count: usize) -> Vec<Relevant> {
         let mut left: Vec<usize> = (0..approaches.len()).filter(|&index| (metrics[index] > 0) == is_critical).collect();
         while chosen.len() < count && !left.is_empty() {
             let nearest = |index: usize| {
-                let distances = chosen.iter().map(|one| distance(&points[one.index], &points[index]));
+                let distances = chosen.iter().map(|approach| distance(&points[approach.index], &points[index]));
                 distances.min_by(f64::total_cmp)
             };
-            // Without a first one, the number of critical metrics decides, then the shorter headway.
+            // Without a first approach, the number of critical metrics decides, then the shorter
+            // headway.
             let rank = |index: usize| match nearest(index) {
                 Some(distance_sd) => [distance_sd, 0.0],
                 None => [metrics[index] as f64, -approaches[index].values.crossing_thw_s],
@@ -107,7 +112,8 @@ pub fn most_relevant(approaches: &[Approach], count: usize) -> Vec<Relevant> {
     chosen
 }
 
-/// Returns the values of each approach, divided by their standard deviations. A front headway that is not recorded is at its mean.
+/// Returns the values of each approach, divided by their standard deviations. A front headway that
+/// is not recorded is at its mean.
 fn normalised(approaches: &[Approach]) -> Vec<[f64; 4]> {
     let fronts: Vec<f64> = approaches.iter().filter_map(|approach| approach.values.front_thw_s).collect();
     let mean_front_s = fronts.iter().sum::<f64>() / fronts.len().max(1) as f64;
@@ -151,8 +157,9 @@ mod tests {
     }
 
     #[test]
-    fn the_bandwidth_is_that_of_silvermans_rule() {
-        // Mean 3, variance 2.5, interquartile range 2: 2/1.34 is below the standard deviation of 1.58.
+    fn the_bandwidth_follows_silvermans_rule() {
+        // Mean 3, variance 2.5, interquartile range 2: 2/1.34 is below the standard deviation of
+        // 1.58.
         let Variation::Fitted { bandwidth, n } = Variation::of(&[1.0, 2.0, 3.0, 4.0, 5.0]) else { panic!("fitted") };
         assert_eq!(n, 5);
         assert!((bandwidth - 0.9 * (2.0 / 1.34) * 0.724_779_663_677_695_6).abs() < 1e-12, "{bandwidth}");
@@ -165,15 +172,15 @@ mod tests {
         // The second and the third are alike; the last one is not critical.
         let all =
             [recorded(30.0, 3.0), recorded(45.0, 5.0), recorded(45.2, 5.0), recorded(68.0, 8.0), recorded(120.0, 2.0)];
-        let critical: Vec<bool> = all.iter().map(|one| !one.critical_metrics().is_empty()).collect();
+        let critical: Vec<bool> = all.iter().map(|approach| !approach.critical_metrics().is_empty()).collect();
         assert_eq!(critical, [true, true, true, true, false]);
         let chosen = most_relevant(&all, 3);
-        let indices: Vec<usize> = chosen.iter().map(|one| one.index).collect();
+        let indices: Vec<usize> = chosen.iter().map(|approach| approach.index).collect();
         assert!(!(indices.contains(&1) && indices.contains(&2)), "{chosen:?}");
-        assert!(chosen.iter().all(|one| one.is_critical) && chosen[0].distance_sd.is_none());
+        assert!(chosen.iter().all(|approach| approach.is_critical) && chosen[0].distance_sd.is_none());
         let every = most_relevant(&all, 9);
         assert_eq!(every.len(), 5);
-        assert_eq!(every.last().map(|one| (one.index, one.is_critical)), Some((4, false)));
+        assert_eq!(every.last().map(|approach| (approach.index, approach.is_critical)), Some((4, false)));
         assert_eq!(most_relevant(&all, 3), chosen);
     }
 }

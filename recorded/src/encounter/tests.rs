@@ -5,13 +5,13 @@ use crate::filters::smooth;
 use crate::lane_change::detect;
 use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
-/// Rear vehicle that changes from lane 2 to lane 1 between 10 and 15 s, 150 m behind the ego vehicle and 10 m/s faster
-/// than the ego and the lead vehicle.
+/// Rear vehicle that changes from lane 2 to lane 1 between 10 and 15 s, 150 m behind the ego
+/// vehicle and 10 m/s faster than the ego and the lead vehicle.
 fn rear() -> Trajectory {
     changing_track(3, (0.0, 30.0), (-5.25, -1.75), (10.0, 5.0), 200)
 }
 
-fn found(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
+fn encounter_among(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
     let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
     let changes = detect(&data);
     let change = changes.iter().find(|change| change.track_id == 3).unwrap();
@@ -25,18 +25,19 @@ fn ego_and_lead() -> Vec<Trajectory> {
 
 #[test]
 fn roles_clock_and_road_are_assigned() {
-    let found = found(ego_and_lead()).unwrap();
-    assert_eq!(found.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
-    assert_eq!((found.start, found.lanes, found.home, found.target), (Time::ZERO, 2, Lane(2), Lane(1)));
-    let [ego, _, rear] = found.ego_lead_rear();
+    let encounter = encounter_among(ego_and_lead()).unwrap();
+    assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
+    assert_eq!((encounter.start, encounter.lanes, encounter.home, encounter.target), (Time::ZERO, 2, Lane(2), Lane(1)));
+    let [ego, _, rear] = encounter.ego_lead_rear();
     assert!(ego.points[0].s_m.abs() < 1e-6 && (rear.points[0].s_m + 150.0).abs() < 1e-6);
     assert!(ego.points.windows(2).all(|pair| pair[1].time - pair[0].time == CONTROL_STEP));
-    // The gap at the crossing is the initial 150 m less 10 m/s times the elapsed time and a vehicle's length.
-    assert!((found.crossing.s() - 12.5).abs() < 0.2, "{}", found.crossing);
-    assert!((found.crossing_thw_s - (150.0 - 10.0 * found.crossing.s() - 4.5) / 30.0).abs() < 0.1);
-    let crossing = rear.points.iter().find(|point| point.time >= found.crossing).unwrap();
-    assert!((crossing.d_m + found.lane_width_m).abs() < 0.2, "{}", crossing.d_m);
-    assert!(found.end <= Time::from_s(21.2) && found.end > Time::from_s(20.0), "{}", found.end);
+    // The gap at the crossing is the initial 150 m less 10 m/s times the elapsed time and a
+    // vehicle's length.
+    assert!((encounter.crossing.s() - 12.5).abs() < 0.2, "{}", encounter.crossing);
+    assert!((encounter.crossing_thw_s - (150.0 - 10.0 * encounter.crossing.s() - 4.5) / 30.0).abs() < 0.1);
+    let crossing = rear.points.iter().find(|point| point.time >= encounter.crossing).unwrap();
+    assert!((crossing.d_m + encounter.lane_width_m).abs() < 0.2, "{}", crossing.d_m);
+    assert!(encounter.end <= Time::from_s(21.2) && encounter.end > Time::from_s(20.0), "{}", encounter.end);
 }
 
 #[test]
@@ -44,9 +45,9 @@ fn the_encounter_starts_once_the_ego_follows_the_lead() {
     // Until 5 s another vehicle drives between the ego and the lead vehicle.
     let mut between = straight_track(4, 165.0, 20.0, -5.25, 50);
     between.points.retain(|point| point.time < Time::from_s(5.0));
-    let found = found(ego_and_lead().into_iter().chain([between]).collect()).unwrap();
-    assert!((found.start.s() - 5.0).abs() < 0.5, "{}", found.start);
-    assert_eq!(found.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
+    let encounter = encounter_among(ego_and_lead().into_iter().chain([between]).collect()).unwrap();
+    assert!((encounter.start.s() - 5.0).abs() < 0.5, "{}", encounter.start);
+    assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
 }
 
 #[test]
@@ -54,14 +55,14 @@ fn vehicles_of_another_carriageway_are_left_out() {
     let mut far = straight_track(5, 150.0, 20.0, -1_005.25, 250);
     far.points.iter_mut().for_each(|point| point.lane = Lane(4));
     let near = straight_track(6, 150.0, 20.0, -1.75, 250);
-    let found = found(ego_and_lead().into_iter().chain([far, near]).collect()).unwrap();
-    let tracks: Vec<u64> = found.vehicles.iter().map(|vehicle| vehicle.trajectory.track_id).collect();
-    assert_eq!((tracks, found.lanes), (vec![1, 2, 3, 6], 2));
+    let encounter = encounter_among(ego_and_lead().into_iter().chain([far, near]).collect()).unwrap();
+    let tracks: Vec<u64> = encounter.vehicles.iter().map(|vehicle| vehicle.trajectory.track_id).collect();
+    assert_eq!((tracks, encounter.lanes), (vec![1, 2, 3, 6], 2));
 }
 
 #[test]
 fn a_lane_change_that_is_no_encounter_states_the_reason() {
-    let message = |others| found(others).unwrap_err().to_string();
+    let message = |others| encounter_among(others).unwrap_err().to_string();
     assert!(message(Vec::new()).contains("no vehicle is ahead of track 3 in lane 2"));
     assert!(
         message(ego_and_lead()[..1].to_vec())
@@ -86,7 +87,8 @@ fn a_lane_change_that_is_no_encounter_states_the_reason() {
 
 #[test]
 fn a_crossing_at_the_start_is_not_repeated() {
-    // The rear vehicle comes from lane 3, and the encounter starts as soon as it is in the lane of the ego vehicle.
+    // The rear vehicle comes from lane 3, and the encounter starts as soon as it is in the lane of
+    // the ego vehicle.
     let mut rear = rear();
     let from = changing_track(3, (0.0, 30.0), (-8.75, -5.25), (2.15, 4.0), 200);
     let before = |time: Time| time < Time::from_s(8.0);
@@ -99,8 +101,8 @@ fn a_crossing_at_the_start_is_not_repeated() {
     let changes = detect(&data);
     let of_rear: Vec<_> = changes.iter().filter(|change| change.track_id == 3).collect();
     let [first, second] = of_rear[..] else { panic!("{of_rear:?}") };
-    let found = encounter(&data, second, &changes, CONTROL_STEP).unwrap();
-    assert_eq!(found.start, Time::from_s(first.crossing_s), "the encounter starts with the crossing");
-    let kept: Vec<_> = found.vehicles[REAR_INDEX].changes.iter().map(|change| change.crossing_s).collect();
+    let encounter = encounter(&data, second, &changes, CONTROL_STEP).unwrap();
+    assert_eq!(encounter.start, Time::from_s(first.crossing_s), "the encounter starts with the crossing");
+    let kept: Vec<_> = encounter.vehicles[REAR_INDEX].changes.iter().map(|change| change.crossing_s).collect();
     assert_eq!(kept, [second.crossing_s]);
 }

@@ -1,9 +1,9 @@
 //! A second-order Butterworth low-pass filter, run forwards and backwards.
 //!
-//! The bilinear transform with a pre-warped corner frequency discretizes the analogue prototype 1/(s² + √2·s + 1)
-//! (Oppenheim and Schafer, Discrete-Time Signal Processing, chapter 7). The filter runs in both directions with
-//! steady-state initial conditions and odd reflection at the ends. SciPy calls this `filtfilt`; the tests compare with
-//! it.
+//! The bilinear transform with a pre-warped corner frequency discretizes the analogue prototype
+//! 1/(s² + √2·s + 1) (Oppenheim and Schafer, Discrete-Time Signal Processing, chapter 7). The
+//! filter runs in both directions with steady-state initial conditions and odd reflection at the
+//! ends. SciPy calls this `filtfilt`; the tests compare with it.
 
 use closecall_traffic::maths;
 use std::f64::consts::{PI, SQRT_2};
@@ -35,8 +35,8 @@ impl LowPass {
 
     /// Filters `signal` with zero phase shift and returns one value for each input value.
     ///
-    /// Odd reflection extends the signal by `padding` samples beyond each end (SciPy's `padlen`, 9 by default), or by
-    /// as many as the signal has.
+    /// Odd reflection extends the signal by `padding` samples beyond each end (SciPy's `padlen`, 9
+    /// by default), or by as many as the signal has.
     pub fn forwards_and_backwards(&self, signal: &[f64], padding: usize) -> Vec<f64> {
         let [.., last] = signal else { return Vec::new() };
         let (first, end) = (signal[0], signal.len() - 1);

@@ -4,9 +4,9 @@ use closecall_traffic::{Time, TrajectoryPoint};
 
 /// Interpolates `points` linearly at every multiple of `period` within their time span.
 ///
-/// Each new point takes the lane of the nearest given point. The interpolation error is at most a·Δt²/8, with the
-/// acceleration a and the time Δt between two given points: 5 mm for 4 m/s² at 10 Hz. A given point that lies on such a
-/// multiple is returned unchanged.
+/// Each new point takes the lane of the nearest given point. The interpolation error is at most
+/// a·Δt²/8, with the acceleration a and the time Δt between two given points: 5 mm for 4 m/s² at 10
+/// Hz. A given point that lies on such a multiple is returned unchanged.
 pub(crate) fn resample(points: &[TrajectoryPoint], period: Time) -> Vec<TrajectoryPoint> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
     let (first_tick, last_tick) = (ceil_div(first.time.ns(), period.ns()), last.time.ns().div_euclid(period.ns()));
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn faster_points_are_decimated_and_shifted_ones_interpolated() {
+    fn faster_points_are_decimated_and_shifted_points_interpolated() {
         let decimated = resample(&line(&[120, 160, 200, 240, 280, 320]), Time::from_ms(100));
         assert_eq!(decimated.iter().map(|point| point.s_m).collect::<Vec<_>>(), [200.0, 300.0]);
         let shifted = resample(&line(&[-150, -50, 50, 150, 250]), Time::from_ms(100));

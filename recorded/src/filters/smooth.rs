@@ -35,7 +35,8 @@ pub struct SmoothedTrajectoryData {
     pub markings: LaneMarkings,
     /// Whether lane changes are found by the recorded lanes.
     pub lanes: LaneReliability,
-    /// The tracks in order of their track ids, without those that cover no instant of the common clock.
+    /// The tracks in order of their track ids, without the tracks that cover no instant of the
+    /// common clock.
     pub tracks: Vec<SmoothedTrack>,
     first_tick: i64,
     present: Vec<Vec<Presence>>,
@@ -80,7 +81,8 @@ pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
 }
 
 impl SmoothedTrajectoryData {
-    /// Returns all vehicles present at the clock instant nearest to `time`, in order of their track ids.
+    /// Returns all vehicles present at the clock instant nearest to `time`, in order of their track
+    /// ids.
     pub fn present_at(&self, time: Time) -> &[Presence] {
         let tick = tick_of(time) - self.first_tick;
         usize::try_from(tick).ok().and_then(|tick| self.present.get(tick)).map_or(&[], Vec::as_slice)
@@ -97,7 +99,8 @@ impl SmoothedTrajectoryData {
         self.tracks.iter().map(|track| &track.trajectory)
     }
 
-    /// Returns the index of track `track_id` in [`Self::tracks`], or `None` if there is no such track.
+    /// Returns the index of track `track_id` in [`Self::tracks`], or `None` if there is no such
+    /// track.
     pub fn track_index(&self, track_id: u64) -> Option<usize> {
         self.tracks.binary_search_by_key(&track_id, |track| track.trajectory.track_id).ok()
     }
@@ -108,7 +111,8 @@ fn tick_of(time: Time) -> i64 {
     (time.ns() + PERIOD.ns() / 2).div_euclid(PERIOD.ns())
 }
 
-/// Returns the first clock instant of `tracks`, and the vehicles present at each instant from that one on.
+/// Returns the first clock instant of `tracks`, and the vehicles present at each instant from then
+/// on.
 fn presence_by_tick(tracks: &[SmoothedTrack]) -> (i64, Vec<Vec<Presence>>) {
     let spans = tracks.iter().filter_map(|track| track.trajectory.span());
     let Some((first, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return (0, Vec::new()) };
@@ -150,7 +154,8 @@ fn smooth_points(points: &mut [TrajectoryPoint], period: Time) {
     }
 }
 
-/// Filters the deviation of `values` from the chord through both ends, so that steady movement passes unchanged.
+/// Filters the deviation of `values` from the chord through both ends, so that steady movement
+/// passes unchanged.
 fn low_pass(values: &[f64], filter: LowPass, padding: usize) -> Vec<f64> {
     let (Some(first), Some(last)) = (values.first(), values.last()) else { return Vec::new() };
     let slope = (last - first) / (values.len() - 1).max(1) as f64;
@@ -160,8 +165,8 @@ fn low_pass(values: &[f64], filter: LowPass, padding: usize) -> Vec<f64> {
     filtered.map(|(k, value)| value + chord(k)).collect()
 }
 
-/// Returns the derivative with respect to time: central differences over five samples, over three next to the ends,
-/// one-sided at the ends.
+/// Returns the derivative with respect to time: central differences over five samples, over three
+/// next to the ends, one-sided at the ends.
 fn derivative(values: &[f64], period: Time) -> Vec<f64> {
     let step_s = period.s();
     let last = values.len().saturating_sub(1);

@@ -1,4 +1,4 @@
-//! Lane stays: how long a vehicle was recorded in which lane.
+//! Lane stays: the intervals in which a vehicle was recorded in one lane.
 
 use closecall_traffic::{Lane, Time, Trajectory};
 
@@ -18,17 +18,18 @@ pub struct Stay {
 /// Returns the lane stays of a track in order of time.
 pub fn stays_of(track: &Trajectory) -> Vec<Stay> {
     let period = period_of(track).unwrap_or(PERIOD);
-    let mut found: Vec<Stay> = Vec::new();
+    let mut stays: Vec<Stay> = Vec::new();
     for point in &track.points {
-        match found.last_mut() {
+        match stays.last_mut() {
             Some(stay) if stay.lane == point.lane => stay.duration += period,
-            _ => found.push(Stay { lane: point.lane, first: point.time, duration: period }),
+            _ => stays.push(Stay { lane: point.lane, first: point.time, duration: period }),
         }
     }
-    found
+    stays
 }
 
-/// Returns the mean time between two frames of a track, or `None` if the track does not have two at different times.
+/// Returns the mean time between two frames of a track, or `None` if the track does not have two at
+/// different times.
 pub(super) fn period_of(track: &Trajectory) -> Option<Time> {
     let (first, last) = track.span()?;
     let steps = track.points.len() as i64 - 1;

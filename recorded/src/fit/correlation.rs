@@ -5,11 +5,12 @@ use crate::criticality::spearman;
 use closecall_traffic::maths;
 use closecall_traffic::statistics::cholesky;
 
-/// Least number of lane changes or pairs with both values, from which a correlation is kept: with fewer, its 95 % interval spans
-/// more than ±0.6.
+/// Least number of lane changes or pairs with both values, from which a correlation is kept: with
+/// fewer, its 95 % interval spans more than ±0.6.
 pub(super) const MIN_PAIRS: usize = 10;
 
-/// Quantities of one lane change, and of one pair of vehicles. Those that repeat another one are left out.
+/// Quantities of one lane change, and of one pair of vehicles. Pairs that repeat another pair are
+/// left out.
 const TOGETHER: [&[Quantity]; 2] = [
     &[Quantity::CutOutThw, Quantity::LaneChangeDuration, Quantity::Closing, Quantity::CrossingSpeed],
     &[Quantity::FrontThw, Quantity::FollowingSpeed],
@@ -28,23 +29,27 @@ pub struct RankCorrelation {
     pub spearman: f64,
 }
 
-/// Returns the rank correlations of all quantities that belong together, rounded to two decimals. Each pair of quantities has its
-/// own lane changes, so that they may contradict each other: they are then scaled down together until a joint distribution has them.
+/// Returns the rank correlations of all quantities that belong together, rounded to two decimals.
+/// Each pair of quantities has its own lane changes, so that they may contradict each other: they
+/// are then scaled down together until a joint distribution has them.
 pub(super) fn correlations(samples: &Samples) -> Vec<RankCorrelation> {
-    let mut found = Vec::new();
+    let mut correlations = Vec::new();
     for quantities in TOGETHER {
-        for (index, of) in quantities.iter().enumerate() {
-            for with in &quantities[index + 1..] {
-                let (a, b) = samples.pairs(*of, *with);
+        for (index, first) in quantities.iter().enumerate() {
+            for second in &quantities[index + 1..] {
+                let (a, b) = samples.pairs(*first, *second);
                 if let Some(spearman) = spearman(&a, &b).filter(|_| a.len() >= MIN_PAIRS) {
-                    found.push(RankCorrelation { of: *of, with: *with, n: a.len(), spearman });
+                    correlations.push(RankCorrelation { of: *first, with: *second, n: a.len(), spearman });
                 }
             }
         }
     }
     let rounded = |scale: f64| -> Vec<RankCorrelation> {
         let round = |spearman: f64| (100.0 * scale * spearman).round().clamp(-99.0, 99.0) / 100.0;
-        found.iter().map(|one| RankCorrelation { spearman: round(one.spearman), ..*one }).collect()
+        correlations
+            .iter()
+            .map(|correlation| RankCorrelation { spearman: round(correlation.spearman), ..*correlation })
+            .collect()
     };
     let scales = std::iter::successors(Some(1.0), |scale| Some(0.95 * scale));
     scales.map(rounded).find(|all| is_consistent(all)).unwrap_or_default()
@@ -52,8 +57,10 @@ pub(super) fn correlations(samples: &Samples) -> Vec<RankCorrelation> {
 
 fn is_consistent(all: &[RankCorrelation]) -> bool {
     let at = |a: Quantity, b: Quantity| {
-        let pair = all.iter().find(|one| (one.of, one.with) == (a, b) || (one.of, one.with) == (b, a));
-        let spearman = pair.map_or(0.0, |one| one.spearman);
+        let pair = all.iter().find(|correlation| {
+            (correlation.of, correlation.with) == (a, b) || (correlation.of, correlation.with) == (b, a)
+        });
+        let spearman = pair.map_or(0.0, |correlation| correlation.spearman);
         if a == b { 1.0 } else { 2.0 * maths::sin(std::f64::consts::PI * spearman / 6.0) }
     };
     let rows = Quantity::ALL.map(|a| Quantity::ALL.map(|b| at(a, b)).to_vec());

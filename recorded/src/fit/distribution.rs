@@ -10,7 +10,8 @@ use super::Quantity;
 /// Least number of values to which a distribution is fitted.
 pub const MIN_VALUES: usize = 5;
 
-/// Largest number of empirical quantiles: the deciles. With fewer values, there are as many quantiles as values.
+/// Largest number of empirical quantiles: the deciles. With fewer values, there are as many
+/// quantiles as values.
 const QUANTILES: usize = 11;
 
 /// Number of bootstrap resamples for the interval of the median.
@@ -19,7 +20,8 @@ const MEDIAN_RESAMPLES: usize = 2_000;
 /// Number of bootstrap samples for the probability of a larger Kolmogorov–Smirnov distance.
 const GOODNESS_OF_FIT_SAMPLES: usize = 1_000;
 
-/// Number of standard deviations at which a normal distribution is truncated, which keeps 99.7 % of it.
+/// Number of standard deviations at which a normal distribution is truncated, which keeps 99.7 % of
+/// it.
 const TRUNCATION_SDS: f64 = 3.0;
 
 /// Probabilities of the lower and upper end of the interval.
@@ -72,7 +74,8 @@ pub struct FittedQuantity {
     pub interval_95: [f64; 2],
     /// The parametric form and its goodness of fit.
     ///
-    /// `None` if the values do not vary, or if they are not all positive and the form is log-normal.
+    /// `None` if the values do not vary, or if they are not all positive and the form is
+    /// log-normal.
     pub form: Option<(Form, GoodnessOfFit)>,
 }
 
@@ -100,7 +103,8 @@ impl FittedQuantity {
     }
 }
 
-/// Returns the random stream of one quantity. Each has its own, so that a further quantity does not change the others.
+/// Returns the random stream of one quantity. Each has its own, so that a further quantity does not
+/// change the others.
 fn stream(seed: u64, quantity: Quantity) -> Stream {
     let mut hasher = blake3::Hasher::new_derive_key("closecall 2026 bootstrap of fitted distributions v1");
     hasher.update(&seed.to_le_bytes());
@@ -140,7 +144,8 @@ impl Family {
 
     /// Fits the form by the moments of `values`, or of their logarithms for the log-normal form.
     ///
-    /// Returns `None` if the values do not vary, or if they are not all positive and the form is log-normal.
+    /// Returns `None` if the values do not vary, or if they are not all positive and the form is
+    /// log-normal.
     fn fit(self, values: &[f64]) -> Option<Form> {
         match self {
             Self::LogNormal => {
@@ -160,8 +165,8 @@ impl Family {
     }
 }
 
-/// Returns the mean and the standard deviation (with n − 1), or `None` unless both are finite and the latter is above
-/// 0.
+/// Returns the mean and the standard deviation (with n − 1), or `None` unless both are finite and
+/// the standard deviation is above 0.
 fn moments(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
@@ -213,8 +218,8 @@ impl Form {
     }
 }
 
-/// Returns the Kolmogorov–Smirnov distance between sorted values and a form, or `None` if no probability is left between
-/// the bounds of the form.
+/// Returns the Kolmogorov–Smirnov distance between sorted values and a form, or `None` if no
+/// probability is left between the bounds of the form.
 fn ks_distance(sorted: &[f64], form: Form) -> Option<f64> {
     let n = sorted.len() as f64;
     let normal = form.standard_normal()?;
@@ -225,8 +230,8 @@ fn ks_distance(sorted: &[f64], form: Form) -> Option<f64> {
     Some(sorted.iter().enumerate().map(at).fold(0.0, f64::max))
 }
 
-/// Returns the goodness of fit of `form`, by a parametric bootstrap that refits the form to each sample, or `None` if no
-/// probability is left between the bounds of the form.
+/// Returns the goodness of fit of `form`, by a parametric bootstrap that refits the form to each
+/// sample, or `None` if no probability is left between the bounds of the form.
 fn goodness_of_fit(sorted: &[f64], form: Form, rng: &mut Stream) -> Option<GoodnessOfFit> {
     let distance = ks_distance(sorted, form)?;
     let normal = form.standard_normal()?;

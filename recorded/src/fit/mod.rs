@@ -18,22 +18,25 @@
 //! | `short-front-thw-s`      | the same                                        | the same, only values from 0.5 s to the critical 0.9 s |
 //! | `following-mps`          | pair of following and lead vehicle              | median speed of the following vehicle    |
 //!
-//! Only lane changes to the left count for the headway and the closing speed, because vehicles overtake on the left. A
-//! vehicle counts as following, or as cutting out from behind a lead vehicle, if its headway is at most 3 s: beyond
-//! that, drivers choose their speed freely (Highway Capacity Manual, criterion for percent followers). A pair needs 2 s
-//! of following. Each pair gives one value, because the instants of one pair are not independent. If short trajectory
-//! data does not contain the true lead vehicle, the headways are upper bounds.
+//! Only lane changes to the left count for the headway and the closing speed, because vehicles
+//! overtake on the left. A vehicle counts as following, or as cutting out from behind a lead
+//! vehicle, if its headway is at most 3 s: beyond that, drivers choose their speed freely (Highway
+//! Capacity Manual, criterion for percent followers). A pair needs 2 s of following. Each pair
+//! gives one value, because the instants of one pair are not independent. If short trajectory data
+//! does not contain the true lead vehicle, the headways are upper bounds.
 //!
 //! # Output for each quantity
 //!
-//! Each result states the number of values, the trajectory data, and the 95 % percentile bootstrap interval of the
-//! median (2,000 resamples, from a stated seed). Besides the empirical quantiles there is a parametric form: log-normal
-//! for headways, durations and closing speeds, normal truncated at ±3 standard deviations for speeds. It comes with its
-//! Kolmogorov–Smirnov distance and the probability of a larger one if the form were true. That probability comes from a
-//! parametric bootstrap (1,000 samples, with the form refitted to each), because the parameters are fitted to the same
-//! values. With fewer than 5 values nothing is fitted.
+//! Each result states the number of values, the trajectory data, and the 95 % percentile bootstrap
+//! interval of the median (2,000 resamples, from a stated seed). Besides the empirical quantiles
+//! there is a parametric form: log-normal for headways, durations and closing speeds, normal
+//! truncated at ±3 standard deviations for speeds. It comes with its Kolmogorov–Smirnov distance
+//! and the probability of a larger distance if the form were true. That probability comes from a
+//! parametric bootstrap (1,000 samples, with the form refitted to each), because the parameters are
+//! fitted to the same values. With fewer than 5 values nothing is fitted.
 //!
-//! [`correlated`] adds Spearman's rank correlations, which scenarios sample by a Gaussian copula (`closecall_scenarios::parameters`).
+//! [`correlated`] adds Spearman's rank correlations, which scenarios sample by a Gaussian copula
+//! (`closecall_scenarios::parameters`).
 
 mod correlation;
 mod distribution;

@@ -12,7 +12,8 @@ use crate::lane_change::{LaneChange, detect};
 /// Largest headway at which a vehicle counts as following (s); see the module documentation.
 const FOLLOWING_THW_S: f64 = 3.0;
 
-/// Shortest time gap of adaptive cruise control (s): half of the 1 s that driver's manuals call the shortest setting.
+/// Shortest time gap of adaptive cruise control (s): half of the 1 s that driver's manuals call the
+/// shortest setting.
 const SHORTEST_ACC_S: f64 = 0.5;
 
 /// Shortest total time of following for which a pair of vehicles counts.
@@ -35,7 +36,8 @@ pub enum Quantity {
     CrossingSpeed,
     /// Median headway of a pair while following (s).
     FrontThw,
-    /// The same, for values that are critical but not shorter than those of adaptive cruise control only (s).
+    /// The same, only for values that are critical but not shorter than the headways of adaptive
+    /// cruise control (s).
     ShortFrontThw,
     /// Median speed of the following vehicle of a pair (m/s).
     FollowingSpeed,
@@ -70,8 +72,9 @@ impl Quantity {
         }
     }
 
-    /// Returns the quantity of which this one is a part, and the range of its values (in its unit): from the first number up to
-    /// below the second. `None` if it is no part of another one.
+    /// Returns the quantity that this quantity is a part of, and the range of its values (in its
+    /// unit): from the first number up to below the second. `None` if it is no part of another
+    /// quantity.
     pub const fn part_of(self) -> Option<(Self, [f64; 2])> {
         match self {
             Self::CriticalCutOutThw => Some((Self::CutOutThw, [0.0, CRITICAL_THW_S])),
@@ -137,7 +140,8 @@ impl Samples {
         self.values.entry(quantity).or_default().push(value);
     }
 
-    /// Adds a headway to a quantity, and to the quantity that is a part of it if it is in its range.
+    /// Adds a headway to a quantity, and to the quantity that is a part of it if it is in its
+    /// range.
     fn push_headway(&mut self, part: Quantity, thw_s: f64) {
         let Some((whole, [from_s, to_s])) = part.part_of() else { return };
         self.push(whole, thw_s);
@@ -174,7 +178,8 @@ fn observe_lane_change(data: &SmoothedTrajectoryData, change: &LaneChange, sampl
         return;
     }
     samples.push_headway(Quantity::CriticalCutOutThw, thw_s);
-    // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are first recorded.
+    // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are
+    // first recorded.
     let follower = &data.tracks[lead.follower_index].trajectory;
     let other = &data.tracks[lead.lead_index].trajectory;
     let Some((earliest, _)) = follower.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
@@ -196,7 +201,8 @@ struct LeadPair<'a> {
     gap_m: f64,
 }
 
-/// Returns track `track_id` and the nearest vehicle in `lane` that is entirely ahead of it at `time`.
+/// Returns track `track_id` and the nearest vehicle in `lane` that is entirely ahead of it at
+/// `time`.
 fn lead_in(data: &SmoothedTrajectoryData, track_id: u64, lane: Lane, time: Time) -> Option<LeadPair<'_>> {
     let present = data.present_at(time);
     let follower = present.iter().find(|presence| data.look_up(**presence).0.track_id == track_id)?;
@@ -215,7 +221,8 @@ fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &Trajectory
     bumper_gap_m(front.1.s_m - rear.1.s_m, front.0.dimensions.length_m, rear.0.dimensions.length_m)
 }
 
-/// Adds the median headway and speed of each pair of vehicles that follow each other for long enough.
+/// Adds the median headway and speed of each pair of vehicles that follow each other for long
+/// enough.
 fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
     let mut pairs: BTreeMap<(usize, usize), Vec<(f64, f64)>> = BTreeMap::new();
     let spans = data.tracks.iter().filter_map(|track| track.trajectory.span());
@@ -238,7 +245,7 @@ fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
     }
 }
 
-/// A vehicle that follows another one at one instant.
+/// A vehicle that follows another vehicle at one instant.
 struct Following {
     follower_index: usize,
     lead_index: usize,

@@ -1,4 +1,5 @@
-//! Writes fitted distributions as TOML, whose lines can be pasted into the `[parameters]` table of a scenario.
+//! Writes fitted distributions as TOML. Its lines can be pasted into the `[parameters]` table of a
+//! scenario.
 
 use std::fmt::Write as _;
 use std::io;
@@ -18,8 +19,8 @@ pub struct Heading {
 
 /// Formats the distributions as TOML text.
 ///
-/// The table `[parameters]` holds the empirical quantiles, and `[parametric]` the parametric forms under the same
-/// names.
+/// The table `[parameters]` holds the empirical quantiles, and `[parametric]` the parametric forms
+/// under the same names.
 pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
     let mut text = String::new();
     push_heading(&mut text, result, heading);
@@ -48,18 +49,22 @@ pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
     text
 }
 
-/// Returns the rank correlations of a quantity with those that follow it, as a further key of its parameter.
+/// Returns the rank correlations of a quantity with the quantities after it, as a further key of
+/// its parameter.
 fn dependence(result: &FittedDistributions, quantity: Quantity) -> String {
     let is_fitted = |quantity: Quantity| result.fitted.iter().any(|fitted| fitted.quantity == quantity);
-    let own = result.correlations.iter().filter(|one| one.of == quantity && is_fitted(one.with));
-    let own: Vec<String> = own.map(|one| format!("{} = {:.2}", one.with.name(), one.spearman)).collect();
-    if own.is_empty() { String::new() } else { format!(", spearman = {{ {} }}", own.join(", ")) }
+    let terms =
+        result.correlations.iter().filter(|correlation| correlation.of == quantity && is_fitted(correlation.with));
+    let terms: Vec<String> =
+        terms.map(|correlation| format!("{} = {:.2}", correlation.with.name(), correlation.spearman)).collect();
+    if terms.is_empty() { String::new() } else { format!(", spearman = {{ {} }}", terms.join(", ")) }
 }
 
 /// Writes the distributions to `path` atomically.
 ///
 /// # Errors
-/// Returns an I/O error if the file cannot be written. A file that existed before then stays untouched.
+/// Returns an I/O error if the file cannot be written. A file that existed before then stays
+/// untouched.
 pub fn write_toml(result: &FittedDistributions, heading: &Heading, path: &Path) -> io::Result<()> {
     let text = to_toml(result, heading);
     write_atomically(path, |file| file.write_all(text.as_bytes()))
@@ -87,11 +92,11 @@ fn push_heading(text: &mut String, result: &FittedDistributions, heading: &Headi
 fn push_entry(text: &mut String, fitted: &FittedQuantity, distribution: &str, source: &str) {
     let [low, high] = fitted.interval_95.map(number);
     let (name, n, source) = (fitted.quantity.name(), fitted.n, quoted(source));
-    let of = fitted.quantity.part_of().map_or_else(String::new, |(whole, cut)| {
+    let part_of = fitted.quantity.part_of().map_or_else(String::new, |(whole, cut)| {
         let [from, to] = cut.map(number);
         format!(", quantity = \"{}\", cut = [{from}, {to}]", whole.name())
     });
-    let provenance = format!("fitted = {{ n = {n}, source = {source}, interval-95 = [{low}, {high}]{of} }}");
+    let provenance = format!("fitted = {{ n = {n}, source = {source}, interval-95 = [{low}, {high}]{part_of} }}");
     // Writing to a string cannot fail.
     let _infallible = writeln!(text, "{name} = {{ {distribution}, {provenance} }}");
 }

@@ -1,6 +1,7 @@
 //! One recorded pair of vehicles, checked for use in a calibration.
 
-/// Shortest recording of a pair that is used (s): shorter ones say little about a driver.
+/// Shortest recording of a pair that is used (s): shorter recordings contain little information
+/// about a driver.
 const MIN_DURATION_S: f64 = 20.0;
 
 /// Largest deviation of a step from the period of a pair (s): numerical.
@@ -36,7 +37,7 @@ impl FollowingInstant {
 /// A recorded pair: at least 20 s without a missing instant, and with a positive gap throughout.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FollowingPair {
-    /// Name: that of the pair in its file.
+    /// Name of the pair in its file.
     pub name: String,
     /// Time between two instants (s).
     pub step_s: f64,
@@ -44,7 +45,8 @@ pub struct FollowingPair {
     pub instants: Vec<FollowingInstant>,
 }
 
-/// Returns one byte of the BLAKE3 hash of a name: the same on every machine, and in no relation to the recording.
+/// Returns one byte of the BLAKE3 hash of a name: the same on every machine, and in no relation to
+/// the recording.
 pub fn name_hash(name: &str) -> u8 {
     blake3::hash(name.as_bytes()).as_bytes()[0]
 }

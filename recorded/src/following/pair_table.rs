@@ -16,7 +16,7 @@ pub(super) fn read(input: impl Read) -> Result<Pairs, LineError> {
     let column = |name: &str| {
         header
             .iter()
-            .position(|found| found == name)
+            .position(|column| column == name)
             .ok_or_else(|| LineError { line: Some(1), message: format!("column `{name}` is missing") })
     };
     let pair_column = column("pair_id")?;
@@ -29,10 +29,10 @@ pub(super) fn read(input: impl Read) -> Result<Pairs, LineError> {
     for record in reader.records() {
         let record = record?;
         let name = record.get(pair_column).unwrap_or_default();
-        if current.as_ref().is_none_or(|(known, _)| known != name)
-            && let Some((known, instants)) = current.replace((name.to_owned(), Vec::new()))
+        if current.as_ref().is_none_or(|(pair_name, _)| pair_name != name)
+            && let Some((pair_name, instants)) = current.replace((name.to_owned(), Vec::new()))
         {
-            pairs.push(FollowingPair::new(known, instants));
+            pairs.push(FollowingPair::new(pair_name, instants));
         }
         let mut values = [0.0; COLUMNS.len()];
         for ((value, column), name) in values.iter_mut().zip(columns).zip(COLUMNS) {
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_of_a_pair_stand_together_and_the_gap_is_bumper_to_bumper() {
+    fn rows_of_a_pair_are_adjacent_and_the_gap_is_bumper_to_bumper() {
         let mut text = String::from(
             "pair_id,time_s,follower_front_y_m,follower_speed_mps,leader_front_y_m,leader_length_m,leader_speed_mps,extra\n",
         );

@@ -1,9 +1,9 @@
-//! A platoon of the OpenACC database (Makridis et al., Transportation Research Part C 125 (2021)): five lines of
-//! description, then one row for each instant.
+//! A platoon of the OpenACC database (Makridis et al., Transportation Research Part C 125 (2021)):
+//! five lines of description, then one row for each instant.
 //!
-//! `Speed`*i* is the speed of vehicle *i* (m/s) and `IVS`*i* the spacing between vehicle *i* and the vehicle *i* + 1 behind
-//! it, bumper to bumper (m). The position of the follower along its path is the integral of its speed, and that of the leader
-//! follows from the spacing.
+//! `Speed`*i* is the speed of vehicle *i* (m/s) and `IVS`*i* the spacing between vehicle *i* and
+//! the vehicle *i* + 1 behind it, bumper to bumper (m). The position of the follower along its path
+//! is the integral of its speed. The position of the leader follows from the spacing.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -11,8 +11,9 @@ use std::io::Read;
 use super::read::{LineError, Pairs, number};
 use super::{FollowingInstant, FollowingPair};
 
-/// Reads every pair of neighbours whose speeds and spacing the file has. An instant with an empty cell ends a pair; the next
-/// one begins another, whose name ends in its number.
+/// Reads every pair of neighbours whose speeds and spacing the file has. An instant with an empty
+/// cell ends a pair; the next instant with values begins another pair, whose name ends in its
+/// number.
 pub(super) fn read(input: impl Read) -> Result<Pairs, LineError> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(input);
     let mut records = reader.records();
@@ -114,8 +115,8 @@ mod tests {
             let spacing = if index == 300 { String::new() } else { "12.5".to_owned() };
             text.push_str(&format!("{:.1},10,10,10,{spacing},8\n", 0.1 * f64::from(index)));
         }
-        let found = read(text.as_bytes()).map_err(|error| error.message).unwrap();
-        let pairs: Vec<FollowingPair> = found.into_iter().map(Result::unwrap).collect();
+        let results = read(text.as_bytes()).map_err(|error| error.message).unwrap();
+        let pairs: Vec<FollowingPair> = results.into_iter().map(Result::unwrap).collect();
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
         assert_eq!(names, ["B-A part 1", "B-A part 2", "C-B part 1"]);
         assert_eq!((pairs[0].instants.len(), pairs[2].instants.len()), (300, 600));

@@ -22,14 +22,14 @@ pub enum FollowingError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// The content is not that of a known layout.
+    /// The content has no known layout.
     #[error("failed to read {}{}: {message}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Content {
         /// The file.
         path: PathBuf,
         /// The line, counted from 1, if one is at fault.
         line: Option<u64>,
-        /// What is wrong, and what is allowed.
+        /// The fault, and the allowed content.
         message: String,
     },
 }
@@ -66,13 +66,14 @@ impl From<csv::Error> for LineError {
     }
 }
 
-/// Pairs of one file: usable ones, or the reasons.
+/// Pairs of one file, each usable or with the reason why it is not.
 pub(super) type Pairs = Vec<Result<FollowingPair, LeftOut>>;
 
 /// Reads recorded pairs from files.
 ///
 /// # Errors
-/// [`FollowingError`] if a file cannot be read, has another layout, a column is missing, or a cell is not a number.
+/// [`FollowingError`] if a file cannot be read, has another layout, a column is missing, or a cell
+/// is not a number.
 pub fn read(paths: &[PathBuf]) -> Result<FollowingData, FollowingError> {
     let mut data = FollowingData::default();
     for path in paths {
@@ -80,12 +81,12 @@ pub fn read(paths: &[PathBuf]) -> Result<FollowingData, FollowingError> {
         let hashed = input::open(path).and_then(|file| hasher.update_reader(file.take(MOST_BYTES)).map(drop));
         hashed.map_err(|source| FollowingError::Read { path: path.clone(), source })?;
         data.files.push(FollowingFile { path: path.clone(), blake3: hasher.finalize().to_string() });
-        let found = read_one(path).map_err(|error| FollowingError::Content {
+        let pairs = read_one(path).map_err(|error| FollowingError::Content {
             path: path.clone(),
             line: error.line,
             message: error.message,
         })?;
-        for pair in found {
+        for pair in pairs {
             match pair {
                 Ok(pair) => data.pairs.push(pair),
                 Err(reason) => data.left_out.push(reason),
@@ -144,8 +145,8 @@ impl<R: Read> Read for Bounded<R> {
             Some(at) => (count - at - 1) as u64,
             None => self.of_line + count as u64,
         };
-        let fail = |what: &str, most: u64| {
-            let message = format!("{what} is longer than {} MiB: it is no file of pairs", most >> 20);
+        let fail = |subject: &str, most: u64| {
+            let message = format!("{subject} is longer than {} MiB: it is no file of pairs", most >> 20);
             Err(std::io::Error::new(std::io::ErrorKind::InvalidData, message))
         };
         match () {

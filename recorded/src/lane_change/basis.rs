@@ -1,4 +1,5 @@
-//! What a detection of lane changes rests on, for its output: which lanes it used, and why it may have found nothing.
+//! The basis of a detection of lane changes, for its output: the lanes that it used, and the reason
+//! why it may have found nothing.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -45,12 +46,14 @@ impl DetectionBasis {
         self.measured_frames += seen.count() as u64;
     }
 
-    /// Returns true if lane positions come from the recorded lanes alone, and none of them is known.
+    /// Returns true if lane positions come from the recorded lanes alone, and none of them is
+    /// known.
     fn has_no_marking(&self) -> bool {
         !self.is_measured && !self.recorded_lanes.iter().any(|&lane| self.markings.right_edge_m(Lane(lane)).is_some())
     }
 
-    /// Returns true if lane changes are searched by the recorded lanes, and no vehicle changes its recorded lane.
+    /// Returns true if lane changes are searched by the recorded lanes, and no vehicle changes its
+    /// recorded lane.
     pub fn lacks_recorded_crossings(&self) -> bool {
         (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable) && self.recorded_crossings == 0
     }
@@ -93,7 +96,7 @@ impl fmt::Display for DetectionBasis {
                 write!(f, "lanes: none; a lateral shift by most of a lane of {width_m:.2} m is a lane change")
             }
             (_, _) => {
-                let known: Vec<u8> = self
+                let lanes: Vec<u8> = self
                     .recorded_lanes
                     .iter()
                     .copied()
@@ -103,7 +106,7 @@ impl fmt::Display for DetectionBasis {
                     f,
                     "lanes: {} recorded, {width_m:.2} m wide, {} markings known, {} changes of the recorded lane",
                     self.recorded_lanes.len(),
-                    known.len(),
+                    lanes.len(),
                     self.recorded_crossings
                 )
             }

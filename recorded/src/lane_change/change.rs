@@ -28,8 +28,8 @@ pub struct LaneChange {
     pub end_s: f64,
     /// Duration of the whole manoeuvre (s).
     pub duration_s: f64,
-    /// Width of the peak of lateral speed (s), about 0.7 of the duration; by the distance criterion the duration
-    /// itself.
+    /// Width of the peak of lateral speed (s), about 0.7 of the duration; by the distance criterion
+    /// the duration itself.
     pub width_s: f64,
     /// Speed along the road at the crossing (m/s).
     pub speed_mps: f64,
@@ -37,12 +37,14 @@ pub struct LaneChange {
     pub peak_speed_mps: f64,
     /// Largest lateral speed, positive in the direction of the lane change (m/s).
     pub peak_lateral_speed_mps: f64,
-    /// Lateral shift from start to end, as far as recorded, positive in the direction of the lane change (m).
+    /// Recorded lateral shift from start to end, positive in the direction of the lane change (m).
     pub lateral_shift_m: f64,
     /// True if another lane change of the vehicle in the same direction overlaps with it in time.
     pub overlapping: bool,
-    /// True if the lane change is part of a double one: from one outer lane of the road to the other in one go.
+    /// True if the lane change is part of a double one: from one outer lane of the road to the
+    /// other in one movement.
     pub double: bool,
-    /// True if the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and overlaps with no other one.
+    /// True if the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and overlaps
+    /// with no other lane change.
     pub complete: bool,
 }

@@ -27,8 +27,8 @@ impl Crossing {
     }
 }
 
-/// Returns the changes between two lanes if the vehicle stays in each for at least [`MIN_DWELL`]. Shorter stays are
-/// ignored.
+/// Returns the changes between two lanes if the vehicle stays in each for at least [`MIN_DWELL`].
+/// Shorter stays are ignored.
 pub(super) fn crossings(stays: &[Stay]) -> Vec<Crossing> {
     let mut crossings = Vec::new();
     let mut current: Option<Lane> = None;
@@ -51,9 +51,9 @@ mod tests {
 
     #[test]
     fn short_stays_are_ignored() {
-        let found = crossings(&[stay(2, 0, 3_000), stay(1, 3_000, 200), stay(2, 3_200, 300), stay(1, 3_500, 900)]);
-        assert_eq!(found, [Crossing { time: Time::from_ms(3_500), from: Lane(2), to: Lane(1) }]);
-        assert_eq!(found[0].direction(), Side::Left);
+        let accepted = crossings(&[stay(2, 0, 3_000), stay(1, 3_000, 200), stay(2, 3_200, 300), stay(1, 3_500, 900)]);
+        assert_eq!(accepted, [Crossing { time: Time::from_ms(3_500), from: Lane(2), to: Lane(1) }]);
+        assert_eq!(accepted[0].direction(), Side::Left);
     }
 
     #[test]

@@ -14,8 +14,8 @@ use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres
 use crate::filters::{PERIOD, SmoothedTrack, SmoothedTrajectoryData, smooth_track, stays_of};
 use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
-/// Largest distance from a crossing to the manoeuvre that it belongs to, if it lies outside (samples): 1 s. Vehicles
-/// pause on a marking, and the start and end of a manoeuvre are estimates.
+/// Largest distance from a crossing to the manoeuvre that it belongs to, if it lies outside
+/// (samples): 1 s. Vehicles pause on a marking, and the start and end of a manoeuvre are estimates.
 const OUTSIDE_SAMPLES: f64 = 5.0;
 
 /// The criterion by which lane changes are detected.
@@ -77,9 +77,9 @@ impl LaneChangeDetector {
 
     /// Detects the lane changes of a track by one criterion, in order of time.
     ///
-    /// `distances` holds the distances to the markings for each point of the track; it is empty if they were not
-    /// measured. If the criterion requires a change of the recorded lane, a track without such a change is not
-    /// smoothed.
+    /// `distances` holds the distances to the markings for each point of the track; it is empty if
+    /// they were not measured. If the criterion requires a change of the recorded lane, a track
+    /// without such a change is not smoothed.
     pub fn detect(
         &self,
         criterion: Criterion,
@@ -107,19 +107,19 @@ impl LaneChangeDetector {
     }
 
     fn by_peak(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
-        let mut found = match self.lanes {
+        let mut changes = match self.lanes {
             LaneReliability::Reliable => by_crossings(&track.trajectory, &crossings(&track.stays), self.lane_width_m),
             LaneReliability::Unreliable => by_shift(&track.trajectory, self.lane_width_m),
         };
-        mark_doubles(&mut found, &self.road);
-        found
+        mark_doubles(&mut changes, &self.road);
+        changes
     }
 
     fn detect_smoothed(&self, criterion: Criterion, data: TrackData<'_>) -> Vec<LaneChange> {
         let TrackData { recorded, distances, smoothed } = data;
         let track = &smoothed.trajectory;
         let width_m = || gradient::lane_width_m(recorded, distances).unwrap_or(self.lane_width_m);
-        let mut found = match (criterion, self.lanes) {
+        let mut changes = match (criterion, self.lanes) {
             (Criterion::Peak, LaneReliability::Reliable) => by_crossings(track, &crossings(&smoothed.stays), width_m()),
             (Criterion::Peak, LaneReliability::Unreliable) => by_shift(track, width_m()),
             (Criterion::Distance, _) if distances.is_empty() => {
@@ -131,8 +131,8 @@ impl LaneChangeDetector {
             }
             (Criterion::Gradient, _) => by_crossings(track, &gradient::jumps(recorded, distances), width_m()),
         };
-        mark_doubles(&mut found, &self.road);
-        found
+        mark_doubles(&mut changes, &self.road);
+        changes
     }
 }
 
@@ -150,7 +150,8 @@ fn by_crossings(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -
 
 /// Returns the manoeuvre that a crossing belongs to, in the direction of the crossing.
 ///
-/// Of the manoeuvres that contain the crossing, this is the one with the highest peak; if none does, it is the nearest.
+/// Of the manoeuvres that contain the crossing, this is the manoeuvre with the highest peak; if
+/// none contains it, the nearest manoeuvre.
 fn manoeuvre_of<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m [Manoeuvre]) -> Option<&'m Manoeuvre> {
     let sample = sampled.sample(crossing.time);
     let outside = |manoeuvre: &Manoeuvre| (manoeuvre.start - sample).max(sample - manoeuvre.end).max(0.0);
@@ -160,10 +161,11 @@ fn manoeuvre_of<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m 
     candidates.min_by(|a, b| outside(a).total_cmp(&outside(b)).then(b.peak_mps.total_cmp(&a.peak_mps)))
 }
 
-/// Returns the lane changes whose peak of lateral speed shifts the vehicle by most of a lane, in order of time.
+/// Returns the lane changes whose peak of lateral speed shifts the vehicle by most of a lane, in
+/// order of time.
 fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
     let Some(sampled) = Sampled::new(track) else { return Vec::new() };
-    let mut found: Vec<LaneChange> = Vec::new();
+    let mut changes: Vec<LaneChange> = Vec::new();
     for manoeuvre in sweeps(manoeuvres(track, lane_width_m)) {
         let span = [manoeuvre.start, manoeuvre.end];
         let shift_m = sampled.shift_m(manoeuvre.direction, span);
@@ -178,16 +180,17 @@ fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
             let sample = sampled.sample_of_share(share, span);
             let to = beside(from, manoeuvre.direction);
             let crossing = Crossing { time: Time::from_s(sampled.time_s(sample)), from, to };
-            found.push(lane_change(&sampled, &manoeuvre, height_share(track, lane_width_m), crossing));
+            changes.push(lane_change(&sampled, &manoeuvre, height_share(track, lane_width_m), crossing));
             from = to;
             share += 1.0 / markings;
         }
     }
-    found.sort_by(|a, b| a.crossing_s.total_cmp(&b.crossing_s));
-    found
+    changes.sort_by(|a, b| a.crossing_s.total_cmp(&b.crossing_s));
+    changes
 }
 
-/// Returns the adjacent lane in `direction`. Lane 1 has none to its left; the result is then lane 1 itself.
+/// Returns the adjacent lane in `direction`. Lane 1 has none to its left; the result is then lane 1
+/// itself.
 pub(super) fn beside(lane: Lane, direction: Side) -> Lane {
     match direction {
         Side::Left => Lane(lane.0.saturating_sub(1).max(1)),
@@ -233,20 +236,20 @@ mod tests {
     use crate::filters::smooth;
     use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
-    fn found(track: Trajectory) -> Vec<LaneChange> {
+    fn detected(track: Trajectory) -> Vec<LaneChange> {
         detect(&smooth(&trajectory_data_of(vec![track])))
     }
 
     #[test]
     fn lane_keeping_is_no_lane_change() {
-        assert!(found(straight_track(1, 0.0, 25.0, -1.75, 200)).is_empty());
+        assert!(detected(straight_track(1, 0.0, 25.0, -1.75, 200)).is_empty());
     }
 
     #[test]
     fn a_swerve_within_the_lane_is_no_lane_change() {
         let mut track = straight_track(1, 0.0, 25.0, -1.75, 200);
         track.points.iter_mut().enumerate().for_each(|(k, point)| point.d_m += maths::sin(0.1 * k as f64));
-        assert!(found(track).is_empty());
+        assert!(detected(track).is_empty());
     }
 
     #[test]
@@ -258,35 +261,38 @@ mod tests {
             point.d_m += back.d_m;
             point.lane = Lane(if point.d_m > -3.5 { 1 } else { 2 });
         }
-        let found = found(track);
-        assert_eq!(found.iter().map(|change| change.direction).collect::<Vec<_>>(), [Side::Left, Side::Right]);
-        assert!(found.iter().all(|change| change.complete));
-        assert!((found[0].crossing_s - 6.5).abs() <= 0.1 && (found[1].crossing_s - 21.0).abs() <= 0.1);
-        assert!((found[0].duration_s - 5.0).abs() < 0.25 && (found[1].duration_s - 6.0).abs() < 0.3);
+        let changes = detected(track);
+        assert_eq!(changes.iter().map(|change| change.direction).collect::<Vec<_>>(), [Side::Left, Side::Right]);
+        assert!(changes.iter().all(|change| change.complete));
+        assert!((changes[0].crossing_s - 6.5).abs() <= 0.1 && (changes[1].crossing_s - 21.0).abs() <= 0.1);
+        assert!((changes[0].duration_s - 5.0).abs() < 0.25 && (changes[1].duration_s - 6.0).abs() < 0.3);
     }
 
     #[test]
     fn a_lane_change_beyond_the_end_of_the_track_is_not_complete() {
-        let found = found(changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 80));
-        assert_eq!(found.len(), 1);
-        assert!(!found[0].complete && (found[0].crossing_s - 7.0).abs() <= 0.1);
+        let changes = detected(changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 80));
+        assert_eq!(changes.len(), 1);
+        assert!(!changes[0].complete && (changes[0].crossing_s - 7.0).abs() <= 0.1);
     }
 
     #[test]
     fn a_track_that_begins_or_ends_at_the_peak_still_has_its_crossing() {
         let whole = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         for range in [0..76, 64..150] {
-            let found = found(whole.with_points(whole.points[range].to_vec()));
-            assert_eq!(found.len(), 1);
-            assert!(!found[0].complete && (found[0].crossing_s - 7.0).abs() <= 0.1);
+            let changes = detected(whole.with_points(whole.points[range].to_vec()));
+            assert_eq!(changes.len(), 1);
+            assert!(!changes[0].complete && (changes[0].crossing_s - 7.0).abs() <= 0.1);
         }
     }
 
     #[test]
     fn one_manoeuvre_over_two_markings_is_two_lane_changes() {
-        let found = found(changing_track(1, (0.0, 30.0), (-8.75, -1.75), (4.0, 9.0), 180));
-        assert_eq!(found.iter().map(|change| (change.from_lane, change.to_lane)).collect::<Vec<_>>(), [(3, 2), (2, 1)]);
-        assert!(found.iter().all(|change| !change.complete && change.double));
+        let changes = detected(changing_track(1, (0.0, 30.0), (-8.75, -1.75), (4.0, 9.0), 180));
+        assert_eq!(
+            changes.iter().map(|change| (change.from_lane, change.to_lane)).collect::<Vec<_>>(),
+            [(3, 2), (2, 1)]
+        );
+        assert!(changes.iter().all(|change| !change.complete && change.double));
     }
 
     #[test]
@@ -299,13 +305,14 @@ mod tests {
             point.lane = Lane(1);
         }
         let detector = LaneChangeDetector::new(LaneReliability::Unreliable, &Default::default());
-        let found = detector.detect(Criterion::Peak, &track, &[]);
-        let [change] = &found[..] else { panic!("{}", found.len()) };
+        let changes = detector.detect(Criterion::Peak, &track, &[]);
+        let [change] = &changes[..] else { panic!("{}", changes.len()) };
         assert!((change.lateral_shift_m - 3.5).abs() < 0.1 && (change.crossing_s - 7.25).abs() < 0.5, "{change:?}");
         assert!(change.start_s < 3.6 && change.end_s > 10.9, "{change:?}");
     }
 
-    /// Detects two lane changes from lane 3 to lane 1. The second begins `pause_s` after the first has begun.
+    /// Detects two lane changes from lane 3 to lane 1. The second begins `pause_s` after the first
+    /// has begun.
     fn two_to_the_left(pause_s: f64) -> Vec<LaneChange> {
         let mut track = changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 4.0), 250);
         let second = changing_track(1, (0.0, 30.0), (0.0, 3.5), (3.0 + pause_s, 4.0), 250);
@@ -313,7 +320,7 @@ mod tests {
             point.d_m += second.d_m;
             point.lane = Lane((-point.d_m / 3.5).floor() as u8 + 1);
         }
-        found(track)
+        detected(track)
     }
 
     #[test]
@@ -329,20 +336,22 @@ mod tests {
     fn overlapping_lane_changes_that_end_in_an_inner_lane_are_not_double() {
         let track = |id, lanes, seconds| changing_track(id, (0.0, 30.0), lanes, (4.0, seconds), 180);
         let tracks = trajectory_data_of(vec![track(1, (-8.75, -1.75), 9.0), track(2, (-12.25, -8.75), 6.0)]);
-        let found = detect(&smooth(&tracks)).into_iter();
-        let flags = found.map(|change| (change.track_id, change.overlapping, change.double));
+        let changes = detect(&smooth(&tracks)).into_iter();
+        let flags = changes.map(|change| (change.track_id, change.overlapping, change.double));
         assert_eq!(flags.collect::<Vec<_>>(), [(1, true, false), (1, true, false), (2, false, false)]);
     }
 
     #[test]
     fn the_midpoint_is_at_half_of_the_lateral_shift() {
-        let found = found(changing_track(1, (0.0, 30.0), (-5.85, -2.35), (4.0, 6.0), 150));
-        assert_eq!(found.len(), 1);
-        // The crossing is later than the midpoint, because the vehicle starts to the right of its lane's centre.
-        assert!((found[0].midpoint_s - 7.0).abs() < 0.05 && found[0].crossing_s > 7.4, "{:?}", found[0]);
+        let changes = detected(changing_track(1, (0.0, 30.0), (-5.85, -2.35), (4.0, 6.0), 150));
+        assert_eq!(changes.len(), 1);
+        // The crossing is later than the midpoint, because the vehicle starts to the right of its
+        // lane's centre.
+        assert!((changes[0].midpoint_s - 7.0).abs() < 0.05 && changes[0].crossing_s > 7.4, "{:?}", changes[0]);
     }
 
-    /// Detects one lane change by the distance criterion, with all lateral positions displaced by `offset_m`.
+    /// Detects one lane change by the distance criterion, with all lateral positions displaced by
+    /// `offset_m`.
     fn by_distance_with_offset(offset_m: f64) -> Vec<LaneChange> {
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         track.points.iter_mut().for_each(|point| point.d_m += offset_m);
@@ -353,8 +362,8 @@ mod tests {
 
     #[test]
     fn the_distance_criterion_measures_the_time_on_the_marking() {
-        let found = by_distance_with_offset(0.0);
-        let [change] = &found[..] else { panic!("{}", found.len()) };
+        let changes = by_distance_with_offset(0.0);
+        let [change] = &changes[..] else { panic!("{}", changes.len()) };
         assert!((change.crossing_s - 7.0).abs() < 0.21 && (change.midpoint_s - 7.0).abs() <= 0.1);
         assert_eq!((change.direction, change.from_lane, change.to_lane), (Side::Left, 2, 1));
         // 1.8 m of 3.5 m at 1.875 times the mean speed and less: at least 1.65 s.
@@ -371,7 +380,7 @@ mod tests {
         for k in [20, 21, 68, 100] {
             track.points[k].lane = Lane(3 - track.points[k].lane.0);
         }
-        assert_eq!(found(track).len(), 1);
+        assert_eq!(detected(track).len(), 1);
     }
 
     proptest! {
@@ -384,12 +393,12 @@ mod tests {
             to_the_left in any::<bool>(),
         ) {
             let lanes = if to_the_left { (-5.25, -1.75) } else { (-1.75, -5.25) };
-            let found = found(changing_track(7, (0.0, 30.0), lanes, (start_s, duration_s), 200));
-            prop_assert_eq!(found.len(), 1);
-            prop_assert!(found[0].complete);
-            let error = (found[0].duration_s - duration_s) / duration_s;
-            prop_assert!(error.abs() < 0.05, "{} instead of {duration_s}", found[0].duration_s);
-            prop_assert!((found[0].crossing_s - start_s - 0.5 * duration_s).abs() <= 0.11);
+            let changes = detected(changing_track(7, (0.0, 30.0), lanes, (start_s, duration_s), 200));
+            prop_assert_eq!(changes.len(), 1);
+            prop_assert!(changes[0].complete);
+            let error = (changes[0].duration_s - duration_s) / duration_s;
+            prop_assert!(error.abs() < 0.05, "{} instead of {duration_s}", changes[0].duration_s);
+            prop_assert!((changes[0].crossing_s - start_s - 0.5 * duration_s).abs() <= 0.11);
         }
     }
 }

@@ -8,8 +8,8 @@ use super::geometry::LaneGeometry;
 use super::manoeuvre::{MIN_SHIFT_M, Sampled, sign};
 use crate::filters::PERIOD;
 
-/// Time by which the lateral shift is measured before the start and after the end, to include the slow parts of the
-/// manoeuvre (samples): 1.5 s.
+/// Time by which the lateral shift is measured before the start and after the end, to include the
+/// slow parts of the manoeuvre (samples): 1.5 s.
 const SETTLED_SAMPLES: f64 = 7.5;
 
 /// Consecutive samples within the band of one lane.
@@ -27,13 +27,13 @@ pub(super) fn by_distance(track: &Trajectory, lane_at: impl Fn(usize) -> Option<
     changes.flat_map(|pair| lane_changes(&sampled, &pair[0], &pair[1], &lane_at)).collect()
 }
 
-/// Returns the lanes that the vehicle keeps for at least [`MIN_DWELL`], in order of time. Successive runs in the same
-/// lane are joined.
+/// Returns the lanes that the vehicle keeps for at least [`MIN_DWELL`], in order of time.
+/// Successive runs in the same lane are joined.
 fn kept_lanes(track: &Trajectory, lane_at: &impl Fn(usize) -> Option<LaneGeometry>) -> Vec<LaneRun> {
     let in_band = |k: usize| {
-        let found = lane_at(k)?;
-        let band_m = 0.5 * (found.width_m - track.dimensions.width_m).max(0.0);
-        ((track.points[k].d_m - found.centre_m).abs() <= band_m).then_some(found.lane)
+        let position = lane_at(k)?;
+        let band_m = 0.5 * (position.width_m - track.dimensions.width_m).max(0.0);
+        ((track.points[k].d_m - position.centre_m).abs() <= band_m).then_some(position.lane)
     };
     let mut runs: Vec<LaneRun> = Vec::new();
     let mut previous = None;
@@ -74,7 +74,10 @@ fn lane_changes(
     };
     let crossing = |passed: u8| {
         let within = (before.last + 1)..=after.first;
-        within.into_iter().find(|&k| lane_at(k).is_some_and(|found| beyond(found.lane, passed))).unwrap_or(after.first)
+        within
+            .into_iter()
+            .find(|&k| lane_at(k).is_some_and(|position| beyond(position.lane, passed)))
+            .unwrap_or(after.first)
     };
     let step = |passed: u8| match direction {
         Side::Left => before.lane.0 - passed,

@@ -1,4 +1,5 @@
-//! Overlapping lane changes, and double ones: from one outer lane of the road to the other in one go.
+//! Overlapping lane changes, and double lane changes: from one outer lane of the road to the other
+//! in one movement.
 
 use closecall_traffic::Lane;
 
@@ -13,13 +14,15 @@ pub(super) struct RoadLanes {
 }
 
 impl RoadLanes {
-    /// Groups the lanes that have a marking between them. Lane 1 is always the leftmost lane of the first road.
+    /// Groups the lanes that have a marking between them. Lane 1 is always the leftmost lane of the
+    /// first road.
     pub(super) fn new(markings: &LaneMarkings) -> Self {
         let mut outer: Vec<[u8; 2]> = Vec::new();
         for left in (1..u8::MAX).filter(|&lane| markings.right_edge_m(Lane(lane)).is_some()) {
             match outer.last_mut() {
                 Some([_, rightmost]) if *rightmost == left => *rightmost = left + 1,
-                // Lane numbers of the next road start after one that is left out: lane 2 is no leftmost lane.
+                // Lane numbers of the next road start after one omitted number: lane 2 is no
+                // leftmost lane.
                 _ => outer.push([if left == 2 { 1 } else { left }, left + 1]),
             }
         }
@@ -32,14 +35,15 @@ impl RoadLanes {
     }
 }
 
-/// Marks the lane changes that overlap in time with another one in the same direction, and those that together lead
-/// from one outer lane to the other. Neither is complete, because its start and end are not its own.
+/// Marks the lane changes that overlap in time with another lane change in the same direction, and
+/// the lane changes that together lead from one outer lane to the other. Neither is complete,
+/// because its start and end are not its own.
 ///
-/// `found` holds the lane changes of one track in order of their crossings.
-pub(super) fn mark_doubles(found: &mut [LaneChange], road: &RoadLanes) {
+/// `changes` holds the lane changes of one track in order of their crossings.
+pub(super) fn mark_doubles(changes: &mut [LaneChange], road: &RoadLanes) {
     let continues =
         |first: &LaneChange, second: &LaneChange| first.direction == second.direction && second.start_s < first.end_s;
-    for chain in found.chunk_by_mut(continues) {
+    for chain in changes.chunk_by_mut(continues) {
         let [first, .., last] = &*chain else { continue };
         let double = road.are_outer(first.from_lane, last.to_lane);
         for change in chain {
@@ -55,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_outer_lanes_are_those_of_one_road() {
+    fn the_outer_lanes_belong_to_one_road() {
         // Lanes 1 to 4, and a second road with lanes 6 to 8. No vehicle crosses the first marking.
         let edges = [(2, -7.0), (3, -10.5), (6, -1_003.5), (7, -1_007.0)].map(|(lane, d_m)| (Lane(lane), d_m));
         let road = RoadLanes::new(&LaneMarkings::from_right_edges(edges));

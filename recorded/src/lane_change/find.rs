@@ -1,4 +1,4 @@
-//! The lane changes of a whole trajectory file, whose tracks are read one by one.
+//! The lane changes of a whole trajectory file. Its tracks are read one by one.
 
 use super::{Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans};
 use crate::trajectory_data::{Tracks, TrajectoryFileError};
@@ -12,12 +12,12 @@ pub struct FoundLaneChanges {
     pub spans: TrackSpans,
     /// Number of tracks.
     pub tracks: u64,
-    /// What the detection rests on.
+    /// The basis of the detection.
     pub basis: DetectionBasis,
 }
 
-/// Detects the lane changes of a trajectory file. The memory does not grow with the file, apart from some bytes for each
-/// track.
+/// Detects the lane changes of a trajectory file. The memory does not grow with the file, apart
+/// from some bytes for each track.
 ///
 /// # Errors
 /// [`TrajectoryFileError`] if the file cannot be read or used.
@@ -28,13 +28,13 @@ pub fn find(
 ) -> Result<FoundLaneChanges, TrajectoryFileError> {
     let detector = LaneChangeDetector::new(lanes, tracks.markings());
     let basis = DetectionBasis::new(criterion, lanes, tracks.markings());
-    let mut found = FoundLaneChanges { lane_changes: Vec::new(), spans: TrackSpans::new(), tracks: 0, basis };
+    let mut result = FoundLaneChanges { lane_changes: Vec::new(), spans: TrackSpans::new(), tracks: 0, basis };
     while let Some(track) = tracks.next_track()? {
-        found.tracks += 1;
-        found.basis.push(&track.trajectory, &track.markings);
-        found.lane_changes.extend(detector.detect(criterion, &track.trajectory, &track.markings));
-        found.spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
+        result.tracks += 1;
+        result.basis.push(&track.trajectory, &track.markings);
+        result.lane_changes.extend(detector.detect(criterion, &track.trajectory, &track.markings));
+        result.spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
     }
-    found.lane_changes.sort_by(|a, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
-    Ok(found)
+    result.lane_changes.sort_by(|a, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
+    Ok(result)
 }

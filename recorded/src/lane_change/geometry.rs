@@ -18,7 +18,7 @@ pub(crate) struct LaneGeometry {
     pub(crate) width_m: f64,
 }
 
-/// Lane markings. Unknown ones are filled in at the typical lane width.
+/// Lane markings. Unknown markings are filled in at the typical lane width.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LaneGrid {
     /// Lateral positions of the right edges of lanes 1, 2 … (m), in descending order.
@@ -33,8 +33,8 @@ impl LaneGrid {
         let mut left_m = 0.0;
         while let Some(lane) = u8::try_from(right_edges_m.len() + 1).ok().filter(|lane| *lane <= LANES) {
             // The lanes up to the next known marking share their width.
-            let known = (lane..=LANES).find_map(|right| Some((right, markings.right_edge_m(Lane(right))?)));
-            let shared = known.map(|(right, edge_m)| (left_m - edge_m) / f64::from(right - lane + 1));
+            let next_edge = (lane..=LANES).find_map(|right| Some((right, markings.right_edge_m(Lane(right))?)));
+            let shared = next_edge.map(|(right, edge_m)| (left_m - edge_m) / f64::from(right - lane + 1));
             let width_m = shared.filter(|width_m| LANE_WIDTHS_M.contains(width_m)).unwrap_or(typical_m);
             left_m -= width_m;
             right_edges_m.push(left_m);
@@ -62,7 +62,7 @@ mod tests {
         let grid = LaneGrid::new(&LaneMarkings::from_right_edges([(Lane(2), -6.8), (Lane(5), -17.3)]));
         let widths = [-3.0, -5.0, -8.0, -15.0].map(|d_m| grid.at(d_m).unwrap().width_m);
         assert!(
-            widths.iter().zip([3.4, 3.4, 3.5, 3.5]).all(|(found, width_m)| (found - width_m).abs() < 1e-9),
+            widths.iter().zip([3.4, 3.4, 3.5, 3.5]).all(|(computed_m, width_m)| (computed_m - width_m).abs() < 1e-9),
             "{widths:?}"
         );
     }

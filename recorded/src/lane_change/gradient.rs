@@ -6,10 +6,12 @@ use super::crossings::Crossing;
 use super::geometry::LaneGeometry;
 use crate::trajectory_data::MarkingDistances;
 
-/// Least change of a distance between two frames that counts as a jump, as a share of the lane width (-).
+/// Least change of a distance between two frames that counts as a jump, as a share of the lane
+/// width (-).
 const JUMP_SHARE: f64 = 0.5;
 
-/// Longest time between two frames that are compared: in a longer time a vehicle can move sideways by half a lane.
+/// Longest time between two frames that are compared: in a longer time a vehicle can move sideways
+/// by half a lane.
 const LONGEST_GAP: Time = Time::from_ms(1_000);
 
 /// Plausible lane widths (m). If the sum of both distances is outside, the markings were mistaken.
@@ -31,7 +33,8 @@ impl MarkingView {
     }
 }
 
-/// Iterates over the frames of a track in which both markings were measured with a plausible lane width.
+/// Iterates over the frames of a track in which both markings were measured with a plausible lane
+/// width.
 fn views<'a>(track: &'a Trajectory, distances: &'a [MarkingDistances]) -> impl Iterator<Item = MarkingView> + 'a {
     track.points.iter().zip(distances).filter_map(|(point, measured)| {
         let (left_m, right_m) = measured.left_m.zip(measured.right_m)?;
@@ -42,15 +45,15 @@ fn views<'a>(track: &'a Trajectory, distances: &'a [MarkingDistances]) -> impl I
 
 /// Returns a crossing for each jump of both distances in opposite directions, in order of time.
 pub(super) fn jumps(track: &Trajectory, distances: &[MarkingDistances]) -> Vec<Crossing> {
-    let mut found = Vec::new();
+    let mut crossings = Vec::new();
     let mut previous: Option<MarkingView> = None;
     for view in views(track, distances) {
         if let Some(crossing) = previous.and_then(|previous| jump(&previous, &view)) {
-            found.push(crossing);
+            crossings.push(crossing);
         }
         previous = Some(view);
     }
-    found
+    crossings
 }
 
 /// Returns the crossing between two frames, or `None` if the distances do not jump.
@@ -74,7 +77,8 @@ pub(super) fn lane_width_m(track: &Trajectory, distances: &[MarkingDistances]) -
     widths.get(widths.len() / 2).copied()
 }
 
-/// Returns, for each point of a smoothed track, the lane according to the distances in the frame nearest in time.
+/// Returns, for each point of a smoothed track, the lane according to the distances in the frame
+/// nearest in time.
 ///
 /// An entry is `None` if that frame is more than half of `period` away.
 pub(super) fn measured_lanes(
@@ -91,7 +95,8 @@ pub(super) fn measured_lanes(
             nearest += 1;
         }
         let view = views.get(nearest).filter(|view| 2 * away(view) <= period.ns())?;
-        // Half the difference of both distances is the displacement of the vehicle to the left of the lane's centre.
+        // Half the difference of both distances is the displacement of the vehicle to the left of
+        // the lane's centre.
         let centre_m = view.d_m - 0.5 * (view.right_m - view.left_m);
         Some(LaneGeometry { lane: view.lane, centre_m, width_m: view.width_m() })
     };

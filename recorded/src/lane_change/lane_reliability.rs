@@ -6,6 +6,7 @@ pub enum LaneReliability {
     /// Reliable: the peak criterion requires a change of the recorded lane.
     #[default]
     Reliable,
-    /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the recorded lane.
+    /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the
+    /// recorded lane.
     Unreliable,
 }

@@ -8,8 +8,8 @@ use crate::filters::PERIOD;
 /// Least prominence of a peak of lateral speed (m/s); see the module documentation.
 pub const MIN_PROMINENCE_MPS: f64 = 0.15;
 
-/// Least lateral shift of a complete lane change (m): most of a lane, because a vehicle need not end at the lane's
-/// centre.
+/// Least lateral shift of a complete lane change (m): most of a lane, because a vehicle need not
+/// end at the lane's centre.
 pub const MIN_SHIFT_M: f64 = 2.5;
 
 /// A lateral manoeuvre: a peak of lateral speed, in fractional samples of its track.
@@ -27,14 +27,16 @@ pub(super) struct Manoeuvre {
     pub(super) end: f64,
 }
 
-/// Returns the width of the peak of lateral speed of a quintic lane change, as a share of its duration (-): √(1 − √h).
+/// Returns the width of the peak of lateral speed of a quintic lane change, as a share of its
+/// duration (-): √(1 − √h).
 ///
 /// The width is measured at the height h = `height_share`, as a share of the peak (-).
 pub fn quintic_width_share(height_share: f64) -> f64 {
     (1.0 - height_share.sqrt()).sqrt()
 }
 
-/// Returns the height at which the width of a peak is measured: h = (w_vehicle / w_lane) / 2, a share of the peak (-).
+/// Returns the height at which the width of a peak is measured: h = (w_vehicle / w_lane) / 2, a
+/// share of the peak (-).
 pub(super) fn height_share(track: &Trajectory, lane_width_m: f64) -> f64 {
     0.5 * (track.dimensions.width_m / lane_width_m).min(1.0)
 }
@@ -42,14 +44,15 @@ pub(super) fn height_share(track: &Trajectory, lane_width_m: f64) -> f64 {
 /// Returns the manoeuvres of a track, those to the left first.
 pub(super) fn manoeuvres(track: &Trajectory, lane_width_m: f64) -> Vec<Manoeuvre> {
     let height_share = height_share(track, lane_width_m);
-    let mut found = manoeuvres_to(track, Side::Left, height_share);
-    found.extend(manoeuvres_to(track, Side::Right, height_share));
-    found
+    let mut both_sides = manoeuvres_to(track, Side::Left, height_share);
+    both_sides.extend(manoeuvres_to(track, Side::Right, height_share));
+    both_sides
 }
 
 fn manoeuvres_to(track: &Trajectory, direction: Side, height_share: f64) -> Vec<Manoeuvre> {
     let sign = sign(direction);
-    // A lateral speed of 0 before and after the track turns its end into a peak if the manoeuvre is cut off there.
+    // A lateral speed of 0 before and after the track turns its end into a peak if the manoeuvre is
+    // cut off there.
     let mut speeds = Vec::with_capacity(track.points.len() + 2);
     speeds.push(0.0);
     speeds.extend(track.points.iter().map(|point| sign * point.lateral_speed_mps));
@@ -66,7 +69,8 @@ fn manoeuvres_to(track: &Trajectory, direction: Side, height_share: f64) -> Vec<
     peaks.into_iter().filter(|peak| peak.height > 0.0).map(manoeuvre).collect()
 }
 
-/// Joins the manoeuvres in one direction that overlap in time: a slow lane change with a pause has several peaks.
+/// Joins the manoeuvres in one direction that overlap in time: a slow lane change with a pause has
+/// several peaks.
 pub(super) fn sweeps(mut manoeuvres: Vec<Manoeuvre>) -> Vec<Manoeuvre> {
     manoeuvres.sort_by(|a, b| {
         (a.direction == Side::Right).cmp(&(b.direction == Side::Right)).then(a.start.total_cmp(&b.start))
@@ -134,20 +138,21 @@ impl<'a> Sampled<'a> {
         &self.track.points[self.index(sample)]
     }
 
-    /// Returns the lateral shift towards `direction` between two samples, as far as it was recorded (m).
+    /// Returns the recorded lateral shift towards `direction` between two samples (m).
     pub(super) fn shift_m(&self, direction: Side, [start, end]: [f64; 2]) -> f64 {
         sign(direction) * (self.point(end.ceil()).d_m - self.point(start.floor()).d_m)
     }
 
-    /// Returns the speed along the road at the largest lateral speed towards `direction` between two samples (m/s). Of two
-    /// equal ones the earlier counts.
+    /// Returns the speed along the road at the largest lateral speed towards `direction` between
+    /// two samples (m/s). Of two equal manoeuvres the earlier counts.
     pub(super) fn peak_speed_mps(&self, direction: Side, [start, end]: [f64; 2]) -> f64 {
         let points = &self.track.points[self.index(start.floor())..=self.index(end.ceil())];
         let lateral = |point: &TrajectoryPoint| sign(direction) * point.lateral_speed_mps;
         points.iter().rev().max_by(|a, b| lateral(a).total_cmp(&lateral(b))).map_or(0.0, |point| point.speed_mps)
     }
 
-    /// Returns the first sample at which the given share of the lateral shift between two samples is done.
+    /// Returns the first sample at which the given share of the lateral shift between two samples
+    /// is done.
     pub(super) fn sample_of_share(&self, share: f64, [start, end]: [f64; 2]) -> f64 {
         let (first, last) = (self.index(start.floor()), self.index(end.ceil()));
         let points = &self.track.points[first..=last];

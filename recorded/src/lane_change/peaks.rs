@@ -1,8 +1,8 @@
 //! Peaks of a signal, with their position, prominence and width.
 //!
-//! The definitions are those of SciPy's `find_peaks`, `peak_prominences` (without `wlen`) and `peak_widths`. The
-//! results are identical to the bit if sums are taken in the same order. `tests/golden/make_golden.py` generates the
-//! values with which the tests compare.
+//! The definitions follow SciPy's `find_peaks`, `peak_prominences` (without `wlen`) and
+//! `peak_widths`. The results are identical to the bit if sums are taken in the same order.
+//! `tests/golden/make_golden.py` generates the values with which the tests compare.
 
 /// A peak of a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,10 +13,10 @@ pub struct Peak {
     pub height: f64,
     /// Prominence: height above the higher one of its two bases.
     pub prominence: f64,
-    /// Index of the left base: the lowest value between the peak and the next higher value on the left, or the end of
-    /// the signal. Of several equal values it is the nearest one.
+    /// Index of the left base: the lowest value between the peak and the next higher value on the
+    /// left, or the end of the signal. Of several equal values it is the nearest.
     pub left_base: usize,
-    /// Index of the right base, defined alike.
+    /// Index of the right base, defined in the same way.
     pub right_base: usize,
 }
 
@@ -76,7 +76,8 @@ pub(super) fn peak_at(signal: &[f64], index: usize) -> Peak {
     Peak { index, height, prominence, left_base, right_base }
 }
 
-/// Measures the width of `peak` at the height that lies `rel_height` times its prominence below its top.
+/// Measures the width of `peak` at the height that lies `rel_height` times its prominence below its
+/// top.
 ///
 /// The ends are interpolated linearly and lie no further out than the bases.
 pub fn peak_width(signal: &[f64], peak: &Peak, rel_height: f64) -> Width {
@@ -115,8 +116,8 @@ mod tests {
     #[test]
     fn a_small_peak_beside_a_high_one_has_its_own_prominence() {
         let signal = [0.0, 5.0, 4.0, 4.5, 1.0, 2.0, 0.0];
-        let found = find_peaks(&signal, 0.0);
-        let prominences: Vec<f64> = found.iter().map(|peak| peak.prominence).collect();
+        let peaks = find_peaks(&signal, 0.0);
+        let prominences: Vec<f64> = peaks.iter().map(|peak| peak.prominence).collect();
         assert_eq!(prominences, [5.0, 0.5, 1.0]);
         assert_eq!(indices(&signal, 0.6), [1, 5]);
     }

@@ -1,11 +1,11 @@
 //! Scores detected lane changes against a reference list.
 //!
-//! The list is a CSV file with the columns `recording_id, track_id, time_s, direction, clear`; further columns are
-//! allowed. A detected lane change matches a listed one of the same track and direction if their times differ by at
-//! most 0.5 s.
+//! The list is a CSV file with the columns `recording_id, track_id, time_s, direction, clear`;
+//! further columns are allowed. A detected lane change matches a listed lane change of the same
+//! track and direction if their times differ by at most 0.5 s.
 //!
-//! - **Recall** refers to the listed lane changes that must be detected: `clear` ones with at least 2 s of track on
-//!   both sides.
+//! - **Recall** refers to the listed lane changes that must be detected: the `clear` lane changes
+//!   with at least 2 s of track on both sides.
 //! - **Precision** refers to all listed lane changes, clear or not.
 
 use std::collections::BTreeMap;
@@ -43,7 +43,8 @@ pub struct ReferenceChange {
     pub time_s: f64,
     /// Direction: to the left or to the right.
     pub direction: Side,
-    /// 1 if the vehicle clearly moved from one lane to another; 0 if it drove on the marking or its track was cut off.
+    /// 1 if the vehicle clearly moved from one lane to another; 0 if it drove on the marking or its
+    /// track was cut off.
     pub clear: u8,
 }
 
@@ -128,9 +129,9 @@ pub struct Score {
 impl Score {
     /// Adds the score of another trajectory data set.
     pub fn add(&mut self, other: &Self) {
-        for (own, other) in [(&mut self.recall, other.recall), (&mut self.precision, other.precision)] {
-            own.hits += other.hits;
-            own.of += other.of;
+        for (rate, other) in [(&mut self.recall, other.recall), (&mut self.precision, other.precision)] {
+            rate.hits += other.hits;
+            rate.of += other.of;
         }
         self.max_time_error_s = self.max_time_error_s.max(other.max_time_error_s);
     }
@@ -139,25 +140,26 @@ impl Score {
 /// First and last instant of each track, by track id.
 pub type TrackSpans = BTreeMap<u64, (Time, Time)>;
 
-/// Scores the lane changes `found` against those `listed` for the same trajectory data, whose tracks cover `spans`.
-pub fn score(found: &[LaneChange], listed: &[&ReferenceChange], spans: &TrackSpans) -> Score {
+/// Scores the `detected` lane changes against the lane changes `listed` for the same trajectory
+/// data. Its tracks cover `spans`.
+pub fn score(detected: &[LaneChange], listed: &[&ReferenceChange], spans: &TrackSpans) -> Score {
     let required: Vec<_> = listed.iter().filter(|listed| must_be_detected(listed, spans)).collect();
-    let recalled = required.iter().filter(|listed| found.iter().any(|change| error_s(change, listed).is_some()));
-    let errors = found
+    let recalled = required.iter().filter(|listed| detected.iter().any(|change| error_s(change, listed).is_some()));
+    let errors = detected
         .iter()
         .filter_map(|change| listed.iter().filter_map(|listed| error_s(change, listed)).min_by(f64::total_cmp));
     let errors: Vec<f64> = errors.collect();
     Score {
         recall: HitRate { hits: recalled.count() as u64, of: required.len() as u64 },
-        precision: HitRate { hits: errors.len() as u64, of: found.len() as u64 },
+        precision: HitRate { hits: errors.len() as u64, of: detected.len() as u64 },
         max_time_error_s: errors.into_iter().fold(0.0, f64::max),
     }
 }
 
 /// Returns the difference of the crossing times (s), or `None` if the two do not match.
-fn error_s(found: &LaneChange, listed: &ReferenceChange) -> Option<f64> {
-    let error_s = (found.crossing_s - listed.time_s).abs();
-    let same = found.track_id == listed.track_id && found.direction == listed.direction;
+fn error_s(detected: &LaneChange, listed: &ReferenceChange) -> Option<f64> {
+    let error_s = (detected.crossing_s - listed.time_s).abs();
+    let same = detected.track_id == listed.track_id && detected.direction == listed.direction;
     (same && error_s <= AGREEMENT_S + ROUNDING_S).then_some(error_s)
 }
 
@@ -184,7 +186,7 @@ mod tests {
     fn a_mismatch_lowers_both_recall_and_precision() {
         let track = |id| changing_track(id, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         let data = trajectory_data_of(vec![track(1), track(2), track(3)]);
-        let found = detect(&smooth(&data));
+        let detected = detect(&smooth(&data));
         let list = [
             listed(1, 7.4, Side::Left),
             listed(2, 7.0, Side::Right),
@@ -192,7 +194,7 @@ mod tests {
             listed(3, 1.0, Side::Left),
         ];
         let spans = data.trajectories.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect();
-        let scored = score(&found, &list.iter().collect::<Vec<_>>(), &spans);
+        let scored = score(&detected, &list.iter().collect::<Vec<_>>(), &spans);
         assert_eq!((scored.recall, scored.precision), (HitRate { hits: 1, of: 3 }, HitRate { hits: 1, of: 3 }));
         assert!((scored.max_time_error_s - 0.3).abs() <= 0.21, "{}", scored.max_time_error_s);
     }

@@ -55,12 +55,14 @@ struct Brownian<'a> {
 
 impl<'a> Brownian<'a> {
     fn new(track: &'a Trajectory, Repetition { seed, number }: Repetition) -> Self {
-        // The name is valid for every track id. Without a stream there would be no noise, and the tests would fail.
+        // The name is valid for every track id. Without a stream there would be no noise, and the
+        // tests would fail.
         let name = ActorId::new(&format!("track-{}", track.track_id)).ok();
         Self { track, stream: name.map(|name| stream(seed, number, &name, "brownian-lateral")), value: 0.0 }
     }
 
-    /// Advances the path to instant `k`, which must follow the previous one, and returns its value there.
+    /// Advances the path to instant `k`, which must follow the previous one, and returns its value
+    /// there.
     fn next(&mut self, k: usize) -> f64 {
         if let (true, Some(stream)) = (k > 0, &mut self.stream) {
             let step_s = (self.track.points[k].time - self.track.points[k - 1].time).s();

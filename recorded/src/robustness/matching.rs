@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::lane_change::LaneChange;
 
-/// Returns the largest number of pairs of a lane change of `found` and one of `known` that match, if each belongs to at
-/// most one pair.
-pub(super) fn matches(found: &[LaneChange], known: &[LaneChange]) -> usize {
-    let partners_of = |known: &LaneChange| (0..found.len()).filter(|&k| is_same(&found[k], known)).collect();
-    let mut matching = Matching { candidates: known.iter().map(partners_of).collect(), taken: BTreeMap::new() };
-    (0..known.len()).filter(|&known| matching.add(known, &mut BTreeSet::new())).count()
+/// Returns the largest number of matching pairs of a lane change of `detected` and a lane change of
+/// `expected`. Each lane change belongs to at most one pair.
+pub(super) fn matches(detected: &[LaneChange], expected: &[LaneChange]) -> usize {
+    let partners_of = |change: &LaneChange| (0..detected.len()).filter(|&k| is_same(&detected[k], change)).collect();
+    let mut matching = Matching { candidates: expected.iter().map(partners_of).collect(), taken: BTreeMap::new() };
+    (0..expected.len()).filter(|&index| matching.add(index, &mut BTreeSet::new())).count()
 }
 
 /// Returns true if two lane changes have the same direction and overlap in time.
@@ -21,20 +21,21 @@ fn is_same(a: &LaneChange, b: &LaneChange) -> bool {
 struct Matching {
     /// The found lane changes that match each known one.
     candidates: Vec<Vec<usize>>,
-    /// The known lane change with which each found one is paired.
+    /// The expected lane change that each detected lane change is paired with.
     taken: BTreeMap<usize, usize>,
 }
 
 impl Matching {
-    /// Pairs `known` with a candidate that is free, or whose own partner can take another one.
-    fn add(&mut self, known: usize, visited: &mut BTreeSet<usize>) -> bool {
-        for found in self.candidates[known].clone() {
-            if !visited.insert(found) {
+    /// Pairs `expected` with a free candidate, or with a candidate whose partner can take another
+    /// candidate.
+    fn add(&mut self, expected: usize, visited: &mut BTreeSet<usize>) -> bool {
+        for detected in self.candidates[expected].clone() {
+            if !visited.insert(detected) {
                 continue;
             }
-            let rival = self.taken.get(&found).copied();
+            let rival = self.taken.get(&detected).copied();
             if rival.is_none_or(|rival| self.add(rival, visited)) {
-                self.taken.insert(found, known);
+                self.taken.insert(detected, expected);
                 return true;
             }
         }
@@ -52,8 +53,8 @@ mod tests {
     #[test]
     fn each_lane_change_matches_at_most_one() {
         let track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
-        let found = detect(&smooth(&trajectory_data_of(vec![track])));
-        let [change] = &found[..] else { panic!("{found:?}") };
+        let changes = detect(&smooth(&trajectory_data_of(vec![track])));
+        let [change] = &changes[..] else { panic!("{changes:?}") };
         let during = |start_s, end_s| LaneChange { start_s, end_s, ..change.clone() };
         // Two pieces of one lane change, and one lane change over two.
         assert_eq!(matches(&[during(4.0, 6.0), during(7.0, 9.0)], &[during(4.0, 10.0)]), 1);

@@ -8,13 +8,15 @@ use super::matching::matches;
 use crate::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
 use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
-/// Share of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
-/// detects undisturbed.
+/// Share of missed or of invented lane changes above which a criterion fails (-), relative to the
+/// number that it detects undisturbed.
 pub const FAILING_SHARE: f64 = 0.05;
-/// Fewest lane changes that a study needs: with fewer, the loss of a single one exceeds [`FAILING_SHARE`].
+/// Fewest lane changes that a study needs: with fewer, the loss of a single lane change exceeds
+/// [`FAILING_SHARE`].
 pub const FEWEST_LANE_CHANGES: usize = 20;
 
-/// A track, and the distances to the markings for each of its points; these are empty if they were not measured.
+/// A track, and the distances to the markings for each of its points; these are empty if they were
+/// not measured.
 pub type Measured = (Trajectory, Vec<MarkingDistances>);
 
 /// The levels of the disturbances, and the repetitions and seed of the noise.
@@ -31,8 +33,8 @@ pub struct Setup {
 }
 
 impl Default for Setup {
-    /// Noise up to 8 m/√s, far beyond any sensor, so that every criterion fails at some level; offsets up to half a lane
-    /// width.
+    /// Noise up to 8 m/√s, far beyond any sensor, so that every criterion fails at some level;
+    /// offsets up to half a lane width.
     fn default() -> Self {
         Self {
             noise_m_per_sqrt_s: vec![
@@ -51,7 +53,8 @@ impl Default for Setup {
 pub enum ReferenceKind {
     /// Lane changes by the gradient criterion: jumps of the distances to the markings.
     Gradient,
-    /// Lane changes by the peak criterion: changes of the recorded lane at peaks of the lateral speed.
+    /// Lane changes by the peak criterion: changes of the recorded lane at peaks of the lateral
+    /// speed.
     RecordedLanes,
     /// Lane changes by the peak criterion: lateral shifts by most of a lane.
     LateralShift,
@@ -95,7 +98,8 @@ impl Study {
         Self::with_lanes(LaneReliability::Reliable, tracks, markings)
     }
 
-    /// Works like [`Self::new`]. The peak criterion finds the reference by the recorded lanes only if they are reliable.
+    /// Works like [`Self::new`]. The peak criterion finds the reference by the recorded lanes only
+    /// if they are reliable.
     pub fn with_lanes(lanes: LaneReliability, tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
         let has_distances = tracks.iter().any(|(_, distances)| !distances.is_empty());
         let (kind, reference_criterion, criteria) = if has_distances {
@@ -130,10 +134,11 @@ impl Study {
 
     /// Returns the number of lane changes that each criterion detects undisturbed.
     pub fn undisturbed(&self) -> Vec<usize> {
-        self.sum_by_criterion(|found, _| found.len())
+        self.sum_by_criterion(|detected, _| detected.len())
     }
 
-    /// Returns how many of the lane changes that each criterion detects undisturbed match one of the reference.
+    /// Returns how many of the lane changes that each criterion detects undisturbed match one of
+    /// the reference.
     pub fn confirmed(&self) -> Vec<usize> {
         self.sum_by_criterion(matches)
     }
@@ -141,12 +146,13 @@ impl Study {
     fn sum_by_criterion(&self, count: impl Fn(&[LaneChange], &[LaneChange]) -> usize) -> Vec<usize> {
         let of_criterion = |criterion: usize| {
             let tracks = self.undisturbed.iter().zip(&self.reference);
-            tracks.map(|(found, reference)| count(&found[criterion], reference)).sum()
+            tracks.map(|(detected, reference)| count(&detected[criterion], reference)).sum()
         };
         (0..self.criteria.len()).map(of_criterion).collect()
     }
 
-    /// Returns all experiments of `setup`: first those with noise, level by level, then those with an offset.
+    /// Returns all experiments of `setup`: first the experiments with noise, level by level, then
+    /// the experiments with an offset.
     pub fn cases(setup: &Setup) -> Vec<Experiment> {
         let noise = setup.noise_m_per_sqrt_s.iter().flat_map(|&noise_m_per_sqrt_s| {
             let disturbance = Disturbance { offset_m: 0.0, noise_m_per_sqrt_s };
@@ -164,15 +170,16 @@ impl Study {
         let mut cells = vec![CriterionCounts::default(); self.criteria.len()];
         for ((track, distances), undisturbed) in self.tracks.iter().zip(&self.undisturbed) {
             let (track, distances) = case.disturbance.apply(track, distances, case.repetition);
-            let found = self.detector.detect_by_each(&self.criteria, &track, &distances);
-            for (cell, (found, undisturbed)) in cells.iter_mut().zip(found.iter().zip(undisturbed)) {
-                cell.count(found, undisturbed);
+            let detected = self.detector.detect_by_each(&self.criteria, &track, &distances);
+            for (cell, (detected, undisturbed)) in cells.iter_mut().zip(detected.iter().zip(undisturbed)) {
+                cell.count(detected, undisturbed);
             }
         }
         cells
     }
 
-    /// Combines the `results` of all experiments of `setup`, which are in the order of [`Self::cases`].
+    /// Combines the `results` of all experiments of `setup`, which are in the order of
+    /// [`Self::cases`].
     pub fn robustness(&self, setup: &Setup, results: &[Vec<CriterionCounts>]) -> Robustness {
         let (noise, offsets) = results.split_at(results.len() - setup.offset_m.len());
         let repetitions = usize::try_from(setup.repetitions).unwrap_or(usize::MAX).max(1);
@@ -190,12 +197,13 @@ impl Study {
 }
 
 impl CriterionCounts {
-    /// Adds the counts of one track: the lane changes that were `found` here, and those found `undisturbed`.
-    fn count(&mut self, found: &[LaneChange], undisturbed: &[LaneChange]) {
-        let again = matches(found, undisturbed);
-        self.found += found.len() as f64;
+    /// Adds the counts of one track: the lane changes `detected` in this experiment, and the lane
+    /// changes detected `undisturbed`.
+    fn count(&mut self, detected: &[LaneChange], undisturbed: &[LaneChange]) {
+        let again = matches(detected, undisturbed);
+        self.found += detected.len() as f64;
         self.again += again as f64;
-        self.invented += (found.len() - again) as f64;
+        self.invented += (detected.len() - again) as f64;
     }
 }
 
@@ -230,8 +238,8 @@ impl Robustness {
             return false;
         }
         self.reference += other.reference;
-        self.undisturbed.iter_mut().zip(&other.undisturbed).for_each(|(own, other)| *own += other);
-        self.confirmed.iter_mut().zip(&other.confirmed).for_each(|(own, other)| *own += other);
+        self.undisturbed.iter_mut().zip(&other.undisturbed).for_each(|(sum, other)| *sum += other);
+        self.confirmed.iter_mut().zip(&other.confirmed).for_each(|(sum, other)| *sum += other);
         let noise = self.noise.iter_mut().flatten().zip(other.noise.iter().flatten());
         for (row, other) in noise.chain(self.offset.iter_mut().zip(&other.offset)) {
             for (cell, other) in row.iter_mut().zip(other) {
@@ -256,16 +264,16 @@ impl Robustness {
         self.noise.iter().map(row).collect()
     }
 
-    /// Returns true if the criterion in column `criterion` fails with the counts of `cell`. A criterion that detects
-    /// nothing undisturbed is not judged.
+    /// Returns true if the criterion in column `criterion` fails with the counts of `cell`. A
+    /// criterion that detects nothing undisturbed is not judged.
     pub fn fails(&self, criterion: usize, cell: &CriterionCounts) -> bool {
         let required = self.undisturbed[criterion] as f64;
         let allowed = FAILING_SHARE * required;
         required > 0.0 && !(required - cell.again <= allowed && cell.invented <= allowed)
     }
 
-    /// Returns the lowest noise intensity at which the criterion in column `criterion` fails in the mean over the
-    /// repetitions (m/√s), or `None` if it fails at no level.
+    /// Returns the lowest noise intensity at which the criterion in column `criterion` fails in the
+    /// mean over the repetitions (m/√s), or `None` if it fails at no level.
     pub fn failing_noise_m_per_sqrt_s(&self, criterion: usize) -> Option<f64> {
         self.first_failing(criterion, &self.mean_noise())
     }
@@ -289,17 +297,18 @@ mod tests {
     use crate::trajectory_data::test_support::changing_track;
 
     #[test]
-    fn what_is_detected_undisturbed_is_no_failure_and_repetitions_are_kept() {
-        // The recorded lane never changes, so that the reference is empty, but the vehicle moves over by a lane.
+    fn undisturbed_detections_are_no_failure_and_repetitions_are_kept() {
+        // The recorded lane never changes, so that the reference is empty, but the vehicle moves
+        // over by a lane.
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         track.points.iter_mut().for_each(|point| point.lane = closecall_traffic::Lane(2));
         let study = Study::new(vec![(track, Vec::new())], &LaneMarkings::default());
         let setup = Setup { noise_m_per_sqrt_s: vec![0.0, 8.0], offset_m: vec![0.0], repetitions: 3, seed: 1 };
         let results: Vec<_> = Study::cases(&setup).iter().map(|case| study.run(case)).collect();
-        let found = study.robustness(&setup, &results);
-        assert_eq!((found.reference, found.undisturbed[0], found.confirmed[0]), (0, 1, 0));
-        assert_eq!(found.failing_noise_m_per_sqrt_s(0), Some(8.0));
-        assert_eq!((found.noise.len(), found.noise[1].len()), (2, 3));
-        assert_eq!(found.failing_noise_by_repetition(0).len(), 3);
+        let result = study.robustness(&setup, &results);
+        assert_eq!((result.reference, result.undisturbed[0], result.confirmed[0]), (0, 1, 0));
+        assert_eq!(result.failing_noise_m_per_sqrt_s(0), Some(8.0));
+        assert_eq!((result.noise.len(), result.noise[1].len()), (2, 3));
+        assert_eq!(result.failing_noise_by_repetition(0).len(), 3);
     }
 }

@@ -52,7 +52,8 @@ pub(super) fn step(before: &Row, row: &Row, clock: FrameClock) -> Result<Step, R
     Err(ReadError::new(row.line, problem))
 }
 
-/// Builds the track of `rows`, which follow one another without gaps. Returns `None` if there are no rows.
+/// Builds the track of `rows`, which follow one another without gaps. Returns `None` if there are
+/// no rows.
 pub(super) fn assemble_track(track_id: u64, rows: &[Row], start: Time) -> Option<RecordedTrack> {
     let first = rows.first()?;
     let height_m = first.class.typical_dimensions().height_m;

@@ -1,7 +1,8 @@
-//! Whether the recorded lanes agree with the lateral positions, and the options that mend it if they do not.
+//! Checks whether the recorded lanes agree with the lateral positions. Options repair a file in
+//! which they do not.
 //!
-//! Lane 1 is the leftmost one, and `d` falls to the right. A file that counts its lanes from the right, or whose lateral
-//! position points the other way, has every lane change on the wrong side.
+//! Lane 1 is the leftmost lane, and `d` falls to the right. A file that counts its lanes from the
+//! right, or whose lateral position points the other way, has every lane change on the wrong side.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,8 @@ use super::source::{ReadError, Row};
 
 /// Least number of rows of a lane whose position is judged.
 const LEAST_ROWS: usize = 10;
-/// Least distance between the middles of two lanes (m). Below it, the positions say nothing about the order of the lanes.
+/// Least distance between the middles of two lanes (m). Below it, the positions say nothing about
+/// the order of the lanes.
 const LEAST_DISTANCE_M: f64 = 1.0;
 
 /// Directions of the file that differ from the documented ones.
@@ -31,13 +33,13 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// Returns what the options ask of a file that begins with `rows`.
+    /// Returns the choices of the options for a file that begins with `rows`.
     pub(super) fn new(options: AxisOptions, rows: &[Row]) -> Self {
         let most = rows.iter().map(|row| row.lane).max().unwrap_or(0);
         Self { mirror_d: options.mirror_d, lane_sum: options.lanes_from_right.then(|| most.saturating_add(1)) }
     }
 
-    /// Turns a row. Lane 0, which stands for no lane, stays.
+    /// Turns a row. Lane 0, which means no lane, stays.
     pub(super) fn turn(self, row: &mut Row) {
         if self.mirror_d {
             row.d_m = -row.d_m;
@@ -50,7 +52,8 @@ impl Axes {
     }
 }
 
-/// Rejects rows in which more neighbouring lanes lie in the opposite order of their numbers than in their order.
+/// Rejects rows in which more neighbouring lanes lie in the opposite order of their numbers than in
+/// their order.
 pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
     let mut lanes: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.lane > 0) {

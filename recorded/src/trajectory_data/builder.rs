@@ -13,8 +13,9 @@ use super::source::{ReadError, Row};
 
 /// Offset between the numbers of a split track's pieces.
 ///
-/// The second piece of vehicle 884 is track 1,000,000,000,884, and so on. This number depends neither on the rest of
-/// the file nor on the order of its rows. Vehicle numbers lie below this offset.
+/// The second piece of vehicle 884 is track 1,000,000,000,884, and so on. This number depends
+/// neither on the rest of the file nor on the order of its rows. Vehicle numbers lie below this
+/// offset.
 pub const PIECE_STRIDE: u64 = 1_000_000_000_000;
 
 /// Maximum number of rows held for incomplete tracks. Three million rows cover 8 hours at 100 Hz.
@@ -70,8 +71,8 @@ impl TrackBuilder {
     /// Adds the next row.
     ///
     /// # Errors
-    /// Fails if the order breaks, if too many rows are held, or if the row contradicts the previous one. The row is
-    /// then left out.
+    /// Fails if the order breaks, if too many rows are held, or if the row contradicts the previous
+    /// one. The row is then left out.
     pub(super) fn push(&mut self, row: Row) -> Result<(), ReadError> {
         let key = (row.number, row.origin);
         match &mut self.order {
@@ -135,7 +136,7 @@ impl TrackBuilder {
         open.into_values().try_for_each(|rows| self.close(&rows))
     }
 
-    /// Completes all tracks unless the track of `key` is among the incomplete ones.
+    /// Completes all tracks unless the track of `key` is among the incomplete tracks.
     fn close_all_but(&mut self, key: (u64, Time)) -> Result<(), ReadError> {
         if self.open.contains_key(&key) { Ok(()) } else { self.finish() }
     }
@@ -156,7 +157,8 @@ impl TrackBuilder {
         let piece = *pieces;
         *pieces += 1;
         if first.number >= PIECE_STRIDE && piece > 0 {
-            // The number already belongs to a piece of a split track, so no number is left for its own pieces.
+            // The number already belongs to a piece of a split track, so no number is left for its
+            // own pieces.
             return Err(ReadError::new(first.line, TrajectoryFileProblem::SplitPiece { track: first.number }));
         }
         let track_id = first.number + piece * PIECE_STRIDE;

@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::fields::{FieldError, wrong_value};
 
-/// Maximum number of different unknown names in one file. More of them mean that the column holds something else.
+/// Maximum number of different unknown names in one file. More of them mean that the column holds
+/// something else.
 const MAX_NAMES: usize = 16;
 
-/// Parts of names that stand for a class other than a car, in lower case.
+/// Parts of names that mean a class other than a car, in lower case.
 const HINTS: [(VehicleClass, &[&str]); 2] = [
     (VehicleClass::Truck, &["truck", "lorry", "bus", "coach", "trailer", "semi", "heavy", "hgv"]),
     (VehicleClass::Motorcycle, &["motor", "bike", "cycl", "scooter", "pedestrian"]),
@@ -23,7 +24,8 @@ pub struct UnknownClass {
     pub name: String,
     /// The class as which its vehicles are read.
     pub read_as: VehicleClass,
-    /// Number of rows with the name; number of vehicles if the layout states the class once for each vehicle.
+    /// Number of rows with the name; number of vehicles if the layout states the class once for
+    /// each vehicle.
     pub entries: u64,
 }
 
@@ -40,24 +42,24 @@ impl fmt::Display for UnknownClass {
 pub(super) struct UnknownClasses(Vec<UnknownClass>);
 
 impl UnknownClasses {
-    /// Returns the class `known` if there is one. Otherwise counts the name `text` and returns the nearest class: the one
-    /// that its words suggest, or else a car.
+    /// Returns the class `recognised` if there is one. Otherwise counts the name `text` and returns
+    /// the nearest class: the class that its words suggest, or else a car.
     ///
     /// # Errors
     /// Fails if `text` is not a name, or if there are too many unknown names.
     pub(super) fn resolve(
         &mut self,
-        known: Option<VehicleClass>,
+        recognised: Option<VehicleClass>,
         text: &str,
         column: &'static str,
     ) -> Result<VehicleClass, FieldError> {
-        if let Some(class) = known {
+        if let Some(class) = recognised {
             return Ok(class);
         }
         let is_name = text.starts_with(char::is_alphabetic) && text.parse::<f64>().is_err();
         let has_room = self.0.len() < MAX_NAMES;
-        let found = self.0.iter_mut().find(|unknown| unknown.name == text);
-        match found {
+        let entry = self.0.iter_mut().find(|unknown| unknown.name == text);
+        match entry {
             Some(unknown) => {
                 unknown.entries += 1;
                 Ok(unknown.read_as)

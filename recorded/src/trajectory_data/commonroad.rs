@@ -1,13 +1,15 @@
 //! CommonRoad XML (versions 2018b and 2020a): lanelets and dynamic obstacles.
 //!
-//! (M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: Composable benchmarks for motion planning on roads", IV 2017; and
-//! the format's documentation.)
+//! (M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: Composable benchmarks for motion planning on
+//! roads", IV 2017; and the format's documentation.)
 //!
-//! Each state of a dynamic obstacle becomes a row. The row's number is the obstacle's id, its frame is the time step,
-//! and its position is the middle of the obstacle's shape, projected onto the road that the lanelets form; see
-//! `lanelets`. Several roads, such as those of both directions, are shifted 1 km apart. Static obstacles, planning
-//! problems and signs are ignored. A first state that repeats the initial state is one state. If a state has no acceleration, it is derived from neighbouring frames. The reader
-//! rejects states whose values are intervals instead of exact values.
+//! Each state of a dynamic obstacle becomes a row. The row's number is the obstacle's id, its frame
+//! is the time step, and its position is the middle of the obstacle's shape, projected onto the
+//! road that the lanelets form; see `lanelets`. Several roads, such as the roads of both
+//! directions, are shifted 1 km apart. Static obstacles, planning problems and signs are ignored. A
+//! first state that repeats the initial state is one state. If a state has no acceleration, it is
+//! derived from neighbouring frames. The reader rejects states whose values are intervals instead
+//! of exact values.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -26,7 +28,8 @@ use super::xml::{Node, Xml};
 
 /// The attributes that the reader uses.
 const ATTRIBUTES: &[&str] = &["id", "ref", "drivingDir", "timeStepSize", "benchmarkID"];
-/// Allowed time step. Shorter steps vanish when rounded to whole nanoseconds, or make derivatives overflow.
+/// Allowed time step. Shorter steps vanish when rounded to whole nanoseconds, or make derivatives
+/// overflow.
 const STEP_S: Bounds = Bounds::closed(0.001, 100.0);
 const PLANE_M: Bounds = allowed::PLANE_M;
 const ANGLE_RAD: Bounds = Bounds::closed(-100.0, 100.0);
@@ -79,7 +82,7 @@ impl<R: BufRead> CommonRoadSource<R> {
     /// Opens a scenario and reads its root element.
     ///
     /// # Errors
-    /// Fails if the root element is not that of a CommonRoad scenario.
+    /// Fails if the root element is not a CommonRoad scenario.
     pub(super) fn new(source: R) -> Result<Self, ReadError> {
         let mut xml = Xml::new(source, ATTRIBUTES);
         let Node::Begin { name, attributes } = xml.next()? else { return xml.fail("there is no element") };
@@ -109,7 +112,7 @@ impl<R: BufRead> CommonRoadSource<R> {
 
     /// Processes the beginning of an element.
     fn begin(&mut self, name: &str, attributes: &[(&'static str, String)]) -> Result<(), ReadError> {
-        let attribute = |wanted| attributes.iter().find(|(known, _)| *known == wanted).map(|(_, text)| text.as_str());
+        let attribute = |wanted| attributes.iter().find(|(name, _)| *name == wanted).map(|(_, text)| text.as_str());
         let depth = self.xml.path().len();
         match name {
             "lanelet" if depth == 2 => {
@@ -272,12 +275,13 @@ impl<R: BufRead> CommonRoadSource<R> {
 }
 
 impl State {
-    /// Returns `true` if `other` states the same values at the same time. Some files repeat the initial state as the first
-    /// state of the trajectory; one of the two may lack the acceleration.
+    /// Returns `true` if `other` states the same values at the same time. Some files repeat the
+    /// initial state as the first state of the trajectory; one of the two may lack the
+    /// acceleration.
     fn is_repeated_by(&self, other: &Self) -> bool {
         let acceleration_mps2 = other.acceleration_mps2.or(self.acceleration_mps2);
-        let own = Self { acceleration_mps2: self.acceleration_mps2.or(acceleration_mps2), ..*self };
-        self.step.is_some() && own == Self { acceleration_mps2, ..*other }
+        let completed = Self { acceleration_mps2: self.acceleration_mps2.or(acceleration_mps2), ..*self };
+        self.step.is_some() && completed == Self { acceleration_mps2, ..*other }
     }
 }
 
@@ -302,8 +306,8 @@ fn with_line<R: BufRead, T>(xml: &Xml<R>, result: Result<T, FieldError>) -> Resu
     result.map_err(|error| ReadError::new(xml.line(), error))
 }
 
-/// Returns the class of CommonRoad's obstacle types. Trucks and buses count as trucks, bicycles and pedestrians as
-/// motorcycles, and the other road users as cars.
+/// Returns the class of CommonRoad's obstacle types. Trucks and buses count as trucks, bicycles and
+/// pedestrians as motorcycles, and the other road users as cars.
 fn class_named(text: &str) -> Option<VehicleClass> {
     match text {
         "car" | "taxi" | "parkedVehicle" | "priorityVehicle" | "unknown" => Some(VehicleClass::Car),

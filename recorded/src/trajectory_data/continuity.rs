@@ -1,4 +1,5 @@
-//! What makes one track of the rows of a vehicle: the clock of the file, gaps that are bridged, jumps at which it is split.
+//! Rules that turn the rows of a vehicle into tracks: the clock of the file, gaps that are bridged,
+//! jumps that split a track.
 //!
 //! | between two rows of a vehicle | becomes |
 //! |---|---|
@@ -15,17 +16,20 @@ use serde::Serialize;
 use super::data::MarkingDistances;
 use super::source::Row;
 
-/// Longest time that is missing between two rows of one track. A car crosses a marking in a few times as long.
+/// Longest time that is missing between two rows of one track. A car crosses a marking in a few
+/// times as long.
 pub(super) const LONGEST_BRIDGE: Time = Time::from_ms(500);
 
-/// Speed beyond the recorded one by which a step along the road is a jump (m/s). No vehicle is so fast within one step;
-/// errors of NGSIM's positions stay below it.
+/// Excess over the recorded speed that makes a step along the road a jump (m/s). No vehicle is so
+/// fast within one step; errors of NGSIM's positions stay below it.
 const JUMP_ALONG_MPS: f64 = 30.0;
-/// Smallest jump along the road (m): less than the length of a car, so that two cars in one lane are further apart.
+/// Smallest jump along the road (m): less than the length of a car, so that two cars in one lane
+/// are further apart.
 const JUMP_ALONG_M: f64 = 3.5;
 /// Lateral speed of a jump (m/s). Lane changes stay below 2 m/s.
 const JUMP_ACROSS_MPS: f64 = 8.0;
-/// Smallest jump across the road (m): half a narrow lane, so that two vehicles side by side are further apart.
+/// Smallest jump across the road (m): half a narrow lane, so that two vehicles side by side are
+/// further apart.
 const JUMP_ACROSS_M: f64 = 1.5;
 
 /// The steps of a file.
@@ -55,7 +59,8 @@ impl FrameClock {
     }
 }
 
-/// Returns the most frequent difference between the frame numbers of two successive rows of a vehicle, 1 if no vehicle has two.
+/// Returns the most frequent difference between the frame numbers of two successive rows of a
+/// vehicle, 1 if no vehicle has two.
 fn usual_step(rows: &[Row]) -> i64 {
     let mut frames: Vec<(u64, Time, i64)> = rows.iter().map(|row| (row.number, row.origin, row.frame)).collect();
     frames.sort_unstable();
@@ -74,18 +79,18 @@ fn usual_step(rows: &[Row]) -> i64 {
 pub struct Continuity {
     /// Vehicles, by their numbers in the file.
     pub vehicles: u64,
-    /// Tracks: the vehicles, and the further pieces of those that were split.
+    /// Tracks: the vehicles, and the further pieces of split vehicles.
     pub pieces: u64,
     /// Gaps that were bridged.
     pub bridged_gaps: u64,
     /// Frames that were interpolated in them.
     pub bridged_frames: u64,
-    /// Movements that no vehicle makes, at each of which a track was split.
+    /// Number of movements that no vehicle makes. Each of them splits a track.
     pub jumps: u64,
 }
 
 impl Continuity {
-    /// Returns what a reader of results has to know of it.
+    /// Returns the notes on it for a reader of results.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         let split = self.pieces - self.vehicles;
@@ -121,10 +126,11 @@ pub(super) fn is_jump(before: &Row, row: &Row) -> bool {
     exceeds(along_m, JUMP_ALONG_MPS, JUMP_ALONG_M) || exceeds(row.d_m - before.d_m, JUMP_ACROSS_MPS, JUMP_ACROSS_M)
 }
 
-/// Returns the rows that are missing between two rows of a vehicle, or `None` if the gap is too long to be bridged.
+/// Returns the rows that are missing between two rows of a vehicle, or `None` if the gap is too
+/// long to be bridged.
 ///
-/// The position along the road follows the cubic polynomial with the recorded positions and speeds at both ends. All else is
-/// linear. A frame has the lane of the nearer row.
+/// The position along the road follows the cubic polynomial with the recorded positions and speeds
+/// at both ends. All else is linear. A frame has the lane of the nearer row.
 pub(super) fn bridge(before: &Row, row: &Row, clock: FrameClock) -> Option<Vec<Row>> {
     let step = row.time - before.time;
     if step > LONGEST_BRIDGE + clock.period {
@@ -135,10 +141,10 @@ pub(super) fn bridge(before: &Row, row: &Row, clock: FrameClock) -> Option<Vec<R
         let share = k as f64 / steps as f64;
         let mix = |from: f64, to: f64| from + share * (to - from);
         let cubic = {
-            let (one, two) = (1.0 - share, share);
-            let from_m = (1.0 + 2.0 * two) * before.s_m + two * step.s() * before.speed_mps;
-            let to_m = (1.0 + 2.0 * one) * row.s_m - one * step.s() * row.speed_mps;
-            one * one * from_m + two * two * to_m
+            let (from_weight, to_weight) = (1.0 - share, share);
+            let from_m = (1.0 + 2.0 * to_weight) * before.s_m + to_weight * step.s() * before.speed_mps;
+            let to_m = (1.0 + 2.0 * from_weight) * row.s_m - from_weight * step.s() * row.speed_mps;
+            from_weight * from_weight * from_m + to_weight * to_weight * to_m
         };
         let nearer = if 2 * k <= steps { before } else { row };
         Row {

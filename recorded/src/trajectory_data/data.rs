@@ -13,11 +13,11 @@ use crate::lane_change::LaneReliability;
 /// Distances to the markings of the vehicle's own lane, as its camera measures them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MarkingDistances {
-    /// Distance from the vehicle's centre line to the left marking (m). It is positive while the marking is on the
-    /// left.
+    /// Distance from the vehicle's centre line to the left marking (m). It is positive while the
+    /// marking is on the left.
     pub left_m: Option<f64>,
-    /// Distance from the vehicle's centre line to the right marking (m). It is positive while the marking is on the
-    /// right.
+    /// Distance from the vehicle's centre line to the right marking (m). It is positive while the
+    /// marking is on the right.
     pub right_m: Option<f64>,
 }
 
@@ -35,7 +35,8 @@ pub struct RecordedTrack {
     pub trajectory: Trajectory,
     /// Line number in the file for each point of the trajectory, counted from 1.
     pub lines: Vec<u64>,
-    /// Distances to the markings for each point of the trajectory, from in-car logs. Empty for other layouts.
+    /// Distances to the markings for each point of the trajectory, from in-car logs. Empty for
+    /// other layouts.
     pub markings: Vec<MarkingDistances>,
 }
 
@@ -48,13 +49,14 @@ pub struct TrajectoryData {
     pub layout: Layout,
     /// Time between two frames.
     pub period: Time,
-    /// Positions of the lane markings, as far as they are known.
+    /// Known positions of the lane markings.
     pub markings: LaneMarkings,
     /// Whether lane changes are found by the recorded lanes.
     pub lanes: LaneReliability,
     /// The tracks, sorted by track number.
     pub trajectories: Vec<Trajectory>,
-    /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from a file.
+    /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from
+    /// a file.
     pub hash: String,
     /// Unknown names of vehicle classes in the file.
     pub unknown_classes: Vec<UnknownClass>,
@@ -62,23 +64,24 @@ pub struct TrajectoryData {
     pub continuity: Continuity,
 }
 
-/// Checks that no two of the files at `paths`, which hold `data_sets`, have the same content: their lane changes would count
-/// twice, and every interval would be too narrow.
+/// Checks that no two of the files at `paths`, which hold `data_sets`, have the same content: their
+/// lane changes would count twice, and every interval would be too narrow.
 ///
 /// # Errors
 /// The names of the first two such files.
 pub fn refuse_duplicates(paths: &[PathBuf], data_sets: &[TrajectoryData]) -> Result<(), String> {
     for (later, data) in data_sets.iter().enumerate() {
         if let Some(earlier) = data_sets[..later].iter().position(|earlier| earlier.hash == data.hash) {
-            let (one, other) = (paths[earlier].display(), paths[later].display());
-            return Err(format!("{one} and {other} have the same content"));
+            let (first, second) = (paths[earlier].display(), paths[later].display());
+            return Err(format!("{first} and {second} have the same content"));
         }
     }
     Ok(())
 }
 
 impl TrajectoryData {
-    /// Creates trajectory data from `trajectories`, sorts them by track number and derives the lane markings from them.
+    /// Creates trajectory data from `trajectories`, sorts them by track number and derives the lane
+    /// markings from them.
     pub fn new(name: &str, period: Time, mut trajectories: Vec<Trajectory>) -> Self {
         trajectories.sort_by_key(|track| track.track_id);
         let markings = LaneMarkings::from_trajectories(&trajectories);
@@ -95,8 +98,8 @@ impl TrajectoryData {
         }
     }
 
-    /// Returns what a reader of results from this data has to know: markings that are not used, and unknown vehicle
-    /// classes.
+    /// Returns the notes for a reader of results from this data: markings that are not used, and
+    /// unknown vehicle classes.
     pub fn warnings(&self) -> Vec<String> {
         let ignored = self.markings.ignored().iter().map(ToString::to_string);
         let unknown = self.unknown_classes.iter().map(ToString::to_string);

@@ -59,24 +59,24 @@ pub enum TrajectoryFileProblem {
     #[error("the line is not text in UTF-8")]
     NotText,
     /// The file is an archive or uses a compression that is not supported.
-    #[error("this is {what}, which is not read; unpack it first, or compress the trajectory file with gzip")]
+    #[error("this is {kind}, which is not read; unpack it first, or compress the trajectory file with gzip")]
     Archive {
         /// Kind of archive or compression.
-        what: &'static str,
+        kind: &'static str,
     },
     /// The file is in a format of another program.
     #[error(
-        "this is {what}, which is not read; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)"
+        "this is {kind}, which is not read; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)"
     )]
     Foreign {
         /// The format.
-        what: &'static str,
+        kind: &'static str,
     },
     /// The file has another layout than the caller requires.
-    #[error("the content is in the layout {}, not in {asked} as asked for", found.name())]
+    #[error("the content is in the layout {}, not in {asked} as asked for", actual.name())]
     OtherLayout {
         /// Layout found in the content.
-        found: Layout,
+        actual: Layout,
         /// Layout required by the caller.
         asked: &'static str,
     },
@@ -125,10 +125,10 @@ pub enum TrajectoryFileProblem {
         name: String,
     },
     /// A row has too few or too many columns.
-    #[error("the row has {found} columns, but {needed} are needed")]
+    #[error("the row has {actual} columns, but {needed} are needed")]
     ColumnCount {
         /// Number of columns found.
-        found: usize,
+        actual: usize,
         /// Number of columns required.
         needed: usize,
     },
@@ -219,10 +219,10 @@ pub enum TrajectoryFileProblem {
         allowed: usize,
     },
     /// The XML is not a readable CommonRoad scenario.
-    #[error("this is no CommonRoad scenario that can be read: {what}")]
+    #[error("this is no CommonRoad scenario that can be read: {reason}")]
     Xml {
         /// Description of the problem.
-        what: String,
+        reason: String,
     },
     /// The file is the tracks file of a highD or exiD data set, and its metadata files are missing.
     #[error(
@@ -246,10 +246,10 @@ pub enum TrajectoryFileProblem {
         last: String,
     },
     /// A table has a wrong number of rows.
-    #[error("there are {found} rows, but {needed} is needed")]
+    #[error("there are {actual} rows, but {needed} is needed")]
     RowCount {
         /// Number of rows found.
-        found: usize,
+        actual: usize,
         /// Number of rows required.
         needed: usize,
     },
@@ -262,12 +262,12 @@ pub enum TrajectoryFileProblem {
         first_line: u64,
     },
     /// A vehicle has a different number of rows than its metadata states.
-    #[error("vehicle {vehicle} has {found} rows, but {stated} are stated in line {line} of {file}")]
+    #[error("vehicle {vehicle} has {actual} rows, but {stated} are stated in line {line} of {file}")]
     OtherCount {
         /// Number of the vehicle.
         vehicle: u64,
         /// Number of rows found.
-        found: u64,
+        actual: u64,
         /// Number of rows stated.
         stated: u64,
         /// Name of the metadata file.
@@ -313,22 +313,22 @@ pub enum TrajectoryFileProblem {
         piece_s: f64,
     },
     /// Values are implausible for road traffic, which points to mixed-up units or columns.
-    #[error("{what} is {found}, but {allowed} is plausible: are units or columns mixed up?")]
+    #[error("{quantity} is {actual}, but {allowed} is plausible: are units or columns mixed up?")]
     Implausible {
         /// Name of the quantity.
-        what: &'static str,
+        quantity: &'static str,
         /// Rounded value with its unit.
-        found: String,
+        actual: String,
         /// Range of plausible values.
         allowed: &'static str,
     },
     /// A file contains rows of several data sets.
-    #[error("is `{found}`, but `{first}` is needed as in the first row: one data set for each file")]
+    #[error("is `{actual}`, but `{first}` is needed as in the first row: one data set for each file")]
     SeveralRecordings {
         /// Data set name in the first row.
         first: String,
         /// Data set name in this row.
-        found: String,
+        actual: String,
     },
 }
 
@@ -365,7 +365,8 @@ impl TrajectoryFileProblem {
     }
 }
 
-/// An error while writing a trajectory file. A file that existed before at the same path is left unchanged.
+/// An error while writing a trajectory file. A file that existed before at the same path is left
+/// unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The file cannot be written.
@@ -377,14 +378,14 @@ pub enum WriteError {
         source: io::Error,
     },
     /// A number is not finite.
-    #[error("failed to write the trajectory file: {what} of track {track_id} at {time_s} s is not finite")]
+    #[error("failed to write the trajectory file: {quantity} of track {track_id} at {time_s} s is not finite")]
     NotFinite {
         /// Number of the track.
         track_id: u64,
         /// Time of the point (s).
         time_s: f64,
         /// Name of the quantity.
-        what: &'static str,
+        quantity: &'static str,
     },
     /// The time of a point lies between two frames.
     #[error(

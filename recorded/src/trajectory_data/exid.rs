@@ -1,20 +1,24 @@
-//! The layout of exiD: three files per data set, in metres in a local plane, y *up*, headings in degrees.
+//! The layout of exiD: three files per data set, in metres in a local plane, y *up*, headings in
+//! degrees.
 //!
 //! (T. Moers et al., "The exiD Dataset", IV 2022; column names as in the data set's documentation.)
 //!
-//! - `NN_tracks.csv`: rows `recordingId, trackId, frame, …, xCenter, yCenter, heading, width, length, …, lonVelocity,
-//!   …, lonAcceleration, …, laneWidth, laneletId, laneChange, …`. `width` is the vehicle's width here.
+//! - `NN_tracks.csv`: rows
+//!   `recordingId, trackId, frame, …, xCenter, yCenter, heading, width, length, …, lonVelocity, …, lonAcceleration, …, laneWidth, laneletId, laneChange, …`.
+//!   `width` is the vehicle's width here.
 //! - `NN_tracksMeta.csv`: class of each vehicle, and its number of rows, which the reader checks.
 //! - `NN_recordingMeta.csv`: frame rate.
 //!
-//! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of another format. The
-//! reader therefore infers the road from the traffic, in two passes before it reads the rows. The reference line of
-//! each direction is the longest path of a vehicle that keeps its lane. The lanes beside it are as wide as the mean
-//! recorded lane width. On either side, the outermost lane is the last one that holds at least 2 % of its
-//! direction's rows. Lateral positions are thus relative to the path of one driver and contain its slow weaving of a
+//! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
+//! another format. The reader therefore infers the road from the traffic, in two passes before it
+//! reads the rows. The reference line of each direction is the longest path of a vehicle that keeps
+//! its lane. The lanes beside it are as wide as the mean recorded lane width. On either side, the
+//! outermost lane is the last lane that holds at least 2 % of its direction's rows. Lateral
+//! positions are thus relative to the path of one driver and contain its slow weaving of a
 //! decimetre or two. Vehicles on ramps count as being in the outermost lane.
 //!
-//! The reader shifts the second direction 1 km to the right of the first, as it does with highD's upper carriageway.
+//! The reader shifts the second direction 1 km to the right of the first, as it does with highD's
+//! upper carriageway.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -169,8 +173,8 @@ impl ExidColumns {
 }
 
 impl InferredRoad {
-    /// Reads the rows of a file twice: first for the reference lines, then for the lanes beside them. It ignores
-    /// unusable rows, because the later reading of the rows reports them.
+    /// Reads the rows of a file twice: first for the reference lines, then for the lanes beside
+    /// them. It ignores unusable rows, because the later reading of the rows reports them.
     ///
     /// # Errors
     /// Fails if the file cannot be read or no vehicle moves.
@@ -224,9 +228,9 @@ impl InferredRoad {
         })?;
         let (mut first_lane, mut shift_m) = (0, 0.0);
         for (index, direction) in self.directions.iter_mut().enumerate() {
-            let own = || rows.iter().filter(|((other, _), _)| *other == index);
-            let least = MIN_SHARE * own().map(|(_, count)| *count).sum::<u64>() as f64;
-            let used = || own().filter(|(_, count)| **count as f64 >= least).map(|((_, lane), _)| *lane);
+            let in_direction = || rows.iter().filter(|((other, _), _)| *other == index);
+            let least = MIN_SHARE * in_direction().map(|(_, count)| *count).sum::<u64>() as f64;
+            let used = || in_direction().filter(|(_, count)| **count as f64 >= least).map(|((_, lane), _)| *lane);
             let (left, right) = (used().max().unwrap_or(0).max(0), used().min().unwrap_or(0).min(0));
             (direction.left, direction.lanes) = (left, left - right + 1);
             (direction.first_lane, direction.shift_m) = (first_lane, shift_m);
@@ -253,8 +257,8 @@ impl InferredRoad {
     /// Returns the lane markings of all directions.
     fn markings(&self) -> LaneMarkings {
         let edges = self.directions.iter().flat_map(|direction| {
-            // Lane 0 of the first direction does not exist. Lane 0 of a later direction is the omitted lane, whose
-            // right edge is the direction's left edge.
+            // Lane 0 of the first direction does not exist. Lane 0 of a later direction is the
+            // omitted lane, whose right edge is the direction's left edge.
             (0..=direction.lanes).map(move |lane| {
                 let edge_m = direction.shift_m - self.lane_width_m * lane as f64;
                 (u8::try_from(direction.first_lane + lane).unwrap_or(u8::MAX), edge_m)
@@ -264,8 +268,8 @@ impl InferredRoad {
     }
 }
 
-/// Keeps the best path of each direction. A path without a lane change is better than one with, and a longer path is
-/// better than a shorter one.
+/// Keeps the best path of each direction. A path without a lane change is better than a path with
+/// one, and a longer path is better than a shorter path.
 fn keep_best_path(paths: &mut Vec<(bool, f64, DrivenPath)>, path: DrivenPath) {
     let Some(length_m) = ReferenceLine::through(path.points.iter().copied()).length_m() else { return };
     let stays = !path.changes_lanes;
@@ -300,15 +304,15 @@ fn rows(input: impl BufRead, visit: &mut impl FnMut(&ColumnIndices, &str, &Field
         match lines.next() {
             Ok(Some((number, line))) => {
                 let split = fields.split(line, Separator::Comma);
-                let Some((needed, known)) = &columns else {
+                let Some((needed, indices)) = &columns else {
                     split.map_err(|problem| ReadError::new(number, problem))?;
                     let header = Header::new((0..fields.len()).map(|index| fields.get(line, index)));
-                    let known = ColumnIndices::new(&header).map_err(|problem| ReadError::new(number, problem))?;
-                    columns = Some((fields.len(), known));
+                    let indices = ColumnIndices::new(&header).map_err(|problem| ReadError::new(number, problem))?;
+                    columns = Some((fields.len(), indices));
                     continue;
                 };
                 if split.is_ok() && fields.len() == *needed {
-                    visit(known, line, &fields);
+                    visit(indices, line, &fields);
                 }
             }
             Ok(None) => return Ok(()),
@@ -350,11 +354,11 @@ impl TextLayout for ExidColumns {
                 wrong_value(text, format!("one of the vehicles in {}", self.meta_file)),
             ));
         };
-        vehicle.found += 1;
+        vehicle.rows_read += 1;
         let class = vehicle.class;
         // A vehicle keeps the direction of its first row, also on a curved ramp.
-        let known = self.latest.filter(|(latest, _)| *latest == track).map(|(_, index)| index);
-        let index = known.or_else(|| self.road.direction(heading_rad)).unwrap_or(0);
+        let latest_index = self.latest.filter(|(latest, _)| *latest == track).map(|(_, index)| index);
+        let index = latest_index.or_else(|| self.road.direction(heading_rad)).unwrap_or(0);
         self.latest = Some((track, index));
         let Some(direction) = self.road.directions.get(index) else { return Ok(None) };
         let projection = direction.line.project(point);

@@ -89,8 +89,8 @@ pub(super) fn integer(text: &str, column: &'static str, (low, high): (i64, i64))
     }
 }
 
-/// Removes the thousands separators from a number such as `1,163,368`. Leaves misplaced commas in the text, so that
-/// parsing fails.
+/// Removes the thousands separators from a number such as `1,163,368`. Leaves misplaced commas in
+/// the text, so that parsing fails.
 fn without_separators(text: &str) -> String {
     let whole = text.split_once('.').map_or(text, |(whole, _)| whole);
     let mut groups = whole.trim_start_matches('-').split(',');

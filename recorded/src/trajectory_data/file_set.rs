@@ -39,8 +39,8 @@ pub(super) struct FileSet {
 }
 
 impl FileSet {
-    /// Finds the set that `path` denotes: `path` is one of its files, their folder, or the common prefix of their
-    /// names. Returns `None` if `path` is a file of another kind.
+    /// Finds the set that `path` denotes: `path` is one of its files, their folder, or the common
+    /// prefix of their names. Returns `None` if `path` is a file of another kind.
     ///
     /// # Errors
     /// Fails if `path` is a folder that contains no such set, or several.
@@ -113,7 +113,7 @@ impl FileSet {
         let (tracks_path, recording_path) = (self.path(TRACKS_META), self.path(RECORDING_META));
         let data = table(&recording_path, digest, recording_meta)?;
         let [(_, data)] = <[_; 1]>::try_from(data).map_err(|rows| {
-            let problem = TrajectoryFileProblem::RowCount { found: rows.len(), needed: 1 };
+            let problem = TrajectoryFileProblem::RowCount { actual: rows.len(), needed: 1 };
             with_path(&recording_path, ReadError::of_file(problem))
         })?;
         let mut vehicles = BTreeMap::new();
@@ -148,9 +148,11 @@ pub(super) struct RecordingMeta {
     pub(super) id: String,
     /// Frames per second (Hz).
     pub(super) frame_rate_hz: f64,
-    /// Positions y of the upper carriageway's markings in the image frame, from top to bottom (m); highD only.
+    /// Positions y of the upper carriageway's markings in the image frame, from top to bottom (m);
+    /// highD only.
     pub(super) upper_m: Vec<f64>,
-    /// Positions y of the lower carriageway's markings in the image frame, from top to bottom (m); highD only.
+    /// Positions y of the lower carriageway's markings in the image frame, from top to bottom (m);
+    /// highD only.
     pub(super) lower_m: Vec<f64>,
 }
 
@@ -162,8 +164,8 @@ pub(super) struct VehicleMeta {
     pub(super) is_upper: bool,
     /// Number of rows that the metadata states.
     pub(super) rows: u64,
-    /// Number of rows found so far.
-    pub(super) found: u64,
+    /// Number of rows read so far.
+    pub(super) rows_read: u64,
     pub(super) line: u64,
 }
 
@@ -209,22 +211,22 @@ fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, FieldError>) -
     fields.split(first, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
     let header = Header::new((0..fields.len()).map(|index| fields.get(first, index)));
     let needed = fields.len();
-    let mut found = Vec::new();
+    let mut numbered_rows = Vec::new();
     while let Some((number, line)) = lines.next().map_err(at_line)? {
         fields.split(line, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
         if fields.len() != needed {
-            return Err(ReadError::new(number, TrajectoryFileProblem::ColumnCount { found: fields.len(), needed }));
+            return Err(ReadError::new(number, TrajectoryFileProblem::ColumnCount { actual: fields.len(), needed }));
         }
         let row = read(&Cells { header: &header, line, fields: &fields });
-        found.push((number, row.map_err(|error| ReadError::new(number, error))?));
+        numbered_rows.push((number, row.map_err(|error| ReadError::new(number, error))?));
         if lines.is_unterminated() {
             return Err(ReadError::new(number, TrajectoryFileProblem::CutLine));
         }
     }
-    if found.is_empty() {
+    if numbered_rows.is_empty() {
         return Err(ReadError::of_file(TrajectoryFileProblem::Empty));
     }
-    Ok(found)
+    Ok(numbered_rows)
 }
 
 fn recording_meta(cells: &Cells<'_>) -> Result<RecordingMeta, FieldError> {
@@ -241,11 +243,11 @@ fn markings(text: &str, column: &'static str) -> Result<Vec<f64>, FieldError> {
     if text.is_empty() {
         return Ok(Vec::new());
     }
-    let found = text.split(';').map(|part| number(part.trim(), column, MARKING_M)).collect::<Result<Vec<_>, _>>()?;
-    if found.len() < 2 || found.windows(2).any(|pair| pair[0] >= pair[1]) {
+    let edges_m = text.split(';').map(|part| number(part.trim(), column, MARKING_M)).collect::<Result<Vec<_>, _>>()?;
+    if edges_m.len() < 2 || edges_m.windows(2).any(|pair| pair[0] >= pair[1]) {
         return Err(FieldError::at(column, wrong_value(text, "a list of at least two rising positions".to_owned())));
     }
-    Ok(found)
+    Ok(edges_m)
 }
 
 /// Returns the number of a vehicle, its entry, and the name of its class.
@@ -261,11 +263,11 @@ fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta, String), FieldEr
             return Err(FieldError::at("drivingDirection", wrong_value(other, allowed)));
         }
     };
-    Ok((id, VehicleMeta { class: VehicleClass::Car, is_upper, rows, found: 0, line: 0 }, class))
+    Ok((id, VehicleMeta { class: VehicleClass::Car, is_upper, rows, rows_read: 0, line: 0 }, class))
 }
 
-/// Returns the vehicle class with this name, if it is known. highD has cars and trucks; exiD spells them in lower case, and
-/// also has vans and motorcycles.
+/// Returns the vehicle class with this name, if it is known. highD has cars and trucks; exiD spells
+/// them in lower case, and also has vans and motorcycles.
 fn class_named(text: &str) -> Option<VehicleClass> {
     match text.to_ascii_lowercase().as_str() {
         "car" | "van" => Some(VehicleClass::Car),

@@ -28,7 +28,7 @@ impl Header {
 
     /// Returns the index of a column, or `None` if it is absent.
     pub(super) fn find(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|found| found.eq_ignore_ascii_case(name))
+        self.names.iter().position(|title| title.eq_ignore_ascii_case(name))
     }
 
     /// Returns the index of a required column.
@@ -36,9 +36,9 @@ impl Header {
         self.find(name).ok_or(TrajectoryFileProblem::MissingColumn { name, layout })
     }
 
-    /// Returns how many of the `known` names the header contains.
-    pub(super) fn count(&self, known: &[&str]) -> usize {
-        known.iter().filter(|name| self.find(name).is_some()).count()
+    /// Returns how many of these `names` the header contains.
+    pub(super) fn count(&self, names: &[&str]) -> usize {
+        names.iter().filter(|name| self.find(name).is_some()).count()
     }
 
     /// Rejects a header that contains a name twice.

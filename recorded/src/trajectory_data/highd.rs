@@ -1,4 +1,5 @@
-//! The layout of highD: three files per data set, in metres, in the image frame (x to the right, y *down*).
+//! The layout of highD: three files per data set, in metres, in the image frame (x to the right, y
+//! *down*).
 //!
 //! ```text
 //!    ◀── drivingDirection 1, upper lanes      s = −x, left is down          y │
@@ -6,21 +7,25 @@
 //!    drivingDirection 2, lower lanes ──▶      s = +x, left is up
 //! ```
 //!
-//! - `NN_tracks.csv`: rows `frame, id, x, y, width, height, xVelocity, …, laneId`. `x`, `y` are the upper left corner
-//!   of the bounding box, `width` is the vehicle's *length*, `height` its width.
-//! - `NN_tracksMeta.csv`: class and driving direction of each vehicle, and its number of rows, which the reader checks.
+//! - `NN_tracks.csv`: rows `frame, id, x, y, width, height, xVelocity, …, laneId`. `x`, `y` are the
+//!   upper left corner of the bounding box, `width` is the vehicle's *length*, `height` its width.
+//! - `NN_tracksMeta.csv`: class and driving direction of each vehicle, and its number of rows,
+//!   which the reader checks.
 //! - `NN_recordingMeta.csv`: frame rate and the positions of the lane markings.
 //!
-//! (R. Krajewski et al., "The highD Dataset", ITSC 2018; column names as in the data set's documentation.)
+//! (R. Krajewski et al., "The highD Dataset", ITSC 2018; column names as in the data set's
+//! documentation.)
 //!
-//! **Two carriageways, one road frame.** The lower carriageway is the road. The reader turns the upper one, which is
-//! driven in the other direction, round and shifts it 1 km to the right of the lower one, so that vehicles of different
-//! carriageways never meet. Its lane numbers continue after one omitted number, which stands for the median: with three
-//! lanes each, the lanes are 1 to 3 and 5 to 7. Data of a single carriageway has lanes from 1, whichever carriageway it
-//! is.
+//! **Two carriageways, one road frame.** The lower carriageway is the road. Traffic on the upper
+//! carriageway drives in the other direction. The reader turns this carriageway round and shifts it
+//! 1 km to the right of the lower one, so that vehicles of different carriageways never meet. Its
+//! lane numbers continue after one omitted number for the median: with three lanes each, the lanes
+//! are 1 to 3 and 5 to 7. Data of a single carriageway has lanes from 1, whether it is the upper or
+//! the lower.
 //!
-//! **Lanes.** highD counts its `laneId` from the top over all areas between markings. A vehicle beside the lanes of its
-//! carriageway counts as being in the lane at that edge. Time is 0 at frame 1, the first frame.
+//! **Lanes.** highD counts its `laneId` from the top over all areas between markings. A vehicle
+//! beside the lanes of its carriageway counts as being in the lane at that edge. Time is 0 at frame
+//! 1, the first frame.
 
 use std::collections::BTreeMap;
 
@@ -39,8 +44,8 @@ use super::rows::Fields;
 use super::source::{Clock, FileInfo, Row};
 use super::text_layout::TextLayout;
 
-/// Allowed speed in the driving direction (m/s). Vehicles practically never reverse, and noise at standstill does not
-/// reach the lower bound.
+/// Allowed speed in the driving direction (m/s). Vehicles practically never reverse, and noise at
+/// standstill does not reach the lower bound.
 pub(super) const SPEED_MPS: Bounds = Bounds::closed(-1.0, 150.0);
 const VELOCITY_MPS: Bounds = Bounds::closed(-150.0, 150.0);
 const DIMENSION_M: Bounds = Bounds::above(0.0, 60.0);
@@ -169,7 +174,7 @@ impl TextLayout for HighdColumns {
                 wrong_value(text(id), format!("one of the vehicles in {}", self.meta_file)),
             ));
         };
-        vehicle.found += 1;
+        vehicle.rows_read += 1;
         let VehicleMeta { class, is_upper, .. } = *vehicle;
         let frame = integer(text(frame), "frame", allowed::FRAMES)?;
         let length_m = real(width, "width", DIMENSION_M)?;
@@ -210,11 +215,11 @@ impl TextLayout for HighdColumns {
     }
 }
 
-/// Checks that each vehicle has as many rows as the metadata states. Reports the first vehicle that has not and removes
-/// it, so that the next call reports the next one.
+/// Checks that each vehicle has as many rows as the metadata states. Reports the first vehicle with
+/// another number and removes it: the next call reports the next such vehicle.
 pub(super) fn check_row_counts(vehicles: &mut BTreeMap<u64, VehicleMeta>, meta_file: &str) -> Result<(), FieldError> {
-    let wrong = vehicles.iter().find(|(_, vehicle)| vehicle.found != vehicle.rows);
-    let Some((&number, &VehicleMeta { rows: stated, found, line, .. })) = wrong else { return Ok(()) };
+    let wrong = vehicles.iter().find(|(_, vehicle)| vehicle.rows_read != vehicle.rows);
+    let Some((&number, &VehicleMeta { rows: stated, rows_read: actual, line, .. })) = wrong else { return Ok(()) };
     vehicles.remove(&number);
-    Err(TrajectoryFileProblem::OtherCount { vehicle: number, found, stated, file: meta_file.to_owned(), line }.into())
+    Err(TrajectoryFileProblem::OtherCount { vehicle: number, actual, stated, file: meta_file.to_owned(), line }.into())
 }

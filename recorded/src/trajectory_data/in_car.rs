@@ -8,10 +8,10 @@
 //!   ── ── ── ── ── ── ──   marking      ▼
 //! ```
 //!
-//! One file contains data at two rates. Every row holds data of the inertial unit (100 Hz: position, heading,
-//! acceleration, yaw rate). Every fourth row also holds data of the vehicle bus (25 Hz: speed, and the distances to the
-//! markings that the camera measures). The bus columns are empty in the rows between two bus frames. A log that has
-//! only bus rows is accepted as well.
+//! One file contains data at two rates. Every row holds data of the inertial unit (100 Hz:
+//! position, heading, acceleration, yaw rate). Every fourth row also holds data of the vehicle bus
+//! (25 Hz: speed, and the distances to the markings that the camera measures). The bus columns are
+//! empty in the rows between two bus frames. A log that has only bus rows is accepted as well.
 //!
 //! | column | meaning | |
 //! |---|---|---|
@@ -25,11 +25,13 @@
 //! | `lane_id` | lane, counted from 1 at the left, if the vehicle knows it from a map; empty if unknown | |
 //! | `length_m`, `width_m`, `vehicle_class` | the vehicle; a typical car if absent or empty | |
 //!
-//! When the vehicle changes lanes, its centre crosses a marking: the distance to that marking falls to zero and then
-//! jumps up by a lane width, while the distance to the other one does the reverse. While the log has no `lane_id`, the
-//! reader counts lanes by these jumps, from the last known lane on. Without one, the first lane follows from `d_left_m` and the lane width.
+//! When the vehicle changes lanes, its centre crosses a marking: the distance to that marking falls
+//! to zero and then jumps up by a lane width, while the distance to the other marking does the
+//! reverse. Where the log has no `lane_id`, the reader counts lanes by these jumps, from the last
+//! known lane on. Without a map, the first lane follows from `d_left_m` and the lane width.
 //!
-//! Times within a quarter of a period of a tick of the clock are moved to that tick. A missing tick is a gap.
+//! Times within a quarter of a period of a tick of the clock are moved to that tick. A missing tick
+//! is a gap.
 
 use closecall_traffic::{Time, VehicleClass};
 
@@ -54,7 +56,8 @@ const YAW_RATE_RADPS: Bounds = Bounds::closed(-100.0, 100.0);
 /// Maximum deviation of a time from a tick of the clock, as a share of the period.
 const MAX_JITTER: f64 = 0.25;
 
-/// Minimum movement of the lane's left edge in a lane change, as a share of the lane width. Noise moves it by less.
+/// Minimum movement of the lane's left edge in a lane change, as a share of the lane width. Noise
+/// moves it by less.
 const MIN_JUMP_SHARE: f64 = 0.5;
 
 /// Plausible lane widths, given by the sum of both distances (m).
@@ -240,12 +243,13 @@ struct LaneCounter {
 }
 
 impl LaneCounter {
-    /// Replaces the counted lane by a `known` one.
-    fn correct(&mut self, known: Option<u8>) {
-        self.lane = known.map(i64::from).or(self.lane);
+    /// Replaces the counted lane by a known `lane`.
+    fn correct(&mut self, lane: Option<u8>) {
+        self.lane = lane.map(i64::from).or(self.lane);
     }
 
-    /// Returns the lane after a row with the lateral position `d_m` (m) and the distances in `seen`.
+    /// Returns the lane after a row with the lateral position `d_m` (m) and the distances in
+    /// `seen`.
     fn count(&mut self, d_m: f64, seen: MarkingDistances) -> u8 {
         if let (Some(left_m), Some(right_m)) = (seen.left_m, seen.right_m)
             && LANE_WIDTH_M.contains(&(left_m + right_m))

@@ -8,10 +8,11 @@
 //!     ●───────────●───────────●
 //! ```
 //!
-//! Lanelets that are linked as successors, or that lie side by side in the same direction, form one road. The reference
-//! line is the left bound of a chain of lanelets without a left neighbour. Of all such chains, it is the one with the
-//! largest product of length and number of lanes. It continues straight beyond both ends. A vehicle is in the lane of
-//! the lanelet that contains its centre; lanes are counted from the left. If no lanelet of the chain contains the
+//! Lanelets that are linked as successors, or that lie side by side in the same direction, form one
+//! road. The reference line is the left bound of a chain of lanelets without a left neighbour. Of
+//! all such chains, the reader takes the chain with the largest product of length and number of
+//! lanes. It continues straight beyond both ends. A vehicle is in the lane of the lanelet that
+//! contains its centre; lanes are counted from the left. If no lanelet of the chain contains the
 //! centre (on a ramp, beside the road), the vehicle is in the lane whose middle is nearest.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,7 +22,8 @@ use closecall_traffic::{Lane, maths};
 use super::markings::LaneMarkings;
 use super::reference_line::{Point, Projection, ReferenceLine};
 
-/// Distance by which each road is shifted to the right of the previous one, so that their vehicles never meet (m).
+/// Distance by which each road is shifted to the right of the previous one, so that their vehicles
+/// never meet (m).
 const SEPARATION_M: f64 = 1_000.0;
 
 /// A section of a lane.
@@ -57,7 +59,8 @@ pub(super) struct RoadPosition {
 #[derive(Clone, Debug)]
 struct Road {
     line: ReferenceLine,
-    /// Outlines of the lanelets beside the reference line, each with its lane, counted from 1 at the left.
+    /// Outlines of the lanelets beside the reference line, each with its lane, counted from 1 at
+    /// the left.
     lanes: Vec<(u8, Vec<Point>)>,
     /// Outlines of all lanelets of the road.
     outlines: Vec<Vec<Point>>,
@@ -70,13 +73,15 @@ struct Road {
 }
 
 impl Roads {
-    /// Builds the roads that `lanelets` form, the largest first. Lanelets without extent are ignored.
+    /// Builds the roads that `lanelets` form, the largest first. Lanelets without extent are
+    /// ignored.
     pub(super) fn from_lanelets(lanelets: &BTreeMap<i64, Lanelet>) -> Self {
-        let mut found: Vec<(f64, Road)> = components(lanelets).iter().filter_map(|ids| road(lanelets, ids)).collect();
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut by_length: Vec<(f64, Road)> =
+            components(lanelets).iter().filter_map(|ids| road(lanelets, ids)).collect();
+        by_length.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (mut first_lane, mut shift_m) = (0_u8, 0.0);
         let mut roads = Vec::new();
-        for (_, road) in found {
+        for (_, road) in by_length {
             let lanes = u8::try_from(road.right_edges_m.len()).unwrap_or(u8::MAX);
             let width_m = road.right_edges_m.last().copied().unwrap_or_default();
             roads.push(Road { first_lane, shift_m, ..road });
@@ -95,7 +100,8 @@ impl Roads {
         let of_road = |road: &Road| {
             let edges = road.right_edges_m.clone().into_iter().enumerate();
             let (first, shift_m) = (road.first_lane, road.shift_m);
-            // The left edge of a later road's first lane is stored as the right edge of the omitted lane before it.
+            // The left edge of a later road's first lane is stored as the right edge of the omitted
+            // lane before it.
             let left = (first > 0).then_some((Lane(first), shift_m));
             let lane = move |k: usize| Lane(first.saturating_add(u8::try_from(k + 1).unwrap_or(u8::MAX)));
             left.into_iter().chain(edges.map(move |(k, edge_m)| (lane(k), shift_m + edge_m))).collect::<Vec<_>>()
@@ -103,8 +109,9 @@ impl Roads {
         LaneMarkings::from_right_edges(self.roads.iter().flat_map(of_road))
     }
 
-    /// Returns the index of the road on which a vehicle at `point` with `heading_rad` drives. The ranking prefers roads
-    /// with the same driving direction, then roads with a lanelet at the point, then the nearest reference line.
+    /// Returns the index of the road on which a vehicle at `point` with `heading_rad` drives. The
+    /// ranking prefers roads with the same driving direction, then roads with a lanelet at the
+    /// point, then the nearest reference line.
     pub(super) fn road_at(&self, point: Point, heading_rad: f64) -> usize {
         let rank = |road: &Road| {
             let on = road.line.project(point);
@@ -170,8 +177,8 @@ fn components(lanelets: &BTreeMap<i64, Lanelet>) -> Vec<BTreeSet<i64>> {
     components
 }
 
-/// Builds the road of one group of lanelets. Also returns its size, which is length times number of lanes. Returns
-/// `None` if no lanelet has an extent.
+/// Builds the road of one group of lanelets. Also returns its size, which is length times number of
+/// lanes. Returns `None` if no lanelet has an extent.
 fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, Road)> {
     let leftmost = |id: &&i64| lanelets.get(id).is_some_and(|lanelet| lanelet.left_id.is_none());
     let chains = ids.iter().filter(leftmost).map(|id| chain(lanelets, *id));
@@ -209,14 +216,14 @@ fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// Returns the chain of lanelets that starts with `id`. Each next lanelet is a successor without a left neighbour; the
-/// chain ends where there is none.
+/// Returns the chain of lanelets that starts with `id`. Each next lanelet is a successor without a
+/// left neighbour; the chain ends where there is none.
 fn chain(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<i64> {
     let (mut chain, mut current) = (vec![id], id);
     while let Some(lanelet) = lanelets.get(&current) {
-        let known = |id: &&i64| lanelets.contains_key(id) && !chain.contains(id);
+        let is_new = |id: &&i64| lanelets.contains_key(id) && !chain.contains(id);
         let is_leftmost = |id: &&i64| lanelets.get(id).is_some_and(|next| next.left_id.is_none());
-        let mut next = lanelet.successors.iter().filter(known).filter(is_leftmost);
+        let mut next = lanelet.successors.iter().filter(is_new).filter(is_leftmost);
         let Some(next) = next.next() else { break };
         chain.push(*next);
         current = *next;
@@ -226,15 +233,15 @@ fn chain(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<i64> {
 
 /// Returns the lanelets side by side from `id` to the right.
 fn side_by_side(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<&Lanelet> {
-    let (mut seen, mut found, mut current) = (BTreeSet::new(), Vec::new(), Some(id));
+    let (mut seen, mut abreast, mut current) = (BTreeSet::new(), Vec::new(), Some(id));
     while let Some((id, lanelet)) = current.and_then(|id| Some((id, lanelets.get(&id)?))) {
         if !seen.insert(id) {
             break;
         }
-        found.push(lanelet);
+        abreast.push(lanelet);
         current = lanelet.right_id;
     }
-    found
+    abreast
 }
 
 /// Returns the reference line along the left bounds of a chain.
@@ -248,7 +255,8 @@ fn outline(lanelet: &Lanelet) -> Vec<Point> {
     lanelet.left.iter().chain(lanelet.right.iter().rev()).copied().collect()
 }
 
-/// Returns `true` if `point` lies within the outline: a ray from it crosses the outline an odd number of times.
+/// Returns `true` if `point` lies within the outline: a ray from it crosses the outline an odd
+/// number of times.
 fn contains(outline: &[Point], (x, y): Point) -> bool {
     let ends = outline.iter().skip(1).chain(outline.first());
     let crosses =

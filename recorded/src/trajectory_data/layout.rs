@@ -27,13 +27,15 @@ const NGSIM_COLUMNS: usize = 18;
 /// Minimum number of known column names for a first line to count as a header of that layout.
 const MIN_KNOWN_NAMES: usize = 4;
 
-/// Minimum number of column names unique to one layout for a first line to count as a header of that layout.
+/// Minimum number of column names unique to one layout for a first line to count as a header of
+/// that layout.
 const MIN_OWN_NAMES: usize = 2;
 
 /// Maximum length of the first line's beginning that an error message repeats (characters).
 const MAX_SHOWN_CHARS: usize = 40;
 
-/// Returns `true` if `line` is the header of a highD or exiD tracks file, which needs metadata files.
+/// Returns `true` if `line` is the header of a highD or exiD tracks file, which needs metadata
+/// files.
 pub(super) fn is_drone_header(line: &str) -> bool {
     Header::parse(line).is_ok_and(|(header, ..)| is_highd(&header) || is_exid(&header))
 }
@@ -81,12 +83,12 @@ pub(super) fn recognise(line: &str) -> Result<Format, TrajectoryFileProblem> {
     Err(TrajectoryFileProblem::UnknownLayout { columns: width, start: line.chars().take(MAX_SHOWN_CHARS).collect() })
 }
 
-/// Returns `true` if `header` is that of highD's tracks file.
+/// Returns `true` if `header` is the header of highD's tracks file.
 fn is_highd(header: &Header) -> bool {
     header.count(&HighdColumns::OWN_NAMES) >= MIN_OWN_NAMES
 }
 
-/// Returns `true` if `header` is that of exiD's tracks file.
+/// Returns `true` if `header` is the header of exiD's tracks file.
 fn is_exid(header: &Header) -> bool {
     header.count(&["xCenter", "yCenter", "lonVelocity", "laneletId"]) >= MIN_OWN_NAMES
 }

@@ -6,21 +6,23 @@ use std::ops::RangeInclusive;
 use closecall_traffic::{Lane, Trajectory};
 use serde::Serialize;
 
-/// Lane width if the data gives none (m). It is the usual width on motorways in built-up areas and lies between NGSIM's
-/// 3.4 m and the 3.75 m of motorways outside of them.
+/// Lane width if the data gives none (m). It is the usual width on motorways in built-up areas and
+/// lies between NGSIM's 3.4 m and the 3.75 m of motorways outside of them.
 pub const DEFAULT_LANE_WIDTH_M: f64 = 3.5;
 
-/// Lane widths that roads have (m): from the narrow lanes at roadworks, 2.5 m, to single-lane ramps, 5.5 m. The lanes of
-/// motorways are 3.25 to 3.75 m wide.
+/// Lane widths that roads have (m): from the narrow lanes at roadworks, 2.5 m, to single-lane
+/// ramps, 5.5 m. The lanes of motorways are 3.25 to 3.75 m wide.
 pub const LANE_WIDTHS_M: RangeInclusive<f64> = 2.5..=5.5;
 
 /// Lateral positions of lane markings.
 ///
-/// A marking lies where the recorded lane of vehicles changes to the adjacent lane. Its position is the median over all
-/// such changes, each taken halfway between its two frames. The left edge of lane 1 is d = 0 by definition.
+/// A marking lies where the recorded lane of vehicles changes to the adjacent lane. Its position is
+/// the median over all such changes, each taken halfway between its two frames. The left edge of
+/// lane 1 is d = 0 by definition.
 ///
-/// Vehicles that merge give positions beside the marking. Therefore only markings are used that leave lanes of
-/// [`LANE_WIDTHS_M`] between them: of all such sets, the one with the most changes of lane.
+/// Vehicles that merge give positions beside the marking. Therefore only markings are used that
+/// leave lanes of [`LANE_WIDTHS_M`] between them: of all such sets, the reader uses the set with
+/// the most changes of lane.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LaneMarkings {
     /// Right edge of each lane (m), by lane number.
@@ -117,25 +119,28 @@ impl LaneMarkings {
         &self.ignored
     }
 
-    /// Returns the lateral position of the marking to the right of `lane` (m), or `None` if it is unknown.
+    /// Returns the lateral position of the marking to the right of `lane` (m), or `None` if it is
+    /// unknown.
     pub fn right_edge_m(&self, lane: Lane) -> Option<f64> {
         self.right_edge_m.get(&lane.0).copied()
     }
 
-    /// Returns the lateral position of the marking to the left of `lane` (m), or `None` if it is unknown.
+    /// Returns the lateral position of the marking to the left of `lane` (m), or `None` if it is
+    /// unknown.
     pub fn left_edge_m(&self, lane: Lane) -> Option<f64> {
         if lane.0 == 1 { Some(0.0) } else { self.right_edge_m(Lane(lane.0.checked_sub(1)?)) }
     }
 
-    /// Returns the width of `lane` (m), or `None` unless both of its markings are known and it lies in
-    /// [`LANE_WIDTHS_M`].
+    /// Returns the width of `lane` (m), or `None` unless both of its markings are known and it lies
+    /// in [`LANE_WIDTHS_M`].
     pub fn lane_width_m(&self, lane: Lane) -> Option<f64> {
         let width = self.left_edge_m(lane)? - self.right_edge_m(lane)?;
         LANE_WIDTHS_M.contains(&width).then_some(width)
     }
 
-    /// Returns the median width of the lanes between neighbouring known markings (m), or [`DEFAULT_LANE_WIDTH_M`] if
-    /// there are none. Lanes between which no marking is known share their width.
+    /// Returns the median width of the lanes between neighbouring known markings (m), or
+    /// [`DEFAULT_LANE_WIDTH_M`] if there are none. Lanes between which no marking is known share
+    /// their width.
     pub fn typical_lane_width_m(&self) -> f64 {
         let edges = std::iter::once((0, 0.0)).chain(self.right_edge_m.iter().map(|(lane, d_m)| (*lane, *d_m)));
         let edges: Vec<(u8, f64)> = edges.collect();
@@ -148,8 +153,9 @@ impl LaneMarkings {
     }
 }
 
-/// Returns, for each of the markings from left to right, whether it belongs to the set with the most lane changes in
-/// which all neighbours fit. Of two such sets the larger one is taken, then the one further left.
+/// Returns, for each of the markings from left to right, whether it belongs to the set with the
+/// most lane changes in which all neighbours fit. Of two such sets the larger one counts; if both
+/// are equal, the set further left.
 fn best_chain(observed: &[Observed]) -> Vec<bool> {
     /// The best set that ends with a marking.
     #[derive(Clone, Copy)]
@@ -223,7 +229,8 @@ mod tests {
 
     #[test]
     fn the_wrong_one_of_two_markings_is_ignored_wherever_it_is() {
-        // The first marking is wrong, and one lane change shows it; the later ones agree with each other.
+        // The first marking is wrong, and one lane change shows it; the later lane changes agree
+        // with each other.
         let tracks = [(1, -5.2), (2, -7.0), (2, -7.1), (3, -10.5)].map(|(lane, d)| crossing(lane, d));
         let markings = LaneMarkings::from_trajectories(&tracks);
         assert_eq!((markings.right_edge_m(Lane(1)), markings.right_edge_m(Lane(3))), (None, Some(-10.5)));

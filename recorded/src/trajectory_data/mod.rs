@@ -5,8 +5,8 @@
 //!                           (one line or element at a time)          (in memory: incomplete ones)     (all tracks)
 //! ```
 //!
-//! The content of a file determines its layout; the file's name does not. `docs/reference/trajectory-data.md` describes all
-//! layouts for users:
+//! The content of a file determines its layout; the file's name does not.
+//! `docs/reference/trajectory-data.md` describes all layouts for users:
 //!
 //! | layout | content | module |
 //! |---|---|---|
@@ -18,32 +18,36 @@
 //!
 //! # What the readers do
 //!
-//! - They convert units to SI. `d` is positive to the left and 0 at the left edge of the leftmost lane. NGSIM's
-//!   `Local_Y` is the middle of the front bumper, so the reader subtracts half the vehicle length to get the centre of
-//!   the box. `Local_X` stays as it is: during a lane change at a heading of 0.05 rad, the front is 0.1 m beside the
-//!   centre, which is below NGSIM's own accuracy.
+//! - They convert units to SI. `d` is positive to the left and 0 at the left edge of the leftmost
+//!   lane. NGSIM's `Local_Y` is the middle of the front bumper, so the reader subtracts half the
+//!   vehicle length to get the centre of the box. `Local_X` stays as it is: during a lane change at
+//!   a heading of 0.05 rad, the front is 0.1 m beside the centre, which is below NGSIM's own
+//!   accuracy.
 //! - They take the step between two frames from the rows: a file may hold every second frame.
-//! - They bridge gaps of at most half a second, and split the rows of a vehicle at longer gaps and at movements that no
-//!   vehicle makes, because NGSIM and others reuse vehicle numbers ([`Continuity`]). The first piece keeps the vehicle's
-//!   number; later pieces add multiples of [`PIECE_STRIDE`] to it.
-//! - The catalogue's export joins several data sets of one location in which vehicle numbers recur. The reader tells
-//!   them apart by the time of frame 0. If their clocks overlap, it shifts them one behind the other, so that their
-//!   vehicles never meet. (Files longer than [`WINDOW_ROWS`] rows are not shifted, because their time spans are unknown
-//!   before the end of the file.)
-//! - NGSIM times are in milliseconds. If they count from 1970, the reader counts them from the first instant instead.
-//! - Finite differences between neighbouring frames supply the quantities that a layout lacks: lateral speed, lateral
-//!   acceleration, and the acceleration if its field is empty.
-//! - A vehicle class that the reader does not know is read as the nearest known one, and counted
-//!   ([`Tracks::unknown_classes`]).
-//! - The readers reject everything else with line, column and allowed values, including mixed-up units and columns
-//!   (`plausible`). They neither guess nor repair. They skip and count unusable rows only if the caller asks for it
-//!   ([`BadRows::Skip`]).
+//! - They bridge gaps of at most half a second, and split the rows of a vehicle at longer gaps and
+//!   at movements that no vehicle makes, because NGSIM and others reuse vehicle numbers
+//!   ([`Continuity`]). The first piece keeps the vehicle's number; later pieces add multiples of
+//!   [`PIECE_STRIDE`] to it.
+//! - The catalogue's export joins several data sets of one location in which vehicle numbers recur.
+//!   The reader tells them apart by the time of frame 0. If their clocks overlap, it shifts one
+//!   behind the other: their vehicles never meet. (Files longer than [`WINDOW_ROWS`] rows are not
+//!   shifted, because their time spans are unknown before the end of the file.)
+//! - NGSIM times are in milliseconds. If they count from 1970, the reader counts them from the
+//!   first instant instead.
+//! - Finite differences between neighbouring frames supply the quantities that a layout lacks:
+//!   lateral speed, lateral acceleration, and the acceleration if its field is empty.
+//! - A vehicle class that the reader does not know counts as the nearest known class, and the
+//!   reader counts such names ([`Tracks::unknown_classes`]).
+//! - The readers reject everything else with line, column and allowed values, including mixed-up
+//!   units and columns (`plausible`). They neither guess nor repair. They skip and count unusable
+//!   rows only if the caller asks for it ([`BadRows::Skip`]).
 //!
 //! # Memory
 //!
-//! [`open`] yields complete tracks one by one. It holds the rows of incomplete tracks and some dozen bytes per vehicle.
-//! Therefore, files longer than [`WINDOW_ROWS`] rows must be sorted by vehicle or by time; see `order`. [`read`] holds
-//! the whole file, in any row order: criticality needs all of it, because every vehicle may be an opponent.
+//! [`open`] yields complete tracks one by one. It holds the rows of incomplete tracks and some
+//! dozen bytes per vehicle. Therefore, files longer than [`WINDOW_ROWS`] rows must be sorted by
+//! vehicle or by time; see `order`. [`read`] holds the whole file, in any row order: criticality
+//! needs all of it, because every vehicle may be an opponent.
 
 mod assemble;
 mod axes;

@@ -1,5 +1,5 @@
-//! The layout of NGSIM: feet, feet per second, milliseconds. The reference point of a vehicle is the middle of its
-//! front bumper.
+//! The layout of NGSIM: feet, feet per second, milliseconds. The reference point of a vehicle is
+//! the middle of its front bumper.
 
 use closecall_traffic::{Time, VehicleClass};
 
@@ -114,7 +114,7 @@ impl NgsimColumns {
         })
     }
 
-    /// Returns `true` if the columns are those of the catalogue's export.
+    /// Returns `true` if the columns are the columns of the catalogue's export.
     fn is_export(&self) -> bool {
         self.location.is_some()
     }
@@ -169,7 +169,7 @@ impl TextLayout for NgsimColumns {
 
 fn class(text: &str) -> Result<VehicleClass, FieldError> {
     let code = integer(text, "v_Class", (1, 3));
-    let named = code.ok().and_then(|code| CLASSES.into_iter().find(|(known, _)| *known == code));
+    let named = code.ok().and_then(|code| CLASSES.into_iter().find(|(listed, _)| *listed == code));
     named.map(|(_, class)| class).ok_or_else(|| {
         FieldError::at("v_Class", wrong_value(text, "one of 1 (motorcycle), 2 (car), 3 (truck)".to_owned()))
     })

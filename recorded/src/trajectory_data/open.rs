@@ -37,7 +37,8 @@ const SUMO: &[u8] = b"<fcd-export";
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see [`WINDOW_ROWS`].
+/// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see
+/// [`WINDOW_ROWS`].
 ///
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
@@ -62,8 +63,8 @@ pub fn read_with(path: &Path, options: ReadOptions) -> Result<TrajectoryData, Tr
     Ok(TrajectoryData { lanes: options.lanes, ..data })
 }
 
-/// Reads trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
-/// name.
+/// Reads trajectory data that consists of one file from any byte source. `path` appears in errors
+/// and supplies the name.
 ///
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with line, column and allowed values.
@@ -71,8 +72,8 @@ pub fn read_from(source: impl Read, path: &Path) -> Result<TrajectoryData, Traje
     open_from(source, path, ReadOptions::default(), usize::MAX)?.collect_all()
 }
 
-/// Opens trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
-/// name. Data of more than `window` rows must be sorted by vehicle or by time.
+/// Opens trajectory data that consists of one file from any byte source. `path` appears in errors
+/// and supplies the name. Data of more than `window` rows must be sorted by vehicle or by time.
 ///
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with line, column and allowed values.
@@ -118,10 +119,10 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
 
 /// Rejects a file whose layout differs from the required one.
 fn check_choice(source: &dyn RowSource, options: &ReadOptions) -> Result<(), ReadError> {
-    let found = source.info().layout;
+    let actual = source.info().layout;
     match options.layout {
-        Some(choice) if !choice.includes(found) => {
-            Err(ReadError::of_file(TrajectoryFileProblem::OtherLayout { found, asked: choice.name() }))
+        Some(choice) if !choice.includes(actual) => {
+            Err(ReadError::of_file(TrajectoryFileProblem::OtherLayout { actual, asked: choice.name() }))
         }
         _ => Ok(()),
     }
@@ -133,16 +134,16 @@ fn reader_for<'a>(
     options: &ReadOptions,
 ) -> Result<Box<dyn RowSource + 'a>, ReadError> {
     let start = input.fill_buf().map_err(|error| ReadError::of_file(io_problem(error)))?;
-    if let Some((_, what)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
-        return Err(ReadError::of_file(TrajectoryFileProblem::Archive { what }));
+    if let Some((_, kind)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Archive { kind }));
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
-    if let Some((_, what)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning)) {
-        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
+    if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning)) {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
     if text.starts_with(b"<") && text.windows(SUMO.len()).any(|window| window == SUMO) {
-        let what = "floating car data (FCD) of SUMO";
-        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { what }));
+        let kind = "floating car data (FCD) of SUMO";
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
     let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
         Box::new(CommonRoadSource::new(input)?)

@@ -1,4 +1,4 @@
-//! The order of a file's rows, and what it means for memory use.
+//! The order of a file's rows, and its effect on the use of memory.
 //!
 //! | order | rows held in memory |
 //! |---|---|
@@ -6,8 +6,9 @@
 //! | by vehicle: the rows of one vehicle are consecutive | those of one vehicle |
 //! | by time: no row is earlier than the one before | those of the vehicles on the road at that time |
 //!
-//! NGSIM's original files and highD's are sorted by vehicle. The reader rejects longer unsorted files, with the line at
-//! which the order breaks: sorting them needs disk space, and `sort` does that better.
+//! NGSIM's original files and highD's are sorted by vehicle. The reader rejects longer unsorted
+//! files, with the line at which the order breaks: sorting them needs disk space, and `sort` does
+//! that better.
 
 use std::collections::BTreeMap;
 
@@ -19,9 +20,9 @@ use super::source::{ReadError, Row};
 
 /// Maximum number of rows of an unsorted file.
 ///
-/// In a longer file, the first rows up to this number determine the period, the start time, the lane markings and
-/// whether the numbers are plausible. They cover about an hour of traffic at one vehicle per second, each recorded for
-/// 30 s at 10 Hz.
+/// In a longer file, the first rows up to this number determine the period, the start time, the
+/// lane markings and whether the numbers are plausible. They cover about an hour of traffic at one
+/// vehicle per second, each recorded for 30 s at 10 Hz.
 pub const WINDOW_ROWS: usize = 1 << 20;
 
 /// The order of the rows in a file that is longer than the window.
@@ -31,7 +32,8 @@ pub(super) enum Order {
     Time,
 }
 
-/// Determines the order of `rows`. If neither order holds, returns the error of the order that breaks later.
+/// Determines the order of `rows`. If neither order holds, returns the error of the order that
+/// breaks later.
 pub(super) fn order_of(rows: &[Row], clock: FrameClock) -> Result<Order, ReadError> {
     let mut by_vehicle = VehicleOrder::default();
     let vehicle_breaks = rows.iter().find_map(|row| by_vehicle.check(row, clock).err());
@@ -52,8 +54,8 @@ pub(super) struct VehicleOrder {
 }
 
 impl VehicleOrder {
-    /// Checks the next row. A vehicle number may recur later, but its track must not continue after rows of other
-    /// vehicles.
+    /// Checks the next row. A vehicle number may recur later, but its track must not continue after
+    /// rows of other vehicles.
     pub(super) fn check(&mut self, row: &Row, clock: FrameClock) -> Result<(), ReadError> {
         let unsorted = || {
             let problem = TrajectoryFileProblem::NotByVehicle { vehicle: row.number, rows: WINDOW_ROWS };

@@ -33,14 +33,15 @@ pub(super) const HEADER: [&str; 17] = [
     "source_scenario",
 ];
 
-/// Allowed values of each column. The ranges exceed what any road vehicle reaches, so that only a broken file violates
-/// them.
+/// Allowed values of each column. The ranges exceed what any road vehicle reaches, so that only a
+/// broken file violates them.
 pub(super) mod allowed {
     use super::Bounds;
 
-    /// Numbers of vehicles. Higher numbers are those of the pieces of split tracks.
+    /// Numbers of vehicles. Higher numbers belong to the pieces of split tracks.
     pub(in super::super) const IDS: (i64, i64) = (0, 999_999_999_999);
-    /// Numbers of tracks. They include the numbers of pieces, because files that Closecall writes contain pieces.
+    /// Numbers of tracks. They include the numbers of pieces, because files that Closecall writes
+    /// contain pieces.
     pub(in super::super) const TRACKS: (i64, i64) = (0, 9_000_000_000_000_000);
     pub(in super::super) const FRAMES: (i64, i64) = (0, 1_000_000_000);
     pub(in super::super) const LANES: (i64, i64) = (0, 255);
@@ -70,7 +71,8 @@ pub(super) struct PlainColumns {
     class: usize,
     vehicle: Option<usize>,
     data: Option<usize>,
-    /// Columns that are only validated: the lateral position gives the heading, and s and d give the position.
+    /// Columns that are only validated: the lateral position gives the heading, and s and d give
+    /// the position.
     validated_only: Vec<(usize, &'static str, Bounds)>,
     unknown_classes: UnknownClasses,
 }

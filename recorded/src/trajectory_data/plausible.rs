@@ -1,7 +1,7 @@
 //! Plausibility check that detects mixed-up units and columns in trajectory data.
 //!
-//! A single number may be odd, and many of NGSIM's are. The check therefore judges medians over the beginning of the
-//! file.
+//! A single number may be odd, and many of NGSIM's are. The check therefore judges medians over the
+//! beginning of the file.
 //!
 //! | quantity | plausible | detects |
 //! |---|---|---|
@@ -18,7 +18,8 @@ use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
 use super::source::{ReadError, Row};
 
-/// Minimum speed of a vehicle for its steps to count (m/s). At lower speeds, position noise hides a wrong unit.
+/// Minimum speed of a vehicle for its steps to count (m/s). At lower speeds, position noise hides a
+/// wrong unit.
 const MIN_SPEED_MPS: f64 = 5.0;
 
 /// Minimum number of steps between frames for their median to be judged.
@@ -27,23 +28,28 @@ const MIN_STEPS: usize = 10;
 /// Rejects rows whose medians are implausible for road traffic.
 pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(), ReadError> {
     let cars = || rows.iter().filter(|row| row.class == VehicleClass::Car);
-    // In-car logs need not state the size of their vehicle, and that single vehicle may have any size.
+    // In-car logs need not state the size of their vehicle, and that single vehicle may have any
+    // size.
     if layout != Layout::InCar {
         let lengths = cars().map(|row| (row.length_m, row.line)).collect();
-        check_median(lengths, (2.0, 12.0), ("the median length of cars", "m", "2 to 12 m"))?;
+        let plausible =
+            Plausible { quantity: "the median length of cars", unit: "m", range: (2.0, 12.0), allowed: "2 to 12 m" };
+        check_median(lengths, plausible)?;
         let widths = cars().map(|row| (row.width_m, row.line)).collect();
-        check_median(widths, (1.0, 3.0), ("the median width of cars", "m", "1 to 3 m"))?;
+        let plausible =
+            Plausible { quantity: "the median width of cars", unit: "m", range: (1.0, 3.0), allowed: "1 to 3 m" };
+        check_median(widths, plausible)?;
     }
     let steps = steps(rows, clock);
     if steps.len() < MIN_STEPS {
         return Ok(());
     }
-    let what = "the median distance between two frames, as a share of what the recorded speed makes,";
-    check_median(steps, (0.6, 1.6), (what, "", "0.6 to 1.6"))
+    let quantity = "the median distance between two frames, as a share of what the recorded speed makes,";
+    check_median(steps, Plausible { quantity, unit: "", range: (0.6, 1.6), allowed: "0.6 to 1.6" })
 }
 
-/// Returns, for each step between two frames, the travelled distance as a share of what the speed predicts, and the
-/// line of the later row.
+/// Returns, for each step between two frames, the travelled distance as a share of what the speed
+/// predicts, and the line of the later row.
 fn steps(rows: &[Row], clock: FrameClock) -> Vec<(f64, u64)> {
     let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
     let mut steps = Vec::new();
@@ -58,12 +64,19 @@ fn steps(rows: &[Row], clock: FrameClock) -> Vec<(f64, u64)> {
     steps
 }
 
-/// Rejects `values` if their median lies outside `low..=high`. The error names the line of the median.
-fn check_median(
-    mut values: Vec<(f64, u64)>,
-    (low, high): (f64, f64),
-    (what, unit, allowed): (&'static str, &str, &'static str),
-) -> Result<(), ReadError> {
+/// A median, as the error names it, and its plausible range.
+struct Plausible {
+    quantity: &'static str,
+    unit: &'static str,
+    range: (f64, f64),
+    /// The range as text.
+    allowed: &'static str,
+}
+
+/// Rejects `values` if their median lies outside the plausible range. The error names the line of
+/// the median.
+fn check_median(mut values: Vec<(f64, u64)>, plausible: Plausible) -> Result<(), ReadError> {
+    let Plausible { quantity, unit, range: (low, high), allowed } = plausible;
     if values.is_empty() {
         return Ok(());
     }
@@ -72,6 +85,6 @@ fn check_median(
     if median >= low && median <= high {
         return Ok(());
     }
-    let found = format!("{median:.3} {unit}").trim_end().to_owned();
-    Err(ReadError::new(line, TrajectoryFileProblem::Implausible { what, found, allowed }))
+    let actual = format!("{median:.3} {unit}").trim_end().to_owned();
+    Err(ReadError::new(line, TrajectoryFileProblem::Implausible { quantity, actual, allowed }))
 }

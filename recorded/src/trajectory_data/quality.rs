@@ -1,4 +1,4 @@
-//! FlawCounts of trajectory data: its flaws are counted, each with the location of the first one.
+//! Flaws of trajectory data: the number of each kind, and the location of its first occurrence.
 //!
 //! | flaw | what counts |
 //! |---|---|
@@ -10,9 +10,9 @@
 //!
 //! [`SkippedRows`](super::SkippedRows) holds the rows that could not be used at all.
 //!
-//! The inspector examines tracks one by one. To find overlaps it stores the positions of the latest 4 million track
-//! points. If a file is sorted by vehicle and a later track begins before the stored positions, the track points before
-//! them count as unchecked.
+//! The inspector examines tracks one by one. To find overlaps it stores the positions of the latest
+//! 4 million track points. If a file is sorted by vehicle and a later track begins before the
+//! stored positions, the track points before them count as unchecked.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +21,8 @@ use serde::Serialize;
 
 use super::data::{RecordedTrack, TrajectoryData};
 
-/// Maximum difference between the speed of a step along the road and the recorded speed (m/s). At 10 Hz, it amounts to a
-/// metre per step.
+/// Maximum difference between the speed of a step along the road and the recorded speed (m/s). At
+/// 10 Hz, it amounts to a metre per step.
 const JUMP_MPS: f64 = 10.0;
 
 /// Maximum lateral speed of a step (m/s). Lane changes stay below 2 m/s.
@@ -34,8 +34,8 @@ const JUMP_M: f64 = 0.5;
 /// Maximum acceleration or deceleration of a vehicle on tyres (m/s²).
 const IMPOSSIBLE_MPS2: f64 = 12.0;
 
-/// Minimum difference between two speeds that counts (m/s). At high rates, smaller ones say nothing about the
-/// acceleration.
+/// Minimum difference between two speeds that counts (m/s). At high rates, smaller differences say
+/// nothing about the acceleration.
 const SPEED_STEP_MPS: f64 = 0.5;
 
 /// Maximum difference between the recorded sizes of one vehicle (m).
@@ -90,7 +90,8 @@ pub struct Flaw {
     pub first: Option<FlawLocation>,
 }
 
-/// The flaws of trajectory data, by kind. The documentation of the `quality` module defines the kinds.
+/// The flaws of trajectory data, by kind. The documentation of the `quality` module defines the
+/// kinds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Flaws {
     /// Missing frames between two pieces of a track.
@@ -207,8 +208,8 @@ impl QualityInspector {
         }
         for (k, point) in track.points.iter().enumerate() {
             if !(point.acceleration_mps2.abs() <= IMPOSSIBLE_MPS2) {
-                let what = || format!("{:.1} m/s² recorded", point.acceleration_mps2);
-                self.flaws.accelerations.record(lines.get(k).copied(), track.track_id, point.time, what);
+                let description = || format!("{:.1} m/s² recorded", point.acceleration_mps2);
+                self.flaws.accelerations.record(lines.get(k).copied(), track.track_id, point.time, description);
             }
             self.check_overlaps(track, point, lines.get(k).copied());
         }
@@ -238,8 +239,9 @@ impl QualityInspector {
         let is_out_of_reach = !(travelled_m >= -JUMP_M && travelled_m <= REACH_MPS * missing_s.abs() + JUMP_M);
         if other || is_out_of_reach {
             let why = if other { "has another class or size than" } else { "is out of reach of" };
-            let what = || format!("vehicle {} {why} the one of this number {missing_s:.1} s before", track.vehicle_id);
-            self.flaws.reused_numbers.record(line, track.track_id, first.time, what);
+            let description =
+                || format!("vehicle {} {why} the one of this number {missing_s:.1} s before", track.vehicle_id);
+            self.flaws.reused_numbers.record(line, track.track_id, first.time, description);
         }
     }
 
@@ -250,15 +252,15 @@ impl QualityInspector {
         let (along_m, across_m) = (point.s_m - before.s_m - speed_mps * step_s, point.d_m - before.d_m);
         let is_jump = |off_m: f64, limit_mps: f64| !(off_m.abs() <= (limit_mps * step_s).max(JUMP_M));
         if is_jump(along_m, JUMP_MPS) || is_jump(across_m, SIDEWAYS_JUMP_MPS) {
-            let what = || format!("{along_m:.2} m along and {across_m:.2} m across beside what its speed makes");
-            self.flaws.jumps.record(line, track_id, point.time, what);
+            let description = || format!("{along_m:.2} m along and {across_m:.2} m across beside what its speed makes");
+            self.flaws.jumps.record(line, track_id, point.time, description);
         }
         let change_mps = point.speed_mps - before.speed_mps;
         if !(change_mps.abs() <= (IMPOSSIBLE_MPS2 * step_s).max(SPEED_STEP_MPS))
             && point.acceleration_mps2.abs() <= IMPOSSIBLE_MPS2
         {
-            let what = || format!("from {:.1} to {:.1} m/s in {step_s:.3} s", before.speed_mps, point.speed_mps);
-            self.flaws.accelerations.record(line, track_id, point.time, what);
+            let description = || format!("from {:.1} to {:.1} m/s in {step_s:.3} s", before.speed_mps, point.speed_mps);
+            self.flaws.accelerations.record(line, track_id, point.time, description);
         }
     }
 
@@ -270,15 +272,15 @@ impl QualityInspector {
         }
         let half_m = 0.5 * track.dimensions.length_m;
         let (from_m, to_m) = (point.s_m - half_m, point.s_m + half_m);
-        let here = OccupiedSpan { lane: point.lane.0, from_m, to_m, track_id: track.track_id };
+        let span = OccupiedSpan { lane: point.lane.0, from_m, to_m, track_id: track.track_id };
         let others = self.occupied.entry(point.time).or_default();
-        for other in others.iter().filter(|other| other.lane == here.lane && other.from_m < to_m && from_m < other.to_m)
+        for other in others.iter().filter(|other| other.lane == span.lane && other.from_m < to_m && from_m < other.to_m)
         {
             let overlap_m = to_m.min(other.to_m) - from_m.max(other.from_m);
-            let what = || format!("overlaps track {} by {overlap_m:.2} m in lane {}", other.track_id, here.lane);
-            self.flaws.overlaps.record(line, track.track_id, point.time, what);
+            let description = || format!("overlaps track {} by {overlap_m:.2} m in lane {}", other.track_id, span.lane);
+            self.flaws.overlaps.record(line, track.track_id, point.time, description);
         }
-        others.push(here);
+        others.push(span);
         self.stored_points += 1;
         while self.stored_points > MAX_STORED_POINTS
             && let Some((time, discarded)) = self.occupied.pop_first()
@@ -290,11 +292,11 @@ impl QualityInspector {
 }
 
 impl Flaw {
-    /// Counts a flaw and keeps the first one.
-    fn record(&mut self, line: Option<u64>, track_id: u64, time: Time, what: impl FnOnce() -> String) {
+    /// Counts a flaw and keeps the first flaw.
+    fn record(&mut self, line: Option<u64>, track_id: u64, time: Time, description: impl FnOnce() -> String) {
         self.count += 1;
         if self.first.is_none() {
-            self.first = Some(FlawLocation { line, track_id, time_s: time.s(), what: what() });
+            self.first = Some(FlawLocation { line, track_id, time_s: time.s(), what: description() });
         }
     }
 }
@@ -312,7 +314,7 @@ mod tests {
         piece.vehicle_id = 2;
         let close = straight_track(4, 3.0, 20.0, -1.75, 4);
         let data = trajectory_data_of(vec![straight_track(1, 0.0, 20.0, -1.75, 10), jumping, piece, close]);
-        let found = count_flaws(&data);
+        let flaws = count_flaws(&data);
         let expected = FlawCounts {
             tracks: 4,
             vehicles: 3,
@@ -324,7 +326,7 @@ mod tests {
             // The piece starts 100 m behind vehicle 2, at the same time.
             reused_numbers: 1,
         };
-        assert_eq!(found, expected);
+        assert_eq!(flaws, expected);
     }
 
     #[test]
@@ -352,7 +354,7 @@ mod tests {
     fn a_lane_change_is_not_a_flaw() {
         let track =
             crate::trajectory_data::test_support::changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 3.0), 150);
-        let found = count_flaws(&trajectory_data_of(vec![track]));
-        assert_eq!((found.jumps, found.accelerations, found.gaps), (0, 0, 0));
+        let flaws = count_flaws(&trajectory_data_of(vec![track]));
+        assert_eq!((flaws.jumps, flaws.accelerations, flaws.gaps), (0, 0, 0));
     }
 }

@@ -7,10 +7,11 @@
 //!   ●─────────────●───┴──────────●
 //! ```
 //!
-//! At a kink, the nearest position of a polyline jumps for points on the inner side, and stands still for points on the
-//! outer side. Therefore the normal of the line turns linearly along each segment, between the bisectors of the kinks at
-//! its ends. (E. Héry, S. Masi, P. Xu, P. Bonnifait, "Map-based curvilinear coordinates for autonomous vehicles",
-//! ITSC 2017.) Points so far inside a bend that normals cross get the nearest position instead.
+//! At a kink, the nearest position of a polyline jumps for points on the inner side, and does not
+//! move for points on the outer side. Therefore the normal of the line turns linearly along each
+//! segment, between the bisectors of the kinks at its ends. (E. Héry, S. Masi, P. Xu, P. Bonnifait,
+//! "Map-based curvilinear coordinates for autonomous vehicles", ITSC 2017.) Far inside a bend,
+//! normals cross; points there get the nearest position instead.
 
 use closecall_traffic::maths;
 
@@ -20,10 +21,12 @@ pub(super) type Point = (f64, f64);
 /// Maximum distance at which two points count as one (m).
 const SAME_POINT_M: f64 = 1e-6;
 
-/// Share of a segment by which the foot of a normal may lie outside of it (-): rounding errors are far below it.
+/// Share of a segment by which the foot of a normal may lie outside of it (-): rounding errors are
+/// far below it.
 const ROUNDING: f64 = 1e-9;
 
-/// Value of 1 + cos θ below which a turn by θ counts as turning back (-): within about 8° of a half turn.
+/// Value of 1 + cos θ below which a turn by θ counts as turning back (-): within about 8° of a half
+/// turn.
 const TURNS_BACK: f64 = 0.01;
 
 /// A polyline. It continues straight beyond both ends.
@@ -74,18 +77,20 @@ impl Segment {
         }
     }
 
-    /// Returns the projection along a normal of this segment, or `None` if none of them leads to the point.
+    /// Returns the projection along a normal of this segment, or `None` if none of them leads to
+    /// the point.
     fn along_normal(&self) -> Option<Projection> {
         let is_before = self.is_first && self.along_m < 0.0;
         if is_before || (self.is_last && self.along_m > self.length_m) {
             return Some(self.projection(self.along_m, 0.0));
         }
-        // In the frame of the segment, the tangent at the share λ is (1, m). Its slope m goes from that of the start to
-        // that of the end.
+        // In the frame of the segment, the tangent at the share λ is (1, m). Its slope m goes from
+        // the slope of the start to the slope of the end.
         let (from, to) = (-self.start.half_turn, self.end.half_turn);
         let spread_m = self.length_m - self.left_m * (to - from);
         let share = (self.along_m + self.left_m * from) / spread_m;
-        // A point on the bisector of a kink belongs to one of its two segments, whatever is rounded.
+        // A point on the bisector of a kink belongs to one of its two segments, whatever the
+        // rounding.
         let is_within = spread_m > 0.0 && (-ROUNDING..=1.0 + ROUNDING).contains(&share);
         is_within.then(|| self.projection(share * self.length_m, maths::atan(from + share * (to - from))))
     }
@@ -97,8 +102,8 @@ impl Segment {
         self.projection(self.along_m.clamp(low, high), 0.0)
     }
 
-    /// Returns the projection onto the position `along_m` (m), at which the line has turned by `turned_rad` (rad) relative
-    /// to the segment.
+    /// Returns the projection onto the position `along_m` (m), at which the line has turned by
+    /// `turned_rad` (rad) relative to the segment.
     fn projection(&self, along_m: f64, turned_rad: f64) -> Projection {
         Projection {
             s_m: self.start.s_m + along_m,
@@ -144,7 +149,8 @@ impl ReferenceLine {
         self.vertices.last().filter(|_| self.vertices.len() > 1).map(|vertex| vertex.s_m)
     }
 
-    /// Projects a point onto the line: along the normal that leads to it, or, if none does, onto the nearest position.
+    /// Projects a point onto the line: along the normal that leads to it, or, if none does, onto
+    /// the nearest position.
     pub(super) fn project(&self, point: Point) -> Projection {
         let last = self.vertices.len().saturating_sub(2);
         let nearer = |a: &Projection, b: &Projection| a.d_m.abs().total_cmp(&b.d_m.abs());
@@ -157,13 +163,13 @@ impl ReferenceLine {
             })
         };
         let along_normals = segments().filter_map(|segment| segment.along_normal()).min_by(nearer);
-        let found = along_normals.or_else(|| segments().map(|segment| segment.nearest()).min_by(nearer));
-        found.unwrap_or(Projection { s_m: 0.0, d_m: 0.0, heading_rad: 0.0 })
+        let projection = along_normals.or_else(|| segments().map(|segment| segment.nearest()).min_by(nearer));
+        projection.unwrap_or(Projection { s_m: 0.0, d_m: 0.0, heading_rad: 0.0 })
     }
 }
 
-/// Returns the tangent of half the angle by which the way from `a` over `b` to `c` turns to the left at `b` (-). A way that
-/// turns back has no bisector; it counts as straight.
+/// Returns the tangent of half the angle by which the way from `a` over `b` to `c` turns to the
+/// left at `b` (-). A way that turns back has no bisector; it counts as straight.
 fn half_turn(a: Point, b: Point, c: Point) -> f64 {
     let (first, second) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
     let lengths = maths::hypot(first.0, first.1) * maths::hypot(second.0, second.1);
@@ -203,8 +209,8 @@ mod tests {
 
     #[test]
     fn a_steady_drive_along_a_bend_moves_steadily_at_the_kinks() {
-        // A bend of 400 m radius in chords of 20 m; the vehicle drives 11 m inside or outside of it, between the first and
-        // the last chord, which have no kink at their outer ends.
+        // A bend of 400 m radius in chords of 20 m; the vehicle drives 11 m inside or outside of
+        // it, between the first and the last chord, which have no kink at their outer ends.
         let (radius_m, chord_rad) = (400.0_f64, 0.05);
         let on_circle = |radius_m: f64, angle_rad: f64| {
             (radius_m * maths::sin(angle_rad), radius_m * (1.0 - maths::cos(angle_rad)))

@@ -1,7 +1,7 @@
 //! Splitting of text into rows of fields, one line at a time.
 //!
-//! In none of the layouts does a quoted field span several lines. Reading line by line therefore bounds the memory that
-//! a damaged file can occupy, and gives the line number of every error.
+//! In none of the layouts does a quoted field span several lines. Reading line by line therefore
+//! bounds the memory that a damaged file can occupy, and gives the line number of every error.
 
 use std::io::{self, BufRead, Read};
 use std::ops::Range;
@@ -36,8 +36,8 @@ impl<R: BufRead> Lines<R> {
         Self { source, buffer: Vec::new(), number: 0 }
     }
 
-    /// Returns the next line that is not blank, and its number, counted from 1. The line has neither line end nor byte
-    /// order mark.
+    /// Returns the next line that is not blank, and its number, counted from 1. The line has
+    /// neither line end nor byte order mark.
     pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, (u64, TrajectoryFileProblem)> {
         loop {
             self.buffer.clear();
@@ -73,7 +73,8 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
-/// Distinguishes an I/O failure from damaged compression, which the decoder reports with the same error type.
+/// Distinguishes an I/O failure from damaged compression, which the decoder reports with the same
+/// error type.
 pub(super) fn io_problem(error: io::Error) -> TrajectoryFileProblem {
     match error.kind() {
         io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {

@@ -6,8 +6,9 @@
 //!   CommonRoad (XML, event by event)                       ─┘
 //! ```
 //!
-//! A reader holds one line or one XML element at a time. When it is opened, it reads the other files of a highD or exiD
-//! data set. A CommonRoad reader also holds the lanelets, which stand before the obstacles in the file.
+//! A reader holds one line or one XML element at a time. When it is opened, it reads the other
+//! files of a highD or exiD data set. A CommonRoad reader also holds the lanelets, which precede
+//! the obstacles in the file.
 
 use closecall_traffic::{Time, VehicleClass};
 
@@ -30,8 +31,8 @@ pub(super) enum Clock {
 /// One vehicle at one frame, in SI units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    /// Number of the vehicle or track in the file. Rows with the same number and origin form one track before it is
-    /// split at gaps.
+    /// Number of the vehicle or track in the file. Rows with the same number and origin form one
+    /// track before it is split at gaps.
     pub(super) number: u64,
     /// Time of frame 0 if it distinguishes several data sets in one file, otherwise zero.
     pub(super) origin: Time,
@@ -52,7 +53,7 @@ pub(super) struct Row {
     pub(super) line: u64,
 }
 
-/// What a reader knows about its file before the last row.
+/// The knowledge of a reader about its file before the last row.
 #[derive(Clone, Debug)]
 pub(super) struct FileInfo {
     pub(super) layout: Layout,
@@ -66,7 +67,7 @@ pub(super) struct FileInfo {
 
 /// A reader of one layout.
 pub(super) trait RowSource {
-    /// Returns what is known about the file so far.
+    /// Returns the knowledge about the file so far.
     fn info(&self) -> FileInfo;
 
     /// Returns the unknown names of vehicle classes found so far.
@@ -75,8 +76,8 @@ pub(super) trait RowSource {
     /// Returns the next row in the order of the file, or `None` at its end.
     ///
     /// # Errors
-    /// Returns the line and the problem. After an error for which [`ReadError::affects_one_row`] holds, the caller can
-    /// ask for the next row.
+    /// Returns the line and the problem. After an error for which [`ReadError::affects_one_row`]
+    /// holds, the caller can ask for the next row.
     fn next_row(&mut self) -> Result<Option<Row>, ReadError>;
 }
 

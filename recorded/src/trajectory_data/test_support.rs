@@ -20,8 +20,8 @@ pub(crate) fn straight_track(id: u64, s_m: f64, speed_mps: f64, d_m: f64, frames
     track_along(id, s_m, speed_mps, frames, |_| (d_m, 0.0))
 }
 
-/// Creates a car that drives at constant speed and changes lanes from `from_d_m` to `to_d_m` on a quintic path. The
-/// change begins at `start_s` and takes `duration_s`.
+/// Creates a car that drives at constant speed and changes lanes from `from_d_m` to `to_d_m` on a
+/// quintic path. The change begins at `start_s` and takes `duration_s`.
 pub(crate) fn changing_track(
     id: u64,
     (s_m, speed_mps): (f64, f64),

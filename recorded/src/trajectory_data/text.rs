@@ -19,7 +19,8 @@ pub(super) struct TextSource<R> {
     name: Option<String>,
     /// The first line with its number, if it is a row instead of a header.
     first: Option<(u64, String)>,
-    /// Length of the last field of the row before (bytes): a shorter one at the end of the file may be cut.
+    /// Length of the last field of the row before (bytes): a shorter one at the end of the file may
+    /// be cut.
     usual_last_field: usize,
 }
 
@@ -33,8 +34,9 @@ impl<R: BufRead> TextSource<R> {
         Self::with_recognised_layout(lines, number, first)
     }
 
-    /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts, it calls `meta` for
-    /// the content of the metadata files. For exiD it also calls `infer_road`, which derives the road from the traffic.
+    /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts,
+    /// it calls `meta` for the content of the metadata files. For exiD it also calls `infer_road`,
+    /// which derives the road from the traffic.
     pub(super) fn with_meta(
         source: R,
         meta: impl FnOnce() -> Result<Meta, TrajectoryFileError>,
@@ -124,23 +126,23 @@ fn parse(
         line
     };
     fields.split(line, format.separator)?;
-    let (found, needed) = (fields.len(), format.width);
-    if found != needed {
-        return Err(TrajectoryFileProblem::ColumnCount { found, needed }.into());
+    let (actual, needed) = (fields.len(), format.width);
+    if actual != needed {
+        return Err(TrajectoryFileProblem::ColumnCount { actual, needed }.into());
     }
     check_name(line, format, fields, name)?;
     format.columns.parse(line, fields)
 }
 
-/// Checks that all rows with a data set name carry the same one: one file holds one data set.
+/// Checks that all rows with a data set name carry the same name: one file holds one data set.
 fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), FieldError> {
-    let Some((column, found)) = format.columns.data(line, fields) else { return Ok(()) };
+    let Some((column, actual)) = format.columns.data(line, fields) else { return Ok(()) };
     match name {
-        _ if found.is_empty() => {}
-        None => *name = Some(found.to_owned()),
-        Some(first) if first == found => {}
+        _ if actual.is_empty() => {}
+        None => *name = Some(actual.to_owned()),
+        Some(first) if first == actual => {}
         Some(first) => {
-            let problem = TrajectoryFileProblem::SeveralRecordings { first: first.clone(), found: found.to_owned() };
+            let problem = TrajectoryFileProblem::SeveralRecordings { first: first.clone(), actual: actual.to_owned() };
             return Err(FieldError::at(column, problem));
         }
     }

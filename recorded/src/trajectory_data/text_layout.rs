@@ -7,11 +7,11 @@ use super::source::{FileInfo, Row};
 
 /// The columns of one text layout.
 pub(super) trait TextLayout {
-    /// Returns what is known about the file so far, apart from a name that the rows state.
+    /// Returns the knowledge about the file so far, apart from a name that the rows state.
     fn info(&self) -> FileInfo;
 
-    /// Returns the column that names the data set and its value in this row, or `None` if the layout has no such
-    /// column.
+    /// Returns the column that names the data set and its value in this row, or `None` if the
+    /// layout has no such column.
     fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)>;
 
     /// Parses one line into a row in SI units. Returns `None` if the line yields no row.

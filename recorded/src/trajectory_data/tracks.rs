@@ -1,4 +1,4 @@
-//! The exit of every reader: complete tracks, one after the other.
+//! The output of every reader: complete tracks, one after the other.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,8 @@ const MIN_EPOCH_TIME: Time = Time::from_ms(86_400_000);
 /// Time between two data sets in one file after shifting them, so that their vehicles never meet.
 const SEPARATION: Time = Time::from_ms(10_000);
 
-/// Largest number of rows that are held at once: four times the rows of all NGSIM motorway data, about 8 GiB.
+/// Largest number of rows that are held at once: four times the rows of all NGSIM motorway data,
+/// about 8 GiB.
 const MAX_ROWS: usize = 50_000_000;
 
 /// Number of pieces per vehicle above which short pieces are shreds.
@@ -77,14 +78,14 @@ impl LayoutChoice {
 
     /// Returns `true` if `layout` is one of the layouts that the choice covers.
     pub fn includes(self, layout: Layout) -> bool {
-        let of = match layout {
+        let choice = match layout {
             Layout::Plain => Self::Csv,
             Layout::Ngsim18 | Layout::Ngsim25 => Self::Ngsim,
             Layout::Highd | Layout::Exid => Self::Highd,
             Layout::Commonroad => Self::Commonroad,
             Layout::InCar => Self::InCar,
         };
-        of == self
+        choice == self
     }
 }
 
@@ -94,7 +95,7 @@ pub enum BadRows {
     /// The first such row ends the reading with an error. None of the file's data is used.
     #[default]
     Reject,
-    /// Such rows are skipped and counted, with the reason and the line of the first one.
+    /// Such rows are skipped and counted, with the reason and the line of the first such row.
     Skip,
 }
 
@@ -158,8 +159,8 @@ impl<'a> Tracks<'a> {
         self.period
     }
 
-    /// Returns the lane markings that the file states, or else those derived from the tracks among the first
-    /// [`WINDOW_ROWS`] rows.
+    /// Returns the lane markings that the file states, or else those derived from the tracks among
+    /// the first [`WINDOW_ROWS`] rows.
     pub fn markings(&self) -> &LaneMarkings {
         &self.markings
     }
@@ -184,13 +185,14 @@ impl<'a> Tracks<'a> {
         &self.dropped
     }
 
-    /// Returns the unknown names of vehicle classes found so far, and the classes as which they are read.
+    /// Returns the unknown names of vehicle classes found so far, and the classes as which they are
+    /// read.
     pub fn unknown_classes(&self) -> &[UnknownClass] {
         self.source.unknown_classes()
     }
 
-    /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last track, it covers the
-    /// whole file.
+    /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last
+    /// track, it covers the whole file.
     pub fn hash(&self) -> String {
         self.digest.hex()
     }
@@ -266,7 +268,8 @@ impl<'a> Tracks<'a> {
         self.builder.push(row).or_else(|error| self.drop_row(error))
     }
 
-    /// Skips a row if the caller asked for it and the rest of the file is still usable. Otherwise returns the error.
+    /// Skips a row if the caller asked for it and the rest of the file is still usable. Otherwise
+    /// returns the error.
     fn drop_row(&mut self, error: ReadError) -> Result<(), ReadError> {
         if self.bad_rows == BadRows::Reject || !error.affects_one_row() {
             return Err(error);
@@ -275,7 +278,8 @@ impl<'a> Tracks<'a> {
         Ok(())
     }
 
-    /// Reads the window, determines the period, the start time and the order from it, and creates the builder.
+    /// Reads the window, determines the period, the start time and the order from it, and creates
+    /// the builder.
     fn read_window(&mut self, window: usize) -> Result<(), ReadError> {
         let mut rows = Vec::new();
         while rows.len() < window {
@@ -359,8 +363,8 @@ struct Extent {
     last: Instant,
 }
 
-/// Returns the mean time step of the vehicle with the most rows. Returns NGSIM's period if no vehicle has two frames,
-/// or if frame numbers may restart.
+/// Returns the mean time step of the vehicle with the most rows. Returns NGSIM's period if no
+/// vehicle has two frames, or if frame numbers may restart.
 fn period(rows: &[Row]) -> Time {
     let mut extents: BTreeMap<(u64, Time), Extent> = BTreeMap::new();
     for row in rows {
@@ -378,7 +382,8 @@ fn period(rows: &[Row]) -> Time {
     if may_restart || step_ns <= 0 { ngsim::PERIOD } else { Time::from_ns(step_ns) }
 }
 
-/// Returns the time to subtract from all times: the earliest one if times count from 1970, otherwise zero.
+/// Returns the time to subtract from all times: the earliest one if times count from 1970,
+/// otherwise zero.
 fn start(rows: &[Row]) -> Time {
     let earliest = rows.iter().map(|row| row.time).min();
     earliest.filter(|time| *time >= MIN_EPOCH_TIME).unwrap_or(Time::ZERO)

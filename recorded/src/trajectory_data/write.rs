@@ -16,13 +16,14 @@ const SOURCE: &str = "closecall";
 /// Maximum deviation of a time from a frame, as a share of the period.
 const MAX_DEVIATION: f64 = 0.01;
 
-/// Writes `data` in the plain layout, one row per track and frame. `x_m` and `y_m` are those of a straight road.
+/// Writes `data` in the plain layout, one row per track and frame. `x_m` and `y_m` are the
+/// coordinates on a straight road.
 ///
 /// Lengths are rounded to 0.1 mm. The file appears at `path` complete or not at all.
 ///
 /// # Errors
-/// Returns a [`WriteError`] if the file cannot be written, a number is not finite, or an instant lies between two
-/// frames.
+/// Returns a [`WriteError`] if the file cannot be written, a number is not finite, or an instant
+/// lies between two frames.
 pub fn write_trajectories(data: &TrajectoryData, path: &Path) -> Result<(), WriteError> {
     let name = data.name.replace(['"', '\n', '\r', ','], "_");
     write_atomically(path, |file| {
@@ -83,7 +84,9 @@ fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Result<(), Write
         ("the width", track.dimensions.width_m),
     ];
     match quantities.into_iter().find(|(_, value)| !value.is_finite()) {
-        Some((what, _)) => Err(WriteError::NotFinite { track_id: track.track_id, time_s: point.time.s(), what }),
+        Some((quantity, _)) => {
+            Err(WriteError::NotFinite { track_id: track.track_id, time_s: point.time.s(), quantity })
+        }
         None => Ok(()),
     }
 }

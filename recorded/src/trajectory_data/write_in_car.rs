@@ -34,7 +34,8 @@ pub struct InCarFrame {
     pub time: Time,
     /// Position of the vehicle's centre along the road (m).
     pub s_m: f64,
-    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost lane (m).
+    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost
+    /// lane (m).
     pub d_m: f64,
     /// Heading relative to the road, positive to the left (rad).
     pub heading_rad: f64,
@@ -76,13 +77,14 @@ pub struct TrueLaneChange {
     pub complete: bool,
 }
 
-/// Returns the path of the ground truth that belongs to the log at `path`: `drive.csv` has `drive.truth.csv` beside it.
+/// Returns the path of the ground truth that belongs to the log at `path`: `drive.csv` has
+/// `drive.truth.csv` beside it.
 pub fn ground_truth_path(path: &Path) -> PathBuf {
     path.with_extension("truth.csv")
 }
 
-/// Writes an in-car log, with times rounded to 0.1 ms and lengths to 1 mm. The file appears at `path` complete or not
-/// at all.
+/// Writes an in-car log, with times rounded to 0.1 ms and lengths to 1 mm. The file appears at
+/// `path` complete or not at all.
 ///
 /// # Errors
 /// Returns a [`WriteError`] if the file cannot be written or a number is not finite.
@@ -132,7 +134,7 @@ fn check_finite(frame: &InCarFrame) -> Result<(), WriteError> {
         ("the distance to the right marking", bus.and_then(|bus| bus.markings.right_m).unwrap_or_default()),
     ];
     match quantities.into_iter().find(|(_, value)| !value.is_finite()) {
-        Some((what, _)) => Err(WriteError::NotFinite { track_id: 1, time_s: frame.time.s(), what }),
+        Some((quantity, _)) => Err(WriteError::NotFinite { track_id: 1, time_s: frame.time.s(), quantity }),
         None => Ok(()),
     }
 }

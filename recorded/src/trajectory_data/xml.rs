@@ -1,8 +1,8 @@
 //! Bounded reading of XML by events, with the line number of each event.
 //!
-//! The reader expands no entities. It rejects document type declarations, because only they can declare entities, and
-//! entities let a small file expand to gigabytes. It also rejects elements nested deeper than in any scenario, and a
-//! single tag or text that exceeds a maximum length.
+//! The reader expands no entities. It rejects document type declarations, because only they can
+//! declare entities, and entities let a small file expand to gigabytes. It also rejects elements
+//! nested deeper than in any scenario, and a single tag or text that exceeds a maximum length.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, Read};
@@ -81,11 +81,12 @@ impl<R: BufRead> Xml<R> {
     }
 
     /// Returns an error at the current line.
-    pub(super) fn fail<T>(&self, what: impl Into<String>) -> Result<T, ReadError> {
-        Err(ReadError::new(self.line(), TrajectoryFileProblem::Xml { what: what.into() }))
+    pub(super) fn fail<T>(&self, reason: impl Into<String>) -> Result<T, ReadError> {
+        Err(ReadError::new(self.line(), TrajectoryFileProblem::Xml { reason: reason.into() }))
     }
 
-    /// Returns the next node. After an end node, the caller must call [`Xml::leave`] and [`Xml::back_to`].
+    /// Returns the next node. After an end node, the caller must call [`Xml::leave`] and
+    /// [`Xml::back_to`].
     pub(super) fn next(&mut self) -> Result<Node, ReadError> {
         if std::mem::take(&mut self.is_empty) {
             return Ok(Node::End { text: String::new() });
@@ -141,7 +142,7 @@ impl<R: BufRead> Xml<R> {
 
     /// Pushes an element that begins onto the path.
     fn enter(&mut self, start_tag: Result<StartTag, String>) -> Result<Node, ReadError> {
-        let (name, attributes) = start_tag.or_else(|what| self.fail(what))?;
+        let (name, attributes) = start_tag.or_else(|reason| self.fail(reason))?;
         if self.path.len() >= MAX_DEPTH {
             return self.fail(format!("elements are nested deeper than {MAX_DEPTH}"));
         }
@@ -160,14 +161,15 @@ fn parse_start_tag(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<St
     let mut attributes = Vec::new();
     for attribute in start.attributes() {
         let attribute = attribute.map_err(|error| format!("the attributes of `{name}`: {error}"))?;
-        if let Some(known) = wanted.iter().find(|known| known.as_bytes() == attribute.key.as_ref()) {
-            attributes.push((*known, text(&attribute.value)?));
+        if let Some(wanted_name) = wanted.iter().find(|wanted_name| wanted_name.as_bytes() == attribute.key.as_ref()) {
+            attributes.push((*wanted_name, text(&attribute.value)?));
         }
     }
     Ok((name, attributes))
 }
 
-/// Counters shared by the XML reader and its source: lines read, and bytes still permitted before the next event.
+/// Counters shared by the XML reader and its source: lines read, and bytes still permitted before
+/// the next event.
 #[derive(Default)]
 struct Meter {
     lines: Cell<u64>,

@@ -1,4 +1,5 @@
-//! Low-pass filter and peak detection compared with SciPy. `golden/make_golden.py` generates the reference values.
+//! Low-pass filter and peak detection compared with SciPy. `golden/make_golden.py` generates the
+//! reference values.
 
 use closecall_recorded::filters::{CORNER_HZ, LowPass};
 use closecall_recorded::lane_change::{find_peaks, peak_width};
@@ -58,28 +59,28 @@ fn the_filter_agrees_with_scipy() {
     assert!(cases.len() > 100);
     for case in cases {
         let filter = LowPass::new(CORNER_HZ, case.rate_hz).unwrap();
-        let found = filter.forwards_and_backwards(&case.signal, case.padding);
-        assert_eq!(found.len(), case.filtered.len(), "{}", case.name);
+        let filtered = filter.forwards_and_backwards(&case.signal, case.padding);
+        assert_eq!(filtered.len(), case.filtered.len(), "{}", case.name);
         let largest = case.signal.iter().fold(1.0_f64, |largest, value| largest.max(value.abs()));
-        for (found, expected) in found.iter().zip(&case.filtered) {
-            let error = (found - expected).abs() / largest;
-            assert!(error < FILTER_SHARE, "{}: {found} instead of {expected}", case.name);
+        for (filtered, expected) in filtered.iter().zip(&case.filtered) {
+            let error = (filtered - expected).abs() / largest;
+            assert!(error < FILTER_SHARE, "{}: {filtered} instead of {expected}", case.name);
         }
     }
 }
 
 #[test]
-fn peaks_prominences_and_bases_equal_those_of_scipy() {
+fn peaks_prominences_and_bases_agree_with_scipy() {
     let cases = golden().peaks;
     assert!(cases.iter().map(|case| case.peaks.len()).sum::<usize>() > 500);
     for case in cases {
-        let found = find_peaks(&case.signal, case.min_prominence);
+        let peaks = find_peaks(&case.signal, case.min_prominence);
         let indices =
-            |value: fn(&closecall_recorded::lane_change::Peak) -> usize| found.iter().map(value).collect::<Vec<_>>();
+            |value: fn(&closecall_recorded::lane_change::Peak) -> usize| peaks.iter().map(value).collect::<Vec<_>>();
         assert_eq!(indices(|peak| peak.index), case.peaks, "{}", case.name);
         assert_eq!(indices(|peak| peak.left_base), case.left_bases, "{}", case.name);
         assert_eq!(indices(|peak| peak.right_base), case.right_bases, "{}", case.name);
-        let prominences: Vec<f64> = found.iter().map(|peak| peak.prominence).collect();
+        let prominences: Vec<f64> = peaks.iter().map(|peak| peak.prominence).collect();
         assert_eq!(prominences, case.prominences, "{}", case.name);
     }
 }
@@ -87,20 +88,20 @@ fn peaks_prominences_and_bases_equal_those_of_scipy() {
 #[test]
 fn widths_agree_with_scipy() {
     for case in golden().peaks {
-        let found = find_peaks(&case.signal, case.min_prominence);
+        let peaks = find_peaks(&case.signal, case.min_prominence);
         for expected in &case.widths {
-            assert_eq!(found.len(), expected.widths.len(), "{}", case.name);
-            for (k, peak) in found.iter().enumerate() {
-                let found = peak_width(&case.signal, peak, expected.rel_height);
-                assert_eq!(found.level, expected.levels[k], "{}", case.name);
+            assert_eq!(peaks.len(), expected.widths.len(), "{}", case.name);
+            for (k, peak) in peaks.iter().enumerate() {
+                let measured = peak_width(&case.signal, peak, expected.rel_height);
+                assert_eq!(measured.level, expected.levels[k], "{}", case.name);
                 let width = expected.widths[k];
-                for (found, expected) in [
-                    (found.right - found.left, width),
-                    (found.left, expected.left[k]),
-                    (found.right, expected.right[k]),
+                for (measured, expected) in [
+                    (measured.right - measured.left, width),
+                    (measured.left, expected.left[k]),
+                    (measured.right, expected.right[k]),
                 ] {
-                    let error = (found - expected).abs();
-                    assert!(error <= WIDTH_SHARE * width.abs(), "{}: {found} instead of {expected}", case.name);
+                    let error = (measured - expected).abs();
+                    assert!(error <= WIDTH_SHARE * width.abs(), "{}: {measured} instead of {expected}", case.name);
                 }
             }
         }

@@ -1,5 +1,5 @@
-//! In-car logs: two rates in one file, distances to the visible markings, and lanes counted by the jumps of the
-//! markings.
+//! In-car logs: two rates in one file, distances to the visible markings, and lanes counted by the
+//! jumps of the markings.
 
 use std::path::Path;
 

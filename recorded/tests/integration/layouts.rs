@@ -1,5 +1,5 @@
-//! Layouts that hold the same data: highD's three files, CommonRoad XML and plain CSV. Also synthetic highD and exiD
-//! files.
+//! Layouts that hold the same data: highD's three files, CommonRoad XML and plain CSV. Also
+//! synthetic highD and exiD files.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ fn the_highd_layout_yields_the_same_data_as_the_plain_layout() {
     let plain = read(&data.join("ngsim_us101/trajectories/us101_h.csv")).unwrap();
     let highd = read(&folder.join("01_tracks.csv")).unwrap();
     assert_eq!((highd.layout, highd.period), (Layout::Highd, Time::from_ms(100)));
-    for other in
+    for path in
         [folder.clone(), folder.join("01"), folder.join("01_tracksMeta.csv"), folder.join("01_recordingMeta.csv")]
     {
-        assert_eq!(read(&other).unwrap().trajectories, highd.trajectories, "{}", other.display());
+        assert_eq!(read(&path).unwrap().trajectories, highd.trajectories, "{}", path.display());
     }
     assert_eq!(highd.trajectories.len(), 27);
     let instants = highd.trajectories.iter().map(|track| track.points.len()).sum::<usize>();
@@ -30,14 +30,21 @@ fn the_highd_layout_yields_the_same_data_as_the_plain_layout() {
     assert!((highd.markings.lane_width_m(Lane(1)).unwrap() - 3.45).abs() < 1e-9);
     let crossings =
         |data| detect(&smooth(data)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>();
-    let (one, other) = (crossings(&plain), crossings(&highd));
-    assert_eq!(other.len(), 4, "the highD file contains four lane changes; it lacks some rows of the plain file");
+    let (plain_crossings, highd_crossings) = (crossings(&plain), crossings(&highd));
+    assert_eq!(
+        highd_crossings.len(),
+        4,
+        "the highD file contains four lane changes; it lacks some rows of the plain file"
+    );
     let is_same = |a: &(Side, f64), b: &(Side, f64)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101;
-    assert!(other.iter().all(|b| one.iter().any(|a| is_same(a, b))), "{one:?} {other:?}");
+    assert!(
+        highd_crossings.iter().all(|b| plain_crossings.iter().any(|a| is_same(a, b))),
+        "{plain_crossings:?} {highd_crossings:?}"
+    );
 }
 
 #[test]
-fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
+fn commonroad_scenarios_yield_the_tracks_of_their_source_data() {
     let Some(data) = data_folder() else { return };
     let entries = std::fs::read_dir(data.join("ngsim_us101/commonroad_xml")).unwrap();
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -53,7 +60,7 @@ fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
         for track in &scenario.trajectories {
             rows += track.points.len();
             // Find the same vehicle in the plain files: same number and same sequence of speeds.
-            let found = plain.iter().flat_map(|data| &data.trajectories).find_map(|other| {
+            let original = plain.iter().flat_map(|data| &data.trajectories).find_map(|other| {
                 let speeds = |points: &[closecall_traffic::TrajectoryPoint]| {
                     points.iter().map(|point| (point.speed_mps * 10.0).round() as i64).collect::<Vec<_>>()
                 };
@@ -63,7 +70,7 @@ fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
                     .flatten()
                     .map(|start| &other.points[start..start + needle.len()])
             });
-            for (a, b) in track.points.iter().zip(found.unwrap_or_default()) {
+            for (a, b) in track.points.iter().zip(original.unwrap_or_default()) {
                 compared += 1;
                 same_lane += usize::from(a.lane == b.lane && (a.d_m - b.d_m).abs() < 0.5);
             }
@@ -87,8 +94,8 @@ fn hand_made_commonroad_scenarios_are_read() {
     }
 }
 
-/// Writes a highD data set. Vehicle 1 drives to the left on the upper carriageway, vehicle 2 to the right on the lower
-/// one.
+/// Writes a highD data set. Vehicle 1 drives to the left on the upper carriageway, vehicle 2 to the
+/// right on the lower one.
 fn write_both_ways(folder: &Path) {
     let meta = "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n";
     std::fs::write(folder.join("07_recordingMeta.csv"), meta).unwrap();
@@ -98,7 +105,8 @@ fn write_both_ways(folder: &Path) {
         "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
     for frame in 1..=30 {
         let x_m = 400.0 - 1.2 * f64::from(frame);
-        // The vehicle changes from the lane next to the median (laneId 3) to the outer lane, within ten frames.
+        // The vehicle changes from the lane next to the median (laneId 3) to the outer lane, within
+        // ten frames.
         let y_m = 13.5 - 0.4 * f64::from((frame - 10).clamp(0, 10));
         let lane = if y_m + 0.9 > 12.5 { 3 } else { 2 };
         rows += &format!("{frame},1,{x_m:.2},{y_m},4.5,1.8,-30.0,0,0.5,0,0,{lane}\n");
@@ -121,8 +129,8 @@ fn both_carriageways_are_driven_forwards_and_are_separated() {
         assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
     }
     assert_eq!((upper.points[0].acceleration_mps2, lower.points[0].acceleration_mps2), (-0.5, -0.5));
-    // The lower carriageway has lanes 1 and 2, lane 3 stands for the median, and the upper carriageway has lanes 4 and
-    // 5.
+    // The lower carriageway has lanes 1 and 2, lane number 3 is left out for the median, and the
+    // upper carriageway has lanes 4 and 5.
     assert_eq!(lower.points[0].lane, Lane(2));
     assert!(
         (lower.points[0].d_m + 6.0).abs() < 1e-9,
@@ -151,9 +159,10 @@ fn a_file_of_another_layout_than_required_is_rejected() {
     assert!(matches!(alone.problem, TrajectoryFileProblem::NeedsMetadata));
 }
 
-/// Writes an exiD data set of a road that bends with a radius of 2 km and is driven in both directions. The first direction
-/// has two lanes. Vehicle 1 keeps the right lane, vehicle 2 changes from the right to the left lane, vehicle 3 keeps the
-/// left lane, and vehicle 4 drives in the opposite direction.
+/// Writes an exiD data set of a road that bends with a radius of 2 km and is driven in both
+/// directions. The first direction has two lanes. Vehicle 1 keeps the right lane, vehicle 2 changes
+/// from the right to the left lane, vehicle 3 keeps the left lane, and vehicle 4 drives in the
+/// opposite direction.
 fn write_bent_both_ways(folder: &Path) {
     const RADIUS_M: f64 = 2_000.0;
     const LANE_M: f64 = 3.75;
@@ -210,7 +219,7 @@ fn the_road_of_exid_data_is_inferred_from_its_traffic() {
     let d_m = |track: &closecall_traffic::Trajectory| track.points[249].d_m;
     assert!((d_m(keeps) + 1.5 * 3.75).abs() < 0.05 && (d_m(changes) + 0.5 * 3.75).abs() < 0.05);
     assert!((d_m(back) + 2.0 * 3.75 + 1_000.0 + 0.5 * 3.75).abs() < 0.05, "{}", d_m(back));
-    let found = detect(&smooth(&data));
-    assert_eq!(found.iter().map(|change| change.track_id).collect::<Vec<_>>(), [2]);
-    assert!((found[0].crossing_s - 5.0).abs() < 0.2, "{}", found[0].crossing_s);
+    let changes = detect(&smooth(&data));
+    assert_eq!(changes.iter().map(|change| change.track_id).collect::<Vec<_>>(), [2]);
+    assert!((changes[0].crossing_s - 5.0).abs() < 0.2, "{}", changes[0].crossing_s);
 }

@@ -1,4 +1,5 @@
-//! Tests of the chain from trajectory files to parameter distributions, through the crate's public interface.
+//! Tests of the chain from trajectory files to parameter distributions, through the crate's public
+//! interface.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

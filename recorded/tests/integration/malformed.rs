@@ -56,7 +56,7 @@ fn ngsim(changes: &[(usize, &str)]) -> String {
 
 /// Returns malformed texts, each with the parts that the error message must contain.
 fn cases() -> Vec<(String, Vec<&'static str>)> {
-    let one = |column: &'static str, value: &'static str| {
+    let cell = |column: &'static str, value: &'static str| {
         plain(&[row(&[]), row(&[("frame", "1"), ("time_s", "0.1"), (column, value)])])
     };
     let second = |changes: &[(&str, &str)]| plain(&[row(&[]), row(changes)]);
@@ -75,24 +75,24 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
         ),
         (plain(&[row(&[]), row(&[("frame", "1")])[..30].to_owned()]), vec!["line 3", "columns, but 17 are needed"]),
         (plain(&[row(&[]) + ",extra"]), vec!["line 2", "18 columns, but 17 are needed"]),
-        (one("speed_mps", "nan"), vec!["line 3", "`speed_mps`", "is `nan`", "a number from 0 to 150"]),
-        (one("s_m", "inf"), vec!["line 3", "`s_m`", "is `inf`", "a number from"]),
-        (one("d_m", "-Infinity"), vec!["line 3", "`d_m`"]),
-        (one("s_m", "12..5"), vec!["line 3", "`s_m`", "is `12..5`"]),
-        (one("s_m", "fast"), vec!["line 3", "`s_m`", "is `fast`"]),
-        (one("s_m", ""), vec!["line 3", "`s_m`", "is ``"]),
-        (one("x_m", "NaN"), vec!["line 3", "`x_m`"]),
-        (one("length_m", "-4.8"), vec!["line 3", "`length_m`", "above 0 and up to 60"]),
-        (one("width_m", "0"), vec!["line 3", "`width_m`", "above 0"]),
-        (one("speed_mps", "-3"), vec!["line 3", "`speed_mps`"]),
-        (one("speed_mps", "1e308"), vec!["line 3", "`speed_mps`"]),
-        (one("track_id", "1.5"), vec!["line 3", "`track_id`", "a whole number"]),
-        (one("track_id", "-1"), vec!["line 3", "`track_id`", "a whole number from 0"]),
-        (one("frame", "99999999999999999999"), vec!["line 3", "`frame`"]),
-        (one("lane_id", "900"), vec!["line 3", "`lane_id`", "from 0 to 255"]),
-        (one("vehicle_class", "2"), vec!["line 3", "`vehicle_class`", "car, truck, motorcycle"]),
-        (one("recording_id", "b"), vec!["line 3", "`recording_id`", "`b`", "`a`", "one data set for each file"]),
-        (one("accel_mps2", "?"), vec!["line 3", "`accel_mps2`"]),
+        (cell("speed_mps", "nan"), vec!["line 3", "`speed_mps`", "is `nan`", "a number from 0 to 150"]),
+        (cell("s_m", "inf"), vec!["line 3", "`s_m`", "is `inf`", "a number from"]),
+        (cell("d_m", "-Infinity"), vec!["line 3", "`d_m`"]),
+        (cell("s_m", "12..5"), vec!["line 3", "`s_m`", "is `12..5`"]),
+        (cell("s_m", "fast"), vec!["line 3", "`s_m`", "is `fast`"]),
+        (cell("s_m", ""), vec!["line 3", "`s_m`", "is ``"]),
+        (cell("x_m", "NaN"), vec!["line 3", "`x_m`"]),
+        (cell("length_m", "-4.8"), vec!["line 3", "`length_m`", "above 0 and up to 60"]),
+        (cell("width_m", "0"), vec!["line 3", "`width_m`", "above 0"]),
+        (cell("speed_mps", "-3"), vec!["line 3", "`speed_mps`"]),
+        (cell("speed_mps", "1e308"), vec!["line 3", "`speed_mps`"]),
+        (cell("track_id", "1.5"), vec!["line 3", "`track_id`", "a whole number"]),
+        (cell("track_id", "-1"), vec!["line 3", "`track_id`", "a whole number from 0"]),
+        (cell("frame", "99999999999999999999"), vec!["line 3", "`frame`"]),
+        (cell("lane_id", "900"), vec!["line 3", "`lane_id`", "from 0 to 255"]),
+        (cell("vehicle_class", "2"), vec!["line 3", "`vehicle_class`", "car, truck, motorcycle"]),
+        (cell("recording_id", "b"), vec!["line 3", "`recording_id`", "`b`", "`a`", "one data set for each file"]),
+        (cell("accel_mps2", "?"), vec!["line 3", "`accel_mps2`"]),
         (second(&[]), vec!["line 3", "frame 0 of vehicle 1 stands there twice", "line 2"]),
         (second(&[("time_s", "5.0")]), vec!["line 3", "stands there twice"]),
         (
@@ -165,7 +165,8 @@ fn a_truncated_gzip_stream_is_rejected_and_a_complete_one_read() {
     encoder.write_all(plain(&rows).as_bytes()).unwrap();
     let packed = encoder.finish().unwrap();
     assert_eq!(read_text(&packed).unwrap().trajectories[0].points.len(), 50);
-    // Two concatenated gzip members form one stream. The second member repeats the header, which is not a valid row.
+    // Two concatenated gzip members form one stream. The second member repeats the header, which is
+    // not a valid row.
     assert_eq!(read_text(&[packed.clone(), packed.clone()].concat()).unwrap_err().line, Some(52));
     for kept in [3, 12, packed.len() / 2, packed.len() - 1] {
         let error = read_text(&packed[..kept]).unwrap_err();

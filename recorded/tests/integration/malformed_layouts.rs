@@ -44,7 +44,8 @@ fn malformed_in_car_logs_are_rejected() {
     }
 }
 
-/// Writes a small highD data set with one text of one file replaced, and returns the error from reading it.
+/// Writes a small highD data set with one text of one file replaced, and returns the error from
+/// reading it.
 fn highd(file: &str, from: &str, to: &str) -> TrajectoryFileError {
     let folder = tempfile::tempdir().unwrap();
     let mut rows =
@@ -254,13 +255,13 @@ fn optional_columns_may_be_empty() {
 
 #[test]
 fn archives_are_rejected_by_name() {
-    for (bytes, what) in [
+    for (bytes, kind) in [
         (&b"PK\x03\x04\x14\0\0\0"[..], "a ZIP archive"),
         (b"BZh91AY&SY", "a bzip2 file"),
         (b"\xfd7zXZ\0\0", "an xz file"),
         (b"\x28\xb5\x2f\xfd\0", "a Zstandard file"),
     ] {
-        assert_mentions(&read_text(bytes).unwrap_err(), &["made-up.csv", what, "gzip"], what);
+        assert_mentions(&read_text(bytes).unwrap_err(), &["made-up.csv", kind, "gzip"], kind);
     }
 }
 
@@ -274,7 +275,8 @@ fn packed(source: &mut impl Read) -> Vec<u8> {
 fn compressed_files_with_no_or_too_much_content_are_rejected_in_little_memory() {
     assert!(matches!(read_text(&packed(&mut &b""[..])).unwrap_err().problem, TrajectoryFileProblem::Empty));
     assert!(matches!(read_text(&packed(&mut &b"\n\n"[..])).unwrap_err().problem, TrajectoryFileProblem::Empty));
-    // 200 MB of one letter, compressed to 0.9 MB: as a line, as a line after a header, and as a tag.
+    // 200 MB of one letter, compressed to 0.9 MB: as a line, as a line after a header, and as a
+    // tag.
     for (start, line) in [("", 1), (PLAIN_HEADER, 2), ("<commonRoad ", 1)] {
         let break_at = if start == PLAIN_HEADER { "\n" } else { "" };
         let mut text = start.as_bytes().chain(break_at.as_bytes()).chain(std::io::repeat(b'x').take(200_000_000));

@@ -1,5 +1,5 @@
-//! Tables whose rows are wrong together: mixed-up units and columns that leave every single number within its allowed
-//! range, cut rows, and rows in an order that a long file must not have.
+//! Tables whose rows are wrong together: mixed-up units and columns that leave every single number
+//! within its allowed range, cut rows, and rows in an order that a long file must not have.
 
 use std::path::Path;
 
@@ -42,8 +42,8 @@ fn mixed_up_units_and_columns_are_detected() {
         ),
         ("length and width swapped", drive(|at| at.swap(4, 5)), &["the median length of cars"]),
     ];
-    for (what, text, needed) in cases {
-        assert_mentions(&read_text(text.as_bytes()).expect_err(what), needed, what);
+    for (case, text, needed) in cases {
+        assert_mentions(&read_text(text.as_bytes()).expect_err(case), needed, case);
     }
     // Metres instead of NGSIM's feet.
     let metres: String = (0..40)
@@ -99,7 +99,8 @@ fn bad_rows_are_skipped_and_counted_on_request() {
     assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "by default a bad row ends the reading");
 }
 
-/// Creates a file with more rows than the window. `vehicle_and_frame` gives vehicle and frame (from its first) of a row.
+/// Creates a file with more rows than the window. `vehicle_and_frame` gives vehicle and frame (from
+/// its first) of a row.
 fn long_file(vehicles: u64, frames: u64, vehicle_and_frame: impl Fn(u64) -> (u64, u64)) -> String {
     let mut text =
         "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
@@ -114,11 +115,11 @@ fn long_file(vehicles: u64, frames: u64, vehicle_and_frame: impl Fn(u64) -> (u64
 
 fn open_with_window(text: &str, window: usize) -> Result<Vec<(u64, usize)>, TrajectoryFileError> {
     let tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), ReadOptions::default(), window)?;
-    let mut found = tracks
+    let mut ids = tracks
         .map(|track| track.map(|track| (track.trajectory.track_id, track.trajectory.points.len())))
         .collect::<Result<Vec<_>, _>>()?;
-    found.sort_unstable();
-    Ok(found)
+    ids.sort_unstable();
+    Ok(ids)
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! NGSIM's US-101 data, if it is available: the layouts agree, and the detected lane changes match the reference list.
+//! NGSIM's US-101 data, if it is available: the layouts agree, and the detected lane changes match
+//! the reference list.
 
 use std::path::Path;
 
@@ -30,8 +31,8 @@ fn scored(folder: &Path, criterion: Criterion) -> Score {
         let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == data.name).collect();
         let detector = LaneChangeDetector::new(LaneReliability::Reliable, &data.markings);
         let tracks = &data.trajectories;
-        let found: Vec<_> = tracks.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect();
-        total.add(&score(&found, &listed, &spans(tracks)));
+        let changes: Vec<_> = tracks.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect();
+        total.add(&score(&changes, &listed, &spans(tracks)));
     }
     total
 }
@@ -50,8 +51,8 @@ fn lane_changes_match_the_reference_list() {
 fn the_distance_criterion_is_precise_but_misses_some_lane_changes() {
     let Some(folder) = data_folder() else { return };
     let Score { recall, precision, .. } = scored(&folder, Criterion::Distance);
-    // Measured: 13 of 18. The criterion misses vehicles that keep off the middle of narrow lanes and vehicles whose
-    // track is short, because they are in no band.
+    // Measured: 13 of 18. The criterion misses vehicles that keep off the middle of narrow lanes
+    // and vehicles whose track is short, because they are in no band.
     assert!(recall.hits * 100 >= recall.of * 60 && recall.hits < recall.of, "recall {recall}");
     assert!(precision.hits * 100 >= precision.of * 95, "precision {precision}");
 }
@@ -80,7 +81,7 @@ fn both_layouts_yield_the_same_data() {
 }
 
 #[test]
-fn the_original_form_without_header_yields_the_same_data_as_the_one_with_commas() {
+fn the_original_form_without_header_yields_the_same_data_as_the_form_with_commas() {
     let Some(folder) = data_folder() else { return };
     let path = folder.join("ngsim_us101/us101_a_ngsim18col_feet.csv");
     let text = std::fs::read_to_string(&path).unwrap();
@@ -109,10 +110,10 @@ fn the_road_matches_the_description_of_the_data() {
     let data = read(&folder.join("ngsim_us101/trajectories/us101_a.csv")).unwrap();
     assert_eq!(data.period, Time::from_ms(100));
     for (lane, edge_m) in [(1, 3.5), (2, 6.9), (3, 10.1), (4, 13.5), (5, 17.2)] {
-        let found = data.markings.right_edge_m(Lane(lane)).unwrap();
-        assert!((found + edge_m).abs() < 0.2, "lane {lane}: {found}");
+        let right_edge_m = data.markings.right_edge_m(Lane(lane)).unwrap();
+        assert!((right_edge_m + edge_m).abs() < 0.2, "lane {lane}: {right_edge_m}");
     }
     assert!((data.markings.typical_lane_width_m() - 3.4).abs() < 0.1);
-    let found = count_flaws(&data);
-    assert_eq!((found.vehicles, found.tracks, found.instants), (92, 105, 11_221));
+    let flaws = count_flaws(&data);
+    assert_eq!((flaws.vehicles, flaws.tracks, flaws.instants), (92, 105, 11_221));
 }

@@ -37,16 +37,16 @@ fn forty() -> Vec<SyntheticLaneChange> {
 fn detected_durations_are_within_five_percent_of_the_truth() {
     for period_ms in [100, 40, 10] {
         let changes = forty();
-        let found = detect(&smooth(&written_and_read(&synthetic(Time::from_ms(period_ms), &changes))));
-        assert_eq!(found.len(), changes.len());
-        for (found, made) in found.iter().zip(&changes) {
-            let error = (found.duration_s - made.duration_s).abs() / made.duration_s;
-            assert!(error < 0.05, "{} s instead of {} s", found.duration_s, made.duration_s);
-            assert!(found.complete && (found.crossing_s - made.start_s - 0.5 * made.duration_s).abs() <= 0.11);
-            assert_eq!(found.direction == Side::Left, made.to_the_left);
+        let detected = detect(&smooth(&written_and_read(&synthetic(Time::from_ms(period_ms), &changes))));
+        assert_eq!(detected.len(), changes.len());
+        for (detected, made) in detected.iter().zip(&changes) {
+            let error = (detected.duration_s - made.duration_s).abs() / made.duration_s;
+            assert!(error < 0.05, "{} s instead of {} s", detected.duration_s, made.duration_s);
+            assert!(detected.complete && (detected.crossing_s - made.start_s - 0.5 * made.duration_s).abs() <= 0.11);
+            assert_eq!(detected.direction == Side::Left, made.to_the_left);
             assert!(
-                (found.start_s - made.start_s).abs() < 0.3
-                    && (found.end_s - found.start_s - found.duration_s).abs() < 1e-9
+                (detected.start_s - made.start_s).abs() < 0.3
+                    && (detected.end_s - detected.start_s - detected.duration_s).abs() < 1e-9
             );
         }
     }

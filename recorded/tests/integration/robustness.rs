@@ -1,4 +1,5 @@
-//! Robustness of each lane-change criterion: on synthetic in-car logs with known ground truth, and on US-101.
+//! Robustness of each lane-change criterion: on synthetic in-car logs with known ground truth, and
+//! on US-101.
 
 use closecall_recorded::lane_change::{Criterion, LaneChangeDetector, LaneReliability};
 use closecall_recorded::robustness::{CriterionCounts, Measured, ReferenceKind, Robustness, Setup, Study};
@@ -7,11 +8,13 @@ use closecall_traffic::{Lane, Time};
 
 use crate::support::{LANE_M, SyntheticLaneChange, data_folder, track};
 
-/// Time between two frames of the synthetic logs: 100 Hz. The camera measures the markings in every fourth frame.
+/// Time between two frames of the synthetic logs: 100 Hz. The camera measures the markings in every
+/// fourth frame.
 const PERIOD: Time = Time::from_ms(10);
 const FRAMES_PER_VIEW: usize = 4;
 
-/// Creates twenty drives of 20 s, each with one lane change of 3 to 8.7 s, and the distances to the markings.
+/// Creates twenty drives of 20 s, each with one lane change of 3 to 8.7 s, and the distances to the
+/// markings.
 fn logs() -> Vec<(SyntheticLaneChange, Measured)> {
     let log = |k: u32| {
         let change = SyntheticLaneChange {
@@ -59,25 +62,25 @@ fn short_setup() -> Setup {
 fn the_gradient_criterion_finds_the_true_lane_changes() {
     let detector = LaneChangeDetector::new(LaneReliability::Reliable, &LaneMarkings::default());
     for (truth, (trajectory, seen)) in logs() {
-        let found = detector.detect(Criterion::Gradient, &trajectory, &seen);
-        let [found] = &found[..] else { panic!("{} instead of 1", found.len()) };
-        assert_eq!(found.direction == closecall_traffic::Side::Left, truth.to_the_left);
+        let changes = detector.detect(Criterion::Gradient, &trajectory, &seen);
+        let [change] = &changes[..] else { panic!("{} instead of 1", changes.len()) };
+        assert_eq!(change.direction == closecall_traffic::Side::Left, truth.to_the_left);
         let crossed = |pair: &[closecall_traffic::TrajectoryPoint]| (pair[0].d_m > -LANE_M) != (pair[1].d_m > -LANE_M);
         let index = trajectory.points.windows(2).position(crossed).unwrap();
         // The camera measures the markings in every fourth frame only.
-        assert!((found.crossing_s - trajectory.points[index].time.s()).abs() <= 0.05, "{}", found.crossing_s);
-        assert!(found.complete && (found.duration_s - truth.duration_s).abs() < 0.05 * truth.duration_s);
+        assert!((change.crossing_s - trajectory.points[index].time.s()).abs() <= 0.05, "{}", change.crossing_s);
+        assert!(change.complete && (change.duration_s - truth.duration_s).abs() < 0.05 * truth.duration_s);
     }
 }
 
 #[test]
 fn an_offset_makes_only_the_distance_criterion_miss_lane_changes() {
     let study = Study::new(logs().into_iter().map(|(_, log)| log).collect(), &LaneMarkings::default());
-    let found = studied(&study, &short_setup());
-    assert_eq!((found.reference_kind, found.reference), (ReferenceKind::Gradient, 20));
-    assert_eq!(found.undisturbed, [20, 20, 20]);
-    assert_eq!(found.criteria, [Criterion::Peak, Criterion::Distance, Criterion::Gradient]);
-    let [left, none, right] = &found.offset[..] else { panic!("three offsets") };
+    let result = studied(&study, &short_setup());
+    assert_eq!((result.reference_kind, result.reference), (ReferenceKind::Gradient, 20));
+    assert_eq!(result.undisturbed, [20, 20, 20]);
+    assert_eq!(result.criteria, [Criterion::Peak, Criterion::Distance, Criterion::Gradient]);
+    let [left, none, right] = &result.offset[..] else { panic!("three offsets") };
     for cell in none {
         assert_eq!((cell.again, cell.found, cell.invented), (20.0, 20.0, 0.0));
     }
@@ -90,14 +93,14 @@ fn an_offset_makes_only_the_distance_criterion_miss_lane_changes() {
 #[test]
 fn with_growing_noise_the_peak_criterion_fails_first() {
     let study = Study::new(logs().into_iter().map(|(_, log)| log).collect(), &LaneMarkings::default());
-    let found = studied(&study, &short_setup());
-    let fails = |column| found.failing_noise_m_per_sqrt_s(column);
+    let result = studied(&study, &short_setup());
+    let fails = |column| result.failing_noise_m_per_sqrt_s(column);
     let (Some(peak), gradient) = (fails(0), fails(2)) else {
         panic!("the peak criterion withstands every noise level")
     };
     assert!(peak > 0.0 && gradient.is_none_or(|gradient| peak < gradient), "{peak} {gradient:?}");
-    assert_eq!(found, studied(&study, &short_setup()));
-    assert_ne!(found.noise, studied(&study, &Setup { seed: 4, ..short_setup() }).noise);
+    assert_eq!(result, studied(&study, &short_setup()));
+    assert_ne!(result.noise, studied(&study, &Setup { seed: 4, ..short_setup() }).noise);
 }
 
 #[test]
@@ -110,10 +113,10 @@ fn an_offset_on_us101_makes_only_the_distance_criterion_miss_lane_changes() {
         let mut tracks = open(&path, Default::default()).unwrap();
         let measured = tracks.by_ref().map(|track| track.unwrap()).map(|track| (track.trajectory, track.markings));
         let measured: Vec<Measured> = measured.collect();
-        let found = studied(&Study::new(measured, tracks.markings()), &setup);
+        let result = studied(&Study::new(measured, tracks.markings()), &setup);
         match &mut all {
-            None => all = Some(found),
-            Some(all) => assert!(all.add(&found)),
+            None => all = Some(result),
+            Some(all) => assert!(all.add(&result)),
         }
     }
     let all = all.unwrap();

@@ -28,8 +28,8 @@ pub(crate) struct SyntheticLaneChange {
 /// Lane width of synthetic roads (m).
 pub(crate) const LANE_M: f64 = 3.75;
 
-/// Creates the track of a vehicle that changes lanes once between lanes 1 and 2 on a quintic path. The track lasts 20
-/// s.
+/// Creates the track of a vehicle that changes lanes once between lanes 1 and 2 on a quintic path.
+/// The track lasts 20 s.
 pub(crate) fn track(change: SyntheticLaneChange, period: Time) -> Trajectory {
     const RECORDED_S: f64 = 20.0;
     let (from, to) = if change.to_the_left { (-1.5 * LANE_M, -0.5 * LANE_M) } else { (-0.5 * LANE_M, -1.5 * LANE_M) };
@@ -60,9 +60,9 @@ pub(crate) fn track(change: SyntheticLaneChange, period: Time) -> Trajectory {
     }
 }
 /// Asserts that the error message contains all of `needed`.
-pub(crate) fn assert_mentions(error: &TrajectoryFileError, needed: &[&str], what: &str) {
+pub(crate) fn assert_mentions(error: &TrajectoryFileError, needed: &[&str], case: &str) {
     let message = error.to_string();
     for part in needed {
-        assert!(message.contains(part), "{what}: `{message}` does not say `{part}`");
+        assert!(message.contains(part), "{case}: `{message}` does not say `{part}`");
     }
 }

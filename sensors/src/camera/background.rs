@@ -1,7 +1,8 @@
 //! The background of the pixels of one row, at all four moments at once.
 //!
-//! Most pixels show nothing but ground or sky, and the ego sees the same kind of it along a row. A pixel whose moments differ in kind is
-//! left to [`Frame::sample`], which computes them one by one with the same bits.
+//! Most pixels show nothing but ground or sky, and the ego sees the same kind of it along a row. If
+//! the moments of a pixel differ in kind, [`Frame::sample`] computes them one by one with the same
+//! bits.
 
 use wide::f32x4;
 
@@ -38,15 +39,16 @@ pub(super) struct BackgroundNoise {
 }
 
 impl Background {
-    /// Returns the background of a row, given the y of its rays by moment, the largest magnitude of their x, and the distance that the
-    /// ego has moved (m).
+    /// Returns the background of a row, given the y of its rays by moment, the largest magnitude of
+    /// their x, and the distance that the ego has moved (m).
     pub(super) fn new(frame: &Frame, y: [f32; MOMENTS], widest: [f32; MOMENTS], travelled_m: [f32; MOMENTS]) -> Self {
         let height_m = frame.lens.height_m as f32;
         let is_ground =
             |[ahead, left, up]: [f32; 3]| up / (ahead * ahead + left * left).sqrt() * GROUND_TO_M < -height_m;
         let ray = |moment: usize, x: f32| frame.lens.ray_in_ground([x, y[moment]]);
-        // Rounding is monotone: the outermost sample has the smallest slope, and one in the middle the largest. If that one meets the
-        // ground, all do, and if this one does not, none does.
+        // Rounding is monotone: the outermost sample has the smallest slope, and a sample in the
+        // middle the largest. If the outermost sample meets the ground, all samples meet it. If the
+        // middle sample does not, no sample does.
         if (0..MOMENTS).all(|moment| is_ground(ray(moment, widest[moment]))) {
             let [ahead, _, up] = lanes(|moment| ray(moment, 0.0));
             let depth_m: [f32; MOMENTS] = std::array::from_fn(|moment| -height_m / up[moment]);
@@ -69,8 +71,9 @@ fn lanes(ray: impl Fn(usize) -> [f32; 3]) -> [[f32; MOMENTS]; 3] {
 }
 
 impl Frame {
-    /// Returns the mean radiance of the background that a pixel shows, and the sum of 1/depth over its moments (1/m), which is 0 for the
-    /// sky. `x` is that of its rays, by moment, and `length` that of the ray through its middle. Returns `None` if the moments differ in kind.
+    /// Returns the mean radiance of the background that a pixel shows, and the sum of 1/depth over
+    /// its moments (1/m), which is 0 for the sky. `x` is the x of its rays, by moment, and `length`
+    /// is the length of the ray through its middle. Returns `None` if the moments differ in kind.
     #[inline]
     pub(super) fn background(
         &self,

@@ -1,5 +1,6 @@
-//! Shading and projection of a body: the faces that can be seen are lit once, and their triangles are projected once for each moment of
-//! the exposure. The moments share a vector, and each lane has the bits of a single moment.
+//! Shading and projection of a body: the faces that can be seen are lit once, and their triangles
+//! are projected once for each moment of the exposure. The moments share a vector, and each lane
+//! has the bits of a single moment.
 
 use wide::f32x4;
 
@@ -9,8 +10,9 @@ use super::mesh::{Mesh, Surface, Texture, Vec3, add_scaled, cross, dot, each, no
 use super::pinhole::Lens;
 use super::raster::{Facing, Projection, ScreenTriangle, project};
 
-/// Number of moments within one exposure at which the scene is sampled, once per pixel each. The mean over these
-/// samples blurs moving objects and smooths edges (Haeberli and Akeley, *The accumulation buffer*, 1990).
+/// Number of moments within one exposure at which the scene is sampled, once per pixel each. The
+/// mean over these samples blurs moving objects and smooths edges (Haeberli and Akeley, *The
+/// accumulation buffer*, 1990).
 pub(crate) const MOMENTS: usize = 4;
 
 /// The properties of a shaded face that a sample of it needs.
@@ -20,8 +22,8 @@ pub(crate) struct Shade {
     pub(crate) radiance: Vec3,
     /// The pattern drawn onto the face.
     pub(crate) texture: Texture,
-    /// Coefficients of the texture coordinates: `u = map[0] · p + offset[0]` for the position p in camera axes, and
-    /// likewise v.
+    /// Coefficients of the texture coordinates: `u = map[0] · p + offset[0]` for the position p in
+    /// camera axes, and likewise v.
     pub(crate) map: [Vec3; 2],
     /// Constants of the texture coordinates, see `map`.
     pub(crate) offset: [f32; 2],
@@ -56,7 +58,8 @@ impl Transform {
     fn new(placement: &Placement, lens: &Lens) -> Self {
         let [cos, sin] = placement.turn;
         let pitch = placement.pitch_rad;
-        // Small-angle approximation of the pitch: the body's x axis dips, and its z axis leans forward.
+        // Small-angle approximation of the pitch: the body's x axis dips, and its z axis leans
+        // forward.
         let axes = [[cos, sin, -pitch], [-sin, cos, 0.0], [cos * pitch, sin * pitch, 1.0]];
         let at = [placement.at[0], placement.at[1], 0.0];
         let origin = lens.in_camera(at);
@@ -84,7 +87,8 @@ fn transform_point(rotation: &[Vec3; 3], at: Vec3, point: Vec3) -> Vec3 {
 /// A corner of a body in camera axes (m): its x, y and z, each by moment.
 pub(crate) type Corner = [f32x4; 3];
 
-/// Returns the corners of a body in camera axes, by moment. Each lane takes the steps of a single [`transform_point`].
+/// Returns the corners of a body in camera axes, by moment. Each lane takes the steps of a single
+/// [`transform_point`].
 fn corners_in_camera(
     mesh: &Mesh,
     placement: &Placement,
@@ -120,8 +124,8 @@ fn corners_in_camera(
     }
 }
 
-/// Projects the faces of a body for each moment, shades those that face the lens, and appends the results to `faces` and `moments`.
-/// `corners` is memory that the next call may reuse.
+/// Projects the faces of a body for each moment, shades the faces that face the lens, and appends
+/// the results to `faces` and `moments`. `corners` is memory that the next call may reuse.
 pub(crate) fn add_body(
     mesh: &Mesh,
     placement: &Placement,
@@ -167,7 +171,8 @@ fn crossed(a: Corner, b: Corner) -> Corner {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Returns the time of a moment relative to the middle of the exposure, in units of the exposure time (−½ to ½).
+/// Returns the time of a moment relative to the middle of the exposure, in units of the exposure
+/// time (−½ to ½).
 pub(crate) fn moment_offset(moment: usize) -> f64 {
     (moment as f64 + 0.5) / MOMENTS as f64 - 0.5
 }
@@ -202,8 +207,8 @@ fn shaded_radiance(corners: &[Vec3; 3], surface: &Surface, shading: &Shading<'_>
     })
 }
 
-/// Returns the radiance that the clear coat of a face reflects: the sky above, the road below, and the sun near its
-/// mirror direction.
+/// Returns the radiance that the clear coat of a face reflects: the sky above, the road below, and
+/// the sun near its mirror direction.
 fn reflected_radiance(normal: Vec3, view: Vec3, gloss: f32, light: &Illumination) -> Vec3 {
     /// Reflectance of glass and clear coat at perpendicular incidence.
     const PERPENDICULAR_REFLECTANCE: f32 = 0.04;
@@ -233,8 +238,8 @@ fn texture_map(mesh: &Mesh, index: usize, transform: &Transform) -> ([Vec3; 2], 
     (axes, axes.map(|axis| -dot(origin, axis)))
 }
 
-/// Returns the factor by which a texture changes the reflectance of its face at the texture coordinates (u, v), each
-/// from 0 to 1.
+/// Returns the factor by which a texture changes the reflectance of its face at the texture
+/// coordinates (u, v), each from 0 to 1.
 pub(crate) fn texture_factor(texture: Texture, u: f32, v: f32) -> f32 {
     let stripe = |x: f32, count: f32| split(x * count).1;
     match texture {
@@ -285,7 +290,8 @@ mod tests {
         let shading = Shading { lens: &lens, light: &light, indicators: [false; 2] };
         let (mut faces, mut moments) = (Vec::new(), <[Vec<ScreenTriangle>; MOMENTS]>::default());
         add_body(&mesh, &placement, &shading, (&mut faces, &mut moments), &mut Vec::new());
-        // Two triangles ahead and two on top. The lens is above the block, and does not see its sides.
+        // Two triangles ahead and two on top. The lens is above the block, and does not see its
+        // sides.
         assert_eq!((mesh.faces.len(), faces.len()), (12, 4));
         assert_eq!(moments.map(|triangles| triangles.len()), [4; MOMENTS]);
     }

@@ -1,12 +1,13 @@
 //! The neural network that classifies a crop, run through the API of ONNX Runtime.
 //!
-//! Two backends implement this API: tract, written in Rust and linked into this binary, and Microsoft's ONNX Runtime,
-//! loaded from a shared library if one is named. A process keeps one backend for its whole life, so the first
-//! classifier decides which. A session runs one crop at a time, so each worker thread has its own.
+//! Two backends implement this API: tract, written in Rust and linked into this binary, and
+//! Microsoft's ONNX Runtime, loaded from a shared library if one is named. A process keeps one
+//! backend for its whole life, so the first classifier decides which. A session runs one crop at a
+//! time, so each worker thread has its own.
 //!
-//! The network takes pixel values from 0 to 255 and returns probabilities: scaling, calibration (by a temperature) and
-//! softmax are part of the graph. `xtask/training/train.py` trained and exported it, and `models/MODEL_CARD.md` reports its
-//! accuracy.
+//! The network takes pixel values from 0 to 255 and returns probabilities: scaling, calibration (by
+//! a temperature) and softmax are part of the graph. `xtask/training/train.py` trained and exported
+//! it, and `models/MODEL_CARD.md` reports its accuracy.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -37,8 +38,8 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// Selects ONNX Runtime from the shared library `named` by the user, or else from the one in `environment` (the
-    /// value of `ORT_DYLIB_PATH`), or else tract.
+    /// Selects ONNX Runtime from the shared library `named` by the user, or else from the library
+    /// in `environment` (the value of `ORT_DYLIB_PATH`), or else selects tract.
     pub fn choose(named: Option<&Path>, environment: Option<PathBuf>) -> Self {
         match named.map(Path::to_owned).or(environment).filter(|path| !path.as_os_str().is_empty()) {
             Some(path) => Self::OnnxRuntime(path),
@@ -78,11 +79,11 @@ pub enum ClassifierError {
     )]
     NeedsOnnxRuntime,
     /// The network has other inputs or outputs.
-    #[error("failed to use the network: it has {found}; wanted are {wanted}")]
+    #[error("failed to use the network: it has {actual}; wanted are {wanted}")]
     Layout {
-        /// What it has.
-        found: String,
-        /// What it must have.
+        /// The actual layout.
+        actual: String,
+        /// The required layout.
         wanted: &'static str,
     },
     /// The network failed during inference. The session must not be used again.
@@ -93,13 +94,13 @@ pub enum ClassifierError {
     },
     /// The output of the network is not four probabilities.
     #[error(
-        "failed to read the answer of {SHIPPED_FILE}: {found:?} in its tensor `{tensor}` are not four probabilities"
+        "failed to read the answer of {SHIPPED_FILE}: {actual:?} in its tensor `{tensor}` are not four probabilities"
     )]
     Answer {
         /// The name of the output.
         tensor: String,
         /// The values that the network returned.
-        found: Vec<String>,
+        actual: Vec<String>,
     },
     /// The network returned a value that its output cannot have.
     #[error("failed to read the answer of {model}: its tensor `{tensor}` has {value}, but {allowed} are needed")]
@@ -129,17 +130,18 @@ impl Classifier {
     /// Loads the network that ships with Closecall on this backend.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] if the backend cannot be loaded, or if the process uses another one.
+    /// Returns a [`ClassifierError`] if the backend cannot be loaded, or if the process uses
+    /// another backend.
     pub fn shipped(backend: &Backend) -> Result<Self, ClassifierError> {
         Self::new(SHIPPED_MODEL, backend)
     }
 
-    /// Loads a network from the bytes of an ONNX file. Its input and output must have the same form as those of
-    /// [`SHIPPED_MODEL`].
+    /// Loads a network from the bytes of an ONNX file. Its input and output must have the form that
+    /// [`SHIPPED_MODEL`] has.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] if the backend cannot be loaded, if the process uses another one, or if `model`
-    /// cannot be read.
+    /// Returns a [`ClassifierError`] if the backend cannot be loaded, if the process uses another
+    /// backend, or if `model` cannot be read.
     pub fn new(model: &[u8], backend: &Backend) -> Result<Self, ClassifierError> {
         let environment = environment(backend)?;
         let session = open_session(model, environment, backend)
@@ -150,8 +152,8 @@ impl Classifier {
     /// Returns the class scores of a crop. The same crop always gives the same bits.
     ///
     /// # Errors
-    /// Returns [`ClassifierError::Run`] if inference fails, and [`ClassifierError::Answer`] if the output is not four
-    /// probabilities.
+    /// Returns [`ClassifierError::Run`] if inference fails, and [`ClassifierError::Answer`] if the
+    /// output is not four probabilities.
     pub fn classify(&mut self, crop: &Crop) -> Result<ClassScores, ClassifierError> {
         for (channel, plane) in self.planes.chunks_exact_mut(SAMPLES).enumerate() {
             let values = crop.rgb[channel..].iter().step_by(CHANNELS);
@@ -164,7 +166,8 @@ impl Classifier {
         clear_upper_parts();
         let outputs = outputs.map_err(run)?;
         let (_, output) = outputs[0].try_extract_tensor::<f32>().map_err(run)?;
-        let invalid = |found| ClassifierError::Answer { tensor: outputs.keys().next().unwrap_or("").to_owned(), found };
+        let invalid =
+            |actual| ClassifierError::Answer { tensor: outputs.keys().next().unwrap_or("").to_owned(), actual };
         scores_from(output).map_err(invalid)
     }
 }

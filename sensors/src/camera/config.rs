@@ -13,7 +13,8 @@ use super::optics::{LensConfig, Optics};
 pub enum Pipeline {
     /// A neural network classifies the part of the image that shows each LiDAR cluster.
     CropClassifier,
-    /// A Mask R-CNN finds vehicles in the whole image, which are then associated with the LiDAR clusters. Needs ONNX Runtime.
+    /// A Mask R-CNN finds vehicles in the whole image, which are then associated with the LiDAR
+    /// clusters. Needs ONNX Runtime.
     MaskRcnn,
     /// The image is not used: class scores come from the shapes of the LiDAR clusters alone.
     Off,
@@ -50,21 +51,23 @@ pub struct CameraConfig {
     pub mount_from_rear_m: Num,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: Num,
-    /// Root mean square of the angular rate of the camera's vibration (rad/s). Vibration blurs long exposures.
+    /// Root mean square of the angular rate of the camera's vibration (rad/s). Vibration blurs long
+    /// exposures.
     pub vibration_radps: Num,
     /// Share of the rear window that is soiled (0 to 1).
     pub dirt: Num,
-    /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic exposure.
+    /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic
+    /// exposure.
     pub exposure_ev: Num,
     /// Position of the sun.
     pub sun: SunConfig,
     /// The lens.
     pub lens: LensConfig,
-    /// Time from the reading of the first row of the image to that of the last (s): 0 for a global shutter, 0.01 to 0.03 for a
-    /// rolling one.
+    /// Time between the readings of the first and of the last row of the image (s): 0 for a global
+    /// shutter, 0.01 to 0.03 for a rolling one.
     pub readout_s: Num,
-    /// Brightness of the night sky, relative to the sky over a town, which the default shows (0 to 1). Far from towns it is about
-    /// 0.03: 0.2 instead of 7 mcd/m².
+    /// Brightness of the night sky, relative to the sky over a town, which the default shows (0 to
+    /// 1). Far from towns it is about 0.03: 0.2 instead of 7 mcd/m².
     pub night_sky: Num,
 }
 
@@ -113,17 +116,19 @@ pub struct Camera {
     pub vibration_radps: f64,
     /// Share of the rear window that is soiled (0 to 1).
     pub dirt: f64,
-    /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic exposure.
+    /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic
+    /// exposure.
     pub exposure_ev: f64,
     /// Position of the sun.
     pub sun: Sun,
     /// The lens.
     pub optics: Optics,
-    /// Time from the reading of the first row of the image to that of the last (s).
+    /// Time between the readings of the first and of the last row of the image (s).
     pub readout_s: f64,
-    /// Brightness of the night sky, relative to the sky over a town (0 to 1): a natural sky has 0.17 to 0.25 mcd/m² (F. Falchi et
-    /// al., *The new world atlas of artificial night sky brightness*, Science Advances 2016; A. Jechow et al., arXiv:1807.10593),
-    /// and that over a town 7 mcd/m² and more, the end of the scale of that atlas.
+    /// Brightness of the night sky, relative to the sky over a town (0 to 1): a natural sky has
+    /// 0.17 to 0.25 mcd/m² (F. Falchi et al., *The new world atlas of artificial night sky
+    /// brightness*, Science Advances 2016; A. Jechow et al., arXiv:1807.10593), and that over a
+    /// town 7 mcd/m² and more, the end of the scale of that atlas.
     pub night_sky: f64,
 }
 

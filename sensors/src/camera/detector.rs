@@ -1,5 +1,6 @@
-//! An instance segmentation network that reads the image and returns boxes, labels, scores and masks, as torchvision's
-//! Mask R-CNN and that of the ONNX model zoo do. It runs in ONNX Runtime: tract has no `RoiAlign`.
+//! An instance segmentation network that reads the image and returns boxes, labels, scores and
+//! masks, as the Mask R-CNNs of torchvision and of the ONNX model zoo do. It runs in ONNX Runtime:
+//! tract has no `RoiAlign`.
 //!
 //! ```text
 //!   image   float [3, 800, 1280] or [1, 3, 800, 1280], as `MaskRcnnInput` says
@@ -8,10 +9,11 @@
 //!   scores  float [n]: 0 to 1                                masks   float [n, 1, height, width], 0 to 1
 //! ```
 //!
-//! A mask has either the size of the image or divides its box. The metadata of a model may name the columns and rows of the
-//! image that it reads (`closecall.columns`, `closecall.rows`): the others are not rendered. If it also takes a picture of these pixels
-//! alone in place of the image (`closecall.takes-sampled`: `yes`), it is given that, which saves the reading of 12 MB. It may also name
-//! its labels (`closecall.labels`: `1=car 2=truck 3=motorcycle`).
+//! A mask has either the size of the image or divides its box. The metadata of a model may name the
+//! columns and rows of the image that it reads (`closecall.columns`, `closecall.rows`): the others
+//! are not rendered. If it also takes a picture of these pixels alone in place of the image
+//! (`closecall.takes-sampled`: `yes`), it is given that, which saves the reading of 12 MB. It may
+//! also name its labels (`closecall.labels`: `1=car 2=truck 3=motorcycle`).
 
 use ort::session::{Session, SessionOutputs};
 use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
@@ -25,8 +27,8 @@ use super::picture::{HEIGHT_PX, WIDTH_PX};
 use super::sampling::Sampling;
 use super::vector_registers::clear_upper_parts;
 
-/// The ONNX file of the Mask R-CNN that ships with Closecall. `xtask/training/mask_rcnn_train.py` trained it, and
-/// `models/MASK_RCNN_CARD.md` reports its precision.
+/// The ONNX file of the Mask R-CNN that ships with Closecall. `xtask/training/mask_rcnn_train.py`
+/// trained it, and `models/MASK_RCNN_CARD.md` reports its precision.
 pub const SHIPPED_MASK_RCNN: &[u8] = include_bytes!("../../models/rear-mask-rcnn.onnx");
 
 /// The layout that a network must have.
@@ -55,9 +57,9 @@ pub struct InstanceDetector {
     /// Name of the network in errors.
     name: String,
     colours: MaskRcnnInput,
-    /// Rows and columns of the input: those of the image, or those of the pixels that the network reads.
+    /// Rows and columns of the input: of the image, or of the pixels that the network reads.
     sides: [usize; 2],
-    /// The input: three planes. What the network does not read stays 0.
+    /// The input: three planes. Pixels that the network does not read stay 0.
     planes: Vec<f32>,
 }
 
@@ -70,11 +72,13 @@ impl InstanceDetector {
         Self::new(SHIPPED_MASK_RCNN, None, backend)
     }
 
-    /// Loads a network from the bytes of an ONNX file. `labels` names its labels if its metadata do not.
+    /// Loads a network from the bytes of an ONNX file. `labels` names its labels if its metadata do
+    /// not.
     ///
     /// # Errors
-    /// [`ClassifierError`] if the backend is not ONNX Runtime or cannot be loaded, if the process uses another one, if `model`
-    /// cannot be read or has another layout, or if no labels are known.
+    /// [`ClassifierError`] if the backend is not ONNX Runtime or cannot be loaded, if the process
+    /// uses another backend, if `model` cannot be read or has another layout, or if no labels are
+    /// known.
     pub fn new(model: &[u8], labels: Option<&LabelMap>, backend: &Backend) -> Result<Self, ClassifierError> {
         if *backend == Backend::Tract {
             return Err(ClassifierError::NeedsOnnxRuntime);
@@ -112,7 +116,8 @@ impl InstanceDetector {
         Self { name: name.to_owned(), ..self }
     }
 
-    /// Returns the same network, which takes these values for the colours of a pixel. [`MaskRcnnInput::Rgb`] is usual.
+    /// Returns the same network, which takes these values for the colours of a pixel.
+    /// [`MaskRcnnInput::Rgb`] is usual.
     #[must_use]
     pub fn with_input(self, colours: MaskRcnnInput) -> Self {
         Self { colours, ..self }
@@ -123,12 +128,14 @@ impl InstanceDetector {
         &self.sampling
     }
 
-    /// Returns the instances in a picture of the pixels at the columns and rows of [`InstanceDetector::sampling`], in the order of the
-    /// network. The same picture always gives the same bits.
+    /// Returns the instances in a picture of the pixels at the columns and rows of
+    /// [`InstanceDetector::sampling`], in the order of the network. The same picture always gives
+    /// the same bits.
     ///
     /// # Errors
-    /// [`ClassifierError::Run`] if inference fails, [`ClassifierError::Layout`] if an output has another shape, and
-    /// [`ClassifierError::Value`] if a box is not finite or has no sides, or a score or a mask is not a probability.
+    /// [`ClassifierError::Run`] if inference fails, [`ClassifierError::Layout`] if an output has
+    /// another shape, and [`ClassifierError::Value`] if a box is not finite or has no sides, or a
+    /// score or a mask is not a probability.
     pub fn detect(&mut self, picture: &Image) -> Result<Vec<Instance>, ClassifierError> {
         self.fill(picture);
         let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
@@ -176,9 +183,9 @@ fn instances(
     let (rows, columns, count) = (side(2), side(3), scores.len());
     let is_right = boxes.len() == 4 * count && labels.len() == count && masks.len() == count * rows * columns;
     if !is_right || (count > 0 && rows * columns == 0) {
-        let found =
+        let actual =
             format!("boxes {boxes_shape:?}, labels {labels_shape:?}, scores {scores_shape:?}, masks {masks_shape:?}");
-        return Err(ClassifierError::Layout { found, wanted: WANTED });
+        return Err(ClassifierError::Layout { actual, wanted: WANTED });
     }
     let check = |tensor: &String, place: Option<usize>, values: &[f32], allowed: &'static str| {
         let Some(index) = place else { return Ok(()) };
@@ -195,14 +202,14 @@ fn instances(
     check(&names[2], scores.iter().position(is_no_probability), scores, PROBABILITIES)?;
     check(&names[3], masks.iter().position(is_no_probability), masks, PROBABILITIES)?;
     let is_image = [columns, rows] == [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
-    let found = (0..count).filter_map(|index| {
+    let instances = (0..count).filter_map(|index| {
         let box_px: [f64; 4] = std::array::from_fn(|part| f64::from(boxes[4 * index + part]));
         let class = map.class(labels[index])?;
         let area_px = if is_image { [0.0, 0.0, WIDTH_PX.into(), HEIGHT_PX.into()] } else { box_px };
         let mask = Mask::new(area_px, [columns, rows], masks[index * rows * columns..][..rows * columns].to_vec())?;
         Some(Instance { box_px, class, score: f64::from(scores[index]).clamp(0.0, 1.0), mask })
     });
-    Ok(found.collect())
+    Ok(instances.collect())
 }
 
 /// Returns name and rank of the input, and the names of boxes, labels, scores and masks.
@@ -216,7 +223,10 @@ fn layout(session: &Session) -> Result<((String, usize), [String; 4]), Classifie
                 outlets.iter().map(|outlet| format!("{} {}", outlet.name(), outlet.dtype())).collect();
             if words.is_empty() { "none".to_owned() } else { words.join(", ") }
         };
-        ClassifierError::Layout { found: format!("inputs {}; outputs {}", list(inputs), list(outputs)), wanted: WANTED }
+        ClassifierError::Layout {
+            actual: format!("inputs {}; outputs {}", list(inputs), list(outputs)),
+            wanted: WANTED,
+        }
     };
     let sides = [1, CHANNELS as i64, HEIGHT_PX.into(), WIDTH_PX.into()];
     let [input] = inputs else { return Err(wrong()) };
@@ -240,7 +250,8 @@ fn layout(session: &Session) -> Result<((String, usize), [String; 4]), Classifie
     Ok(((input.name().to_owned(), rank), [boxes, labels, scores, masks].map(|outlet| outlet.name().to_owned())))
 }
 
-/// Returns the shape of a tensor of this kind of element, with −1 for a dynamic side. Returns `None` for anything else.
+/// Returns the shape of a tensor of this kind of element, with −1 for a dynamic side. Returns
+/// `None` for anything else.
 fn shape(outlet: &Outlet, kind: TensorElementType) -> Option<Vec<i64>> {
     match outlet.dtype() {
         ValueType::Tensor { ty, shape, .. } if *ty == kind => Some(shape.to_vec()),
@@ -250,7 +261,8 @@ fn shape(outlet: &Outlet, kind: TensorElementType) -> Option<Vec<i64>> {
 
 /// Returns whether a shape can be one with these sides. A negative side is dynamic, or any.
 fn fits(shape: &[i64], sides: &[i64]) -> bool {
-    shape.len() == sides.len() && shape.iter().zip(sides).all(|(own, side)| own == side || *own < 0 || *side < 0)
+    shape.len() == sides.len()
+        && shape.iter().zip(sides).all(|(dimension, side)| dimension == side || *dimension < 0 || *side < 0)
 }
 
 #[cfg(test)]

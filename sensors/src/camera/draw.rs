@@ -1,6 +1,7 @@
 //! The rendering of an exposure's pixels.
 //!
-//! Each pixel is a function of (scene, pixel, key) alone, and does not depend on what was rendered before.
+//! Each pixel is a function of (scene, pixel, key) alone, and does not depend on what was rendered
+//! before.
 
 use wide::f32x4;
 
@@ -28,8 +29,8 @@ impl Frame {
         self.sampled(&columns, &rows)
     }
 
-    /// Renders every `step`-th pixel of the rows `rows` of the image, as a small picture for human viewers. Each pixel
-    /// is identical to that of the whole image.
+    /// Renders every `step`-th pixel of the rows `rows` of the image, as a small picture for human
+    /// viewers. Each pixel is identical to the same pixel of the whole image.
     pub fn preview(&mut self, step: u16, rows: std::ops::Range<u16>) -> Image {
         let columns: Vec<i32> = (step / 2..WIDTH_PX).step_by(step.into()).map(i32::from).collect();
         let rows: Vec<i32> =
@@ -37,10 +38,11 @@ impl Frame {
         self.sampled(&columns, &rows).image
     }
 
-    /// Renders the pixels at the intersections of `columns` and `rows`, in their order, with the instance number of
-    /// each. Each pixel is identical to that of the whole image.
+    /// Renders the pixels at the intersections of `columns` and `rows`, in their order, with the
+    /// instance number of each. Each pixel is identical to the same pixel of the whole image.
     pub fn sampled(&mut self, columns: &[i32], rows: &[i32]) -> LabelledImage {
-        /// Side of the square tiles in which the picture is rendered (px), small enough for the processor's cache.
+        /// Side of the square tiles in which the picture is rendered (px), small enough for the
+        /// processor's cache.
         const TILE: usize = 64;
         let width = columns.len();
         let mut rgb = vec![0; width * rows.len() * CHANNELS];
@@ -78,15 +80,16 @@ impl Frame {
         }
     }
 
-    /// Returns the share of the latest crop's samples that show the vehicle with the index `other` in the scene's list
-    /// of other vehicles.
+    /// Returns the share of the latest crop's samples that show the vehicle with the index `other`
+    /// in the scene's list of other vehicles.
     pub fn instance_share(&self, other: usize) -> f64 {
         let samples = self.lists.visibility.face.len();
         let hits = (0..samples).filter(|sample| usize::from(self.instance(*sample)) == other + 1).count();
         hits as f64 / samples.max(1) as f64
     }
 
-    /// Returns the instance number that a sample of the latest rendering shows, or 0 if it shows no vehicle.
+    /// Returns the instance number that a sample of the latest rendering shows, or 0 if it shows no
+    /// vehicle.
     fn instance(&self, sample: usize) -> u16 {
         let face = self.lists.visibility.face[sample][0] as usize;
         self.lists.faces.get(face).map_or(0, |shade| shade.instance)
@@ -125,22 +128,23 @@ impl Frame {
         self.lists.effects = of_tile;
     }
 
-    /// Renders one pixel of a row. `sample` is its index in the lattice, and `place` that in the row.
+    /// Renders one pixel of a row. `sample` is its index in the lattice, and `place` that in the
+    /// row.
     fn pixel(&self, sample: usize, place: usize, line: &mut Line<'_>) -> [u8; 3] {
         let pixel = [line.columns[place], line.row];
         let left_px = pixel[0] as f32;
         let (centre, length) = line.centre(self, place);
         let (mut light, nearness) = match self.at_once((sample, place), length, line) {
-            Some(found) => found,
+            Some(colour) => colour,
             None => self.moment_by_moment((sample, place), length, line),
         };
-        let reaches = |own: &Bounds| left_px <= own[2] && own[0] <= left_px + 1.0;
+        let reaches = |bounds_px: &Bounds| left_px <= bounds_px[2] && bounds_px[0] <= left_px + 1.0;
         let mut glare = [0.0; 3];
         let mut direction = [0.0; 3];
         if self.may_see_glare(centre, length) || !line.effects.clouds.is_empty() || !self.lists.veils.is_empty() {
             direction = self.lens.ray_in_ground(centre).map(|part| part / length);
             let mut thickness = 0.0;
-            for (_, cloud) in line.effects.clouds.iter().filter(|(own, _)| reaches(own)) {
+            for (_, cloud) in line.effects.clouds.iter().filter(|(bounds_px, _)| reaches(bounds_px)) {
                 thickness += cloud.optical_depth(direction, length * MOMENTS as f32 / nearness.max(1e-3));
             }
             if thickness > 0.0 {
@@ -151,7 +155,7 @@ impl Frame {
             glare = glow::sun(direction, &self.light);
         }
         let at = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
-        for (_, glow) in line.effects.glows.iter().filter(|(own, _)| reaches(own)) {
+        for (_, glow) in line.effects.glows.iter().filter(|(bounds_px, _)| reaches(bounds_px)) {
             glow.add_to(at, &mut light);
         }
         for veil in &self.lists.veils {
@@ -172,8 +176,9 @@ impl Frame {
         self.light.sun[0] > 0.0 && towards_sun > glow::NO_GLARE_TO_COSINE * length
     }
 
-    /// Returns the mean radiance of a pixel that shows nothing but bodies, or nothing but background of one kind, and the sum of 1/depth
-    /// over its moments (1/m). Returns `None` for other pixels.
+    /// Returns the mean radiance of a pixel that shows nothing but bodies, or nothing but
+    /// background of one kind, and the sum of 1/depth over its moments (1/m). Returns `None` for
+    /// other pixels.
     #[inline]
     fn at_once(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> Option<(Vec3, f32)> {
         let inverse_depth = f32x4::from(self.lists.visibility.inverse_depth[sample]);
@@ -188,7 +193,8 @@ impl Frame {
         self.background(&line.background, (x, length), &lit, &mut line.background_noise)
     }
 
-    /// Returns the mean radiance of a pixel that shows a body at each moment, and the sum of 1/depth over its moments (1/m).
+    /// Returns the mean radiance of a pixel that shows a body at each moment, and the sum of
+    /// 1/depth over its moments (1/m).
     #[inline]
     fn bodies(
         &self,
@@ -211,7 +217,8 @@ impl Frame {
         (mean(seen), inverse_depth.to_array().into_iter().fold(0.0, |sum, part| sum + part))
     }
 
-    /// Returns the radiance of a face at this depth (m), before the air, in the sample of a moment at a place of the row.
+    /// Returns the radiance of a face at this depth (m), before the air, in the sample of a moment
+    /// at a place of the row.
     #[inline]
     fn of_face(&self, face: u32, (place, moment): (usize, usize), depth: f32, line: &Line<'_>) -> Vec3 {
         let shade = &self.lists.faces[face as usize];
@@ -239,8 +246,9 @@ impl Frame {
         (sum.map(|part| part / MOMENTS as f32), nearness)
     }
 
-    /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky. The sample is given by its index in the
-    /// lattice and in the row, and `length` is that of the ray through the middle of the pixel.
+    /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky. The
+    /// sample is given by its index in the lattice and in the row, and `length` is the length of
+    /// the ray through the middle of the pixel.
     fn sample(&self, (sample, place): (usize, usize), moment: usize, length: f32, line: &mut Line<'_>) -> (Vec3, f32) {
         let inverse_depth = self.lists.visibility.inverse_depth[sample][moment];
         if inverse_depth > 0.0 {
@@ -264,7 +272,8 @@ impl Frame {
         (sky::radiance(slope(), bearing, &self.light, &mut line.noise[moment].1), 0.0)
     }
 
-    /// Returns the distance that the ego has moved when a row of the image is read, relative to the middle row (m).
+    /// Returns the distance that the ego has moved when a row of the image is read, relative to the
+    /// middle row (m).
     pub(super) fn travelled_at(&self, row: i32) -> f32 {
         (self.ego_speed_mps * self.lens.read_after_s(f64::from(row) + 0.5)) as f32
     }

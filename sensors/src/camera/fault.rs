@@ -1,16 +1,19 @@
-//! What a fault of the camera does to the pixels that the classifier receives. Glare is light, and part of the exposure
-//! ([`Frame::add_glare`](super::Frame::add_glare)); dirt and blur change its pixels.
+//! The effect of a fault of the camera on the pixels that the classifier receives. Glare is light,
+//! and part of the exposure ([`Frame::add_glare`](super::Frame::add_glare)). Dirt and blur change
+//! the pixels of the exposure.
 
 use super::image::{CHANNELS, CROP_PX, Crop, Image, sample_positions};
 use super::sampling::Sampling;
 use closecall_traffic::maths;
 
-/// Side of the cells of the image that a blot of dirt covers or leaves (px). On a lens of 5 mm with 1280 pixels, a blot of
-/// 0.15 mm covers about 40 pixels (assumption).
+/// Side of the cells of the image that a blot of dirt covers or leaves (px). On a lens of 5 mm with
+/// 1280 pixels, a blot of 0.15 mm covers about 40 pixels (assumption).
 const BLOT_PX: i32 = 40;
-/// Colour of light that has passed through dirt, sRGB (assumption: dark brown, as of dried road spray).
+/// Colour of light that has passed through dirt, sRGB (assumption: dark brown, as of dried road
+/// spray).
 const DIRT_RGB: [f32; CHANNELS] = [70.0, 62.0, 52.0];
-/// Key of the pattern of blots. The same for all runs, so that dirt does not change between paired arms.
+/// Key of the pattern of blots. The same for all runs, so that dirt does not change between paired
+/// arms.
 const BLOT_KEY: u64 = 0x0b10_7b10_7b10_70b1;
 
 /// The effects of faults of the rear camera at one instant. None by default.
@@ -22,7 +25,8 @@ pub struct CameraFault {
     pub is_frozen: bool,
     /// Stray light of the sun, relative to that in a healthy young eye.
     pub sun_glare: f64,
-    /// Stray light of the main beam of the nearest vehicle behind, relative to that in a healthy young eye.
+    /// Stray light of the main beam of the nearest vehicle behind, relative to that in a healthy
+    /// young eye.
     pub main_beam_glare: f64,
     /// Share of the lens that dirt covers (0 to 1).
     pub dirt: f64,
@@ -72,7 +76,8 @@ impl CameraFault {
     }
 }
 
-/// Returns whether a cell of the image lies behind a blot: the cells are covered at random with the probability `share`.
+/// Returns whether a cell of the image lies behind a blot: the cells are covered at random with the
+/// probability `share`.
 fn is_blot([column, row]: [i32; 2], share: f64) -> bool {
     let mut z = BLOT_KEY ^ ((column as u32 as u64) << 32 | row as u32 as u64);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -80,7 +85,8 @@ fn is_blot([column, row]: [i32; 2], share: f64) -> bool {
     ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 <= share && share > 0.0
 }
 
-/// Blurs a crop with a Gaussian kernel of this standard deviation (crop pixels), along rows and columns.
+/// Blurs a crop with a Gaussian kernel of this standard deviation (crop pixels), along rows and
+/// columns.
 fn blur(crop: &mut Crop, sd: f32) {
     if sd < 0.1 {
         return;
@@ -106,8 +112,8 @@ fn blur(crop: &mut Crop, sd: f32) {
     }
 }
 
-/// Blurs a picture of these columns and rows with a Gaussian kernel of this standard deviation (px of the image), along rows and
-/// columns. Pixels count by their distance in the image.
+/// Blurs a picture of these columns and rows with a Gaussian kernel of this standard deviation (px
+/// of the image), along rows and columns. Pixels count by their distance in the image.
 fn blur_picture(picture: &mut Image, sampling: &Sampling, sd_px: f32) {
     /// Distance beyond which a pixel does not count (standard deviations).
     const REACH: f32 = 3.0;

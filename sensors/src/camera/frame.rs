@@ -1,4 +1,5 @@
-//! One exposure of the rear camera: the scene, prepared so that `draw.rs` can render any of its pixels.
+//! One exposure of the rear camera: the scene, prepared so that `draw.rs` can render any of its
+//! pixels.
 //!
 //! ```text
 //!   bodies ─ shaded, projected at 4 moments ─▶ visible face of each sample ─▶ radiance ─▶ air ─▶ mean of 4
@@ -6,9 +7,10 @@
 //!                                          bytes ◀─ noise, exposure ◀─ window ◀─ glow ◀─ spray ◀────┘
 //! ```
 //!
-//! **A crop is identical to the same pixels of the whole image, bit for bit**, because a pixel is a function of (scene,
-//! pixel, key) alone. The frame leaves out bodies, shadows, spray clouds and halos that cannot reach the requested
-//! pixels. Their bounds are never too small, and each contributes exactly nothing outside its bounds.
+//! **A crop is identical to the same pixels of the whole image, bit for bit**, because a pixel is a
+//! function of (scene, pixel, key) alone. The frame leaves out bodies, shadows, spray clouds and
+//! halos that cannot reach the requested pixels. Their bounds are never too small, and each
+//! contributes exactly nothing outside its bounds.
 
 use closecall_traffic::{Indicator, Time, maths};
 
@@ -32,13 +34,16 @@ use closecall_traffic::{Scene, SceneVehicle};
 
 /// Longitudinal distance beyond which vehicles are not rendered (m).
 const MAX_DISTANCE_M: f64 = 400.0;
-/// Offset within the pixel of the sample of each moment (1/256 px). Together they form a rotated grid.
+/// Offset within the pixel of the sample of each moment (1/256 px). Together they form a rotated
+/// grid.
 const SUBPIXEL_OFFSETS: [[i32; 2]; MOMENTS] = [[32, 160], [96, 32], [224, 96], [160, 224]];
-/// Margin by which bounds are enlarged to cover vibration, motion within the exposure, and rounding (px).
+/// Margin by which bounds are enlarged to cover vibration, motion within the exposure, and rounding
+/// (px).
 const MARGIN_PX: f64 = 24.0;
 /// Maximum shift of the image by vibration during an exposure (px).
 const MAX_SHAKE_PX: f64 = 6.0;
-/// Interval at which the pattern of drops on the window changes, because drops move and are wiped away.
+/// Interval at which the pattern of drops on the window changes, because drops move and are wiped
+/// away.
 const DROP_PATTERN_PERIOD: Time = Time::from_ms(400);
 /// Period of a blinking indicator, which shines during the first half.
 const BLINK_PERIOD: Time = Time::from_ms(700);
@@ -58,7 +63,8 @@ pub struct Frame {
     pub(super) window: RearWindow,
     /// Offset within the pixel of the sample of each moment, including vibration (1/256 px).
     pub(super) subpixel: [[i32; 2]; MOMENTS],
-    /// Distance that the ego has moved along s at each moment, relative to the middle of the exposure (m).
+    /// Distance that the ego has moved along s at each moment, relative to the middle of the
+    /// exposure (m).
     pub(super) travelled_m: [f32; MOMENTS],
     /// Speed of the ego (m/s).
     pub(super) ego_speed_mps: f64,
@@ -78,7 +84,7 @@ pub struct FrameBuffers {
     pub(super) glows: Vec<(Bounds, Glow)>,
     pub(super) veils: Vec<Veil>,
     pub(super) visibility: Visibility,
-    /// What may affect the pixels that are being rendered.
+    /// The effects that may touch the pixels to render.
     pub(super) effects: Effects,
     /// Memory of the row that is being rendered.
     pub(super) line: LineMemory,
@@ -107,7 +113,8 @@ impl FrameBuffers {
 }
 
 impl Frame {
-    /// Prepares the exposure for rendering within the rectangles `regions`. Pixels outside of them are not valid.
+    /// Prepares the exposure for rendering within the rectangles `regions`. Pixels outside of them
+    /// are not valid.
     pub fn new(camera: &Camera, scene: &Scene<'_>, key: ExposureKey, regions: &[PixelRect]) -> Self {
         Self::with_buffers(FrameBuffers::default(), camera, scene, key, regions)
     }
@@ -144,7 +151,7 @@ impl Frame {
         }
         frame.add_roadside(scene, s_m, regions);
         frame.add_ghosts_of_the_sun();
-        let own = spray::clouds_behind(
+        let ego_clouds = spray::clouds_behind(
             &scene.ego,
             scene,
             [-lens.ahead_m as f32, 0.0],
@@ -152,7 +159,7 @@ impl Frame {
             lens.height_m as f32,
             key.0,
         );
-        frame.add_clouds(own.into_iter().flatten());
+        frame.add_clouds(ego_clouds.into_iter().flatten());
         frame
     }
 
@@ -332,7 +339,8 @@ impl Frame {
         }
     }
 
-    /// Adds the ghosts of a source of light at a position in the image (px), which illuminates the lens so much.
+    /// Adds the ghosts of a source of light at a position in the image (px), which illuminates the
+    /// lens so much.
     fn add_ghosts(&mut self, source_px: [f32; 2], irradiance: Vec3) {
         let reflectance = self.lens.optics.surface_reflectance as f32;
         if reflectance > 0.0 {
@@ -345,7 +353,8 @@ impl Frame {
         let towards = self.lens.direction_in_camera(self.light.to_sun.map(f64::from));
         if self.light.sun[0] > 0.0 && towards[2] > 0.0 {
             let at_px = self.lens.pixel(towards).map(|part| part as f32);
-            // The light of the sun is that of a white surface facing it, which is matt: its radiance is E/π.
+            // The light of the sun is the radiance of a white, matt surface that faces the sun:
+            // E/π.
             self.add_ghosts(at_px, self.light.sun.map(|part| std::f32::consts::PI * part));
         }
     }
@@ -358,8 +367,8 @@ impl Frame {
         GroundBox { length_m: body.length_m + along_m, width_m: body.width_m + across_m, ..body }
     }
 
-    /// Returns the bounds in the image of a box given in the ground frame, never too small. Returns `None` if the box
-    /// is not visible.
+    /// Returns the bounds in the image of a box given in the ground frame, never too small. Returns
+    /// `None` if the box is not visible.
     fn bounds_of(&self, body: &GroundBox) -> Option<Bounds> {
         let corners = body.corners().map(|corner| self.lens.in_camera(corner));
         self.lens.bounds(&corners).map(widened)
@@ -381,8 +390,8 @@ fn blinking(indicator: Indicator, time: Time) -> [bool; 2] {
     [on && indicator == Indicator::Left, on && indicator == Indicator::Right]
 }
 
-/// Returns the offset within the pixel of the sample of each moment, for a camera that rotates at a constant rate
-/// during the exposure.
+/// Returns the offset within the pixel of the sample of each moment, for a camera that rotates at a
+/// constant rate during the exposure.
 fn shaken_offsets(camera: &Camera, light: &Illumination, lens: &Lens, key: ExposureKey) -> [[i32; 2]; MOMENTS] {
     let [yaw, pitch, _] = normal3(mix(key.0 ^ 0x7368_616b));
     #[expect(clippy::cast_possible_truncation, reason = "limited to a few pixels before the cast")]

@@ -1,8 +1,8 @@
-//! Stray light in the lens and the window, and reflections: halos around lamps, streaks of lamps on a wet road, and the
-//! glare of the sun.
+//! Stray light in the lens and the window, and reflections: halos around lamps, streaks of lamps on
+//! a wet road, and the glare of the sun.
 //!
-//! A halo has a finite radius and contributes exactly zero beyond it. A crop that the halo does not reach can therefore
-//! be rendered without it.
+//! A halo has a finite radius and contributes exactly zero beyond it. A crop that the halo does not
+//! reach can therefore be rendered without it.
 
 use super::light::Illumination;
 use super::mesh::{Vec3, dot};
@@ -10,11 +10,12 @@ use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
 
 /// Cosine of the angle to the sun within which glare is visible: about 53°.
 const GLARE_FROM_COSINE: f32 = 0.6;
-/// Cosine of an angle that is a little larger, which no rounding can mistake for the other one.
+/// Cosine of a slightly larger angle: rounding cannot confuse the two.
 pub(crate) const NO_GLARE_TO_COSINE: f32 = GLARE_FROM_COSINE - 0.001;
 
-/// Places of the ghosts, as a multiple of the source's distance to the middle of the image, and their radii (px): an assumption,
-/// because each lens has its own. Ghosts are the sharper the nearer the second reflection is to a focus.
+/// Places of the ghosts, as a multiple of the source's distance to the middle of the image, and
+/// their radii (px): an assumption, because each lens has its own. Ghosts are the sharper the
+/// nearer the second reflection is to a focus.
 const GHOSTS: [[f32; 2]; 3] = [[-0.5, 60.0], [-1.1, 36.0], [0.35, 90.0]];
 
 /// A halo, a streak or a ghost in the image.
@@ -24,15 +25,16 @@ pub(crate) struct Glow {
     pub(crate) centre_px: [f32; 2],
     /// Horizontal and vertical radius, beyond which there is no light (px).
     pub(crate) reach_px: [f32; 2],
-    /// Sharpness of the peak in the middle, dimensionless: 0 for streaks and ghosts, which have none.
+    /// Sharpness of the peak in the middle, dimensionless: 0 for streaks and ghosts, which have
+    /// none.
     pub(crate) peak: f32,
     /// Radiance in the centre.
     pub(crate) radiance: Vec3,
 }
 
 impl Glow {
-    /// Returns the halo of a lamp at the depth `depth_m`. `facing` is the cosine of the angle between the lamp's axis
-    /// and the direction to the lens. Halos are used only in the dark.
+    /// Returns the halo of a lamp at the depth `depth_m`. `facing` is the cosine of the angle
+    /// between the lamp's axis and the direction to the lens. Halos are used only in the dark.
     pub(crate) fn halo(centre_px: [f32; 2], depth_m: f32, facing: f32, radiance: Vec3) -> Self {
         /// Depth at which the halo's size and strength have their nominal values (m).
         const REFERENCE_M: f32 = 30.0;
@@ -47,15 +49,17 @@ impl Glow {
         }
     }
 
-    /// Returns the streak that the lamp of `halo` draws on a wet road. The mirror image of the lamp is at `at` (px).
+    /// Returns the streak that the lamp of `halo` draws on a wet road. The mirror image of the lamp
+    /// is at `at` (px).
     pub(crate) fn streak(centre_px: [f32; 2], halo: &Self, wetness: f32) -> Self {
         let [side, _] = halo.reach_px;
         let reach_px = [0.16 * side, 0.9 * side];
         Self { centre_px, reach_px, peak: 0.0, radiance: halo.radiance.map(|x| x * 0.5 * wetness) }
     }
 
-    /// Returns the ghosts of a source at a position in the image (px): light that two surfaces of the lens have reflected appears
-    /// again on the line through the middle of the image. `irradiance` is what all of it would bring to the lens.
+    /// Returns the ghosts of a source at a position in the image (px): light that two surfaces of
+    /// the lens have reflected appears again on the line through the middle of the image.
+    /// `irradiance` is what all of it would bring to the lens.
     pub(crate) fn ghosts(source_px: [f32; 2], irradiance: Vec3) -> [Self; GHOSTS.len()] {
         let middle = [WIDTH_PX, HEIGHT_PX].map(|extent| f32::from(extent) / 2.0);
         GHOSTS.map(|[place, radius_px]| {
@@ -89,7 +93,8 @@ impl Glow {
     }
 }
 
-/// Returns the radiance of the sun's disc and of its glare in the direction of the unit vector `towards`.
+/// Returns the radiance of the sun's disc and of its glare in the direction of the unit vector
+/// `towards`.
 pub(crate) fn sun(towards: Vec3, light: &Illumination) -> Vec3 {
     let cosine = dot(towards, light.to_sun);
     if light.sun[0] <= 0.0 || cosine <= GLARE_FROM_COSINE {

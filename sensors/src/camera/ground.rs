@@ -1,7 +1,8 @@
-//! The ground: the road surface with its markings, the verge, and the shadows and headlamp beams of vehicles on it.
+//! The ground: the road surface with its markings, the verge, and the shadows and headlamp beams of
+//! vehicles on it.
 //!
-//! The markings follow German practice for motorways: edge lines are 0.30 m wide, lane lines are 0.15 m wide and
-//! dashed, with dashes of 6 m every 18 m.
+//! The markings follow German practice for motorways: edge lines are 0.30 m wide, lane lines are
+//! 0.15 m wide and dashed, with dashes of 6 m every 18 m.
 
 use closecall_traffic::{Road, maths};
 
@@ -17,8 +18,8 @@ const EDGE_LINE_HALF_M: f32 = 0.15;
 const LANE_LINE_HALF_M: f32 = 0.075;
 const DASH_M: f32 = 6.0;
 const DASH_EVERY_M: f32 = 18.0;
-/// The distances at which dashes begin to merge into a uniform grey line and at which they have merged (m), because a
-/// pixel row then spans several of them.
+/// The distances at which dashes begin to merge into a uniform grey line and at which they have
+/// merged (m), because a pixel row then spans several of them.
 const DASHES_MERGE_M: [f32; 2] = [60.0, 110.0];
 /// Widths of the paved shoulder left of the leftmost lane and right of the rightmost lane (m).
 const SHOULDER_M: [f32; 2] = [1.3, 2.6];
@@ -39,7 +40,8 @@ const LEAST_SUN: f32 = 0.05;
 /// The road surface as seen from one position of the lens.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ground {
-    /// Position of the lens in road coordinates (s, d) (m), with s modulo the period of the textures.
+    /// Position of the lens in road coordinates (s, d) (m), with s modulo the period of the
+    /// textures.
     s_m: f32,
     d_m: f32,
     /// Cosine and sine of the ego's heading relative to the road.
@@ -91,14 +93,15 @@ pub(crate) struct GroundNoise {
 #[derive(Clone, Copy)]
 pub(crate) struct GroundLight<'a> {
     pub(crate) light: &'a Illumination,
-    /// Shadows and beams of the pixel's row, with their bounds in the image. They have no effect outside of these.
+    /// Shadows and beams of the pixel's row, with their bounds in the image. They have no effect
+    /// outside of these.
     pub(crate) patches: &'a [(Bounds, Patch)],
     /// Left edge of the pixel (px).
     pub(crate) left_px: f32,
 }
 
-/// The combined effect of all patches on one point of the ground: the visible shares of sky and sun, and the added
-/// light of headlamps.
+/// The combined effect of all patches on one point of the ground: the visible shares of sky and
+/// sun, and the added light of headlamps.
 struct PatchLight {
     sky: f32,
     sun: f32,
@@ -106,9 +109,11 @@ struct PatchLight {
 }
 
 impl Ground {
-    /// Creates the surface of `road` for a lens at (`s_m`, `d_m`) in a vehicle with this heading relative to the road.
+    /// Creates the surface of `road` for a lens at (`s_m`, `d_m`) in a vehicle with this heading
+    /// relative to the road.
     pub(crate) fn new(road: &Road, s_m: f64, d_m: f64, heading_rad: f64) -> Self {
-        /// Period at which s is wrapped to keep numbers small (m): a multiple of the periods of dashes and textures.
+        /// Period at which s is wrapped to keep numbers small (m): a multiple of the periods of
+        /// dashes and textures.
         const PERIOD_M: f64 = 18.0 * 512.0;
         Self {
             s_m: s_m.rem_euclid(PERIOD_M) as f32,
@@ -123,9 +128,10 @@ impl Ground {
 
     /// Returns the road coordinates (s, d) (m) of the point (x, y) of the ground frame.
     ///
-    /// The reference line is a circle of curvature κ that touches the X axis. Then d = −q/(1 + √(1 + κ·q)) for
-    /// q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0. The arc length s follows from X/(1 − κ·Y) to third order,
-    /// which suffices because it only positions dashes and textures.
+    /// The reference line is a circle of curvature κ that touches the X axis. Then
+    /// d = −q/(1 + √(1 + κ·q)) for q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0. The arc length
+    /// s follows from X/(1 − κ·Y) to third order, which suffices because it only positions dashes
+    /// and textures.
     fn road_position(&self, x: f32, y: f32) -> (f32, f32) {
         let along = self.cos * x - self.sin * y;
         let across = self.d_m + self.sin * x + self.cos * y;
@@ -141,8 +147,8 @@ impl Ground {
         (self.s_m + tangent * (1.0 - bend * bend / 3.0), d)
     }
 
-    /// Returns the radiance of the ground at the point (x, y) of the ground frame, after the ego has moved by
-    /// `travelled_m` along s.
+    /// Returns the radiance of the ground at the point (x, y) of the ground frame, after the ego
+    /// has moved by `travelled_m` along s.
     pub(crate) fn radiance(
         &self,
         [x, y]: [f32; 2],
@@ -165,8 +171,8 @@ impl Ground {
         })
     }
 
-    /// Returns the reflectance, and the share of the sky's light that a wet surface mirrors. `run` is the horizontal
-    /// distance from the lens (m).
+    /// Returns the reflectance, and the share of the sky's light that a wet surface mirrors. `run`
+    /// is the horizontal distance from the lens (m).
     fn albedo(&self, [s, d]: [f32; 2], run: f32, wetness: f32, noise: &mut GroundNoise) -> (Vec3, f32) {
         let right = -self.lanes * self.lane_width_m;
         // The texture fades with distance, as a pixel spans more than one of its cells.
@@ -249,8 +255,8 @@ fn in_sun_shadow(patch: &Patch, [along, left]: [f32; 2], to_sun: Vec3) -> bool {
     from < to
 }
 
-/// Returns for the axes along and across a vehicle how fast the way to the sun leads along it, never 0, and half the extent that
-/// casts a shadow (m).
+/// Returns for the axes along and across a vehicle how fast the way to the sun leads along it,
+/// never 0, and half the extent that casts a shadow (m).
 fn ways(patch: &Patch, to_sun: Vec3) -> [(f32, f32); 2] {
     let [cos, sin] = patch.turn;
     let way = [cos * to_sun[0] + sin * to_sun[1], cos * to_sun[1] - sin * to_sun[0]];
@@ -258,8 +264,8 @@ fn ways(patch: &Patch, to_sun: Vec3) -> [(f32, f32); 2] {
     [(along, patch.extent[0]), (across, 0.92 * patch.extent[1])]
 }
 
-/// Returns the light of a pair of dipped headlamps on the road, `ahead` of them and to their `left` (m), in units of
-/// [`Illumination::beam`].
+/// Returns the light of a pair of dipped headlamps on the road, `ahead` of them and to their `left`
+/// (m), in units of [`Illumination::beam`].
 fn headlamp_beam(ahead: f32, left: f32) -> f32 {
     let [far, wide] = BEAM_M;
     if !(ahead > 0.0 && ahead < far) {

@@ -1,9 +1,9 @@
 //! Reproducible noise that depends on the position, not on the order of evaluation.
 //!
-//! The noise of a pixel depends only on a key and on the pixel's coordinates, so that a crop has the same noise as the
-//! whole image. The camera therefore uses a hash instead of a random stream: the finaliser of SplitMix64 (Steele, Lea
-//! and Flood, *Fast splittable pseudorandom number generators*, 2014). With a counter as input it passes the usual
-//! statistical test batteries.
+//! The noise of a pixel depends only on a key and on the pixel's coordinates, so a crop has the
+//! same noise as the whole image. The camera therefore uses a hash instead of a random stream: the
+//! finaliser of SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number
+//! generators*, 2014). With a counter as input it passes the usual statistical test batteries.
 
 /// Hashes 64 bits.
 #[inline]
@@ -28,8 +28,8 @@ pub(crate) const fn unit(bits: u64) -> f32 {
     (bits >> 40) as f32 * STEP
 }
 
-/// Returns three approximately normal numbers with mean 0 and standard deviation 1, within ±3. Each is the sum of three
-/// uniform numbers of 7 bits (Irwin–Hall distribution).
+/// Returns three approximately normal numbers with mean 0 and standard deviation 1, within ±3. Each
+/// is the sum of three uniform numbers of 7 bits (Irwin–Hall distribution).
 pub(crate) fn normal3(bits: u64) -> [f32; 3] {
     const BITS: u32 = 7;
     const MASK: u64 = (1 << BITS) - 1;
@@ -66,7 +66,8 @@ pub(crate) struct LineNoise {
 }
 
 impl LineNoise {
-    /// Returns the noise of `key` at `x`, from 0 (inclusive) to 1 (exclusive). The key must be the same in all calls.
+    /// Returns the noise of `key` at `x`, from 0 (inclusive) to 1 (exclusive). The key must be the
+    /// same in all calls.
     #[inline]
     pub(crate) fn at(&mut self, key: u64, x: f32) -> f32 {
         let (cell, within) = split(x);
@@ -79,8 +80,8 @@ impl LineNoise {
     }
 }
 
-/// Value noise in a plane, with cells of size 1, which remembers the corners of its latest cell: neighbouring samples often share
-/// it, and hashing its corners takes most of the time.
+/// Value noise in a plane, with cells of size 1, which remembers the corners of its latest cell:
+/// neighbouring samples often share it, and hashing its corners takes most of the time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PlaneNoise {
     cell: Option<[i32; 2]>,
@@ -88,7 +89,8 @@ pub(crate) struct PlaneNoise {
 }
 
 impl PlaneNoise {
-    /// Returns the noise of `key` at (x, y), from 0 (inclusive) to 1 (exclusive). The key must be the same in all calls.
+    /// Returns the noise of `key` at (x, y), from 0 (inclusive) to 1 (exclusive). The key must be
+    /// the same in all calls.
     #[inline]
     pub(crate) fn at(&mut self, key: u64, x: f32, y: f32) -> f32 {
         let ((i, fx), (j, fy)) = (split(x), split(y));
@@ -130,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_asked_before_does_not_change_the_noise() {
+    fn earlier_samples_do_not_change_the_noise() {
         let (mut line, mut plane) = (LineNoise::default(), PlaneNoise::default());
         for step in 0_u16..2_000 {
             let (x, y) = (0.37 * f32::from(step % 50) - 9.0, 0.29 * f32::from(step / 50) - 5.0);

@@ -1,4 +1,5 @@
-//! Image types: the whole image, the crop that the classifier receives, and an image with its ground truth.
+//! Image types: the whole image, the crop that the classifier receives, and an image with its
+//! ground truth.
 
 use super::pinhole::PixelRect;
 
@@ -47,10 +48,11 @@ impl Image {
 
 /// The classifier's input for one object: 32 × 32 pixels sampled from a square window of the image.
 ///
-/// A window of side n is sampled at the columns `left + ⌊(2i + 1)·n/64⌋`, i = 0 … 31, and at the rows by the same
-/// formula. A large window (a near object) contributes every (n/32)-th pixel, a window of 32 px every pixel, and a
-/// smaller one some pixels more than once. Pixels are not averaged, so that each sample is identical, bit for bit, to a
-/// pixel of the whole image. Samples outside the image are black.
+/// A window of side n is sampled at the columns `left + ⌊(2i + 1)·n/64⌋`, i = 0 … 31, and at the
+/// rows by the same formula. A large window (a near object) contributes every (n/32)-th pixel, a
+/// window of 32 px every pixel, and a smaller window some pixels more than once. Pixels are not
+/// averaged, so that each sample is identical, bit for bit, to a pixel of the whole image. Samples
+/// outside the image are black.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Crop {
     /// The square window of the image that was sampled.
@@ -68,8 +70,8 @@ impl Default for Crop {
     }
 }
 
-/// Returns the pixel coordinates that a crop samples along one axis of a window, which begins at `start` and is
-/// `extent` pixels wide.
+/// Returns the pixel coordinates that a crop samples along one axis of a window, which begins at
+/// `start` and is `extent` pixels wide.
 pub(crate) fn sample_positions(start: i32, extent: u32) -> [i32; CROP_PX] {
     #[expect(clippy::cast_possible_wrap, reason = "windows are a few thousand pixels at most")]
     std::array::from_fn(|i| start + ((2 * i as u32 + 1) * extent / (2 * CROP_PX as u32)) as i32)
@@ -80,8 +82,9 @@ pub(crate) fn sample_positions(start: i32, extent: u32) -> [i32; CROP_PX] {
 pub struct LabelledImage {
     /// The image.
     pub image: Image,
-    /// The instance number of each pixel, row by row from the top: 1 + the index of the visible vehicle in
-    /// [`Scene::others`](closecall_traffic::Scene::others), or 0 if the pixel shows no vehicle.
+    /// The instance number of each pixel, row by row from the top: 1 + the index of the visible
+    /// vehicle in [`Scene::others`](closecall_traffic::Scene::others), or 0 if the pixel shows no
+    /// vehicle.
     pub instances: Vec<u16>,
 }
 

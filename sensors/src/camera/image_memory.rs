@@ -1,30 +1,33 @@
-//! What the network has said about the objects of one run, so that it classifies each only as often as it can learn
-//! something.
+//! The network's results about the objects of one run. The network classifies an object only while
+//! another image can still add information.
 //!
-//! Successive images of a vehicle show it at nearly the same distance, in the same light and from the same side, so that
-//! the network errs alike in them: the tracker counts about three scans as one observation. Scores that are up to 0.2 s
-//! old therefore say as much as new ones, and cost nothing. A new object is always classified at once.
+//! Successive images show a vehicle at nearly the same distance, in the same light and from the
+//! same side. The network then makes the same error in each of them, and the tracker counts about
+//! three scans as one observation. Scores that are up to 0.2 s old therefore carry as much
+//! information as new scores, and cost nothing. A new object is always classified at once.
 //!
-//! Five clear images of one class in a second drive the class of a track to its bounds, whatever it was before. Another
-//! image of the same class then changes nothing. Such an object is classified again if its scale in the image has
-//! changed by a fifth, and at least once per second (assumptions).
+//! Five clear images of one class in a second drive the class of a track to its bounds, whatever it
+//! was before. Another image of the same class then changes nothing. Such an object is classified
+//! again if its scale in the image has changed by a fifth, and at least once per second
+//! (assumptions).
 
 use closecall_traffic::{ClassScores, Time, maths};
 
 use crate::tracking::Detection;
 
-/// Age at which the scores of an object may be replaced: each object is classified at most five times per second.
+/// Age at which the scores of an object may be replaced: each object is classified at most five
+/// times per second.
 const MIN_AGE: Time = Time::from_ms(200);
 /// Age at which the scores of an object are replaced in any case.
 const MAX_AGE: Time = Time::from_ms(1_000);
-/// Number of successive clear images of one class after which another one says nothing new.
+/// Number of successive clear images of one class after which another image adds no information.
 const SETTLED_IMAGES: u32 = 5;
 /// Score from which an image is clear.
 const CLEAR_SCORE: f64 = 0.9;
 /// Relative change of the distance after which an image says something new.
 const NEW_SCALE: f64 = 0.2;
-/// Distance along and across the ego's axis by which an object may move between two scans that detect it (m): a closing
-/// speed of 50 m/s over one control step, and a lane change over two.
+/// Distance along and across the ego's axis by which an object may move between two scans that
+/// detect it (m): a closing speed of 50 m/s over one control step, and a lane change over two.
 const GATE_M: [f64; 2] = [2.0, 1.0];
 
 /// An object that the network has classified.
@@ -44,7 +47,7 @@ struct SeenObject {
 }
 
 impl SeenObject {
-    /// Returns whether a new image would say something that the earlier ones do not.
+    /// Returns whether a new image would add information to the earlier images.
     fn is_due(&self, time: Time, distance_m: f64) -> bool {
         let age = time - self.taken_at;
         let has_new_scale = (distance_m / self.taken_from_m - 1.0).abs() > NEW_SCALE;
@@ -54,7 +57,7 @@ impl SeenObject {
 
 /// Returns the class with the highest score, background included, and that score.
 fn best(scores: &ClassScores) -> (usize, f64) {
-    let by_score = |one: &(usize, f64), other: &(usize, f64)| one.1.total_cmp(&other.1);
+    let by_score = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
     scores.0.into_iter().enumerate().max_by(by_score).unwrap_or((ClassScores::BACKGROUND, 0.0))
 }
 
@@ -77,7 +80,8 @@ impl ImageMemory {
         self.objects.retain(|object| time - object.seen_at < MIN_AGE);
     }
 
-    /// Returns the network's scores of the object that a detection belongs to, or `None` if it must be classified.
+    /// Returns the network's scores of the object that a detection belongs to, or `None` if it must
+    /// be classified.
     pub(super) fn recall(&mut self, detection: &Detection) -> Option<ClassScores> {
         let time = self.time;
         let object = self.object_of(detection)?;
@@ -93,10 +97,10 @@ impl ImageMemory {
     pub(super) fn store(&mut self, detection: &Detection, scores: ClassScores) {
         let time = self.time;
         let (class, score) = best(&scores);
-        let known = self.object_of(detection).map(|object| *object);
-        self.objects.retain(|object| known.is_none_or(|known| object.face_m != known.face_m));
-        let same = known.filter(|known| best(&known.scores).0 == class);
-        let before = same.map_or(0, |known| known.clear_images);
+        let remembered = self.object_of(detection).map(|object| *object);
+        self.objects.retain(|object| remembered.is_none_or(|remembered| object.face_m != remembered.face_m));
+        let same = remembered.filter(|remembered| best(&remembered.scores).0 == class);
+        let before = same.map_or(0, |remembered| remembered.clear_images);
         self.objects.push(SeenObject {
             face_m: [detection.face_x_m, detection.face_y_m],
             seen_at: time,
@@ -107,14 +111,14 @@ impl ImageMemory {
         });
     }
 
-    /// Returns the object that a detection belongs to: the nearest one within the gate.
+    /// Returns the object that a detection belongs to: the nearest object within the gate.
     fn object_of(&mut self, detection: &Detection) -> Option<&mut SeenObject> {
         let apart_m = |object: &SeenObject| {
             [(object.face_m[0] - detection.face_x_m).abs(), (object.face_m[1] - detection.face_y_m).abs()]
         };
         let in_gate = |object: &&mut SeenObject| apart_m(object).iter().zip(GATE_M).all(|(m, gate_m)| *m <= gate_m);
         let apart = |object: &SeenObject| apart_m(object).iter().sum::<f64>();
-        self.objects.iter_mut().filter(in_gate).min_by(|one, other| apart(one).total_cmp(&apart(other)))
+        self.objects.iter_mut().filter(in_gate).min_by(|a, b| apart(a).total_cmp(&apart(b)))
     }
 }
 
@@ -146,8 +150,8 @@ mod tests {
         }
     }
 
-    /// Returns the number of images of an object at these distances, one in each control step, whose scores are
-    /// `scores`.
+    /// Returns the number of images of an object at these distances, one in each control step,
+    /// whose scores are `scores`.
     fn images(distances_m: impl Iterator<Item = f64>, scores: ClassScores) -> usize {
         let (mut memory, mut taken) = (ImageMemory::default(), 0);
         for (step, distance_m) in (0..).zip(distances_m) {
@@ -173,7 +177,8 @@ mod tests {
     #[test]
     fn a_clear_object_is_classified_once_per_second_unless_its_scale_changes() {
         let truck = ClassScores::certain(VehicleClass::Truck);
-        // Five images in the first second, the last at 0.8 s, and then one after each second: at 1.8, 2.8 and 3.8 s.
+        // Five images in the first second, the last at 0.8 s, and then one after each second: at
+        // 1.8, 2.8 and 3.8 s.
         assert_eq!(images((0..100).map(|_| 60.0), truck), 8);
         // At 20 m/s from 100 m, the distance falls by a fifth in 1 s, and then ever sooner.
         let closing = images((0..100).map(|step| 100.0 - 0.8 * f64::from(step)), truck);
@@ -191,7 +196,8 @@ mod tests {
                 memory.store(&at(-60.0, 0.0), ClassScores::certain(class));
             }
         }
-        // Settled at 0.8 s, taken again at 1.8 s and, with the new class, at 2.8 s: then at 5 Hz, five times.
+        // Settled at 0.8 s, taken again at 1.8 s and, with the new class, at 2.8 s: then at 5 Hz,
+        // five times.
         assert_eq!(taken, [0, 5, 10, 15, 20, 45, 70, 75, 80, 85, 90]);
     }
 

@@ -1,10 +1,11 @@
-//! What an instance detector finds in an image: a box, a class, a score and a mask.
+//! A result of an instance detector in an image: a box, a class, a score and a mask.
 
 use closecall_traffic::VehicleClass;
 
 use super::picture::{HEIGHT_PX, WIDTH_PX};
 
-/// Probability from which a pixel counts as a part of an instance, as in torchvision and in the paper of Mask R-CNN (K. He et al., 2017).
+/// Probability from which a pixel counts as a part of an instance, as in torchvision and in the
+/// paper of Mask R-CNN (K. He et al., 2017).
 pub const MASK_THRESHOLD: f32 = 0.5;
 
 /// A vehicle that a detector has found in the image.
@@ -32,14 +33,16 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Creates a mask from the probabilities of cells that divide `area_px` (left, top, right, bottom) evenly, row by row.
-    /// Returns `None` unless there are `columns` · `rows` of them, and 1 at least.
+    /// Creates a mask from the probabilities of cells that divide `area_px` (left, top, right,
+    /// bottom) evenly, row by row. Returns `None` unless there are `columns` · `rows` of them, and
+    /// 1 at least.
     pub fn new(area_px: [f64; 4], [columns, rows]: [usize; 2], values: Vec<f32>) -> Option<Self> {
         let is_whole = columns * rows == values.len() && !values.is_empty();
         is_whole.then_some(Self { area_px, cells: [columns, rows], values })
     }
 
-    /// Returns the probability at a position in the image (px): linear between the centres of the cells, and 0 outside of the area.
+    /// Returns the probability at a position in the image (px): linear between the centres of the
+    /// cells, and 0 outside of the area.
     pub fn at(&self, [u, v]: [f64; 2]) -> f32 {
         let [left, top, right, bottom] = self.area_px;
         if !((left..right).contains(&u) && (top..bottom).contains(&v)) {
@@ -60,7 +63,8 @@ impl Mask {
         across(j) + part_v * (across(next_j) - across(j))
     }
 
-    /// Returns the smallest box around the cells of the instance: left, top, right, bottom (px). Returns `None` if there is none.
+    /// Returns the smallest box around the cells of the instance: left, top, right, bottom (px).
+    /// Returns `None` if there is none.
     pub fn extent_px(&self) -> Option<[f64; 4]> {
         let [columns, _] = self.cells;
         let inside = self.values.iter().enumerate().filter(|(_, value)| **value >= MASK_THRESHOLD);
@@ -82,7 +86,8 @@ impl Mask {
         })
     }
 
-    /// Returns for each pixel of the image whether it belongs to the instance, row by row from the top.
+    /// Returns for each pixel of the image whether it belongs to the instance, row by row from the
+    /// top.
     pub fn pixels(&self) -> Vec<bool> {
         let rows = (0..HEIGHT_PX).map(|row| f64::from(row) + 0.5);
         rows.flat_map(|v| (0..WIDTH_PX).map(move |column| [f64::from(column) + 0.5, v]))
@@ -91,7 +96,7 @@ impl Mask {
     }
 }
 
-/// Returns the area that two boxes have in common, as a share of the smaller one (0 to 1).
+/// Returns the area that two boxes have in common, as a share of the smaller box (0 to 1).
 pub fn overlap(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let area = |[left, top, right, bottom]: &[f64; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
     let common = area(&[a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);

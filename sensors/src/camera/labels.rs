@@ -7,7 +7,8 @@ use closecall_traffic::VehicleClass;
 pub struct LabelMap(Vec<(i64, VehicleClass)>);
 
 impl LabelMap {
-    /// Reads labels and classes such as `1=car 2=truck 3=motorcycle`. Labels that are not named are ignored in the output.
+    /// Reads labels and classes such as `1=car 2=truck 3=motorcycle`. Labels that are not named are
+    /// ignored in the output.
     ///
     /// # Errors
     /// The word that cannot be read.
@@ -24,6 +25,6 @@ impl LabelMap {
 
     /// Returns the class of a label, or `None` if it is none of a vehicle's.
     pub(super) fn class(&self, label: i64) -> Option<VehicleClass> {
-        self.0.iter().find(|(own, _)| *own == label).map(|(_, class)| *class)
+        self.0.iter().find(|(listed, _)| *listed == label).map(|(_, class)| *class)
     }
 }

@@ -1,8 +1,9 @@
 //! The four moments of a pixel at once, in the lanes of one vector.
 //!
-//! Each lane takes the same steps in the same order as a single sample does, so that it has the same bits: additions, multiplications,
-//! divisions and square roots round alike, and nothing is fused. Where the moments of a pixel differ in kind, such as at the edge of the
-//! road, they are computed one by one instead.
+//! Each lane takes the same steps in the same order as a single sample. Its bits are therefore the
+//! same: additions, multiplications, divisions and square roots round alike, and nothing is fused.
+//! Where the moments of a pixel differ in kind, such as at the edge of the road, they are computed
+//! one by one instead.
 
 use wide::{f32x4, i32x4};
 
@@ -28,7 +29,8 @@ pub(crate) fn none(condition: f32x4) -> bool {
     !condition.any()
 }
 
-/// Splits each number into its integer part, rounded down, and its fractional part, as [`super::hash::split`] does.
+/// Splits each number into its integer part, rounded down, and its fractional part, as
+/// [`super::hash::split`] does.
 #[inline]
 pub(crate) fn split(x: f32x4) -> (i32x4, f32x4) {
     let towards_zero = x.trunc_int();
@@ -37,7 +39,8 @@ pub(crate) fn split(x: f32x4) -> (i32x4, f32x4) {
     (whole, x - whole.round_float())
 }
 
-/// Returns what is left of `radiance` behind so much air (m), with the light that the air adds.
+/// Returns the remaining share of `radiance` behind this distance of air (m), plus the light that
+/// the air adds.
 #[inline]
 pub(crate) fn through_air(light: &Illumination, radiance: Radiance, distance_m: f32x4) -> Radiance {
     let left = exp_negative(f32x4::splat(light.extinction_per_m) * distance_m);
@@ -113,7 +116,8 @@ impl PlaneNoise {
         near + (far - near) * smoothstep(within_y)
     }
 
-    /// Moves to other cells. Along a row of the image, the next cell often shares an edge with the latest one.
+    /// Moves to other cells. Along a row of the image, the next cell often shares an edge with the
+    /// latest one.
     fn fill(&mut self, key: u64, cells: [i32x4; 2]) {
         let [before_i, before_j] = self.cells.map(i32x4::to_array);
         let [to_i, to_j] = cells.map(i32x4::to_array);
@@ -143,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_has_the_bits_of_a_single_sample_wherever_it_was_asked_before() {
+    fn noise_has_the_bits_of_a_single_sample_after_any_earlier_sample() {
         let (mut line, mut plane) = (LineNoise::default(), PlaneNoise::default());
         for step in 0_u16..4_000 {
             // To and fro, in steps of less and of more than a cell, and across 0.
@@ -161,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_split_as_single_ones_are_even_beyond_the_integers() {
+    fn numbers_are_split_like_single_numbers_even_beyond_the_integers() {
         let numbers =
             [-0.0, 0.0, -1.0, 1.0, -1.5, 0.999, 3e9, -3e9, f32::INFINITY, f32::NEG_INFINITY, 16_777_217.0, -7e-9];
         for four in numbers.chunks_exact(4) {

@@ -1,10 +1,11 @@
-//! The illumination, the attenuation by the air, and the exposure settings that follow from the environment.
+//! The illumination, the attenuation by the air, and the exposure settings that follow from the
+//! environment.
 //!
-//! Radiance has a relative unit: a white matt surface in full daylight has about 1. The model knows three light levels
-//! (day, dusk, night) instead of the time of day. The ratios between them are about those of a camera that has opened
-//! up as far as it can.
-//! Air attenuates light by exp(−σ·distance): σ = 3.912/V for the visibility V (Koschmieder, contrast threshold 2 %).
-//! Rain adds 1.076·R^0.67 dB/km for the rain rate R in mm/h (Carbonneau and Wisely, 1998).
+//! Radiance has a relative unit: a white matt surface in full daylight has about 1. The model knows
+//! three light levels (day, dusk, night) instead of the time of day. The ratios between them are
+//! about the ratios of a camera with its aperture fully open. Air attenuates light by
+//! exp(−σ·distance): σ = 3.912/V for the visibility V (Koschmieder, contrast threshold 2 %). Rain
+//! adds 1.076·R^0.67 dB/km for the rain rate R in mm/h (Carbonneau and Wisely, 1998).
 
 use closecall_traffic::{Environment, Light, VehicleState, maths};
 
@@ -16,7 +17,8 @@ use closecall_traffic::{KOSCHMIEDER, rain_db_per_km};
 const PER_METRE_OF_DB_PER_KM: f64 = 1.0 / 4_343.0;
 /// Rain rate from which the sky is fully overcast (mm/h).
 const OVERCAST_RAIN_MM_PER_H: f64 = 0.5;
-/// The visibility up to which the sun gives no direct light, and the one from which it gives its full light (m).
+/// The largest visibility without direct light of the sun, and the smallest with its full light
+/// (m).
 const SUN_FADES_M: [f64; 2] = [1_500.0, 5_000.0];
 /// Height of the water film from which the road has its full gloss (mm).
 const WET_FILM_MM: f64 = 0.3;
@@ -32,8 +34,8 @@ pub(crate) struct Illumination {
     pub(crate) to_sun: Vec3,
     /// Radiance of the sky overhead.
     pub(crate) zenith: Vec3,
-    /// Radiance of the sky at the horizon, which is also the radiance of the scattering air in front of distant
-    /// objects.
+    /// Radiance of the sky at the horizon, which is also the radiance of the scattering air in
+    /// front of distant objects.
     pub(crate) horizon: Vec3,
     /// Extinction coefficient of the air (1/m).
     pub(crate) extinction_per_m: f32,
@@ -41,8 +43,8 @@ pub(crate) struct Illumination {
     pub(crate) gain: f32,
     /// Exposure time (s).
     pub(crate) exposure_s: f32,
-    /// Noise of the encoded value: the standard deviation of the shot noise, and the coefficient of the read noise,
-    /// which matters in dark pixels.
+    /// Noise of the encoded value: the standard deviation of the shot noise, and the coefficient of
+    /// the read noise, which matters in dark pixels.
     pub(crate) noise: [f32; 2],
     /// Radiance of headlamps seen from the front.
     pub(crate) headlamp: f32,
@@ -115,15 +117,15 @@ const NIGHT: LightLevel = LightLevel {
     tail: 0.06,
 };
 
-/// Ratio of the brightness of brake lights to that of tail lamps.
+/// Brightness of brake lights divided by the brightness of tail lamps.
 const BRAKE_LIGHT: f32 = 3.0;
 
 impl Illumination {
     /// Slope at which the colour of the sky is half way from the horizon to the zenith (-).
     pub(crate) const HALF_WAY_SLOPE: f32 = 0.35;
 
-    /// Derives the illumination from the environment, for a camera in the vehicle `ego`, whose yaw in the plane is
-    /// `yaw_rad`.
+    /// Derives the illumination from the environment, for a camera in the vehicle `ego`, whose yaw
+    /// in the plane is `yaw_rad`.
     pub(crate) fn new(environment: &Environment, camera: &Camera, ego: &VehicleState, yaw_rad: f64) -> Self {
         let level = match environment.light {
             Light::Day => DAY,
@@ -136,7 +138,8 @@ impl Illumination {
         let (sin, cos) = maths::sin_cos(camera.sun.elevation_rad);
         let (sin_azimuth, cos_azimuth) = maths::sin_cos(camera.sun.azimuth_rad - yaw_rad);
         let clear = clear as f32;
-        // An overcast sky is grey, about as bright at the zenith as at the horizon, and illuminates from all sides.
+        // An overcast sky is grey, about as bright at the zenith as at the horizon, and illuminates
+        // from all sides.
         let grey = level.horizon.iter().sum::<f32>() / 3.0;
         let overcast = |clear_value: f32, grey_value: f32| grey_value + (clear_value - grey_value) * clear;
         let extinction_per_m =
@@ -185,10 +188,12 @@ impl Illumination {
         }
     }
 
-    /// Returns the illumination of the lens by a headlamp at a distance (m), in units of π times the radiance of a white surface.
-    /// `facing` is the cosine of the angle between the lamp's axis and the direction to the lens.
+    /// Returns the illumination of the lens by a headlamp at a distance (m), in units of π times
+    /// the radiance of a white surface. `facing` is the cosine of the angle between the lamp's axis
+    /// and the direction to the lens.
     pub(crate) fn headlamp_irradiance(&self, distance_m: f32, facing: f32) -> f32 {
-        /// Distance at which a headlamp lights a white surface as [`Illumination::beam`] states (m).
+        /// Distance at which a headlamp lights a white surface as [`Illumination::beam`] states
+        /// (m).
         const BEAM_FROM_M: f32 = 10.0;
         let near = BEAM_FROM_M / distance_m.max(1.0);
         let facing = facing.max(0.0);
@@ -205,15 +210,17 @@ impl Illumination {
         each(|channel| self.ambient[channel] * sky + self.sun[channel] * sun)
     }
 
-    /// Returns the radiance of the sky, without clouds, at a slope (rise over run) above the horizon.
+    /// Returns the radiance of the sky, without clouds, at a slope (rise over run) above the
+    /// horizon.
     pub(crate) fn sky(&self, slope: f32) -> Vec3 {
         let high = slope / (slope + Self::HALF_WAY_SLOPE);
         each(|channel| self.horizon[channel] + (self.zenith[channel] - self.horizon[channel]) * high)
     }
 }
 
-/// Returns e^−x for x ≥ 0, with an error below 2e-4. It uses only basic arithmetic, so that the result is the same on
-/// every machine: the series of e^(x/16) to fourth order, raised to the 16th power and inverted.
+/// Returns e^−x for x ≥ 0, with an error below 2e-4. It uses only basic arithmetic, so that the
+/// result is the same on every machine: the series of e^(x/16) to fourth order, raised to the 16th
+/// power and inverted.
 fn exp_negative(x: f32) -> f32 {
     let x = (x / 16.0).min(4.0);
     let inverse = 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x / 24.0)));

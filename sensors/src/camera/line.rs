@@ -1,7 +1,8 @@
-//! What the pixels of one row share, so that it is computed once per row or once per column and not in each sample.
+//! Values that the pixels of one row share. They are computed once per row or once per column, not
+//! in each sample.
 //!
-//! Everything has the bits that a single sample would compute. The noise of the textures is remembered for each moment, because the
-//! samples of one moment follow a line on the road.
+//! All values have the bits that a single sample would compute. The noise of the textures is
+//! remembered for each moment, because the samples of one moment follow a line on the road.
 
 use wide::f32x4;
 
@@ -25,7 +26,7 @@ pub(super) struct Line<'a> {
     pub(super) columns: &'a [i32],
     /// The row.
     pub(super) row: i32,
-    /// What may affect the row.
+    /// The effects that may touch the row.
     pub(super) effects: Effects,
     /// For each moment, whether all samples meet the ground.
     pub(super) is_ground: [bool; MOMENTS],
@@ -37,9 +38,11 @@ pub(super) struct Line<'a> {
     /// What lies behind the vehicles, and the noise of its textures.
     pub(super) background: Background,
     pub(super) background_noise: BackgroundNoise,
-    /// Whether a column of the image has one x and a row one y, which a distorted lens does not give.
+    /// Whether a column of the image has one x and a row one y, which a distorted lens does not
+    /// give.
     is_straight: bool,
-    /// The x of the rays through the columns: for each column that of each moment, and that of its middle.
+    /// The x of the rays through each column: one for each moment, and one for the middle of the
+    /// exposure.
     x: Vec<[f32; MOMENTS + 1]>,
     /// The y of the rays through the row, likewise.
     y: [f32; MOMENTS + 1],
@@ -97,7 +100,8 @@ impl<'a> Line<'a> {
         self.background = Background::new(frame, y, self.widest, self.travelled_m);
         let height = frame.lens.height_m as f32;
         for moment in 0..MOMENTS {
-            // Rounding is monotone, so that the outermost sample has the smallest slope: if it meets the ground, all do.
+            // Rounding is monotone, so that the outermost sample has the smallest slope: if it
+            // meets the ground, all do.
             let [ahead, left, up] = frame.lens.ray_in_ground([self.widest[moment], self.y[moment]]);
             let slope = up / (ahead * ahead + left * left).sqrt();
             self.is_ground[moment] = slope * GROUND_TO_M < -height;
@@ -130,12 +134,14 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the offset within the pixel of the sample of a moment, or of the middle after the last moment (1/256 px).
+/// Returns the offset within the pixel of the sample of a moment, or of the middle after the last
+/// moment (1/256 px).
 fn subpixel(frame: &Frame, moment: usize) -> [i32; 2] {
     frame.subpixel.get(moment).copied().unwrap_or([MIDDLE; 2])
 }
 
-/// Returns the position of a sample along an axis of an image that has this extent (px), in units of the focal length.
+/// Returns the position of a sample along an axis of an image that has this extent (px), in units
+/// of the focal length.
 fn coordinate(frame: &Frame, [pixel, extent]: [i32; 2], subpixel: i32) -> f32 {
     let position = (pixel * SUBPIXEL_STEPS + subpixel) as f32 / SUBPIXEL_STEPS as f32;
     (position - extent as f32 / 2.0) / frame.lens.focal_px as f32

@@ -11,31 +11,34 @@ use super::image::CHANNELS;
 use super::labels::LabelMap;
 use super::picture::WIDTH_PX;
 
-/// Share of the vehicles from [`SHIPPED_MIN_SHOWN_PX`] on that the shipped network misses at a score of 0.5, on the held-out renders of all
-/// lights and weathers (`models/MASK_RCNN_CARD.md`).
+/// Share of the vehicles from [`SHIPPED_MIN_SHOWN_PX`] on that the shipped network misses at a
+/// score of 0.5, on the held-out renders of all lights and weathers (`models/MASK_RCNN_CARD.md`).
 pub const SHIPPED_MISSED: f64 = 0.074;
 /// Visible width of the vehicles of that share (px).
 pub const SHIPPED_MIN_SHOWN_PX: f64 = 20.0;
-/// Share of missed vehicles at which an image says nothing about what it does not show.
+/// Share of missed vehicles at which an image is no evidence about vehicles that it does not show.
 const UNKNOWN_MISSED: f64 = 1.0;
 
 /// The values that a network takes for the colours of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskRcnnInput {
-    /// Red, green and blue, 0 to 1: the shipped network and those of torchvision, which normalise by themselves.
+    /// Red, green and blue, 0 to 1: the shipped network and the networks of torchvision, which
+    /// normalise by themselves.
     #[default]
     Rgb,
-    /// Blue, green and red, 0 to 255 less the means 102.9801, 115.9465 and 122.7717: the Mask R-CNN of the ONNX model zoo.
+    /// Blue, green and red, 0 to 255 less the means 102.9801, 115.9465 and 122.7717: the Mask R-CNN
+    /// of the ONNX model zoo.
     BgrMean,
 }
 
 impl MaskRcnnInput {
-    /// Means of blue, green and red that [`Self::BgrMean`] subtracts: section *Preprocessing steps* of
-    /// `vision/object_detection_segmentation/mask-rcnn` in github.com/onnx/models.
+    /// Means of blue, green and red that [`Self::BgrMean`] subtracts: section *Preprocessing steps*
+    /// of `vision/object_detection_segmentation/mask-rcnn` in github.com/onnx/models.
     const MEANS: [f32; CHANNELS] = [102.9801, 115.9465, 122.7717];
 
-    /// Returns the plane of a channel (0 red, 1 green, 2 blue) and what it has for the 8-bit value of that channel.
+    /// Returns the plane of a channel (0 red, 1 green, 2 blue), and its value for the 8-bit value
+    /// of that channel.
     pub(super) fn place(self, channel: usize, value: u8) -> (usize, f32) {
         match self {
             Self::Rgb => (channel, f32::from(value) / 255.0),
@@ -51,21 +54,26 @@ impl MaskRcnnInput {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct MaskRcnnConfig {
-    /// Number of images per second (Hz). An image is taken with the first scan of the LiDAR that is due.
+    /// Number of images per second (Hz). An image is taken with the first scan of the LiDAR that is
+    /// due.
     pub rate_hz: Num,
-    /// Time from the exposure to the result (s), rounded up to the next scan of the LiDAR. The result applies to the objects that were there at
-    /// the exposure.
+    /// Time from the exposure to the result (s), rounded up to the next scan of the LiDAR. The
+    /// result applies to the objects that were there at the exposure.
     pub latency_s: Num,
-    /// ONNX file of another network, relative to the working directory. Default: none; the one that ships with Closecall.
+    /// ONNX file of another network, relative to the working directory. Default: none; the one that
+    /// ships with Closecall.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
-    /// Labels of the other network, such as `3=car 4=motorcycle 8=truck`. Default: none; those of the network's metadata.
+    /// Labels of the other network, such as `3=car 4=motorcycle 8=truck`. Default: none; the labels
+    /// in the network's metadata.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub labels: Option<String>,
     /// What the network takes for the colours of a pixel.
     pub input: MaskRcnnInput,
-    /// Share of the vehicles from `min-shown-px` on that the network misses at a score of 0.5 (0 to 1): how much a cluster loses that no
-    /// instance overlaps. Default: that of the shipped network, 0.074; 1 for another one, whose image then says nothing about such a cluster.
+    /// Share of the vehicles from `min-shown-px` on that the network misses at a score of 0.5 (0 to
+    /// 1): how much a cluster loses that no instance overlaps. Default: 0.074 for the shipped
+    /// network, as measured; 1 for another network, whose image then says nothing about such a
+    /// cluster.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missed: Option<Num>,
     /// Visible width from which `missed` applies (px). Default: 20.
@@ -74,7 +82,8 @@ pub struct MaskRcnnConfig {
 }
 
 impl Default for MaskRcnnConfig {
-    /// Returns rate and latency of the original: 195 ms per image, 5 frames per second (K. He et al., *Mask R-CNN*, 2017).
+    /// Returns rate and latency of the original: 195 ms per image, 5 frames per second (K. He et
+    /// al., *Mask R-CNN*, 2017).
     fn default() -> Self {
         Self {
             rate_hz: Num::Fixed(5.0),
@@ -101,8 +110,8 @@ pub struct MaskRcnn {
     pub labels: Option<&'static str>,
     /// What the network takes for the colours of a pixel.
     pub input: MaskRcnnInput,
-    /// Share of the vehicles from `min_shown_px` on that the network misses (0 to 1). At 1, the image says nothing about what it does not
-    /// show.
+    /// Share of the vehicles from `min_shown_px` on that the network misses (0 to 1). At 1, the
+    /// image says nothing about what it does not show.
     pub missed: f64,
     /// Visible width from which the network would find a vehicle (px).
     pub min_shown_px: f64,
@@ -139,8 +148,8 @@ impl Check for MaskRcnnConfig {
 fn kept(text: &str) -> &'static str {
     static KEPT: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = all.get(text) {
-        return known;
+    if let Some(interned) = all.get(text) {
+        return interned;
     }
     let leaked: &'static str = Box::leak(text.to_owned().into_boxed_str());
     all.insert(leaked);
@@ -166,12 +175,12 @@ mod tests {
         assert!(check("min-shown-px = 0").unwrap_err().to_string().starts_with("`min-shown-px` is 0"));
         let wrong = toml::from_str::<MaskRcnnConfig>("input = 'bgr'").unwrap_err().to_string();
         assert!(wrong.contains("rgb") && wrong.contains("bgr-mean"), "{wrong}");
-        let [one, other] = [0, 1].map(|_| check("model = 'a.onnx'").unwrap().model.unwrap());
-        assert!(std::ptr::eq(one, other), "a name is kept once");
+        let [first, second] = [0, 1].map(|_| check("model = 'a.onnx'").unwrap().model.unwrap());
+        assert!(std::ptr::eq(first, second), "a name is kept once");
     }
 
     #[test]
-    fn the_model_card_is_that_of_the_shipped_network() {
+    fn the_model_card_describes_the_shipped_network() {
         use sha2::{Digest, Sha256};
         let card = include_str!("../../models/MASK_RCNN_CARD.md");
         let bytes = crate::camera::detector::SHIPPED_MASK_RCNN;

@@ -1,12 +1,13 @@
 //! Triangle meshes of bodies, and the few solids that they are composed of.
 //!
-//! Every solid is convex, so that its faces can be oriented outwards by a comparison with its centre. Coordinates are
-//! in the frame of the body: for a vehicle x forward, y left, z up, with the origin on the ground below the centre of
-//! its box.
+//! Every solid is convex: a comparison with its centre orients its faces outwards. Coordinates are
+//! in the frame of the body: for a vehicle x forward, y left, z up, with the origin on the ground
+//! below the centre of its box.
 
 pub(crate) type Vec3 = [f32; 3];
 
-/// Returns one value for each of three axes or colours. Unlike `map` on an array, it is always inlined.
+/// Returns one value for each of three axes or colours. Unlike `map` on an array, it is always
+/// inlined.
 #[inline]
 pub(crate) fn each<T>(value: impl Fn(usize) -> T) -> [T; 3] {
     [value(0), value(1), value(2)]
@@ -62,8 +63,8 @@ pub(crate) enum Emission {
     Headlamp,
     /// A small amber lamp, on at dusk and at night.
     Marker,
-    /// A direction indicator, which shines during the bright phase of its blinking. `true` if it is on the vehicle's
-    /// left side.
+    /// A direction indicator, which shines during the bright phase of its blinking. `true` if it is
+    /// on the vehicle's left side.
     Indicator(bool),
 }
 
@@ -117,8 +118,8 @@ pub(crate) struct Face {
     pub(crate) map: u16,
 }
 
-/// Texture coordinates as linear functions of the position p: u = (p − origin)·u_axis, and likewise v. Both range from
-/// 0 to 1 across the face.
+/// Texture coordinates as linear functions of the position p: u = (p − origin)·u_axis, and likewise
+/// v. Both range from 0 to 1 across the face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TextureMap {
     pub(crate) origin: Vec3,
@@ -133,7 +134,8 @@ pub(crate) struct Lamp {
     pub(crate) emission: Emission,
 }
 
-/// A corner of a prism's outline: longitudinal position, height, and half the width of the prism there (m).
+/// A corner of a prism's outline: longitudinal position, height, and half the width of the prism
+/// there (m).
 pub(crate) type Rib = [f32; 3];
 
 /// A body as a mesh of flat triangles.
@@ -176,8 +178,8 @@ impl Mesh {
         }
     }
 
-    /// Adds a prism that is symmetric about y = `centre_y`. Its outline is convex in the x–z plane, and each corner of
-    /// the outline has its own half width. There are at most eight.
+    /// Adds a prism that is symmetric about y = `centre_y`. Its outline is convex in the x–z plane,
+    /// and each corner of the outline has its own half width. There are at most eight.
     pub(crate) fn prism(&mut self, ribs: &[Rib], centre_y: f32, surface: Surface) {
         let count = ribs.len() as f32;
         let mean = |part: usize| ribs.iter().map(|rib| rib[part]).sum::<f32>() / count;
@@ -233,10 +235,12 @@ impl Mesh {
         self.polygon(&lid, centre, surface);
     }
 
-    /// Adds a quadrangle on top of a face. Its corners are bottom left, bottom right, top right and top left, as seen
-    /// from outside. It is raised slightly above the face and shrunk towards its centre by the share `inset`.
+    /// Adds a quadrangle on top of a face. Its corners are bottom left, bottom right, top right and
+    /// top left, as seen from outside. It is raised slightly above the face and shrunk towards its
+    /// centre by the share `inset`.
     pub(crate) fn decal(&mut self, corners: [Vec3; 4], inset: f32, surface: Surface) {
-        /// Height above the face (m), sufficient for the decal not to be hidden by the face at any distance.
+        /// Height above the face (m), sufficient for the decal not to be hidden by the face at any
+        /// distance.
         const LIFT_M: f32 = 0.012;
         let normal = normalised(cross(sub(corners[1], corners[0]), sub(corners[3], corners[0])));
         let centre = [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f32>() / 4.0);
@@ -261,7 +265,8 @@ impl Mesh {
         }
     }
 
-    /// Adds a decal that faces forward on a plane of constant `x`. Its centre and its half extents are given as (y, z).
+    /// Adds a decal that faces forward on a plane of constant `x`. Its centre and its half extents
+    /// are given as (y, z).
     pub(crate) fn front_decal(&mut self, x: f32, [y, z]: [f32; 2], [half_y, half_z]: [f32; 2], surface: Surface) {
         // Seen from the front, the vehicle's left (+y) is on the right.
         let corners =

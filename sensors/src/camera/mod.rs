@@ -1,15 +1,17 @@
-//! The rear camera: a software renderer, and a neural network that classifies the image of each LiDAR cluster.
+//! The rear camera: a software renderer, and a neural network that classifies the image of each
+//! LiDAR cluster.
 //!
 //! ```text
 //!   detection ─▶ box in the ego's frame ─▶ window of the image ─▶ crop, 32 × 32 px ─▶ network ─▶ class scores
 //!                                              scene ──────────────▲
 //! ```
 //!
-//! A second pipeline finds vehicles in the whole image by a Mask R-CNN ([`WholeImageDetector`]); it needs ONNX Runtime.
+//! A second pipeline finds vehicles in the whole image by a Mask R-CNN ([`WholeImageDetector`]); it
+//! needs ONNX Runtime.
 //!
-//! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers 60° horizontally.
-//! A simulated run renders only the pixels that a network reads. Each pixel of a crop is
-//! identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
+//! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers
+//! 60° horizontally. A simulated run renders only the pixels that a network reads. Each pixel of a
+//! crop is identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
 
 mod background;
 mod body;

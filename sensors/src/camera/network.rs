@@ -1,4 +1,5 @@
-//! A network from an ONNX file with one input and one output of 32-bit floats, for detectors outside of this crate.
+//! A network from an ONNX file with one input and one output of 32-bit floats, for detectors
+//! outside of this crate.
 
 use ort::session::Session;
 use ort::value::TensorRef;
@@ -18,17 +19,20 @@ impl Network {
     /// Loads a network from the bytes of the ONNX file `name`.
     ///
     /// # Errors
-    /// [`ClassifierError`] if the backend cannot be loaded, if the process uses another one, or if `model` cannot be read.
+    /// [`ClassifierError`] if the backend cannot be loaded, if the process uses another backend, or
+    /// if `model` cannot be read.
     pub fn new(name: &'static str, model: &[u8], backend: &Backend) -> Result<Self, ClassifierError> {
         let session = open_session(model, environment(backend)?, backend);
         let session = session.map_err(|error| ClassifierError::Model { reason: error.to_string() })?;
         Ok(Self { session, name })
     }
 
-    /// Returns the output for `values` of the given shape, with its own shape. The same input always gives the same bits.
+    /// Returns the output for `values` of the given shape, with its own shape. The same input
+    /// always gives the same bits.
     ///
     /// # Errors
-    /// [`ClassifierError::Run`] if inference fails, and [`ClassifierError::Value`] if a value is not finite.
+    /// [`ClassifierError::Run`] if inference fails, and [`ClassifierError::Value`] if a value is
+    /// not finite.
     pub fn run(&mut self, shape: [usize; 4], values: &[f32]) -> Result<(Vec<usize>, Vec<f32>), ClassifierError> {
         let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
         let input = TensorRef::from_array_view((shape, values)).map_err(run)?;

@@ -1,4 +1,5 @@
-//! How a real lens differs from a pinhole: radial distortion, vignetting, and reflections between its surfaces.
+//! The differences of a real lens from a pinhole: radial distortion, vignetting, and reflections
+//! between its surfaces.
 //!
 //! ```text
 //!   ray x, y (tangents) ─ r·(1 + k1·r² + k2·r⁴) ─▶ pixel          pixel ─ Newton's method ─▶ ray
@@ -10,28 +11,31 @@ use serde::{Deserialize, Serialize};
 
 use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
 
-/// Tangent of the angle to the axis up to which the polynomial of the distortion holds: just beyond the corners of the
-/// image, which lie at 0.68. Farther out the distortion continues linearly.
+/// Tangent of the angle to the axis up to which the polynomial of the distortion holds: just beyond
+/// the corners of the image, which lie at 0.68. Farther out the distortion continues linearly.
 const POLYNOMIAL_TO: f64 = 0.75;
 /// Least slope of the polynomial up to there, so that the distorted image does not fold (-).
 const LEAST_SLOPE: f64 = 0.2;
-/// Number of steps of Newton's method. The error is below 1e-9 after six, for every distortion that is allowed.
+/// Number of steps of Newton's method. The error is below 1e-9 after six, for every distortion that
+/// is allowed.
 const NEWTON_STEPS: usize = 8;
 
 /// The lens as a scenario file describes it. The default is an ideal lens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct LensConfig {
-    /// Coefficient k1 of the radial distortion r·(1 + k1·r² + k2·r⁴), r being the tangent of the angle to the axis (-): negative for
-    /// the barrel distortion of wide-angle lenses. The detections are projected with the same lens, because a camera is calibrated.
+    /// Coefficient k1 of the radial distortion r·(1 + k1·r² + k2·r⁴), r being the tangent of the
+    /// angle to the axis (-): negative for the barrel distortion of wide-angle lenses. The
+    /// detections are projected with the same lens, because a camera is calibrated.
     pub distortion_k1: Num,
     /// Coefficient k2 of the radial distortion (-).
     pub distortion_k2: Num,
-    /// Share of the natural vignetting, by which brightness falls with the fourth power of the cosine of the angle to the axis
-    /// (0 to 1). 1 is an uncorrected lens: 47 % of the light remain in the corners.
+    /// Share of the natural vignetting, by which brightness falls with the fourth power of the
+    /// cosine of the angle to the axis (0 to 1). 1 is an uncorrected lens: 47 % of the light remain
+    /// in the corners.
     pub vignetting: Num,
-    /// Reflectance of each surface of the lens (0 to 0.05), which draws ghosts of the sun and of headlamps: about 0.005 with a
-    /// coating, 0.04 without one.
+    /// Reflectance of each surface of the lens (0 to 0.05), which draws ghosts of the sun and of
+    /// headlamps: about 0.005 with a coating, 0.04 without one.
     pub surface_reflectance: Num,
 }
 
@@ -101,7 +105,8 @@ impl Optics {
         1.0 + square * (3.0 * k1 + square * 5.0 * k2)
     }
 
-    /// Distorts a ray (x, y, 1), given by its tangents: returns its position in the image, in units of the focal length.
+    /// Distorts a ray (x, y, 1), given by its tangents: returns its position in the image, in units
+    /// of the focal length.
     pub(crate) fn distorted(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let r = (x * x + y * y).sqrt();
         if r == 0.0 {
@@ -111,7 +116,8 @@ impl Optics {
         [x * factor, y * factor]
     }
 
-    /// Returns the ray (x, y, 1) that reaches a position in the image: the inverse of [`Optics::distorted`].
+    /// Returns the ray (x, y, 1) that reaches a position in the image: the inverse of
+    /// [`Optics::distorted`].
     pub(crate) fn undistorted(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let wanted = (x * x + y * y).sqrt();
         if wanted == 0.0 {
@@ -126,12 +132,14 @@ impl Optics {
         [x * factor, y * factor]
     }
 
-    /// Returns the bounds in the distorted image of a rectangle `[left, top, right, bottom]` of the ideal image (px).
+    /// Returns the bounds in the distorted image of a rectangle `[left, top, right, bottom]` of the
+    /// ideal image (px).
     pub(crate) fn bounds(&self, [left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
         let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
         let tangents = |low: f64, high: f64, axis: usize| {
             let [low, high] = [low, high].map(|at| (at - centre[axis]) / FOCAL_PX);
-            // A line of the rectangle deviates most at its ends, or where it is nearest to the axis.
+            // A line of the rectangle deviates most at its ends, or where it is nearest to the
+            // axis.
             [low, 0.0_f64.clamp(low, high.max(low)), high]
         };
         let (columns, rows) = (tangents(left, right, 0), tangents(top, bottom, 1));

@@ -8,8 +8,9 @@
 //!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
 //! ```
 //!
-//! The camera axes follow the convention of computer vision: x right, y down, z along the optical axis (the *depth*).
-//! Pixels are square. Unless the lens is configured otherwise ([`Optics`]), it has no distortion.
+//! The camera axes follow the convention of computer vision: x right, y down, z along the optical
+//! axis (the *depth*). Pixels are square. Unless the lens is configured otherwise ([`Optics`]), it
+//! has no distortion.
 
 use closecall_traffic::{Scene, SceneVehicle, maths};
 
@@ -17,7 +18,8 @@ use super::Camera;
 use super::optics::Optics;
 use super::picture::{FIELD_OF_VIEW_RAD, HEIGHT_PX, WIDTH_PX};
 
-/// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body lies there.
+/// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body
+/// lies there.
 pub(crate) const NEAR_M: f64 = 0.3;
 
 /// A rectangle of pixels, which may extend beyond the image.
@@ -50,7 +52,8 @@ impl PixelRect {
 /// A box that stands on the ground, in the ego's vehicle frame, as a detection describes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundBox {
-    /// Longitudinal position of the box's centre relative to the ego's centre (m), negative behind the ego.
+    /// Longitudinal position of the box's centre relative to the ego's centre (m), negative behind
+    /// the ego.
     pub x_m: f64,
     /// Lateral position of the box's centre relative to the ego's centre (m), positive to the left.
     pub y_m: f64,
@@ -82,7 +85,8 @@ impl GroundBox {
 pub(crate) struct Lens {
     /// Focal length (px).
     pub(crate) focal_px: f64,
-    /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind the centre.
+    /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind
+    /// the centre.
     pub(crate) ahead_m: f64,
     /// Height of the lens above the ground (m).
     pub(crate) height_m: f64,
@@ -92,7 +96,7 @@ pub(crate) struct Lens {
     pub(crate) cos_pitch: f64,
     /// How the lens differs from a pinhole.
     pub(crate) optics: Optics,
-    /// Time from the reading of the first row of the image to that of the last (s).
+    /// Time between the readings of the first and of the last row of the image (s).
     pub(crate) readout_s: f64,
 }
 
@@ -100,7 +104,8 @@ impl Lens {
     /// Creates the lens of the rear camera in `ego`, whose body may be pitched.
     pub(crate) fn new(camera: &Camera, ego: &SceneVehicle) -> Self {
         let ahead_m = camera.mount_from_rear_m - ego.vehicle.dimensions.length_m / 2.0;
-        // If the nose of the ego dips, its tail rises: the lens moves up and its axis points higher.
+        // If the nose of the ego dips, its tail rises: the lens moves up and its axis points
+        // higher.
         let pitch = camera.pitch_rad - ego.pitch_rad;
         Self {
             focal_px: f64::from(WIDTH_PX) / 2.0 / maths::tan(FIELD_OF_VIEW_RAD / 2.0),
@@ -140,8 +145,8 @@ impl Lens {
         [f64::from(WIDTH_PX) / 2.0 + self.focal_px * x / z, f64::from(HEIGHT_PX) / 2.0 + self.focal_px * y / z]
     }
 
-    /// Returns the position in camera axes of a moving point when the row of the image is read in which it appears. The
-    /// velocity is relative to the lens, in the ground frame (m/s).
+    /// Returns the position in camera axes of a moving point when the row of the image is read in
+    /// which it appears. The velocity is relative to the lens, in the ground frame (m/s).
     pub(crate) fn when_read(&self, [x, y, z]: [f64; 3], [along, left]: [f64; 2]) -> [f64; 3] {
         let [_, row] = self.pixel([x, y, z.max(NEAR_M)]);
         let after_s = self.read_after_s(row);
@@ -160,8 +165,8 @@ impl Lens {
         [y, s * x - c * z, -c * x - s * z]
     }
 
-    /// Returns the pose of vehicle `other` in the ground frame: the position (x, y) of its centre (m) and its heading
-    /// (rad).
+    /// Returns the pose of vehicle `other` in the ground frame: the position (x, y) of its centre
+    /// (m) and its heading (rad).
     pub(crate) fn pose_in_ground(&self, scene: &Scene<'_>, other: &SceneVehicle) -> ([f64; 2], f64) {
         let pose = |vehicle: &SceneVehicle| {
             scene.road.plane_pose(vehicle.state.s_m, vehicle.state.d_m, vehicle.state.heading_rad)
@@ -172,8 +177,9 @@ impl Lens {
         ([cos * dx + sin * dy - self.ahead_m, cos * dy - sin * dx], other.yaw_rad - ego.yaw_rad)
     }
 
-    /// Returns the smallest rectangle `[left, top, right, bottom]` (px) around the visible part of a convex body, given
-    /// its corners in camera axes. Returns `None` if no part of the body lies beyond the near plane.
+    /// Returns the smallest rectangle `[left, top, right, bottom]` (px) around the visible part of
+    /// a convex body, given its corners in camera axes. Returns `None` if no part of the body lies
+    /// beyond the near plane.
     pub(crate) fn bounds(&self, corners: &[[f64; 3]]) -> Option<[f64; 4]> {
         let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         let mut include = |point: [f64; 3]| {
@@ -184,7 +190,8 @@ impl Lens {
             if a[2] >= NEAR_M {
                 include(a);
             }
-            // If the body crosses the near plane, some of the lines between two of its corners cross it, too.
+            // If the body crosses the near plane, some of the lines between two of its corners
+            // cross it, too.
             for &b in &corners[index + 1..] {
                 if (a[2] < NEAR_M) != (b[2] < NEAR_M) {
                     let part = (NEAR_M - a[2]) / (b[2] - a[2]);
@@ -218,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn the_focal_length_is_that_of_the_lens() {
+    fn the_focal_length_follows_from_the_lens() {
         assert!((FOCAL_PX - lens(0.0).focal_px).abs() < 1e-9);
     }
 
@@ -247,8 +254,8 @@ mod tests {
     #[test]
     fn a_ray_rotated_into_the_ground_frame_and_back_is_unchanged() {
         let lens = lens(0.01);
-        let there = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
-        let from_lens = [there[0], there[1], there[2] + lens.height_m];
+        let ray = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
+        let from_lens = [ray[0], ray[1], ray[2] + lens.height_m];
         for (got, wanted) in lens.in_camera(from_lens).iter().zip([0.3, -0.2, 1.0]) {
             assert!((got - wanted).abs() < 1e-6);
         }

@@ -1,4 +1,5 @@
-//! The camera in the simulation loop: it adds the evidence of the image to the class scores of each LiDAR detection.
+//! The camera in the simulation loop: it adds the evidence of the image to the class scores of each
+//! LiDAR detection.
 
 use crate::tracking::{Detection, LaneGeometry};
 use closecall_traffic::{ClassScores, Scene, SceneVehicle};
@@ -10,13 +11,15 @@ use super::{Camera, Crop, ExposureKey, Frame, FrameBuffers, GroundBox, PixelRect
 
 /// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
 pub const MIN_SHARE_IN_IMAGE: f64 = 0.6;
-/// Lower bound that the fusion applies to each score (0 to 1), so that neither the shape nor the image alone can rule
-/// out a class.
+/// Lower bound that the fusion applies to each score (0 to 1), so that neither the shape nor the
+/// image alone can rule out a class.
 const MIN_SCORE: f64 = 0.02;
-/// Minimum height assumed for a cluster (m), because the LiDAR's beams may have hit only the lower part of the object.
+/// Minimum height assumed for a cluster (m), because the LiDAR's beams may have hit only the lower
+/// part of the object.
 const MIN_HEIGHT_M: f64 = 0.8;
 
-/// The scene in which detections are classified, and the one that the image shows, which is older if the camera is frozen.
+/// The scene in which detections are classified, and the scene that the image shows. The second is
+/// older if the camera is frozen.
 #[derive(Clone, Copy)]
 pub struct ImagedScene<'a> {
     /// The scene of the detections.
@@ -56,16 +59,17 @@ impl CropClassifier {
         })
     }
 
-    /// Classifies the detections that lie in the image and on the road, and fuses the network's scores with the class
-    /// scores that a detection has from its shape. Returns the number of crops that the network has classified.
+    /// Classifies the detections that lie in the image and on the road, and fuses the network's
+    /// scores with the class scores that a detection has from its shape. Returns the number of
+    /// crops that the network has classified.
     ///
-    /// The network's scores of a detection that `memory` knows are those of its latest crop. Detections out of view, and
-    /// those that lie entirely beside the road, keep their scores. `scene` is the scene at the time of the scan, `key`
-    /// the key of the exposure's noise.
+    /// If `memory` knows a detection, its scores are the scores of its latest crop. Detections out
+    /// of view, and detections entirely beside the road, keep their scores. `scene` is the scene at
+    /// the time of the scan, `key` the key of the exposure's noise.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] if the network fails. The scores of the detections before the failure have
-    /// then been updated already.
+    /// Returns a [`ClassifierError`] if the network fails. The scores of the detections before the
+    /// failure have then been updated already.
     pub fn classify_detections(
         &mut self,
         scene: &Scene<'_>,
@@ -124,8 +128,8 @@ impl CropClassifier {
 }
 
 impl RearCamera {
-    /// Returns the window of the image that the network classifies for a detection. Returns `None` if too little of the
-    /// window lies in the image.
+    /// Returns the window of the image that the network classifies for a detection. Returns `None`
+    /// if too little of the window lies in the image.
     pub fn detection_window(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
         self.project(ego, &ground_box(detection)).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
     }
@@ -151,8 +155,8 @@ pub fn is_beside_road(detection: &Detection, lane: &LaneGeometry) -> bool {
     left_m - half_m > lane.edges_m[0] || left_m + half_m < lane.edges_m[1]
 }
 
-/// Fuses the scores from shape and image by their normalised product, which assumes that their errors are independent
-/// and that all classes are equally likely a priori.
+/// Fuses the scores from shape and image by their normalised product, which assumes that their
+/// errors are independent and that all classes are equally likely a priori.
 pub fn fuse(shape: &ClassScores, image: &ClassScores) -> ClassScores {
     let product = [0, 1, 2, 3].map(|class| shape.0[class].max(MIN_SCORE) * image.0[class].max(MIN_SCORE));
     let sum: f64 = product.iter().sum();

@@ -1,8 +1,10 @@
-//! An exact integer rasteriser with a depth buffer. It determines which triangle is visible at each sample.
+//! An exact integer rasteriser with a depth buffer. It determines which triangle is visible at each
+//! sample.
 //!
-//! Corners are snapped to a grid of 1/256 px. Integer edge functions (Pineda, *A parallel algorithm for polygon
-//! rasterization*, 1988) then decide whether a sample lies inside a triangle. They have no rounding error: adjacent
-//! triangles leave no gaps, and the result for one pixel does not depend on which other pixels are rendered.
+//! Corners are snapped to a grid of 1/256 px. Integer edge functions (Pineda, *A parallel algorithm
+//! for polygon rasterization*, 1988) then decide whether a sample lies inside a triangle. They have
+//! no rounding error: adjacent triangles leave no gaps, and the result for one pixel does not
+//! depend on which other pixels are rendered.
 
 use super::body::MOMENTS;
 use super::mesh::Vec3;
@@ -16,17 +18,20 @@ pub(crate) const SUBPIXEL_STEPS: i32 = 256;
 /// A triangle projected to the image, ready to be rasterised.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenTriangle {
-    /// Coefficients (a, b, c) of the edge functions a·x + b·y + c, which are all ≥ 0 inside the triangle.
+    /// Coefficients (a, b, c) of the edge functions a·x + b·y + c, which are all ≥ 0 inside the
+    /// triangle.
     edges: [[i64; 3]; 3],
     /// Minimum and maximum x, minimum and maximum y (1/256 px).
     bounds: [i32; 4],
-    /// Coefficients (a, b, c) of 1/depth = a·x + b·y + c (1/m), with x and y on the fixed-point grid.
+    /// Coefficients (a, b, c) of 1/depth = a·x + b·y + c (1/m), with x and y on the fixed-point
+    /// grid.
     inverse_depth: [f64; 3],
     /// Index of the face that the triangle is part of.
     face: u32,
 }
 
-/// The samples to be rendered: a lattice of pixels, each sampled at the same offset within the pixel.
+/// The samples to be rendered: a lattice of pixels, each sampled at the same offset within the
+/// pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice<'a> {
     /// Columns of the image, in ascending order.
@@ -112,20 +117,24 @@ impl Visibility {
 pub(crate) struct Projection<'a> {
     /// Focal length (px).
     pub(crate) focal_px: f32,
-    /// How the lens differs from a pinhole. The corners of triangles are distorted, and their edges remain straight.
+    /// How the lens differs from a pinhole. The corners of triangles are distorted, and their edges
+    /// remain straight.
     pub(crate) optics: &'a Optics,
 }
 
-/// The plane of a triangle in camera axes, normal · p = offset. The length of the normal is twice the triangle's area.
+/// The plane of a triangle in camera axes, normal · p = offset. The length of the normal is twice
+/// the triangle's area.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facing {
     /// The normal, which points outwards (m²).
     pub(crate) normal: Vec3,
-    /// The offset (m³). The lens is the origin of the camera axes, so that a triangle is seen from outside if the offset is negative.
+    /// The offset (m³). The lens is the origin of the camera axes, so that a triangle is seen from
+    /// outside if the offset is negative.
     pub(crate) offset: f32,
 }
 
-/// Projects a triangle given in camera axes (m), which is seen from outside, and appends its visible part to `out`.
+/// Projects a triangle given in camera axes (m), which is seen from outside, and appends its
+/// visible part to `out`.
 pub(crate) fn project(
     corners: [Vec3; 3],
     Facing { normal, offset }: Facing,
@@ -179,17 +188,19 @@ impl Plane {
     }
 }
 
-/// Returns the coefficients a, b and c of a·x + b·y + c, which has these values at three points of the fixed-point grid.
+/// Returns the coefficients a, b and c of a·x + b·y + c, which has these values at three points of
+/// the fixed-point grid.
 fn interpolated(corners: [[i32; 2]; 3], values: [f64; 3]) -> [f64; 3] {
-    let [from, one, other] = corners.map(|corner| corner.map(f64::from));
-    let [[x1, y1], [x2, y2]] = [one, other].map(|to| [to[0] - from[0], to[1] - from[1]]);
+    let [from, second, third] = corners.map(|corner| corner.map(f64::from));
+    let [[x1, y1], [x2, y2]] = [second, third].map(|to| [to[0] - from[0], to[1] - from[1]]);
     let [w1, w2] = [values[1] - values[0], values[2] - values[0]];
     let area = x1 * y2 - x2 * y1;
     let (a, b) = ((w1 * y2 - w2 * y1) / area, (x1 * w2 - x2 * w1) / area);
     [a, b, values[0] - a * from[0] - b * from[1]]
 }
 
-/// Rounds to the nearest integer, halves away from zero, as `f32::round` does: that is a call of the C library.
+/// Rounds to the nearest integer, halves away from zero, as `f32::round` does: that is a call of
+/// the C library.
 #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates")]
 fn rounded(x: f32) -> i32 {
     // With a whole half, the sum of the number just below a half would round up to 1.
@@ -228,8 +239,8 @@ fn append(at: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, o
     out.push(ScreenTriangle { edges, bounds: [low(0), high(0), low(1), high(1)], inverse_depth, face });
 }
 
-/// The edge function from `a` to `b`, inside on the right of it; samples on the edge itself belong to the triangle
-/// below or to the right of it (the top-left rule).
+/// The edge function from `a` to `b`, inside on the right of it; samples on the edge itself belong
+/// to the triangle below or to the right of it (the top-left rule).
 fn edge(a: [i32; 2], b: [i32; 2]) -> [i64; 3] {
     let [dx, dy] = [0, 1].map(|axis| i64::from(b[axis]) - i64::from(a[axis]));
     let is_top_left = dy < 0 || (dy == 0 && dx > 0);
@@ -291,7 +302,7 @@ mod tests {
         let hits = |visibility: &Visibility| visibility.face.iter().filter(|face| face[0] != u32::MAX).count();
         assert_eq!(hits(&both), 200 * 200);
         let single: usize =
-            triangles.iter().map(|one| hits(&rasterised(std::slice::from_ref(one), &columns, &rows))).sum();
+            triangles.iter().map(|triangle| hits(&rasterised(std::slice::from_ref(triangle), &columns, &rows))).sum();
         assert_eq!(single, 200 * 200);
         assert!(both.inverse_depth.iter().all(|[w, ..]| *w == 0.0 || (w - 0.1).abs() < 1e-6));
     }

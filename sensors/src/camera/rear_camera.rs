@@ -1,4 +1,5 @@
-//! The public interface of the rear camera: it projects boxes to windows and renders scenes to images and crops.
+//! The public interface of the rear camera: it projects boxes to windows and renders scenes to
+//! images and crops.
 
 use super::exposure::ExposureKey;
 use super::image::{Crop, LabelledImage};
@@ -8,8 +9,8 @@ use closecall_traffic::{Scene, SceneVehicle};
 
 /// Ratio of the side of a window to the larger side of the object's projection.
 const WINDOW_TO_OBJECT_RATIO: f64 = 1.3;
-/// Minimum width of a window, measured at the object's distance (m), so that a crop of a single post also shows its
-/// surroundings.
+/// Minimum width of a window, measured at the object's distance (m), so that a crop of a single
+/// post also shows its surroundings.
 const MIN_WINDOW_WIDTH_M: f64 = 2.2;
 /// Maximum width of a window (px).
 const MAX_WINDOW_WIDTH_PX: f64 = 2_400.0;
@@ -33,8 +34,8 @@ impl RearCamera {
         &self.camera
     }
 
-    /// Returns the square window of the image around a box given in the vehicle frame of `ego`. Returns `None` if the
-    /// box is not behind the ego vehicle or is too near to the lens.
+    /// Returns the square window of the image around a box given in the vehicle frame of `ego`.
+    /// Returns `None` if the box is not behind the ego vehicle or is too near to the lens.
     pub fn project(&self, ego: &SceneVehicle, object: &GroundBox) -> Option<PixelRect> {
         let lens = Lens::new(&self.camera, ego);
         let relative_to_lens = GroundBox { x_m: object.x_m - lens.ahead_m, ..*object };
@@ -64,7 +65,8 @@ impl RearCamera {
         Frame::new(&self.camera, scene, key, &[PixelRect::IMAGE]).image()
     }
 
-    /// Renders the crop of one window. For several windows of the same exposure, prepare one [`Frame`] instead.
+    /// Renders the crop of one window. For several windows of the same exposure, prepare one
+    /// [`Frame`] instead.
     pub fn render_crop(&self, scene: &Scene<'_>, window: PixelRect, key: ExposureKey, crop: &mut Crop) {
         Frame::new(&self.camera, scene, key, &[window]).crop(window, crop);
     }
@@ -133,8 +135,8 @@ mod tests {
         (road, environment, others)
     }
 
-    /// Returns the pixels in the middle of the cells between knots, which lie at these cells and pixels, as `xtask/training/mask_rcnn_sampling.py`
-    /// chooses those of the Mask R-CNN.
+    /// Returns the pixels in the middle of the cells between knots, which lie at these cells and
+    /// pixels, as `xtask/training/mask_rcnn_sampling.py` chooses the pixels of the Mask R-CNN.
     fn between(knots: [(f64, f64); 6]) -> Vec<i32> {
         let cells = (0..).map(|cell| f64::from(cell) + 0.5).take_while(|cell| *cell < knots[5].0);
         let pixel = |cell: f64| {
@@ -146,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pixels_that_the_mask_rcnn_reads_are_those_of_the_whole_image() {
+    fn the_pixels_that_the_mask_rcnn_reads_equal_the_whole_image() {
         let columns = between([(0., 0.), (48., 320.), (96., 512.), (224., 768.), (272., 960.), (320., 1280.)]);
         let rows = between([(0., 0.), (17., 250.), (29., 310.), (89., 430.), (112., 522.), (144., 800.)]);
         assert_eq!((columns.len(), rows.len()), (320, 144));
@@ -291,9 +293,10 @@ mod tests {
     }
 
     #[test]
-    fn a_rolling_shutter_moves_only_what_moves_and_what_the_rows_beside_the_middle_show() {
+    fn a_rolling_shutter_moves_only_moving_objects_and_rows_beside_the_middle() {
         let rolling = camera_with(|config| config.readout_s = Num::Fixed(0.1));
-        // 8 m behind the lens, the car lies below the middle of the image, where rows are read later.
+        // 8 m behind the lens, the car lies below the middle of the image, where rows are read
+        // later.
         let height = |camera: &RearCamera, mps: f64| centre_px(&rendered(camera, Light::Day, [488.0, mps]))[1];
         assert!(height(&rear_camera(), 50.0) > 400.0);
         assert!((height(&rolling, 30.0) - height(&rear_camera(), 30.0)).abs() < 0.5, "as fast as the ego");

@@ -1,7 +1,8 @@
 //! The columns and rows of the image that a network reads.
 //!
-//! A network need not read every pixel. Objects far away are small and lie near the horizon, and near ones are large, so
-//! that few pixels say as much as all. What is not read need not be rendered.
+//! A network need not read every pixel. Distant objects are small and lie near the horizon, and
+//! near objects are large. A few pixels therefore carry as much information as all pixels. Other
+//! pixels need not be rendered.
 
 use super::picture::{HEIGHT_PX, WIDTH_PX};
 
@@ -14,9 +15,9 @@ pub struct Sampling {
 
 /// The reason why columns or rows cannot be sampled.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the {what} {text:?} are not {wanted}")]
+#[error("the {axis} {text:?} are not {wanted}")]
 pub struct SamplingError {
-    what: &'static str,
+    axis: &'static str,
     text: String,
     wanted: String,
 }
@@ -32,7 +33,7 @@ impl Sampling {
     /// # Errors
     /// [`SamplingError`] if the numbers do not ascend, or lie outside of the image.
     pub fn parse(columns: &str, rows: &str) -> Result<Self, SamplingError> {
-        let read = |what, text: &str, limit: u16| {
+        let read = |axis, text: &str, limit: u16| {
             let numbers: Option<Vec<i32>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
             let is_right = |numbers: &Vec<i32>| {
                 numbers.first().is_some_and(|first| *first >= 0)
@@ -40,7 +41,7 @@ impl Sampling {
                     && numbers.is_sorted_by(|one, next| one < next)
             };
             numbers.filter(is_right).ok_or_else(|| SamplingError {
-                what,
+                axis,
                 text: text.chars().take(80).collect(),
                 wanted: format!("ascending whole numbers from 0 to {}", limit - 1),
             })

@@ -23,8 +23,8 @@ pub(crate) struct SkyNoise {
     clouds: PlaneNoise,
 }
 
-/// Returns the radiance of the background in a direction `slope` (rise over run) above the horizon. `bearing` is the
-/// tangent of the angle from the camera's axis plus the ego's yaw.
+/// Returns the radiance of the background in a direction `slope` (rise over run) above the horizon.
+/// `bearing` is the tangent of the angle from the camera's axis plus the ego's yaw.
 pub(crate) fn radiance(slope: f32, bearing: f32, light: &Illumination, noise: &mut SkyNoise) -> Vec3 {
     let sky = light.sky(slope.max(0.0));
     if slope < WOODS_SLOPE {

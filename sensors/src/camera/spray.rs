@@ -1,9 +1,11 @@
-//! Spray: water that tyres throw up from a wet road, modelled as a chain of thin spherical clouds behind each wheel.
+//! Spray: water that tyres throw up from a wet road, modelled as a chain of thin spherical clouds
+//! behind each wheel.
 //!
-//! A cloud attenuates a ray according to the chord that the ray cuts through it, as far as the chord lies in front of
-//! the object that the ray hits. Light scattered by the air replaces the lost light. The density grows with the height
-//! of the water film and with the square of the speed, and starts at about 40 km/h (as measured, for instance, by Weir,
-//! Strange and Heffley, *Reduction of adverse aerodynamic effects of large trucks*, FHWA 1978).
+//! A cloud attenuates a ray according to the part of the ray that lies in the cloud and in front of
+//! the object that the ray hits. Light scattered by the air replaces the lost light. The density
+//! grows with the height of the water film and with the square of the speed, and starts at about 40
+//! km/h (as measured, for instance, by Weir, Strange and Heffley, *Reduction of adverse aerodynamic
+//! effects of large trucks*, FHWA 1978).
 
 use closecall_traffic::VehicleClass;
 
@@ -17,8 +19,8 @@ const MIN_SPEED_MPS: f64 = 11.0;
 const NOMINAL_SPEED_MPS: f64 = 30.0;
 /// Height of the water film at which the density has its nominal value (mm).
 const NOMINAL_FILM_MM: f64 = 1.0;
-/// Extinction coefficient in the middle of the first cloud behind a car's wheel, at the nominal speed and water film
-/// (1/m).
+/// Extinction coefficient in the middle of the first cloud behind a car's wheel, at the nominal
+/// speed and water film (1/m).
 const DENSITY_PER_M: f32 = 0.55;
 /// Number of clouds in one chain.
 const CLOUDS: usize = 6;
@@ -41,7 +43,8 @@ impl Cloud {
         Self { at, radius_m, extinction_per_m, tangent_squared_m2: dot(at, at) - radius_m * radius_m }
     }
 
-    /// Returns the optical depth along the unit vector `towards`, up to the distance `max_distance_m`.
+    /// Returns the optical depth along the unit vector `towards`, up to the distance
+    /// `max_distance_m`.
     pub(crate) fn optical_depth(&self, towards: Vec3, max_distance_m: f32) -> f32 {
         let middle = dot(self.at, towards);
         let half = middle * middle - self.tangent_squared_m2;
@@ -50,17 +53,18 @@ impl Cloud {
         }
         let half = half.sqrt();
         let (from, to) = ((middle - half).max(0.0), (middle + half).min(max_distance_m));
-        // The cloud is thinner towards its rim: the depth is weighted by the half chord relative to the radius.
+        // The cloud is thinner towards its rim: the depth is weighted by the half chord relative to
+        // the radius.
         self.extinction_per_m * (to - from).max(0.0) * half / self.radius_m
     }
 }
 
-/// Side of the road cells that serve as keys of the spray (m). It is so small that no two vehicles have their centres
-/// in the same cell.
+/// Side of the road cells that serve as keys of the spray (m). It is so small that no two vehicles
+/// have their centres in the same cell.
 const CELL_M: f64 = 0.1;
 
-/// Returns the key of the road cell that contains the vehicle's centre. Because this key, not the index in a list,
-/// seeds the spray, the spray does not depend on the order of the vehicles.
+/// Returns the key of the road cell that contains the vehicle's centre. Because this key, not the
+/// index in a list, seeds the spray, the spray does not depend on the order of the vehicles.
 #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, far beyond the ends of any road")]
 fn cell_key(vehicle: &SceneVehicle) -> u64 {
     let [along, across] = [vehicle.state.s_m, vehicle.state.d_m].map(|position_m| (position_m / CELL_M).round() as i32);
@@ -70,8 +74,8 @@ fn cell_key(vehicle: &SceneVehicle) -> u64 {
 /// Number of clouds behind one vehicle: a chain behind each of four wheels.
 const CLOUDS_BEHIND: usize = 4 * CLOUDS;
 
-/// Returns the clouds behind one vehicle, given its position `at` (m) and the cosine and sine of its heading, `turn`,
-/// in the ground frame. Returns `None` if it throws up no spray.
+/// Returns the clouds behind one vehicle, given its position `at` (m) and the cosine and sine of
+/// its heading, `turn`, in the ground frame. Returns `None` if it throws up no spray.
 pub(crate) fn clouds_behind(
     vehicle: &SceneVehicle,
     scene: &Scene<'_>,

@@ -4,8 +4,8 @@ use closecall_traffic::Vehicle;
 
 use super::shapes;
 
-/// A triangle of a vehicle's body, in the frame of the vehicle: x forward, y left, z up, with the origin on the ground below
-/// the centre of its box.
+/// A triangle of a vehicle's body, in the frame of the vehicle: x forward, y left, z up, with the
+/// origin on the ground below the centre of its box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyTriangle {
     /// The corners (m), counter-clockwise as seen from outside.

@@ -1,17 +1,21 @@
-//! Glare: the veil that stray light of a bright source lays over the image, in the lens and on the window in front of it.
+//! Glare: the veil that stray light of a bright source lays over the image, in the lens and on the
+//! window in front of it.
 //!
-//! A source that illuminates the lens with E adds to each direction the radiance of Stiles and Holladay, which the International
-//! Commission on Illumination has adopted for the human eye (CIE 146:2002; J. J. Vos, *On the cause of disability glare and its
-//! dependence on glare angle, age and ocular pigmentation*, Clinical and Experimental Optometry 86, 2003):
+//! A source that illuminates the lens with E adds to each direction the radiance of Stiles and
+//! Holladay, which the International Commission on Illumination has adopted for the human eye (CIE
+//! 146:2002; J. J. Vos, *On the cause of disability glare and its dependence on glare angle, age
+//! and ocular pigmentation*, Clinical and Experimental Optometry 86, 2003):
 //!
 //! ```text
 //!   L = k · 10 · E / θ²      θ: angle to the source (deg), 1° to 30°
 //! ```
 //!
-//! k is 1 for a healthy young eye. That a camera behind a window scatters alike is an assumption; the falloff is that of polished surfaces,
-//! whose scatter falls with a power of the angle of about 1.8 (the default of the ABg model of Photon Engineering's FRED). Within 1° the
-//! radiance stays that at 1°, and beyond 30° it goes on to fall, to zero where the source is behind the lens. The veil is added before the
-//! exposure, so that pixels near the source saturate, and all contrast is lost there. Nothing hides a source.
+//! k is 1 for a healthy young eye. It is an assumption that a camera behind a window scatters light
+//! in the same way. The falloff is that of polished surfaces: their scatter falls with about the
+//! 1.8th power of the angle (the default of the ABg model of Photon Engineering's FRED). Within 1°
+//! the radiance keeps its value at 1°. Beyond 30° it continues to fall, to zero where the source is
+//! behind the lens. The veil is added before the exposure: pixels near the source saturate, and all
+//! contrast is lost there. Nothing hides a source.
 
 use closecall_traffic::{Scene, SceneVehicle, maths};
 
@@ -28,8 +32,9 @@ const AT_ONE_RADIAN: f32 = 0.003_046_174;
 const LEAST_SQUARE: f32 = 0.000_304_617_4;
 /// Distance across the road beyond which a main beam misses the camera (m): a lane and a half.
 const BEAM_HALF_WIDTH_M: f64 = 5.6;
-/// Ratio of the luminous intensity of a main beam to that of the dipped beam where it lights the road. A main beam of class B has at least
-/// 40,500 cd in its middle (UN Regulation 149, table 5); that the dipped beam has a fourth of it is an assumption.
+/// Luminous intensity of a main beam divided by the intensity of the dipped beam where it lights
+/// the road. A main beam of class B has at least 40,500 cd in its middle (UN Regulation 149, table
+/// 5). It is an assumption that the dipped beam has a fourth of it.
 const MAIN_BEAM: f32 = 4.0;
 
 /// The veil of one source.
@@ -37,7 +42,8 @@ const MAIN_BEAM: f32 = 4.0;
 pub(crate) struct Veil {
     /// Unit vector to the source in the ground frame.
     towards: Vec3,
-    /// Illumination of the lens by the source times the strength k, in units of π times the radiance of a white surface.
+    /// Illumination of the lens by the source times the strength k, in units of π times the
+    /// radiance of a white surface.
     irradiance: Vec3,
 }
 
@@ -45,7 +51,7 @@ impl Veil {
     /// Adds the veil's radiance in the direction of a unit vector to `light`.
     pub(crate) fn add_to(&self, direction: Vec3, light: &mut Vec3) {
         let apart = sub(direction, self.towards);
-        // The square of the chord is that of the angle, up to 2 % at 30°.
+        // The square of the chord equals the square of the angle to within 2 % at 30°.
         let factor = AT_ONE_RADIAN / dot(apart, apart).max(LEAST_SQUARE);
         for (sum, irradiance) in light.iter_mut().zip(self.irradiance) {
             *sum += irradiance * factor;
@@ -54,7 +60,7 @@ impl Veil {
 }
 
 impl Frame {
-    /// Adds the glare of a fault of the camera. `scene` is the one that the image shows.
+    /// Adds the glare of a fault of the camera. `scene` is the scene that the image shows.
     pub fn add_glare(&mut self, fault: &CameraFault, scene: &Scene<'_>) {
         let sun = of_sun(fault.sun_glare, &self.lens, &self.light);
         let beams = nearest_behind(scene)
@@ -107,7 +113,7 @@ fn nearest_behind<'a>(scene: &Scene<'a>) -> Option<&'a SceneVehicle> {
     let half_m = |vehicle: &SceneVehicle| 0.5 * vehicle.vehicle.dimensions.length_m;
     let gap_m = |other: &SceneVehicle| ego.state.s_m - half_m(ego) - other.state.s_m - half_m(other);
     let near = scene.others.iter().filter(|other| (other.state.d_m - ego.state.d_m).abs() < BEAM_HALF_WIDTH_M);
-    near.filter(|other| gap_m(other) > 0.0).min_by(|one, other| gap_m(one).total_cmp(&gap_m(other)))
+    near.filter(|other| gap_m(other) > 0.0).min_by(|a, b| gap_m(a).total_cmp(&gap_m(b)))
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! The pipeline `mask-rcnn` in the simulation loop: it renders the pixels of the whole image that the network reads, and
-//! returns the instances.
+//! The pipeline `mask-rcnn` in the simulation loop: it renders the pixels of the whole image that
+//! the network reads, and returns the instances.
 
 use crate::tracking::Detection;
 use closecall_traffic::{Check, Parameters, Scene, SceneVehicle, maths};
@@ -24,15 +24,17 @@ pub struct WholeImageDetector {
 }
 
 impl CameraConfig {
-    /// Loads the Mask R-CNN that this configuration names, so that what is missing or wrong is reported before any work is done.
+    /// Loads the Mask R-CNN that this configuration names. A missing or wrong file is then reported
+    /// before any work begins.
     ///
     /// # Errors
     /// As [`MaskRcnn::detector`]; a configuration that cannot be checked is no error here.
     pub fn check_network(&self, backend: &Backend) -> Result<(), ClassifierError> {
-        // Only what names the network: a number may be a parameter, whose value is not known yet.
+        // Only the keys that name the network: a number may be a parameter, and its value is not
+        // known yet.
         let MaskRcnnConfig { model, labels, input, .. } = self.mask_rcnn.clone();
-        let own = MaskRcnnConfig { model, labels, input, ..MaskRcnnConfig::default() };
-        own.check(&Parameters::default()).map_or(Ok(()), |checked| checked.detector(backend).map(|_| ()))
+        let config = MaskRcnnConfig { model, labels, input, ..MaskRcnnConfig::default() };
+        config.check(&Parameters::default()).map_or(Ok(()), |checked| checked.detector(backend).map(|_| ()))
     }
 }
 
@@ -50,8 +52,8 @@ impl MaskRcnn {
         let bytes = std::fs::read(path).map_err(|error| at(error.to_string()))?;
         let detector = InstanceDetector::new(&bytes, labels.as_ref(), backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
-            ClassifierError::Layout { found, wanted } => {
-                ClassifierError::Layout { found: format!("{path}: {found}"), wanted }
+            ClassifierError::Layout { actual, wanted } => {
+                ClassifierError::Layout { actual: format!("{path}: {actual}"), wanted }
             }
             other => other,
         });
@@ -100,7 +102,8 @@ impl WholeImageDetector {
 }
 
 impl RearCamera {
-    /// Returns the box in the image around a detection: left, top, right, bottom (px). Returns `None` if no part of it is in the image.
+    /// Returns the box in the image around a detection: left, top, right, bottom (px). Returns
+    /// `None` if no part of it is in the image.
     pub fn detection_bounds(&self, ego: &SceneVehicle, detection: &Detection) -> Option<[f64; 4]> {
         let lens = Lens::new(self.camera(), ego);
         let mut object = ground_box(detection);
@@ -111,14 +114,16 @@ impl RearCamera {
         (inside[0] < inside[2] && inside[1] < inside[3]).then_some(inside)
     }
 
-    /// Returns the distance from the lens back to a position along the axis of `ego` (m), or `None` ahead of the lens.
+    /// Returns the distance from the lens back to a position along the axis of `ego` (m), or `None`
+    /// ahead of the lens.
     pub fn depth_m(&self, ego: &SceneVehicle, x_m: f64) -> Option<f64> {
         let depth_m = Lens::new(self.camera(), ego).ahead_m - x_m;
         (depth_m > 0.0).then_some(depth_m)
     }
 
-    /// Returns the position (x, y) in the frame of `ego` (m) at which the ray through a position in the image (px) meets a flat road, and the
-    /// tangent of its angle below the horizon. Returns `None` above the horizon.
+    /// Returns the position (x, y) in the frame of `ego` (m) at which the ray through a position in
+    /// the image (px) meets a flat road, and the tangent of its angle below the horizon. Returns
+    /// `None` above the horizon.
     pub fn on_ground(&self, ego: &SceneVehicle, [u, v]: [f64; 2]) -> Option<([f64; 2], f64)> {
         let lens = Lens::new(self.camera(), ego);
         let mut at = [(u - f64::from(WIDTH_PX) / 2.0) / FOCAL_PX, (v - f64::from(HEIGHT_PX) / 2.0) / FOCAL_PX];

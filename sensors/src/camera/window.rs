@@ -1,5 +1,5 @@
-//! The optical path from the scene to the pixel values: the rear window with dirt and water drops, falling rain, and
-//! the image sensor with its noise.
+//! The optical path from the scene to the pixel values: the rear window with dirt and water drops,
+//! falling rain, and the image sensor with its noise.
 //!
 //! Every effect depends only on the pixel and on random keys, never on neighbouring pixels.
 
@@ -9,12 +9,13 @@ use super::hash::{mix_at, normal3, unit};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
 
-/// Side of the square cells of the window (px). A cell holds at most one speck of dirt and one drop.
+/// Side of the square cells of the window (px). A cell holds at most one speck of dirt and one
+/// drop.
 const CELL_PX: i32 = 44;
 /// Width and height of the cells in which at most one streak of rain falls (px).
 const STREAK_CELL_PX: [i32; 2] = [11, 64];
-/// Share of the window that drops cover in heavy rain (0 to 1), and the rain rate at which they cover half of that
-/// share (mm/h).
+/// Share of the window that drops cover in heavy rain (0 to 1), and the rain rate at which they
+/// cover half of that share (mm/h).
 const DROP_COVERAGE: [f32; 2] = [0.5, 10.0];
 /// Rain rate at which every cell holds a streak (mm/h).
 const STREAKS_FULL_MM_PER_H: f32 = 60.0;
@@ -53,8 +54,8 @@ impl RearWindow {
         if light.rain_mm_per_h > 0.0 {
             let covered = DROP_COVERAGE[0] * light.rain_mm_per_h / (light.rain_mm_per_h + DROP_COVERAGE[1]);
             if let Some(blot) = blot_at(self.drops_key, pixel, covered) {
-                // A real drop shows a small inverted image, with the bright sky below and the dark road above. The
-                // model uses the mean of that image.
+                // A real drop shows a small inverted image, with the bright sky below and the dark
+                // road above. The model uses the mean of that image.
                 let bright = 0.35 + 0.5 * blot.random;
                 radiance = each(|i| radiance[i] + (bright * light.horizon[i] - radiance[i]) * 0.5 * blot.depth);
             }
@@ -79,10 +80,12 @@ impl RearWindow {
         if x == column && y >= from && y < from + length { OPACITY } else { 0.0 }
     }
 
-    /// Returns the pixel's value: it applies the exposure gain, encodes the result by a square root, and adds noise.
+    /// Returns the pixel's value: it applies the exposure gain, encodes the result by a square
+    /// root, and adds noise.
     ///
-    /// The standard deviation of shot noise grows with the square root of the light, so that it is uniform after a
-    /// square-root encoding (Anscombe, 1948). Read noise is added, which is visible only in dark pixels.
+    /// The standard deviation of shot noise grows with the square root of the light, so that it is
+    /// uniform after a square-root encoding (Anscombe, 1948). Read noise is added, which is visible
+    /// only in dark pixels.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0 … 255 before the cast")]
     pub(crate) fn encode(&self, [u, v]: [i32; 2], light_in: Vec3, light: &Illumination) -> [u8; 3] {
         const DARK: f32 = 0.1;
@@ -98,7 +101,8 @@ impl RearWindow {
     }
 }
 
-/// Returns the blot that covers a pixel, if there is one. `share` is the share of cells that hold a blot.
+/// Returns the blot that covers a pixel, if there is one. `share` is the share of cells that hold a
+/// blot.
 fn blot_at(key: u64, [u, v]: [i32; 2], share: f32) -> Option<Blot> {
     let (i, j) = (u.div_euclid(CELL_PX), v.div_euclid(CELL_PX));
     let bits = mix_at(key, i, j);

@@ -1,6 +1,6 @@
-//! Annotations in the COCO format (Lin et al., *Microsoft COCO: common objects in context*, 2014). The field names
-//! follow <https://cocodataset.org/#format-data>. Masks are uncompressed run lengths in column-major order, and the
-//! first run counts zeros.
+//! Annotations in the COCO format (Lin et al., *Microsoft COCO: common objects in context*, 2014).
+//! The field names follow <https://cocodataset.org/#format-data>. Masks are uncompressed run
+//! lengths in column-major order, and the first run counts zeros.
 
 use closecall_traffic::{BodyShape, VehicleClass};
 use serde::Serialize;
@@ -117,8 +117,8 @@ fn category(class: VehicleClass) -> usize {
     class as usize + 1
 }
 
-/// Returns the bounding box `[left, top, width, height]` (px) and the number of the pixels that show the vehicle with
-/// this index. Returns `None` if no pixel shows it.
+/// Returns the bounding box `[left, top, width, height]` (px) and the number of the pixels that
+/// show the vehicle with this index. Returns `None` if no pixel shows it.
 fn extent(picture: &LabelledImage, index: usize) -> Option<([usize; 4], usize)> {
     let width = picture.image.width as usize;
     let pixels = picture.instances.iter().enumerate().filter(|(_, instance)| usize::from(**instance) == index + 1);

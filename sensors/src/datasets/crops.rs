@@ -1,4 +1,4 @@
-//! Labelled crops: vehicles in boxes with errors like those of LiDAR clusters, and background.
+//! Labelled crops: background, and vehicles in boxes with the errors of LiDAR clusters.
 
 use std::fmt::Write;
 
@@ -107,8 +107,9 @@ fn rendered_share(
     frame.instance_share(index)
 }
 
-/// Returns a random box that a LiDAR cluster of the vehicle could have given. The visible face is almost correct, the
-/// length is often an assumption, and the height depends on which part of the vehicle the beams hit.
+/// Returns a random box that a LiDAR cluster of the vehicle could have given. The visible face is
+/// almost correct, the length is often an assumption, and the height depends on which part of the
+/// vehicle the beams hit.
 fn vehicle_cluster_box(scene: &RandomScene, vehicle: &SceneVehicle, rng: &mut Stream) -> GroundBox {
     let mut truth = ego_box(scene, vehicle);
     let face = truth.length_m / 2.0;
@@ -126,7 +127,8 @@ fn vehicle_cluster_box(scene: &RandomScene, vehicle: &SceneVehicle, rng: &mut St
 
 /// Returns the true box of a vehicle in the ego's frame.
 fn ego_box(scene: &RandomScene, vehicle: &SceneVehicle) -> GroundBox {
-    let pose = |of: &SceneVehicle| scene.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
+    let pose =
+        |vehicle: &SceneVehicle| scene.road.plane_pose(vehicle.state.s_m, vehicle.state.d_m, vehicle.state.heading_rad);
     let (ego, other) = (pose(&scene.ego), pose(vehicle));
     let (sin, cos) = maths::sin_cos(ego.yaw_rad);
     let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
@@ -141,8 +143,8 @@ fn ego_box(scene: &RandomScene, vehicle: &SceneVehicle) -> GroundBox {
     }
 }
 
-/// Returns the random box of a cluster that is not a vehicle: spray or ground near the ego, rails and posts beside the
-/// road, or any other position.
+/// Returns the random box of a cluster that is not a vehicle: spray or ground near the ego, rails
+/// and posts beside the road, or any other position.
 fn background_cluster_box(scene: &RandomScene, rng: &mut Stream) -> GroundBox {
     let kind = rng.random_range(0..3);
     let back = match kind {

@@ -1,4 +1,5 @@
-//! Atomic file output: a file is written under a temporary name in the same folder, and then renamed.
+//! Atomic file output: a file is written under a temporary name in the same folder, and then
+//! renamed.
 
 use std::fs;
 use std::io::Write;

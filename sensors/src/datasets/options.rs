@@ -1,4 +1,4 @@
-//! What a data set is made of.
+//! The options of a data set.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,8 @@ pub enum Content {
     Crops,
 }
 
-/// How the cameras of a data set differ from the ideal one. The default is the ideal camera, with which the network was trained.
+/// How the cameras of a data set differ from the ideal one. The default is the ideal camera, with
+/// which the network was trained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraLooks {
     /// The lens.
@@ -55,8 +56,8 @@ pub struct DatasetOptions {
     pub seed: u64,
     /// How the cameras differ from the ideal one. The scenes are the same for all of them.
     pub looks: CameraLooks,
-    /// Least and largest number of vehicles in a scene: [`USUAL_VEHICLES`], or what an empty or a crowded road has. A scene without room
-    /// has fewer.
+    /// Least and largest number of vehicles in a scene: [`USUAL_VEHICLES`], or what an empty or a
+    /// crowded road has. A scene without room has fewer.
     pub vehicles: [usize; 2],
 }
 
@@ -67,7 +68,8 @@ pub const USUAL_VEHICLES: [usize; 2] = [1, 5];
 pub const MAX_VEHICLES: usize = 40;
 
 impl Set {
-    /// Returns the channel of the random stream for this set and purpose. The two sets use separate streams.
+    /// Returns the channel of the random stream for this set and purpose. The two sets use separate
+    /// streams.
     pub(super) fn channel(self, purpose: &str) -> &'static str {
         match (self, purpose == "crops") {
             (Self::Training, true) => "training-crops",

@@ -9,12 +9,14 @@ use crate::camera::Camera;
 use closecall_traffic::{ActorId, Stream, stream};
 use std::path::Path;
 
-/// Renders a data set into `folder`, which is created if it does not exist. Each file is written atomically.
+/// Renders a data set into `folder`, which is created if it does not exist. Each file is written
+/// atomically.
 ///
 /// The same options give the same bytes.
 ///
 /// # Errors
-/// Returns a [`DatasetError`] if a scene cannot be set up, or if a file cannot be encoded or written.
+/// Returns a [`DatasetError`] if a scene cannot be set up, or if a file cannot be encoded or
+/// written.
 pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<DatasetSummary, DatasetError> {
     let output = Output::new(folder)?;
     let mut summary = DatasetSummary { scenes: options.scenes, pictures: 0, labels: [0; 4] };

@@ -1,5 +1,5 @@
-//! Pictures at the columns and rows that a network reads, to train it: rendering them takes a tenth of the time of whole
-//! images.
+//! Pictures at the columns and rows that a network reads, to train it: rendering them takes a tenth
+//! of the time of whole images.
 //!
 //! A tenth of the scenes are empty roads, and a tenth are crowded.
 
@@ -19,9 +19,9 @@ const PERIOD: u32 = 10;
 /// Numbers of vehicles in a crowded scene.
 const CROWD: std::ops::RangeInclusive<usize> = 6..=10;
 
-/// Renders random scenes at these columns and rows into `folder`: `pixels.rgb` [scenes, rows, columns, 3] and
-/// `instances.u8` [scenes, rows, columns] (0: no vehicle, or 1 + the index of the vehicle in its scene), both as bytes, and
-/// `vehicles.csv` with a line for each vehicle.
+/// Renders random scenes at these columns and rows into `folder`: `pixels.rgb` [scenes, rows,
+/// columns, 3] and `instances.u8` [scenes, rows, columns] (0: no vehicle, or 1 + the index of the
+/// vehicle in its scene), both as bytes, and `vehicles.csv` with a line for each vehicle.
 ///
 /// The same arguments give the same bytes.
 ///

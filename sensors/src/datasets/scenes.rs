@@ -1,4 +1,5 @@
-//! Random scenes behind the ego vehicle: road, weather, light, and vehicles of every shape and paint.
+//! Random scenes behind the ego vehicle: road, weather, light, and vehicles of every shape and
+//! paint.
 
 use std::f64::consts::PI;
 
@@ -163,7 +164,8 @@ fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> BodyShape {
             held_out[rng.random_range(0..held_out.len())]
         }
         Set::Training => loop {
-            // The type of the range decides what is drawn: with `u8`, the data set is the one of the shipped network.
+            // The type of the range decides what is drawn: with `u8`, this is the data set that
+            // trained the shipped network.
             let shape = all[usize::from(rng.random_range(0..all.len() as u8))];
             if !HELD_OUT_SHAPES.contains(&shape) {
                 return shape;
@@ -172,8 +174,8 @@ fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> BodyShape {
     }
 }
 
-/// Draws the dimensions of a vehicle. A third of the vehicles have about the typical size of the class regardless of
-/// their shape, as in a scenario file that does not state the size.
+/// Draws the dimensions of a vehicle. A third of the vehicles have about the typical size of the
+/// class regardless of their shape, as in a scenario file that does not state the size.
 fn dimensions(shape: BodyShape, rng: &mut Stream) -> Dimensions {
     let usual = if rng.random_bool(1.0 / 3.0) { shape.class().typical_dimensions() } else { shape.usual_dimensions() };
     Dimensions {
@@ -183,10 +185,11 @@ fn dimensions(shape: BodyShape, rng: &mut Stream) -> Dimensions {
     }
 }
 
-/// Draws the paint of a vehicle. Half of the vehicles are grey, the others coloured. The two sets use disjoint bands of
-/// brightness (grey) and of hue (coloured).
+/// Draws the paint of a vehicle. Half of the vehicles are grey, the others coloured. The two sets
+/// use disjoint bands of brightness (grey) and of hue (coloured).
 fn paint(set: Set, rng: &mut Stream) -> [u8; 3] {
-    /// Number of equal parts of the scale. The upper quarter of each part belongs to the held-out set.
+    /// Number of equal parts of the scale. The upper quarter of each part belongs to the held-out
+    /// set.
     const BANDS: f64 = 5.0;
     let banded = |rng: &mut Stream| loop {
         let value: f64 = rng.random();

@@ -1,4 +1,4 @@
-//! What a data set that was rendered holds, or why it cannot be written.
+//! The content of a rendered data set, or the reason why it cannot be written.
 
 use closecall_traffic::ConfigError;
 use serde::Serialize;
@@ -14,8 +14,8 @@ pub struct DatasetSummary {
     pub labels: [usize; 4],
 }
 
-/// The reason why a data set cannot be written. Every file in the folder is complete, from this run or from an earlier
-/// one, except that a temporary file may remain.
+/// The reason why a data set cannot be written. Every file in the folder is complete, from this run
+/// or from an earlier one, except that a temporary file may remain.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// A file could not be written.

@@ -1,7 +1,9 @@
-//! The faults of the LiDARs and the rear camera as a scenario file describes them, and the table of all faults.
+//! The faults of the LiDARs and the rear camera as a scenario file describes them, and the table of
+//! all faults.
 //!
-//! Sources: the yaw of a mounted LiDAR can be measured to 0.1° in production (Kim et al. 2020, arXiv 2008.10542), so that a
-//! residual of some tenths of a degree is what a fault of the mounting means. All other magnitudes are the scenario's choice.
+//! Sources: the yaw of a mounted LiDAR can be measured to 0.1° in production (Kim et al. 2020,
+//! arXiv 2008.10542), so a fault of the mounting means a residual of some tenths of a degree. All
+//! other magnitudes are the scenario's choice.
 
 use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range, maths};
 use schemars::JsonSchema;
@@ -17,12 +19,13 @@ use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
 pub(super) const MAX_DELAY_S: f64 = 0.4;
 /// Greatest share of measurements that can be lost.
 pub(super) const SHARE: Range = Range::closed(0.0, 1.0);
-/// Errors of the clock (s) and of the mounting (deg, m) that the model covers: those of one entry, and those of all entries that
-/// hold at once together.
+/// Errors of the clock (s) and of the mounting (deg, m) that the model covers: of one entry, and of
+/// the sum of all entries that hold at once.
 pub(super) const CLOCK_OFFSET_S: Range = Range::closed(-0.2, 0.2);
 pub(super) const ANGLE_DEG: Range = Range::closed(-5.0, 5.0);
 const HEIGHT_M: Range = Range::closed(-0.2, 0.5);
-/// Stray light in a camera relative to that in a healthy young eye: up to a hundred times, at which one source veils the whole image.
+/// Stray light in a camera relative to that in a healthy young eye: up to a hundred times, at which
+/// one source veils the whole image.
 const GLARE: Range = Range::closed(0.0, 100.0);
 
 /// A fault of a LiDAR. It holds from `from-s` to `until-s`, with all effects that it names.
@@ -41,15 +44,17 @@ pub struct LidarFaultConfig {
     pub frozen: bool,
     /// Share of scans that do not arrive (-).
     pub lost_frames: Option<Num>,
-    /// Share of points that are lost, regardless of their power (-), in addition to the sensor's own `dropout`. Default: 0.
+    /// Share of points that are lost, regardless of their power (-), in addition to the sensor's
+    /// own `dropout`. Default: 0.
     pub dropout: Option<Num>,
-    /// Azimuth at which a blocked sector begins (deg), within the LiDAR's field of view: 0 is straight behind, or straight ahead for
-    /// the LiDAR that looks ahead; positive is to the ego's left.
+    /// Azimuth at which a blocked sector begins (deg), within the LiDAR's field of view: 0 is
+    /// straight behind, or straight ahead for the LiDAR that looks ahead; positive is to the ego's
+    /// left.
     pub blocked_from_deg: Option<Num>,
     /// Azimuth at which the blocked sector ends (deg).
     pub blocked_to_deg: Option<Num>,
-    /// Share of the light that dirt on the window transmits each way (-), in addition to the sensor's own
-    /// `window-transmission`.
+    /// Share of the light that dirt on the window transmits each way (-), in addition to the
+    /// sensor's own `window-transmission`.
     pub window_transmission: Option<Num>,
     /// Additional latency of each scan (s).
     pub delay_s: Option<Num>,
@@ -57,21 +62,24 @@ pub struct LidarFaultConfig {
     pub jitter_s: Option<Num>,
     /// Error of the time stamps (s): positive if a scan counts as measured later than it was.
     pub clock_offset_s: Option<Num>,
-    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis, to the left seen
-    /// from above (deg). After calibration some tenths of a degree remain.
+    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis,
+    /// to the left seen from above (deg). After calibration some tenths of a degree remain.
     pub yaw_deg: Option<Num>,
     /// Error of the mounting: upward tilt of the sensor's axis (deg).
     pub pitch_deg: Option<Num>,
-    /// Error of the mounting: height of the sensor above the place at which the ego believes it (m).
+    /// Error of the mounting: height of the sensor above the place at which the ego believes it
+    /// (m).
     pub height_m: Option<Num>,
     /// Standard deviation of an additional error of each range (m).
     pub range_noise_m: Option<Num>,
-    /// Share of the points on vehicles that return a second time as a mirror image behind a guard rail (-). It needs
-    /// `guard-rails`. The images appear in the scan; the detector drops them, unless the map is wrong about where the road ends.
+    /// Share of the points on vehicles that return a second time as a mirror image behind a guard
+    /// rail (-). It needs `guard-rails`. The images appear in the scan; the detector drops them,
+    /// unless the map is wrong about where the road ends.
     pub rail_ghosts: Option<Num>,
     /// Mean number of bursts of false points in a scan, as pulses of another LiDAR cause them (-).
     pub crosstalk: Option<Num>,
-    /// Half-width of the halo of false points around a saturated return of a registration plate (deg).
+    /// Half-width of the halo of false points around a saturated return of a registration plate
+    /// (deg).
     pub blooming_deg: Option<Num>,
 }
 
@@ -124,14 +132,14 @@ impl Default for LidarFault {
 }
 
 /// Returns the share that two independent losses cause together.
-pub(super) fn either(one: f64, other: f64) -> f64 {
-    1.0 - (1.0 - one) * (1.0 - other)
+pub(super) fn either(a: f64, b: f64) -> f64 {
+    1.0 - (1.0 - a) * (1.0 - b)
 }
 
 impl Combine for LidarFault {
     fn and(self, other: Self) -> Self {
         Self {
-            // Of several entries, those of one sensor hold together.
+            // Of several entries, the entries of one sensor hold together.
             sensor: self.sensor.or(other.sensor),
             is_dead: self.is_dead || other.is_dead,
             is_frozen: self.is_frozen || other.is_frozen,
@@ -154,7 +162,8 @@ impl Combine for LidarFault {
 }
 
 impl LidarFault {
-    /// Returns the fault in a scene turned by half a turn, in which the ego's left is on its right. Rotations keep their sense.
+    /// Returns the fault in a scene turned by half a turn, in which the ego's left is on its right.
+    /// Rotations keep their sense.
     pub(crate) fn turned(self) -> Self {
         Self { blocked_deg: self.blocked_deg.map(|sector| sector.map(|[from, to]| [-to, -from])), ..self }
     }
@@ -170,7 +179,8 @@ impl LidarFault {
         steps
     }
 
-    /// Returns whether the points of a scan differ from those of a sensor without faults, apart from power and pose.
+    /// Returns whether the points of a scan differ from the points of a sensor without faults,
+    /// apart from power and pose.
     pub(crate) fn changes_points(&self) -> bool {
         let amounts = [self.dropout, self.range_noise_m, self.rail_ghosts, self.crosstalk, self.blooming_deg];
         amounts.iter().any(|amount| *amount > 0.0) || self.blocked_deg.iter().any(Option::is_some)
@@ -190,8 +200,9 @@ impl LidarFaultConfig {
         parameters: &Parameters,
     ) -> Result<FaultList<LidarFault>, ConfigError> {
         let list = FaultList::check(key, entries, |entry| entry.check(parameters))?;
-        // Entries of different sensors do not add up. Those without a sensor add up with those of each.
-        // No sensor has the empty name: it stands for those that no entry names.
+        // Entries of different sensors do not add up. Entries without a sensor add up with the
+        // entries of each sensor. No sensor has the empty name: here it means all sensors that no
+        // entry names.
         let lists = list.sensors().chain([""]).map(|sensor| list.of_sensor(sensor));
         for (index, sum) in lists.flat_map(|list| list.combinations().collect::<Vec<_>>()) {
             // A sum of allowed values may exceed its limit by rounding.
@@ -271,12 +282,14 @@ pub struct CameraFaultConfig {
     pub dead: bool,
     /// The camera delivers its latest image again and again.
     pub frozen: bool,
-    /// Stray light of the sun in the lens and on its window, relative to that in a healthy young eye (-): a veil that falls with the
-    /// square of the angle to the sun (`sensors.rear-camera.sun`), and saturates the pixels near it. At 1, that is 4° around a sun on a
-    /// clear day; at 3, 7°.
+    /// Stray light of the sun in the lens and on its window, relative to that in a healthy young
+    /// eye (-): a veil that falls with the square of the angle to the sun
+    /// (`sensors.rear-camera.sun`), and saturates the pixels near it. At 1, that is 4° around a sun
+    /// on a clear day; at 3, 7°.
     pub sun_glare: Option<Num>,
-    /// The same for the main beam of the nearest vehicle behind, at dusk and at night (-). At 1, the veil of a car's headlamps
-    /// saturates 2.6 m to either side of them at night, at any distance up to 150 m.
+    /// The same for the main beam of the nearest vehicle behind, at dusk and at night (-). At 1,
+    /// the veil of a car's headlamps saturates 2.6 m to either side of them at night, at any
+    /// distance up to 150 m.
     pub main_beam_glare: Option<Num>,
     /// Share of the lens that opaque dirt covers, in blots (-).
     pub dirt: Option<Num>,
@@ -344,8 +357,8 @@ impl FaultEntries<'_> {
     /// Checks all entries.
     ///
     /// # Errors
-    /// [`ConfigError`] with the entry's key, if a value is out of its range, an entry names no effect, or there are more than
-    /// four entries for a sensor.
+    /// [`ConfigError`] with the entry's key, if a value is out of its range, an entry names no
+    /// effect, or there are more than four entries for a sensor.
     pub fn check(&self, parameters: &Parameters) -> Result<super::Faults, ConfigError> {
         let [front, surround, rear] = self.object;
         Ok(super::Faults {

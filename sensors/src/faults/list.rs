@@ -7,7 +7,7 @@ use crate::camera::CameraFault;
 
 /// Maximum number of entries of one sensor.
 const MAX_ENTRIES: usize = 4;
-/// Longest time of a start or an end (s), that of the longest run.
+/// Latest start or end of a fault (s): the longest duration of a run.
 const MAX_TIME_S: f64 = 3_600.0;
 
 /// Effects that can be combined if several entries hold at once.
@@ -36,7 +36,8 @@ impl<T: Copy> Default for FaultList<T> {
 }
 
 impl<T: Combine> FaultList<T> {
-    /// Checks the entries of the list `key`, which `check` turns into effects with their `from-s` and `until-s`.
+    /// Checks the entries of the list `key`, which `check` turns into effects with their `from-s`
+    /// and `until-s`.
     pub(crate) fn check<C>(
         key: &str,
         configs: &[C],
@@ -59,13 +60,14 @@ impl<T: Combine> FaultList<T> {
         self.entries.iter().all(Option::is_none)
     }
 
-    /// Returns what holds at `time`: all entries together whose time has begun and has not ended. `None` if there is none.
+    /// Returns what holds at `time`: all entries together whose time has begun and has not ended.
+    /// `None` if there is none.
     pub(crate) fn at(&self, time: Time) -> Option<T> {
         self.held(time.s()).map(|entry| entry.effect).reduce(T::and)
     }
 
-    /// Returns the time since the latest entry began that holds at `time` and has the effect `has` (s); `None` if none holds. An
-    /// entry without a start begins with the run.
+    /// Returns the time since the latest entry began that holds at `time` and has the effect `has`
+    /// (s); `None` if none holds. An entry without a start begins with the run.
     pub(crate) fn since_s(&self, time: Time, has: impl Fn(&T) -> bool) -> Option<f64> {
         let supplier = self.held(time.s()).filter(|entry| has(&entry.effect)).last();
         supplier.map(|entry| time.s() - entry.from_s.max(0.0))
@@ -88,10 +90,12 @@ impl<T: Combine> FaultList<T> {
         self.entries.iter().flatten().map(|entry| (entry.effect, [entry.from_s, entry.until_s]))
     }
 
-    /// Returns everything that holds together at some time, each with the index of the entry that begins or ends then.
+    /// Returns everything that holds together at some time, each with the index of the entry that
+    /// begins or ends then.
     pub(crate) fn combinations(&self) -> impl Iterator<Item = (usize, T)> {
-        let entries = self.entries.iter().enumerate().filter_map(|(index, entry)| entry.as_ref().map(|of| (index, of)));
-        let instants_s = entries.flat_map(|(index, of)| [of.from_s, of.until_s].map(|time_s| (index, time_s)));
+        let entries =
+            self.entries.iter().enumerate().filter_map(|(index, entry)| entry.as_ref().map(|fault| (index, fault)));
+        let instants_s = entries.flat_map(|(index, fault)| [fault.from_s, fault.until_s].map(|time_s| (index, time_s)));
         instants_s
             .filter_map(|(index, time_s)| Some((index, self.held(time_s).map(|entry| entry.effect).reduce(T::and)?)))
     }
@@ -102,7 +106,8 @@ impl<T: Combine> FaultList<T> {
 }
 
 impl FaultList<LidarFault> {
-    /// Returns the entries of the sensor with this name: those that name it, and those that name none.
+    /// Returns the entries of the sensor with this name: the entries that name it, and the entries
+    /// that name no sensor.
     pub(crate) fn of_sensor(self, name: &str) -> Self {
         let is_own = |entry: &Entry<LidarFault>| entry.effect.sensor.is_none_or(|sensor| sensor == name);
         Self { entries: self.entries.map(|entry| entry.filter(is_own)) }
@@ -114,7 +119,8 @@ impl FaultList<LidarFault> {
     }
 }
 
-/// Checks start and end of an entry. Without them, it holds from before the start of the run, or to its end.
+/// Checks start and end of an entry. Without them, it holds from before the start of the run, or to
+/// its end.
 pub(super) fn check_span([from, until]: [&Option<Num>; 2], parameters: &Parameters) -> Result<[f64; 2], ConfigError> {
     let number = |num: &Option<Num>, key, default| {
         parameters.number_or(num.as_ref(), key, Range::closed(0.0, MAX_TIME_S), default)
@@ -141,13 +147,15 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Returns whether a fault concerns the sensors that look back, or the odometry and the map that all sensors depend on.
+    /// Returns whether a fault concerns the sensors that look back, or the odometry and the map
+    /// that all sensors depend on.
     pub fn concern_rear(&self) -> bool {
         let has_sensor = !(self.rear_lidar.is_empty() && self.rear_camera.is_empty() && self.rear_object.is_empty());
         has_sensor || !self.odometry.is_none()
     }
 
-    /// Returns whether odometry and map are all that is wrong: such faults act in each mode of the sensors.
+    /// Returns whether odometry and map are all that is wrong: such faults act in each mode of the
+    /// sensors.
     pub fn concern_odometry_only(&self) -> bool {
         !self.odometry.is_none() && *self == Self { odometry: self.odometry, ..Self::default() }
     }

@@ -1,4 +1,5 @@
-//! Faults of the sensors, each with a start and an end: what breaks, becomes dirty, is late, or is mounted askew.
+//! Faults of the sensors, each with a start and an end: a sensor breaks, becomes dirty, is late, or
+//! is misaligned.
 //!
 //! ```text
 //!  [[fault.rear-lidar]]  ─▶ FaultList ─▶ what holds at this instant ─▶ scan, frames, health (also [[fault.front-lidar]])
@@ -7,14 +8,16 @@
 //!  [fault.odometry]      ─▶ OdometryErrors ─▶ the scene and the map as the ego believes them to be
 //! ```
 //!
-//! The ego does not know its faults. It notices only what a monitor of the sensor's output can notice: that a sensor delivers
-//! nothing ([`Health::Failed`](crate::Health::Failed) after [`NOTICED_AFTER_SCANS`] scans), or the same bits again and again.
-//! A sensor whose dirt leaves less than half of its range reports [`Health::Degraded`](crate::Health::Degraded), as sensors with a
-//! blockage monitor do; no function acts on that. Glare, dirt on the camera, a blocked sector, noise, wrong time stamps, a wrong
-//! mounting, and a wrong odometry or map remain unnoticed.
+//! The ego does not know its faults. It notices only what a monitor of the sensor's output can
+//! notice: a sensor that delivers nothing ([`Health::Failed`](crate::Health::Failed) after
+//! [`NOTICED_AFTER_SCANS`] scans), or the same bits again and again. A sensor whose dirt leaves
+//! less than half of its range reports [`Health::Degraded`](crate::Health::Degraded), as sensors
+//! with a blockage monitor do; no function acts on that. Glare, dirt on the camera, a blocked
+//! sector, noise, wrong time stamps, a wrong mounting, and a wrong odometry or map remain
+//! unnoticed.
 //!
-//! The random numbers of faults come from streams of their own, and from the address of a beam in a scan. A scenario without
-//! faults draws none of them.
+//! The random numbers of faults come from streams of their own, and from the address of a beam in a
+//! scan. A scenario without faults draws none of them.
 
 mod config;
 mod list;
@@ -38,8 +41,9 @@ pub(crate) use object::ObjectFault;
 pub use object::ObjectFaultConfig;
 pub(crate) use sector::Sectors;
 
-/// Number of successive scans without output, or with the same output, after which the ego counts a sensor as failed: 1 s.
+/// Number of successive scans without output, or with the same output, after which the ego counts a
+/// sensor as failed: 1 s.
 ///
-/// An assumption: long enough for a restart of the connection, and short against the 4 s or more from the detection of a rear
-/// vehicle to the critical distance.
+/// An assumption: long enough for a restart of the connection, and short against the 4 s or more
+/// from the detection of a rear vehicle to the critical distance.
 pub const NOTICED_AFTER_SCANS: u32 = 25;

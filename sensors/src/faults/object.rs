@@ -1,9 +1,10 @@
 //! The faults of the object-level sensors as a scenario file describes them.
 //!
-//! They are those of a LiDAR, as far as a sensor that delivers tracks can have them. Sources: dirt, ice or a film of water on a
-//! radar attenuates each way, and by the radar equation the range goes with the fourth root of the power, so that 6 dB each
-//! way halve it. For the angle of the mounting see [`LidarFaultConfig`](super::LidarFaultConfig). All magnitudes are the
-//! scenario's choice.
+//! They are the faults of a LiDAR that a sensor that delivers tracks can have. Sources: dirt, ice
+//! or a film of water on a radar attenuates each way, and by the radar equation the range is
+//! proportional to the fourth root of the power: 6 dB each way halve it. For the angle of the
+//! mounting see [`LidarFaultConfig`](super::LidarFaultConfig). All magnitudes are the scenario's
+//! choice.
 
 use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, maths};
 use schemars::JsonSchema;
@@ -21,7 +22,8 @@ const RANGE_SHARE: Range = Range::above(0.0, 1.0);
 const NOISE_M: Range = Range::closed(0.0, 5.0);
 const NOISE_MPS: Range = Range::closed(0.0, 10.0);
 
-/// A fault of an object-level sensor. It holds from `from-s` to `until-s`, with all effects that it names.
+/// A fault of an object-level sensor. It holds from `from-s` to `until-s`, with all effects that it
+/// names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct ObjectFaultConfig {
@@ -35,34 +37,41 @@ pub struct ObjectFaultConfig {
     pub frozen: bool,
     /// Share of scans that do not arrive (-): no vehicle is measured in them. Default: 0.
     pub lost_frames: Option<Num>,
-    /// Share of the measurements of visible vehicles that are lost (-), in addition to the sensor's own `dropout`. Default: 0.
+    /// Share of the measurements of visible vehicles that are lost (-), in addition to the sensor's
+    /// own `dropout`. Default: 0.
     pub dropout: Option<Num>,
-    /// Azimuth at which a blocked sector begins (deg), within the sensor's field of view: 0 is straight ahead for the front radar,
-    /// and straight behind for the other sensors; positive is to the ego's left. A vehicle is hidden if less than a quarter of it
-    /// is free.
+    /// Azimuth at which a blocked sector begins (deg), within the sensor's field of view: 0 is
+    /// straight ahead for the front radar, and straight behind for the other sensors; positive is
+    /// to the ego's left. A vehicle is hidden if less than a quarter of it is free.
     pub blocked_from_deg: Option<Num>,
     /// Azimuth at which the blocked sector ends (deg).
     pub blocked_to_deg: Option<Num>,
-    /// Share of the range that dirt, ice or a film of water leaves (-). By the radar equation, 6 dB each way leave a half.
-    /// Default: 1.
+    /// Share of the range that dirt, ice or a film of water leaves (-). By the radar equation, 6 dB
+    /// each way leave a half. Default: 1.
     pub range_share: Option<Num>,
     /// Additional latency (s). No sensor is later than 0.4 s. Default: 0.
     pub delay_s: Option<Num>,
-    /// Greatest further latency of a scan, drawn anew for each (s). Scans arrive in their order. Default: 0.
+    /// Greatest further latency of a scan, drawn anew for each (s). Scans arrive in their order.
+    /// Default: 0.
     pub jitter_s: Option<Num>,
-    /// Error of the time stamps (s): positive if a scan counts as measured later than it was. Default: 0.
+    /// Error of the time stamps (s): positive if a scan counts as measured later than it was.
+    /// Default: 0.
     pub clock_offset_s: Option<Num>,
-    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis, to the left seen
-    /// from above (deg). It moves what is seen; the field of view stays. Default: 0.
+    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis,
+    /// to the left seen from above (deg). It moves what is seen; the field of view stays. Default:
+    /// 0.
     pub yaw_deg: Option<Num>,
-    /// Standard deviation of an additional error of each measured position along the road (m). Default: 0.
+    /// Standard deviation of an additional error of each measured position along the road (m).
+    /// Default: 0.
     pub range_noise_m: Option<Num>,
-    /// Standard deviation of an additional error of each measured position across the road (m). Default: 0.
+    /// Standard deviation of an additional error of each measured position across the road (m).
+    /// Default: 0.
     pub lateral_noise_m: Option<Num>,
-    /// Standard deviation of an additional error of each measured speed (m/s), of a sensor that measures speed. Default: 0.
+    /// Standard deviation of an additional error of each measured speed (m/s), of a sensor that
+    /// measures speed. Default: 0.
     pub speed_noise_mps: Option<Num>,
-    /// Distance of a track without a vehicle, in the ego's lane, when the fault begins (m): ahead of the ego for the front
-    /// radar, behind it for the other sensors.
+    /// Distance of a track without a vehicle, in the ego's lane, when the fault begins (m): ahead
+    /// of the ego for the front radar, behind it for the other sensors.
     pub ghost_gap_m: Option<Num>,
     /// Speed at which that track approaches the ego (m/s). Default: 0.
     pub ghost_closing_mps: Option<Num>,

@@ -1,13 +1,14 @@
-//! Errors of the ego's odometry, of its position on the map, and of the map itself. The ego does not know them.
+//! Errors of the ego's odometry, of its position on the map, and of the map itself. The ego does
+//! not know them.
 //!
 //! ```text
 //!   scene ─▶ seen from the ego: distance, bearing ─▶ + own position, heading and speed, on the map ─▶ scene as believed
 //!                 (as it is)                                 (wrong)
 //! ```
 //!
-//! The ego derives the speed of another vehicle from a position relative to itself and its own motion, and its lane from the
-//! same position and the map. Everything that it sees is where it is seen, and the speeds over ground, the lanes and the region of
-//! interest are wrong.
+//! The ego derives the speed of another vehicle from a position relative to itself and its own
+//! motion, and its lane from the same position and the map. All positions relative to the ego are
+//! right. Speeds over ground, lanes and the region of interest are wrong.
 
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{ConfigError, Num, Parameters, Range, Road, Time};
@@ -23,12 +24,14 @@ const MAX_SPEED_SCALE: f64 = 0.1;
 const MAX_LATERAL_M: f64 = 1.0;
 /// Greatest error of the heading (deg).
 const MAX_HEADING_DEG: f64 = 3.0;
-/// Greatest error of the curvature (1/m): a bend of a radius of 1 km that the map takes for straight.
+/// Greatest error of the curvature (1/m): a bend of a radius of 1 km that the map takes for
+/// straight.
 const MAX_CURVATURE_PER_M: f64 = 0.001;
 /// Greatest error of the width of a lane (m).
 const MAX_LANE_WIDTH_M: f64 = 1.0;
 
-/// Errors of odometry and map as a scenario file describes them. They hold from `from-s` to `until-s`.
+/// Errors of odometry and map as a scenario file describes them. They hold from `from-s` to
+/// `until-s`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct OdometryErrorConfig {
@@ -36,20 +39,24 @@ pub struct OdometryErrorConfig {
     pub from_s: Option<Num>,
     /// Time at which the errors end (s). Default: the end of the run.
     pub until_s: Option<Num>,
-    /// Relative error of the measured own speed (-): 0.01 if the ego takes 30 m/s for 30.3 m/s. Wheel speeds err by the wear and
-    /// the pressure of the tyres. Default: 0.
+    /// Relative error of the measured own speed (-): 0.01 if the ego takes 30 m/s for 30.3 m/s.
+    /// Wheel speeds err by the wear and the pressure of the tyres. Default: 0.
     pub speed_scale: Option<Num>,
-    /// Error of the own lateral position on the map (m): positive if the ego believes itself too far left. Default: 0.
+    /// Error of the own lateral position on the map (m): positive if the ego believes itself too
+    /// far left. Default: 0.
     pub lateral_m: Option<Num>,
-    /// Error of the own heading relative to the road (deg): positive if the ego believes itself to be turned too far to the left. It
-    /// moves a vehicle 60 m behind by 1 m per degree on the map. Default: 0.
+    /// Error of the own heading relative to the road (deg): positive if the ego believes itself to
+    /// be turned too far to the left. It moves a vehicle 60 m behind by 1 m per degree on the map.
+    /// Default: 0.
     pub heading_deg: Option<Num>,
-    /// Error of the curvature on the map (1/m): positive if the map bends too far to the left. Default: 0.
+    /// Error of the curvature on the map (1/m): positive if the map bends too far to the left.
+    /// Default: 0.
     pub curvature_per_m: Option<Num>,
-    /// Error of the width of each lane on the map (m): positive if the lanes on the map are too wide. Default: 0.
+    /// Error of the width of each lane on the map (m): positive if the lanes on the map are too
+    /// wide. Default: 0.
     pub lane_width_m: Option<Num>,
-    /// The map has no guard rails, though they stand along the road. It needs `guard-rails`. The region of interest then reaches
-    /// behind them.
+    /// The map has no guard rails, though they stand along the road. It needs `guard-rails`. The
+    /// region of interest then reaches behind them.
     pub rails_missing: bool,
 }
 
@@ -144,19 +151,21 @@ impl OdometryErrors {
         if self.has_no_rails { map.without_guard_rails() } else { map }
     }
 
-    /// Returns the lateral position on the map of an ego at `d_m` (m). The ego measures its place between the markings of its lane.
+    /// Returns the lateral position on the map of an ego at `d_m` (m). The ego measures its place
+    /// between the markings of its lane.
     pub fn own_d_m(&self, road: &Road, d_m: f64) -> f64 {
         d_m * (self.map_of(road).lane_width_m() / road.lane_width_m()) + self.lateral_m
     }
 }
 
-/// What the ego believes about itself, the road and the vehicles around it.
+/// The ego's beliefs about itself, the road and the vehicles around it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Belief {
     errors: OdometryErrors,
     /// Position along the road in the previous step (m).
     previous_s_m: Option<f64>,
-    /// Distance that the ego believes to have driven beyond the true one (m). It remains when the error of the speed ends.
+    /// Distance that the ego believes to have driven beyond the true one (m). It remains when the
+    /// error of the speed ends.
     ahead_m: f64,
     map: Option<Road>,
     others: Vec<SceneVehicle>,
@@ -174,17 +183,17 @@ impl Belief {
             return *scene;
         }
         let errors = self.errors.at(scene.time);
-        let own = scene.ego.state;
-        self.ahead_m += errors.speed_scale * (own.s_m - self.previous_s_m.unwrap_or(own.s_m));
-        self.previous_s_m = Some(own.s_m);
+        let ego_state = scene.ego.state;
+        self.ahead_m += errors.speed_scale * (ego_state.s_m - self.previous_s_m.unwrap_or(ego_state.s_m));
+        self.previous_s_m = Some(ego_state.s_m);
         let map = &*self.map.insert(errors.map_of(scene.road));
-        let faster_mps = errors.speed_scale * own.speed_mps;
+        let faster_mps = errors.speed_scale * ego_state.speed_mps;
         let mut ego = scene.ego;
         ego.state.s_m += self.ahead_m;
-        ego.state.d_m = errors.own_d_m(scene.road, own.d_m);
+        ego.state.d_m = errors.own_d_m(scene.road, ego_state.d_m);
         ego.state.heading_rad += errors.heading_rad;
         ego.state.speed_mps += faster_mps;
-        let [seen, believed] = [EgoFrame::new(scene.road, &own), EgoFrame::new(map, &ego.state)];
+        let [seen, believed] = [EgoFrame::new(scene.road, &ego_state), EgoFrame::new(map, &ego.state)];
         let on_map = |vehicle: &SceneVehicle| {
             let mut vehicle = *vehicle;
             let state = &mut vehicle.state;

@@ -33,8 +33,8 @@ pub(super) fn check_sector(
             }
             Some([from, to])
         }
-        (one, _) => {
-            let key = if one.is_none() { "blocked-from-deg" } else { "blocked-to-deg" };
+        (from_deg, _) => {
+            let key = if from_deg.is_none() { "blocked-from-deg" } else { "blocked-to-deg" };
             return Err(ConfigError::new(key, Problem::Missing { needed: "a blocked sector has two ends" }));
         }
     };

@@ -24,7 +24,7 @@ const PERIOD_S: f64 = CONTROL_STEP.s();
 const EGO_S_M: f64 = 1_000.0;
 const LEFT_LANE_M: f64 = -1.875;
 
-/// The table `[fault]` of a scenario, as far as it concerns sensors.
+/// The part of a scenario's table `[fault]` that concerns sensors.
 #[derive(Default, Deserialize)]
 #[serde(rename_all = "kebab-case", default, deny_unknown_fields)]
 struct Table {
@@ -135,7 +135,7 @@ impl Drive<'_> {
             }
             let health = perception.health();
             let groups = [health.front, health.surround, health.rear];
-            let worst = [Health::Failed, Health::Degraded].into_iter().find(|of| groups.contains(of));
+            let worst = [Health::Failed, Health::Degraded].into_iter().find(|health| groups.contains(health));
             let worst = worst.unwrap_or_default();
             let health = if health.front == Health::Failed { health.front } else { health.rear };
             let boxes = perception.rear_lidar().map_or(&[][..], |mounted| mounted.detections);
@@ -174,7 +174,7 @@ fn points_per_scan(steps: &[Step]) -> f64 {
 }
 
 #[test]
-fn a_fault_holds_from_its_start_to_its_end_and_leaves_the_rest_as_it_is() {
+fn a_fault_holds_from_its_start_to_its_end_and_changes_nothing_else() {
     let usual = with("dropout = 0.0");
     let faulty = with("dropout = 0.9\nfrom-s = 1.0\nuntil-s = 2.0");
     for (step, (usual, faulty)) in usual.iter().zip(&faulty).enumerate() {
@@ -266,10 +266,10 @@ fn a_dead_lidar_loses_its_tracks_and_is_noticed_after_a_second() {
 }
 
 #[test]
-fn a_wrong_mounting_moves_what_is_seen_by_its_angle_and_height() {
+fn a_wrong_mounting_moves_points_and_tracks_by_its_angle_and_height() {
     let lateral_m = |fault: &str| with(fault).iter().filter_map(Step::rear).map(Track::y_m).next_back().unwrap();
-    // The sensor is turned to the left, so that it looks to the right, and a vehicle straight behind appears to its left of
-    // centre: at 60 m by 60 · tan 0.5°.
+    // The sensor is turned to the left, so that it looks to the right, and a vehicle straight
+    // behind appears to its left of centre: at 60 m by 60 · tan 0.5°.
     let shift_m = lateral_m("yaw-deg = 0.5") - lateral_m("yaw-deg = 0.0");
     assert!((shift_m - 60.0 * maths::tan(0.5_f64.to_radians())).abs() < 0.08, "{shift_m}");
     let shift_m = lateral_m("yaw-deg = -0.5") - lateral_m("yaw-deg = 0.0");
@@ -277,7 +277,7 @@ fn a_wrong_mounting_moves_what_is_seen_by_its_angle_and_height() {
     let height_m = |fault: &str| {
         let steps = with(fault);
         let points = steps.iter().flat_map(|step| &step.points);
-        mean(points.filter(|(_, of)| *of == PointSource::Actor(1)).map(|([_, _, z_m], _)| *z_m))
+        mean(points.filter(|(_, source)| *source == PointSource::Actor(1)).map(|([_, _, z_m], _)| *z_m))
     };
     assert!(height_m("pitch-deg = -1.0") > height_m("pitch-deg = 0.0") + 0.3);
     assert!(height_m("height-m = -0.2") > height_m("height-m = 0.0") + 0.05);
@@ -309,7 +309,8 @@ fn a_wrong_clock_moves_an_approaching_vehicle_by_its_closing_speed() {
     }
     for offset in ["-0.2", "0.2"] {
         let steps = run(&format!("clock-offset-s = {offset}\nfrom-s = 1.5\nuntil-s = 3.0"));
-        for (step, track) in steps.iter().enumerate().flat_map(|(step, of)| of.tracks.iter().map(move |it| (step, it)))
+        for (step, track) in
+            steps.iter().enumerate().flat_map(|(step, output)| output.tracks.iter().map(move |track| (step, track)))
         {
             let is_right = track.state.iter().all(|value| value.is_finite()) && track.covariance.cholesky().is_some();
             assert!(is_right, "{offset}: step {step}: {track:?}");
@@ -327,11 +328,12 @@ fn rails_mirror_vehicles_and_only_where_there_are_rails() {
     };
     let ghosts = |steps: &[Step]| {
         let points = steps.iter().flat_map(|step| &step.points);
-        points.filter(|(_, of)| *of == PointSource::False).map(|(at_m, _)| at_m[1]).collect::<Vec<f64>>()
+        points.filter(|(_, source)| *source == PointSource::False).map(|(at_m, _)| at_m[1]).collect::<Vec<f64>>()
     };
     let mirrored = run("rail-ghosts = 0.5", true);
     let left: Vec<f64> = ghosts(&mirrored).into_iter().filter(|y_m| *y_m > 0.0).collect();
-    // The rail stands 0.75 m beyond the edge, 5.625 m to the left of the ego: the mirror image of 3.75 m is 9 m.
+    // The rail stands 0.75 m beyond the edge, 5.625 m to the left of the ego: the mirror image of
+    // 3.75 m is 9 m.
     let y_m = mean(left.iter().copied());
     assert!(left.len() > 1_000 && (y_m - 9.0).abs() < 0.3, "{} {y_m}", left.len());
     let usual = run("rail-ghosts = 0.0", true);
@@ -347,7 +349,8 @@ fn rails_mirror_vehicles_and_only_where_there_are_rails() {
 #[test]
 fn crosstalk_adds_bursts_of_false_points_at_its_rate() {
     let steps = with("crosstalk = 3.0");
-    let false_points = steps.iter().flat_map(|step| &step.points).filter(|(_, of)| *of == PointSource::False).count();
+    let false_points =
+        steps.iter().flat_map(|step| &step.points).filter(|(_, source)| *source == PointSource::False).count();
     // Three bursts of 3 to 10 columns and four layers in each of the 100 scans.
     let expected = 100.0 * 3.0 * 6.5 * 4.0;
     assert!((false_points as f64 / expected - 1.0).abs() < 0.15, "{false_points}");

@@ -1,4 +1,4 @@
-//! Injected faults in words: which sensor, what is wrong with it, and when.
+//! Injected faults in words: the sensor, its fault, and the time.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub struct StatedFault {
     pub group: SensorGroup,
     /// The sensor.
     pub sensor: String,
-    /// What is wrong with it.
+    /// Its fault.
     pub effects: String,
     /// Whether a track without a vehicle is among the effects.
     pub has_ghost: bool,
@@ -64,7 +64,8 @@ pub(crate) struct ActingSensors {
     pub(crate) is_full: bool,
     /// Whether a LiDAR looks ahead, and not the radar.
     pub(crate) has_front_lidar: bool,
-    /// Whether the sensors around the ego and those that look back are models, and not the truth.
+    /// Whether the sensors around the ego and the sensors that look back are models, and not the
+    /// truth.
     pub(crate) has_models: bool,
 }
 
@@ -129,7 +130,7 @@ fn those(effects: impl IntoIterator<Item = (bool, String)>) -> Vec<String> {
     effects.into_iter().filter(|(is_there, _)| *is_there).map(|(_, words)| words).collect()
 }
 
-/// Returns the words for a latency with a greatest further one (s).
+/// Returns the words for a latency and its greatest additional part (s).
 fn late(delay_s: f64, jitter_s: f64) -> String {
     let up_to = if jitter_s > 0.0 { "up to " } else { "" };
     format!("late by {up_to}{:.2} s", delay_s + jitter_s)

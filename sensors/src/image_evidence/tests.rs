@@ -20,7 +20,8 @@ fn ego() -> SceneVehicle {
     with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), 30.0)
 }
 
-/// Returns the box that a LiDAR without errors finds for a typical vehicle whose front is this far from the ego's centre (m).
+/// Returns the box that a LiDAR without errors finds for a typical vehicle whose front is this far
+/// from the ego's centre (m).
 fn detection(class: VehicleClass, face_x_m: f64, face_y_m: f64) -> Detection {
     let size = class.typical_dimensions();
     Detection {
@@ -87,7 +88,7 @@ fn two_instances_of_one_vehicle_share_its_scores() {
 }
 
 #[test]
-fn the_image_speaks_against_what_only_the_lidar_sees_if_it_would_show_it() {
+fn the_image_is_evidence_against_a_lidar_detection_that_it_should_show() {
     let near = detection(VehicleClass::Car, -30.0, 0.0);
     let evidence = associated(&[], std::slice::from_ref(&near)).evidence[0].unwrap();
     assert!(evidence.scores.vehicle() < 0.25 && evidence.width_m.is_none(), "{evidence:?}");
@@ -95,12 +96,12 @@ fn the_image_speaks_against_what_only_the_lidar_sees_if_it_would_show_it() {
     assert_eq!(associated(&[], &[detection(VehicleClass::Car, -115.0, 0.0)]).evidence, [None], "too small");
     assert_eq!(associated(&[], &[detection(VehicleClass::Car, -30.0, 12.0)]).evidence, [None], "beside the road");
     let hidden = detection(VehicleClass::Car, -60.0, 0.0);
-    let found = associated(&[instance(&near, VehicleClass::Car, 0.9)], &[near, hidden]).evidence;
-    assert!(found[0].unwrap().scores.vehicle() > 0.8);
+    let evidence = associated(&[instance(&near, VehicleClass::Car, 0.9)], &[near, hidden]).evidence;
+    assert!(evidence[0].unwrap().scores.vehicle() > 0.8);
 }
 
 #[test]
-fn a_network_of_which_nothing_is_known_says_nothing_about_what_it_does_not_show() {
+fn an_unmeasured_network_gives_no_evidence_about_clusters_that_it_does_not_show() {
     let near = detection(VehicleClass::Car, -30.0, 0.0);
     let evidence = |network: &str| {
         let text = format!("pipeline = 'mask-rcnn'\nmask-rcnn = {{ {network} }}\n");
@@ -116,7 +117,7 @@ fn a_network_of_which_nothing_is_known_says_nothing_about_what_it_does_not_show(
 }
 
 #[test]
-fn what_nearer_vehicles_hide_is_not_expected_in_the_image() {
+fn a_vehicle_hidden_by_nearer_vehicles_is_not_expected_in_the_image() {
     let (near, hidden) = (detection(VehicleClass::Truck, -20.0, 0.0), detection(VehicleClass::Car, -60.0, 0.0));
     let bounds: Vec<_> = [&near, &hidden].map(|seen| camera().detection_bounds(&ego(), seen)).into();
     let detections = [near, hidden];
@@ -125,7 +126,7 @@ fn what_nearer_vehicles_hide_is_not_expected_in_the_image() {
 }
 
 #[test]
-fn a_vehicle_that_only_the_camera_sees_stands_where_its_mask_meets_the_road() {
+fn a_vehicle_that_only_the_camera_sees_is_where_its_mask_meets_the_road() {
     for (distance_m, y_m) in [(15.0, 0.0), (30.0, 3.75), (50.0, -3.75)] {
         let truth = detection(VehicleClass::Car, -distance_m, y_m);
         let alone = associated(&[instance(&truth, VehicleClass::Car, 0.8)], &[]).alone;
@@ -143,7 +144,7 @@ fn a_vehicle_that_only_the_camera_sees_stands_where_its_mask_meets_the_road() {
 }
 
 #[test]
-fn what_the_camera_alone_sees_is_moved_with_the_ego() {
+fn camera_only_detections_move_with_the_ego() {
     let seen = detection(VehicleClass::Car, -30.0, 3.75);
     let exposed = Exposed { time: Time::ZERO, ego: ego() };
     with_scene(|scene| {
@@ -155,7 +156,8 @@ fn what_the_camera_alone_sees_is_moved_with_the_ego() {
     });
 }
 
-/// Returns the confirmed track of a vehicle after `steps` scans. Each scan has the detections that `seen` returns.
+/// Returns the confirmed track of a vehicle after `steps` scans. Each scan has the detections that
+/// `seen` returns.
 fn tracked(steps: usize, seen: impl Fn(usize) -> Vec<Detection>) -> Option<Track> {
     let (mut tracker, mut list) =
         (Tracker::new(TrackerConfig::default().check(&Parameters::default()).unwrap()), TrackList::default());
@@ -178,8 +180,8 @@ fn tracked(steps: usize, seen: impl Fn(usize) -> Vec<Detection>) -> Option<Track
     list.tracks.into_iter().find(|track| track.status != TrackStatus::Tentative)
 }
 
-/// Returns whether a vehicle has a confirmed track after 4 s, if the LiDAR sees it in the first `lidar_scans` scans, and the camera alone in
-/// every `camera_every`-th scan of the rest.
+/// Returns whether a vehicle has a confirmed track after 4 s, if the LiDAR sees it in the first
+/// `lidar_scans` scans, and the camera alone in every `camera_every`-th scan of the rest.
 fn is_confirmed(lidar_scans: usize, camera_every: Option<usize>) -> bool {
     let lidar = detection(VehicleClass::Car, -30.0, 0.0);
     let camera = associated(&[instance(&lidar, VehicleClass::Car, 0.9)], &[]).alone;

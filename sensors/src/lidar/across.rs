@@ -5,14 +5,16 @@ use super::parts::{ends_at_plate, plate_middle};
 use crate::Extent;
 use closecall_traffic::maths;
 
-/// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the last step, 1/√12 = 0.29.
+/// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the
+/// last step, 1/√12 = 0.29.
 const EDGE_SD_COLUMNS: f64 = 0.3;
-/// Additional lateral standard deviation if a side is seen, from which mirrors and wheels protrude (m).
+/// Additional lateral standard deviation if a side is seen, from which mirrors and wheels protrude
+/// (m).
 const SIDE_SD_M: f64 = 0.02;
 /// Relative increase of an edge's standard deviation at [`LOST_EDGE_RANGE_M`].
 ///
-/// The probability that the outermost columns are lost to weak returns grows with distance. The increase is
-/// proportional to the square of the distance.
+/// The probability that the outermost columns are lost to weak returns grows with distance. The
+/// increase is proportional to the square of the distance.
 const LOST_EDGE_GROWTH: f64 = 0.6;
 /// Distance that [`LOST_EDGE_GROWTH`] refers to (m).
 const LOST_EDGE_RANGE_M: f64 = 100.0;
@@ -25,7 +27,7 @@ pub(super) struct Across {
     pub(super) sd_m: f64,
     pub(super) width_m: f64,
     pub(super) extent: Extent,
-    /// Whether the middle is that of the plate.
+    /// Whether the middle is the middle of the plate.
     pub(super) is_by_plate: bool,
 }
 
@@ -36,7 +38,8 @@ pub(super) fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typic
     let lost_share = LOST_EDGE_GROWTH * (fit.range_m / LOST_EDGE_RANGE_M).powi(2);
     let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m * (1.0 + lost_share);
     let told_sd = fit.edges.map_or(edge_sd, |edges| edges.sd_share * edge_sd);
-    // An edge lies between the inner sub-rays of the outermost beam that meets the face and those of the next one.
+    // An edge lies between the inner sub-rays of two beams: the outermost beam that meets the face,
+    // and the next beam.
     let mean_columns = 0.5 - 0.25 * fit.footprint_columns;
     let [right_shift, left_shift] = fit.edges.map_or([0.0; 2], |edges| edges.shifts);
     let right_m = right - (mean_columns + right_shift) * fit.spacing_m;

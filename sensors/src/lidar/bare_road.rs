@@ -1,8 +1,10 @@
-//! The returns of the bare road that a scan can leave out, since the detector would discard them as ground.
+//! The returns of the bare road that a scan can leave out, since the detector would discard them as
+//! ground.
 //!
-//! Nearly all points of a usual scan are road. A beam that meets nothing but the road gives points on its centre line,
-//! from the distance at which its lowest sub-ray meets the road to the greatest distance from which the road returns
-//! enough light, both widened by the greatest error of the range. Along that line the height falls:
+//! Nearly all points of a usual scan are road. A beam that meets nothing but the road gives points
+//! on its centre line, from the distance at which its lowest sub-ray meets the road to the greatest
+//! distance from which the road returns enough light, both widened by the greatest error of the
+//! range. Along that line the height falls:
 //!
 //! ```text
 //!   sensor o-._
@@ -12,8 +14,8 @@
 //!               nearest  farthest
 //! ```
 //!
-//! If the nearest possible point counts as ground, all points of the beam do. The noise is addressed by beam, so that
-//! leaving out a beam changes no other one.
+//! If the nearest possible point counts as ground, all points of the beam do. The noise is
+//! addressed by beam, so a scan without one beam changes no other beam.
 
 use fearless_simd::Simd;
 
@@ -34,8 +36,8 @@ const MAX_SLOPE: f32 = 0.24;
 const LEVEL_SHARE: f32 = 0.97;
 /// Margin for rounding in single precision (m).
 const MARGIN_M: f32 = 0.002;
-/// Further margins for bounds of a block of columns: for the heights (m), for the slopes, and for the distances, relative to the sum of the
-/// components of the road's vector.
+/// Further margins for bounds of a block of columns: for the heights (m), for the slopes, and for
+/// the distances, relative to the sum of the components of the road's vector.
 const BLOCK_MARGIN_M: f32 = 0.001;
 const BLOCK_SLOPE: f32 = 1e-5;
 const BLOCK_SHARE: f32 = 1e-6;
@@ -52,14 +54,16 @@ pub(crate) struct BareRoad {
     max_shift_m: f32,
 }
 
-/// Returns the distance beyond which a road of this strength (m) returns too little light to be detected (m).
+/// Returns the distance beyond which a road of this strength (m) returns too little light to be
+/// detected (m).
 pub(crate) fn farthest_road_return_m(link: &LinkBudget, strength_m: f32) -> f32 {
     maths::cbrt(POWER_MARGIN * link.gain_m2 * strength_m / MIN_POWER)
 }
 
 impl BareRoad {
-    /// Returns the bounds, or `None` if the road may return light from beyond `ground_reach_m`, up to which it counts as ground (m).
-    /// `max_shift_m` is the distance by which deskewing may move a point (m).
+    /// Returns the bounds, or `None` if the road may return light from beyond `ground_reach_m`, up
+    /// to which it counts as ground (m). `max_shift_m` is the distance by which deskewing may move
+    /// a point (m).
     pub(crate) fn new(
         targets: &Targets,
         link: &LinkBudget,
@@ -72,8 +76,9 @@ impl BareRoad {
         is_near.then_some(Self { pose, max_error_m, max_shift_m })
     }
 
-    /// Returns true if all points that a column may give count as ground, provided that its beams meet nothing but the
-    /// road. False if the uppermost of the tested layers may give a point, too: the layers above it are not tested.
+    /// Returns true if all points that a column may give count as ground, provided that its beams
+    /// meet nothing but the road. False if the uppermost of the tested layers may give a point,
+    /// too: the layers above it are not tested.
     ///
     /// Written without branches, so that the layers are tested side by side in vector registers.
     #[inline(always)]
@@ -97,11 +102,13 @@ impl BareRoad {
         kept == [false; ROAD_LAYERS]
     }
 
-    /// Returns true if [`BareRoad::covers`] surely returns true for all columns of a block. False for a turned sensor.
+    /// Returns true if [`BareRoad::covers`] surely returns true for all columns of a block. False
+    /// for a turned sensor.
     ///
-    /// The inverse distance at which the lowest sub-ray of a layer meets the road is at most `most`, so that the nearest point is at least
-    /// `nearest_m` away. Per metre of range, a centre line rises by `slopes` times the cosine of its elevation. The height falls
-    /// below that of the ground if `nearest_m` times `gain` exceeds what the sensor is above it.
+    /// The inverse distance at which the lowest sub-ray of a layer meets the road is at most
+    /// `most`, so that the nearest point is at least `nearest_m` away. Per metre of range, a centre
+    /// line rises by `slopes` times the cosine of its elevation. The point lies below the ground if
+    /// `nearest_m` times `gain` exceeds the height of the sensor above the ground.
     #[inline(always)]
     pub(crate) fn covers_block(&self, bounds: &LineBounds, road: &Road) -> bool {
         if self.pose.is_turned() {
@@ -113,8 +120,12 @@ impl BareRoad {
         let [along, up] = self.pose.level_slopes();
         let mut kept = [false; ROAD_LAYERS];
         for (layer, kept) in kept.iter_mut().enumerate() {
-            let least = |factor: f32, of: &[[f32; ROAD_LAYERS]; 2]| (factor * of[0][layer]).min(factor * of[1][layer]);
-            let most = |factor: f32, of: &[[f32; ROAD_LAYERS]; 2]| (factor * of[0][layer]).max(factor * of[1][layer]);
+            let least = |factor: f32, extremes: &[[f32; ROAD_LAYERS]; 2]| {
+                (factor * extremes[0][layer]).min(factor * extremes[1][layer])
+            };
+            let most = |factor: f32, extremes: &[[f32; ROAD_LAYERS]; 2]| {
+                (factor * extremes[0][layer]).max(factor * extremes[1][layer])
+            };
             let inverse = most(x, &bounds.cos) + most(y, &bounds.sin) + most(z, &bounds.lowest_tan) + slack;
             let nearest_m = 1.0 / (inverse * bounds.lowest_cosine[1][layer]) - self.max_error_m - MARGIN_M;
             let slopes = [
@@ -139,9 +150,10 @@ impl BareRoad {
         }
     }
 
-    /// Returns true if every point that a beam may give counts as ground. `azimuth` has the cosine and sine of the azimuth
-    /// of its centre line, `elevation` the tangent and cosine of its elevation. `per_range` is the inverse range at which
-    /// the lowest sub-ray meets the road (1/m).
+    /// Returns true if every point that a beam may give counts as ground. `azimuth` has the cosine
+    /// and sine of the azimuth of its centre line, `elevation` the tangent and cosine of its
+    /// elevation. `per_range` is the inverse range at which the lowest sub-ray meets the road
+    /// (1/m).
     #[inline(always)]
     fn counts_as_ground<const IS_TURNED: bool>(
         &self,
@@ -165,7 +177,8 @@ impl BareRoad {
 pub(crate) struct Road {
     /// Vector m of its plane (1/m), see [`targets`](super::targets).
     inverse: [f32; 3],
-    /// Received power of a return, if multiplied by the cube of the inverse distance (thresholds · m³), at most.
+    /// Received power of a return, if multiplied by the cube of the inverse distance (thresholds ·
+    /// m³), at most.
     max_power_m3: f32,
 }
 
@@ -181,20 +194,22 @@ impl Road {
         self.inverse[0] * cos + self.inverse[1] * sin + self.inverse[2] * tan
     }
 
-    /// Returns true if a beam may receive a return whose lowest sub-ray meets the road at this inverse distance (1/m).
+    /// Returns true if a beam may receive a return whose lowest sub-ray meets the road at this
+    /// inverse distance (1/m).
     #[inline(always)]
     fn is_detectable(&self, per_distance: f32) -> bool {
         (per_distance > 0.0) & (self.max_power_m3 * per_distance * per_distance * per_distance > MIN_POWER)
     }
 }
 
-/// Finds the layers of a column that may receive a return from the road, and sets [`ColumnHits::ground_below`] and
-/// [`ColumnHits::bare`].
+/// Finds the layers of a column that may receive a return from the road, and sets
+/// [`ColumnHits::ground_below`] and [`ColumnHits::bare`].
 ///
-/// The layers are tried from the lowest up to the first whose return would be too weak to be detected. Beams that may
-/// also hit a solid are intersected with the road here. For the others the receiver computes the return directly, since
-/// the road, with nothing below it, occludes nothing; `omitted` decides which of these returns are left out. All returns of layers
-/// that are not `wanted` (a bit mask) are left out.
+/// The layers are tried from the lowest up to the first whose return would be too weak to be
+/// detected. Beams that may also hit a solid are intersected with the road here. For the others the
+/// receiver computes the return directly, since the road, with nothing below it, occludes nothing;
+/// `omitted` decides which of these returns are left out. All returns of layers that are not
+/// `wanted` (a bit mask) are left out.
 #[inline(always)]
 pub(crate) fn cast_ground<S: Simd>(
     simd: S,

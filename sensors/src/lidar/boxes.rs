@@ -8,9 +8,10 @@
 //!              side face (seen if the vehicle is beside the sensor's axis)
 //! ```
 //!
-//! The heading of a box is the direction of the road, which the ego knows and which vehicles on a motorway follow. If
-//! enough of a side is seen, the heading is refined about that direction by the closeness criterion of L-shape fitting
-//! (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape fitting for vehicle detection using laser scanners").
+//! The heading of a box is the direction of the road, which the ego knows and which vehicles on a
+//! motorway follow. If enough of a side is seen, the heading is refined about that direction by the
+//! closeness criterion of L-shape fitting (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape
+//! fitting for vehicle detection using laser scanners").
 
 use crate::tracking::MAX_SIDE_AZIMUTH_RAD;
 use closecall_traffic::maths;
@@ -21,8 +22,8 @@ use super::receiver::MAX_INTENSITY;
 use super::{LaneGeometry, LidarScan};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Number of columns at either end of the field of view. A cluster with a point in one of them may extend beyond the
-/// field of view.
+/// Number of columns at either end of the field of view. A cluster with a point in one of them may
+/// extend beyond the field of view.
 const EDGE_COLUMNS: usize = 4;
 /// One point in this many may lie ahead of the front face because of noise.
 const POINTS_PER_STRAY: usize = 20;
@@ -38,15 +39,17 @@ const REFINE_POINTS: usize = 30;
 const HEADINGS: i32 = 6;
 /// Spacing of these headings (rad).
 const HEADING_STEP_RAD: f64 = 1.0 * DEGREE;
-/// Standard deviation of headings about the road's direction (rad; assumption). A lateral speed of 3.5 m/s at 100 km/h,
-/// for comparison, is 7°.
+/// Standard deviation of headings about the road's direction (rad; assumption). A lateral speed of
+/// 3.5 m/s at 100 km/h, for comparison, is 7°.
 const HEADING_SD_RAD: f64 = 2.5 * DEGREE;
-/// Maximum distance from a side that counts in the closeness criterion (m). Points farther away carry no information.
+/// Maximum distance from a side that counts in the closeness criterion (m). Points farther away
+/// carry no information.
 const MAX_CLOSENESS_M: f64 = 0.5;
-/// Azimuth from straight behind beyond which a cluster seen by a turned sensor may extend past the selected points (rad): 2° less than
-/// that of the selection.
+/// Azimuth from straight behind beyond which a cluster seen by a turned sensor may extend past the
+/// selected points (rad): 2° less than the azimuth of the selection.
 const SIDE_EDGE_RAD: f64 = MAX_SIDE_AZIMUTH_RAD - 2.0 * DEGREE;
-/// Spacing of columns up to which the edges need not be found within a column (m): then they are known to a millimetre or two.
+/// Spacing of columns up to which the edges need not be found within a column (m): then they are
+/// known to a millimetre or two.
 const FINE_SPACING_M: f64 = 0.01;
 /// Maximum number of points that are used to try headings.
 const REFINE_MAX_POINTS: usize = 80;
@@ -64,7 +67,8 @@ pub(crate) struct BoxFit {
     pub(crate) across_m: [f64; 2],
     /// Where the edges lie within their columns, if the powers of the beams tell it.
     pub(crate) edges: Option<Edges>,
-    /// Least and greatest position v of the points on a retro-reflector (m), which saturate the receiver; `None` if there is none.
+    /// Least and greatest position v of the points on a retro-reflector (m), which saturate the
+    /// receiver; `None` if there is none.
     pub(crate) plate_m: Option<[f64; 2]>,
     /// Height of the highest point (m).
     pub(crate) top_m: f64,
@@ -94,17 +98,20 @@ pub(crate) struct BoxFit {
     pub(crate) vertical_rad: [f64; 2],
     /// Position of the sensor to the left of the ego's centre line (m).
     pub(crate) sensor_y_m: f64,
-    /// Least and greatest azimuth of the points from straight behind the sensor, positive to the ego's left (rad).
+    /// Least and greatest azimuth of the points from straight behind the sensor, positive to the
+    /// ego's left (rad).
     pub(crate) azimuth_rad: [f64; 2],
     /// Whether the right and the left edge of the cluster are truncated by the field of view.
     ///
-    /// This follows from the columns of the points. The azimuth would be wrong: the ego moves on after a column is
-    /// measured, so at the scan's end the azimuth of a near point is no longer that of its beam.
+    /// This follows from the columns of the points. The azimuth would be wrong: the ego moves on
+    /// after it measures a column. At the scan's end, the azimuth of a near point differs from the
+    /// azimuth of its beam.
     pub(crate) truncated: [bool; 2],
 }
 
 impl BoxFit {
-    /// Fits a box to the points of a cluster. `members` are their indices in the scan, at least one.
+    /// Fits a box to the points of a cluster. `members` are their indices in the scan, at least
+    /// one.
     pub(crate) fn new(members: &[u32], scan: &LidarScan, lane: &LaneGeometry) -> Self {
         let (empty, mean_x) = Self::without_extent(members, scan);
         let road_rad = lane.direction_rad(mean_x);
@@ -118,12 +125,14 @@ impl BoxFit {
         if side_seen && has_many { refined() } else { fit }
     }
 
-    /// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
+    /// Returns true if the box is so far to one side of the sensor's axis that one of its sides is
+    /// visible.
     pub(super) fn sees_side(&self) -> bool {
         self.azimuth_rad[0] > 0.0 || self.azimuth_rad[1] < 0.0
     }
 
-    /// Returns true if a side of the box faces the sensor: its outermost points are then not those of the front.
+    /// Returns true if a side of the box faces the sensor: its outermost points then do not belong
+    /// to the front.
     fn shows_flank(&self) -> bool {
         self.azimuth_rad[0] > -self.heading_rad || self.azimuth_rad[1] < -self.heading_rad
     }
@@ -177,7 +186,8 @@ impl BoxFit {
         fit
     }
 
-    /// Returns a fit whose extents are empty, with the values that do not depend on the heading, and the mean of x (m).
+    /// Returns a fit whose extents are empty, with the values that do not depend on the heading,
+    /// and the mean of x (m).
     fn without_extent(members: &[u32], scan: &LidarScan) -> (Self, f64) {
         let (mut x_m, mut intensity, mut offset_ns) = (0.0, 0.0, 0.0);
         let mut beams = [u16::MAX, 0];
@@ -218,7 +228,7 @@ impl BoxFit {
 
     /// Sets the front face to the mean position of the points on it.
     ///
-    /// `edge_m` is the position u of the foremost point that is not taken for noise.
+    /// `edge_m` is the position u of the foremost point that does not count as noise.
     fn locate_front(&mut self, edge_m: f64, [sin, cos]: [f64; 2], members: &[u32], scan: &LidarScan) {
         let (mut sum, mut count) = (0.0, 0_usize);
         for &member in members {
@@ -260,16 +270,17 @@ impl BoxFit {
     }
 }
 
-/// Returns whether the last of these beams is in the outermost columns on the ego's right, and the first in those on its left. The
-/// sweep begins on the left.
+/// Returns whether the last of these beams is in the outermost columns on the ego's right, and the
+/// first in the outermost columns on its left. The sweep begins on the left.
 fn truncated_edges(beams: [u16; 2], scan: &LidarScan) -> [bool; 2] {
     let Resolution { columns: count, layers, .. } = scan.resolution;
     let [first, last] = beams.map(|beam| usize::from(beam) / layers);
     [last + EDGE_COLUMNS >= count, first < EDGE_COLUMNS]
 }
 
-/// Returns true if the points surely extend over more than [`REFINE_LENGTH_M`] behind the front face, for this heading. The front
-/// face is at most [`FACE_DEPTH_M`] behind the foremost point that is not taken for noise.
+/// Returns true if the points surely extend over more than [`REFINE_LENGTH_M`] behind the front
+/// face, for this heading. The front face is at most [`FACE_DEPTH_M`] behind the foremost point
+/// that does not count as noise.
 fn has_long_side(heading_rad: f64, members: &[u32], scan: &LidarScan) -> bool {
     let (sin, cos) = maths::sin_cos(heading_rad);
     let mut nearest = LargestValues::default();
@@ -320,7 +331,8 @@ impl LargestValues {
     }
 }
 
-/// Returns the heading near `road_rad` for which the points are closest to the sides of a rectangle (rad).
+/// Returns the heading near `road_rad` for which the points are closest to the sides of a rectangle
+/// (rad).
 fn refined_heading_rad(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
     let stride = members.len().div_ceil(REFINE_MAX_POINTS);
     let mut best = (f64::INFINITY, road_rad);
@@ -364,14 +376,15 @@ pub(super) fn point(scan: &LidarScan, member: u32) -> [f64; 3] {
     [scan.x_m[index].into(), scan.y_m[index].into(), scan.z_m[index].into()]
 }
 
-/// Returns the lesser of two numbers. Points are finite, so that NaN, which [`f64::min`] tests for, does not occur.
+/// Returns the lesser of two numbers. Points are finite, so that NaN, which [`f64::min`] tests for,
+/// does not occur.
 #[inline(always)]
-fn lesser(one: f64, other: f64) -> f64 {
-    if other < one { other } else { one }
+fn lesser(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
 }
 
 /// Returns the greater of two numbers that are not NaN.
 #[inline(always)]
-fn greater(one: f64, other: f64) -> f64 {
-    if other > one { other } else { one }
+fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }

@@ -1,10 +1,11 @@
 //! The ray cast: finds the face that each sub-ray hits first.
 //!
-//! A face is given by the vector m of [`targets`](super::targets), a direction by the vector d. The eight sub-rays of a beam lie side by
-//! side in the lanes of vector registers, and the product m·d takes three multiplications and two additions for all of them.
+//! A face is given by the vector m of [`targets`](super::targets), a direction by the vector d. The
+//! eight sub-rays of a beam lie side by side in the lanes of vector registers, and the product m·d
+//! takes three multiplications and two additions for all of them.
 //!
-//! The columns and layers that can hit a solid follow from its bounds, and only these are tried. `by_brute_force` tries
-//! all of them, and a property test requires the same result to the bit.
+//! The columns and layers that can hit a solid follow from its bounds, and only these are tried.
+//! `by_brute_force` tries all of them, and a property test requires the same result to the bit.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
@@ -18,8 +19,8 @@ pub(crate) const NO_FACE: u32 = u32::MAX;
 /// The first hits of the sub-rays of a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BeamHits {
-    /// Inverse of the horizontal distance of each hit (1/m), or 0 if the sub-ray hits nothing. Sub-rays of the same height, whose ranges are
-    /// most alike, have successive indices.
+    /// Inverse of the horizontal distance of each hit (1/m), or 0 if the sub-ray hits nothing.
+    /// Sub-rays of the same height, whose ranges are most alike, have successive indices.
     pub(crate) inverse: [f32; SUBRAYS],
     /// Index of the face that each sub-ray hits, or [`NO_FACE`].
     pub(crate) face: [u32; SUBRAYS],
@@ -63,12 +64,14 @@ impl ColumnHits {
         self.tested >> layer & 1 == 1
     }
 
-    /// Returns a bit mask of the layers that may receive a return from a solid or from the road that must not be left out.
+    /// Returns a bit mask of the layers that may receive a return from a solid or from the road
+    /// that must not be left out.
     pub(crate) fn need_echoes(&self) -> u64 {
         self.tested | layers_below(self.ground_below) & !self.bare
     }
 
-    /// Intersects the beams of a column with a solid, in those layers that are `wanted` (a bit mask).
+    /// Intersects the beams of a column with a solid, in those layers that are `wanted` (a bit
+    /// mask).
     #[inline(always)]
     pub(crate) fn cast<S: Simd>(
         &mut self,
@@ -136,14 +139,15 @@ impl<S: Simd> SubRays<S> {
         }
     }
 
-    /// Returns the inverse horizontal distance m·d at which each sub-ray meets the plane of a face (1/m).
+    /// Returns the inverse horizontal distance m·d at which each sub-ray meets the plane of a face
+    /// (1/m).
     #[inline(always)]
     fn inverse_distances(&self, [x, y, z]: [f32; 3]) -> f32x8<S> {
         self.cos * x + self.sin * y + self.tan * z
     }
 
-    /// Replaces the hits of those sub-rays that meet this solid at a shorter distance. At equal distance the earlier
-    /// hit stays.
+    /// Replaces the hits of those sub-rays that meet this solid at a shorter distance. At equal
+    /// distance the earlier hit stays.
     #[inline(always)]
     fn intersect(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
         let mut nearest = f32x8::splat(self.simd, f32::INFINITY);
@@ -234,14 +238,15 @@ impl ActiveParts {
     }
 }
 
-/// Returns the hits of a column, with every beam tested against every solid regardless of its bounds.
+/// Returns the hits of a column, with every beam tested against every solid regardless of its
+/// bounds.
 #[cfg(test)]
 pub(crate) fn by_brute_force(column: &Column, elevations: &[Elevation], targets: &Targets) -> ColumnHits {
     let mut hits = ColumnHits::new(elevations.len());
     for part in &targets.parts {
         let part = Part { columns: 0..usize::MAX, layers: layers_below(elevations.len()), ..*part };
-        let of = (&part, u64::MAX);
-        fearless_simd::dispatch!(fearless_simd::Level::baseline(), simd => hits.cast(simd, (column, elevations), of, targets));
+        let part_and_mask = (&part, u64::MAX);
+        fearless_simd::dispatch!(fearless_simd::Level::baseline(), simd => hits.cast(simd, (column, elevations), part_and_mask, targets));
     }
     hits
 }

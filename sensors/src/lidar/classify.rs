@@ -1,9 +1,9 @@
 //! The classification of a box by its shape alone.
 //!
-//! Bayes' rule combines independent normal likelihoods of width, height and length. The likelihoods allow for what a
-//! scan can show at the distance of the box: far away, a footprint is as high as a car, and the outermost columns may
-//! be lost. The background class covers objects that stand beside the carriageway, return too little light, or are too
-//! low or too thin.
+//! Bayes' rule combines independent normal likelihoods of width, height and length. The likelihoods
+//! allow for what a scan can show at the distance of the box: far away, a footprint is as high as a
+//! car, and the outermost columns may be lost. The background class covers objects that are beside
+//! the carriageway, return too little light, or are too low or too thin.
 
 use closecall_traffic::{ClassScores, VehicleClass, maths};
 
@@ -24,8 +24,8 @@ struct ClassModel {
     length_m: Gaussian,
 }
 
-/// Car, truck, motorcycle and background. The sizes are typical of European roads, the priors are shares in motorway
-/// traffic (assumptions).
+/// Car, truck, motorcycle and background. The sizes are typical of European roads, the priors are
+/// shares in motorway traffic (assumptions).
 const CLASS_MODELS: [ClassModel; 4] = [
     ClassModel {
         prior: 0.60,
@@ -66,18 +66,20 @@ const FAINT_INTENSITY: f64 = 0.03;
 const FAINT_REACH_M: f64 = 20.0;
 /// Factor on the odds of background for a cluster of such low intensity.
 const FAINT_ODDS: f64 = 30.0;
-/// Factor on the odds of a motorcycle for a cluster with a plate (assumption): in front, motorcycles have none in most states of Europe
-/// (the United Kingdom forbids it since 2001).
+/// Factor on the odds of a motorcycle for a cluster with a plate (assumption): in front,
+/// motorcycles have none in most states of Europe (the United Kingdom forbids it since 2001).
 const MOTORCYCLE_PLATE_ODDS: f64 = 0.02;
 /// Minimum score of each class, because shape alone cannot rule out a class.
 const MIN_SCORE: f64 = 0.005;
 
-/// Returns the typical length and width of a vehicle class (m), which replace the extents that are not seen.
+/// Returns the typical length and width of a vehicle class (m), which replace the extents that are
+/// not seen.
 pub(crate) fn typical_size_m(class: usize) -> [f64; 2] {
     [CLASS_MODELS[class].length_m.mean, CLASS_MODELS[class].width_m.mean]
 }
 
-/// Returns the class scores of a fitted box. `width_seen` is true if both lateral edges were in view.
+/// Returns the class scores of a fitted box. `width_seen` is true if both lateral edges were in
+/// view.
 pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) -> ClassScores {
     let mut logs = [0.0; 4];
     for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
@@ -120,15 +122,17 @@ fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
     let half_layer = 0.5 * fit.layer_m();
     let expected = height.min(fit.in_view_m - half_layer);
     let sd = maths::hypot(maths::hypot(sd, half_layer), 0.1);
-    // From afar a single layer may hit the vehicle, and the upper part of a car is glass, which returns little light.
+    // From afar a single layer may hit the vehicle, and the upper part of a car is glass, which
+    // returns little light.
     let lost = height * (fit.range_m / LOST_TOP_M).min(1.0);
     let deviation = fit.top_m - expected;
-    // Neither branch is normalised: a class is not penalised because its top can be lost more easily.
+    // Neither branch is normalised: a class is not penalised because its top can be lost more
+    // easily.
     if deviation < 0.0 { -0.5 * (deviation / maths::hypot(sd, lost)).powi(2) } else { -0.5 * (deviation / sd).powi(2) }
 }
 
-/// Returns the log likelihood of the visible length. Only a length in excess of the class's counts, since a box is at
-/// least as long as its visible part.
+/// Returns the log likelihood of the visible length. Only a length in excess of the class's counts,
+/// since a box is at least as long as its visible part.
 fn length_log(fit: &BoxFit, model: &ClassModel) -> f64 {
     let Gaussian { mean: length, sd } = model.length_m;
     let excess = (fit.length_m() - length).max(0.0);

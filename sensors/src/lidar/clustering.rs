@@ -1,23 +1,26 @@
 //! Density-based clustering by DBSCAN in a stretched plane.
 //!
-//! Points of one vehicle lie millimetres apart at 3 m and metres apart at 100 m, where one layer on the bumper and the
-//! next on the windscreen differ by 2 m in depth. No single radius suits both distances. The points are therefore
-//! clustered in a plane that is stretched such that a radius of 1 in it corresponds, in metres, to
+//! Points of one vehicle lie millimetres apart at 3 m and metres apart at 100 m, where one layer on
+//! the bumper and the next on the windscreen differ by 2 m in depth. No single radius suits both
+//! distances. The points are therefore clustered in a plane that is stretched such that a radius of
+//! 1 in it corresponds, in metres, to
 //!
 //! ```text
 //!   along the road   e_x = 0.8 m + 0.015·r      0.8 m near, 2.3 m at 100 m: less than any gap between followers
 //!   across the road  e_y = 0.5 m + 0.005·r      less than 1.6 m between vehicles side by side
 //! ```
 //!
-//! with r the distance behind the sensor. The stretched coordinates of a point, whose lateral offset from the ego's
-//! path is y, are X = ∫dr/e_x = ln(1 + b·r/a)/b for e_x = a + b·r, and Y = y/e_y.
+//! with r the distance behind the sensor. The stretched coordinates of a point, whose lateral
+//! offset from the ego's path is y, are X = ∫dr/e_x = ln(1 + b·r/a)/b for e_x = a + b·r, and Y =
+//! y/e_y.
 //!
-//! The points are thinned first. If a small cell contains more points than make a core point, the surplus is left out
-//! and receives the label of the cell afterwards: all points of such a cell are core points of the same cluster anyway.
-//! Thinning never joins clusters that DBSCAN would keep apart. It may split a cluster that is connected only by gaps of
-//! more than 0.43 of the radius, which is the radius less two diagonals of a cell.
+//! The points are thinned first. If a small cell contains more points than a core point needs, the
+//! clustering leaves out the surplus and gives it the label of the cell afterwards. All points of
+//! such a cell are core points of the same cluster anyway. Thinning never joins clusters that
+//! DBSCAN would keep apart. It may split a cluster that is connected only by gaps of more than 0.43
+//! of the radius, which is the radius less two diagonals of a cell.
 //!
-//! DBSCAN is that of [`dbscan`](super::dbscan), or that of `linfa-clustering` over the search for
+//! DBSCAN comes from [`dbscan`](super::dbscan), or from `linfa-clustering` with the search for
 //! neighbours in [`neighbours`](super::neighbours). Both give the same labels. A point that lies
 //! exactly at the radius is a neighbour.
 
@@ -97,7 +100,8 @@ pub struct ClusteredPoints {
 }
 
 impl ClusteredPoints {
-    /// Number of points within the radius, the point itself included, that make a point a core point.
+    /// Number of points within the radius, the point itself included, that make a point a core
+    /// point.
     pub const CORE_POINTS: usize = CORE_POINTS;
     /// Radius within which points are neighbours.
     pub const RADIUS: f64 = RADIUS;
@@ -116,18 +120,20 @@ pub(crate) struct Clustering {
     pub(crate) labels: Vec<u32>,
     /// Number of clusters.
     pub(crate) count: usize,
-    /// For each cell, the number of candidates that were kept, at most [`CORE_POINTS`], and the row of the latest.
+    /// For each cell, the number of candidates that were kept, at most [`CORE_POINTS`], and the row
+    /// of the latest.
     cells: Vec<(u8, u32)>,
     /// Cell of each candidate.
     cell_of: Vec<u32>,
-    /// Row of each candidate in `rows`. A candidate that was left out has the row of another one in the same cell.
+    /// Row of each candidate in `rows`. An omitted candidate has the row of another candidate in
+    /// the same cell.
     row_of: Vec<u32>,
     /// Stretched coordinates of the candidates that were kept.
     rows: Vec<[f64; 2]>,
     /// The implementation of DBSCAN.
     pub(crate) method: ClusteringMethod,
     grid: GridDbscan,
-    /// New number of each cluster that is merged into no other one.
+    /// New number of each cluster that is merged into no other cluster.
     renumbered: Vec<u32>,
     /// The vehicles of the clusters that the truth gives.
     vehicles: Vec<usize>,
@@ -189,7 +195,8 @@ impl Clustering {
         Ok(())
     }
 
-    /// Returns the points that the latest run has given to DBSCAN, in the stretched plane, with their labels.
+    /// Returns the points that the latest run has given to DBSCAN, in the stretched plane, with
+    /// their labels.
     pub(crate) fn rows(&self) -> (&[[f64; 2]], Vec<Option<usize>>) {
         let mut labels = vec![None; self.rows.len()];
         for (&row, &label) in self.row_of.iter().zip(&self.labels) {
@@ -198,13 +205,14 @@ impl Clustering {
         (&self.rows, labels)
     }
 
-    /// Assigns the candidates to clusters by the vehicle that each belongs to, `None` for one that belongs to no vehicle.
+    /// Assigns the candidates to clusters by the vehicle that each belongs to, `None` for one that
+    /// belongs to no vehicle.
     pub(crate) fn assign(&mut self, vehicles: impl Iterator<Item = Option<usize>>) {
         self.vehicles.clear();
         self.labels.clear();
         for vehicle in vehicles {
             let index = vehicle.map(|vehicle| {
-                self.vehicles.iter().position(|known| *known == vehicle).unwrap_or_else(|| {
+                self.vehicles.iter().position(|listed| *listed == vehicle).unwrap_or_else(|| {
                     self.vehicles.push(vehicle);
                     self.vehicles.len() - 1
                 })
@@ -214,8 +222,8 @@ impl Clustering {
         self.count = self.vehicles.len();
     }
 
-    /// Merges each cluster into its parent, which is another cluster or itself. Chains of parents are followed to their
-    /// end.
+    /// Merges each cluster into its parent, which is another cluster or itself. Chains of parents
+    /// are followed to their end.
     pub(crate) fn merge(&mut self, parents: &[u32]) {
         let root = |label: u32| {
             let mut root = label;
@@ -240,7 +248,8 @@ impl Clustering {
         self.count = next as usize;
     }
 
-    /// Converts the candidates to the stretched plane, and leaves out the surplus points of each cell.
+    /// Converts the candidates to the stretched plane, and leaves out the surplus points of each
+    /// cell.
     fn thin(&mut self, candidates: &[Candidate]) {
         self.rows.clear();
         self.row_of.clear();
@@ -266,7 +275,8 @@ impl Clustering {
     }
 }
 
-/// Returns the cluster of each point by linfa's DBSCAN, `None` for noise. Needs two core points or more, and a radius above 0.
+/// Returns the cluster of each point by linfa's DBSCAN, `None` for noise. Needs two core points or
+/// more, and a radius above 0.
 #[expect(clippy::expect_used, reason = "the caller passes constants")]
 fn linfa_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<Option<usize>> {
     let params = Dbscan::params_with(core_points, L2Dist, GridSearch { cell: radius }).tolerance(radius);
@@ -350,7 +360,8 @@ mod tests {
             }
             pairs.sort_unstable();
             pairs.dedup();
-            // The mapping is one to one: each label corresponds to one of scikit-learn's, and vice versa.
+            // The mapping is one to one: each label corresponds to one of scikit-learn's, and vice
+            // versa.
             let clusters = expected.iter().max().unwrap() + 1;
             assert!(clusters > 1, "{name}");
             assert_eq!(pairs.len(), usize::try_from(clusters).unwrap(), "{name}");
@@ -363,14 +374,15 @@ mod tests {
 
     #[test]
     fn points_exactly_at_the_radius_are_neighbours() {
-        // With only the nearer points as neighbours, the first three were no core points, and all were noise.
+        // With only the nearer points as neighbours, the first three were no core points, and all
+        // were noise.
         let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.5, 0.0]];
         assert_eq!(linfa_dbscan(&points, 1.0, 3).to_vec(), [Some(0), Some(0), Some(0), None]);
         assert_eq!(grid_dbscan(&points, 1.0, 3), [Some(0), Some(0), Some(0), None]);
     }
 
-    /// Points in clumps, so that clusters, their borders and noise all occur. Coordinates are whole quarters in half of the cases, so
-    /// that points lie exactly at the radius.
+    /// Points in clumps: clusters, their borders and noise all occur. Coordinates are whole
+    /// quarters in half of the cases, and some points then lie exactly at the radius.
     fn clumps() -> impl Strategy<Value = Vec<[f64; 2]>> {
         let clump = ((0.0..30.0_f64, -9.0..9.0_f64), prop::collection::vec((-1.5..1.5_f64, -1.5..1.5_f64), 1..20));
         let clumps = prop::collection::vec(clump, 0..8);
@@ -386,7 +398,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_labels_are_those_of_the_definition(
+        fn the_labels_follow_the_definition(
             points in clumps(),
             earlier in clumps(),
             radius in prop::sample::select(vec![0.25, 0.7, 1.0, 1.25, 1.9]),
@@ -418,8 +430,8 @@ mod tests {
         for back in [2.0, 10.0, 30.0, 60.0, 100.0, 145.0_f32] {
             let column_m = (back * 0.002_2).max(0.05);
             let mut points = Vec::new();
-            // One vehicle in the ego's lane, one in the left lane with 1.9 m between their sides, and one behind the
-            // first at a distance of 1.5 radii and 0.5 m.
+            // One vehicle in the ego's lane, one in the left lane with 1.9 m between their sides,
+            // and one behind the first at a distance of 1.5 radii and 0.5 m.
             for (at, left) in [(back, 0.0), (back, 3.75), (back + 1.5 * (ALONG_M + ALONG_GAIN * back) + 0.5, 0.0)] {
                 let mut across = -0.92;
                 while across < 0.92 {
@@ -447,7 +459,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn thinning_joins_no_clusters_and_splits_only_loosely_connected_ones(
+        fn thinning_joins_no_clusters_and_splits_only_loosely_connected_clusters(
             points in plane(),
             copies in 1..6_usize,
         ) {
@@ -458,7 +470,8 @@ mod tests {
             let thinned = labels(&points);
             let unthinned = |radius: f64| dbscan_by_definition(&rows, radius, CORE_POINTS);
             let (whole, tight) = (unthinned(RADIUS), unthinned(0.43));
-            // A point on the border of two clusters may belong to either, so only core points are compared.
+            // A point on the border of two clusters may belong to either, so only core points are
+            // compared.
             let neighbours = |at: usize, radius: f64| {
                 let distance = |to: usize| maths::hypot(rows[at][0] - rows[to][0], rows[at][1] - rows[to][1]);
                 (0..points.len()).filter(|&to| distance(to) <= radius).count()

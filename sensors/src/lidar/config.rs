@@ -1,4 +1,5 @@
-//! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it becomes.
+//! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it
+//! becomes.
 
 use closecall_traffic::{ActorId, Check, Choice, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
@@ -37,14 +38,15 @@ impl Plates {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct LidarConfig {
-    /// Name of the sensor in faults, recordings and tables: lower-case letters, digits and hyphens. Each of
-    /// `additional-rear-lidars` needs one. Default: `rear-lidar` or `front-lidar`.
+    /// Name of the sensor in faults, recordings and tables: lower-case letters, digits and hyphens.
+    /// Each of `additional-rear-lidars` needs one. Default: `rear-lidar` or `front-lidar`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Model of the LiDAR, whose pattern and range ship with Closecall; `pattern-file` replaces them.
+    /// Model of the LiDAR, whose pattern and range ship with Closecall; `pattern-file` replaces
+    /// them.
     pub model: Choice<LidarModel>,
-    /// File with the pattern and the range of another LiDAR, relative to the scenario file. Its contents become `pattern` when the
-    /// scenario is read. Default: none.
+    /// File with the pattern and the range of another LiDAR, relative to the scenario file. Its
+    /// contents become `pattern` when the scenario is read. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pattern_file: Option<String>,
     /// Pattern and range of another LiDAR, with the keys of its file. Default: none.
@@ -54,36 +56,40 @@ pub struct LidarConfig {
     pub mount_height_m: Num,
     /// Upward tilt of the sensor's axis relative to the ego's body (rad).
     pub tilt_rad: Num,
-    /// Distance of the sensor from the bumper towards the ego's middle (m). The ego's own body hides nothing. Default: 0.
+    /// Distance of the sensor from the bumper towards the ego's middle (m). The ego's own body
+    /// hides nothing. Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub inset_m: Num,
     /// Distance of the sensor from the ego's centre line to the left (m). Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub left_m: Num,
-    /// Azimuth of the sensor's axis (deg): 0 is straight behind, or straight ahead for the LiDAR that looks ahead; positive is to the
-    /// ego's left. Default: 0.
+    /// Azimuth of the sensor's axis (deg): 0 is straight behind, or straight ahead for the LiDAR
+    /// that looks ahead; positive is to the ego's left. Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub azimuth_deg: Num,
     /// Rotation of the sensor about its axis, clockwise as it sees it (deg). Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub roll_deg: Num,
-    /// Nominal range (m): the range at which a target of 50 % reflectivity that fills the beam is detected with
-    /// probability 0.5, in air that does not attenuate. Default: that of the LiDAR's pattern; 200 for `scala-2`.
+    /// Nominal range (m): the range at which a target of 50 % reflectivity that fills the beam is
+    /// detected with probability 0.5, in air that does not attenuate. Default: the range of the
+    /// LiDAR's pattern; 200 for `scala-2`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nominal_range_m: Option<Num>,
     /// Share of returns (0 to 1) that are lost regardless of their power.
     pub dropout: Num,
-    /// Probability (0 to 0.01) that a beam gives a point in a scan although there is nothing: noise of the receiver above its threshold.
-    /// Makers specify their ranges at 0.0001 (data sheet of the Ouster OS1, manual of the LeddarTech Pixell). Default: 0.0001.
+    /// Probability (0 to 0.01) that a beam gives a point in a scan although there is nothing: noise
+    /// of the receiver above its threshold. Makers specify their ranges at 0.0001 (data sheet of
+    /// the Ouster OS1, manual of the LeddarTech Pixell). Default: 0.0001.
     #[serde(skip_serializing_if = "is_usual_rate")]
     pub false_alarm_rate: Num,
-    /// Standard deviation of the error of the pitch angle that the ego uses to level its points (rad).
+    /// Standard deviation of the error of the pitch angle that the ego uses to level its points
+    /// (rad).
     pub levelling_sd_rad: Num,
-    /// Share of the light (0 to 1) that the sensor's window transmits each way: 1 if clean, 0 if blocked by snow or
-    /// mud.
+    /// Share of the light (0 to 1) that the sensor's window transmits each way: 1 if clean, 0 if
+    /// blocked by snow or mud.
     pub window_transmission: Num,
-    /// State of the registration plates of the vehicles behind. Their plates are retro-reflectors, which carry the detection of
-    /// dark cars.
+    /// State of the registration plates of the vehicles behind. Their plates are retro-reflectors,
+    /// which carry the detection of dark cars.
     pub plates: Choice<Plates>,
 }
 
@@ -91,8 +97,9 @@ fn is_zero(number: &Num) -> bool {
     *number == Num::Fixed(0.0)
 }
 
-/// Probability of a false alarm in a beam, per scan: the rate at which makers specify the range of their LiDARs (data sheet of the Ouster OS1:
-/// "false positive rate of 1/10,000"; manual of the LeddarTech Pixell: "0.0001 false alarm rate"). No source gives that of the SCALA 2.
+/// Probability of a false alarm in a beam, per scan: the rate at which makers specify the range of
+/// their LiDARs (data sheet of the Ouster OS1: "false positive rate of 1/10,000"; manual of the
+/// LeddarTech Pixell: "0.0001 false alarm rate"). No source gives the rate of the SCALA 2.
 const FALSE_ALARM_RATE: f64 = 1e-4;
 
 fn is_usual_rate(number: &Num) -> bool {
@@ -100,8 +107,9 @@ fn is_usual_rate(number: &Num) -> bool {
 }
 
 impl Default for LidarConfig {
-    /// Returns a sensor in the rear bumper without tilt. On each mirror side, one layer then lies next to the axis, at
-    /// −0.24° or +0.24°. At 100 m these two elevations meet the two halves of a car's painted front as seen from 0.6 m.
+    /// Returns a sensor in the rear bumper without tilt. On each mirror side, one layer then lies
+    /// next to the axis, at −0.24° or +0.24°. At 100 m these two elevations meet the two halves of
+    /// a car's painted front as seen from 0.6 m.
     fn default() -> Self {
         Self {
             name: None,
@@ -136,7 +144,8 @@ pub struct Lidar {
     /// Distance from the bumper towards the ego's middle, and from its centre line to the left (m).
     pub(crate) inset_m: f64,
     pub(crate) left_m: f64,
-    /// Azimuth of the axis, positive to the ego's left, and rotation about the axis, clockwise as the sensor sees it (rad).
+    /// Azimuth of the axis, positive to the ego's left, and rotation about the axis, clockwise as
+    /// the sensor sees it (rad).
     pub(crate) azimuth_rad: f64,
     pub(crate) roll_rad: f64,
     pub(crate) nominal_range_m: f64,
@@ -152,11 +161,11 @@ pub struct Lidar {
     pub(crate) is_exact: bool,
     /// The implementation of DBSCAN that clusters the points.
     pub(crate) clustering: ClusteringMethod,
-    /// Whether each clustering is compared with that of another implementation.
+    /// Whether each clustering is compared with the clustering of another implementation.
     pub(crate) clustering_check: Option<ClusteringCheck>,
 }
 
-/// Range of a LiDAR whose points are the truth (m): more than that of the region of interest.
+/// Range of a LiDAR whose points are the truth (m): more than the range of the region of interest.
 const EXACT_RANGE_M: f64 = 500.0;
 
 impl Lidar {
@@ -170,7 +179,8 @@ impl Lidar {
         self.azimuth_rad != 0.0 || self.roll_rad != 0.0
     }
 
-    /// Returns the sensor in a scene turned by half a turn, in which the ego's left is on its right.
+    /// Returns the sensor in a scene turned by half a turn, in which the ego's left is on its
+    /// right.
     pub(crate) fn half_turned(self) -> Self {
         Self { left_m: -self.left_m, azimuth_rad: -self.azimuth_rad, ..self }
     }
@@ -180,7 +190,8 @@ impl Lidar {
         self.kind.half_field_deg
     }
 
-    /// Returns the range up to which the processing expects vehicles (m): beyond it no point is reported or used.
+    /// Returns the range up to which the processing expects vehicles (m): beyond it no point is
+    /// reported or used.
     pub(crate) fn reach_m(&self) -> f64 {
         let max_range_m = if self.is_exact { f64::INFINITY } else { self.kind.max_range_m.into() };
         self.nominal_range_m.min(max_range_m).min(REACH_M.into())

@@ -1,10 +1,10 @@
 //! DBSCAN (Ester et al. 1996) with an exact search for neighbours on a grid, in memory that is
 //! reused from scan to scan.
 //!
-//! It stays beside that of `linfa-clustering` for its speed: a point that has joined a cluster
-//! takes no part in later searches, while `linfa-clustering` asks for all neighbours of each point,
-//! as a new list. `docs/explanation/performance.md` has the figures. The labels of both are the
-//! same, numbering included, and those of scikit-learn: a neighbour is at most the radius away.
+//! This implementation stays beside `linfa-clustering` for its speed: a point that has joined a
+//! cluster takes no part in later searches, while `linfa-clustering` asks for all neighbours of
+//! each point, as a new list. `docs/explanation/performance.md` has the figures. Both give the same
+//! labels with the same numbers, and so does scikit-learn: a neighbour is at most the radius away.
 
 use std::ops::RangeInclusive;
 
@@ -153,14 +153,14 @@ impl Grid {
     /// Returns true if there are at least `count` points within `range`.
     fn has_within(&self, [columns, rows]: &Span, point: [f64; 2], range: f64, count: usize) -> bool {
         // The own column first: it has most neighbours.
-        let own = self.cell_along(point[0], 0, self.size[0] - 1);
-        let mut found = 0;
-        for column in std::iter::once(own).chain(columns.clone().filter(|&column| column != own)) {
+        let centre_column = self.cell_along(point[0], 0, self.size[0] - 1);
+        let mut neighbours = 0;
+        for column in std::iter::once(centre_column).chain(columns.clone().filter(|&column| column != centre_column)) {
             let first = self.starts[column * self.size[1] + rows.start()] as usize;
             let end = self.starts[column * self.size[1] + rows.end() + 1] as usize;
             for (other, _) in &self.sorted[first..end] {
-                found += usize::from(is_within(*other, point, range));
-                if found >= count {
+                neighbours += usize::from(is_within(*other, point, range));
+                if neighbours >= count {
                     return true;
                 }
             }
@@ -190,8 +190,8 @@ impl Grid {
 }
 
 /// Returns true if two points are at most `range` apart.
-fn is_within(one: [f64; 2], other: [f64; 2], range: f64) -> bool {
-    let (x, y) = (one[0] - other[0], one[1] - other[1]);
+fn is_within(a: [f64; 2], b: [f64; 2], range: f64) -> bool {
+    let (x, y) = (a[0] - b[0], a[1] - b[1]);
     x * x + y * y <= range * range
 }
 

@@ -1,4 +1,5 @@
-//! The detector: turns a scan into detections, by point selection, clustering, box fitting and classification.
+//! The detector: turns a scan into detections, by point selection, clustering, box fitting and
+//! classification.
 
 use closecall_traffic::{ClassScores, Time, VehicleClass, maths};
 
@@ -14,14 +15,16 @@ use crate::tracking::SIDE_PROTRUSION_M;
 
 use crate::{Detection, Extent, SeenBy, SeenPart, SensorError};
 
-/// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
+/// Number of columns between the edges of two clusters within which the nearer cluster may occlude
+/// the other.
 const OCCLUSION_COLUMNS: f64 = 3.0;
 /// Difference in range from which a cluster may occlude another (m).
 const OCCLUSION_DEPTH_M: f64 = 1.0;
-/// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate, bonnet edge.
+/// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate,
+/// bonnet edge.
 pub(crate) const FACE_SD_M: f64 = 0.034;
-/// Additional standard deviation of the front if a side is seen too, whose points lie close behind those of the front
-/// (m).
+/// Additional standard deviation of the front if a side is seen too: its points lie close behind
+/// the points of the front (m).
 const CORNER_SD_M: f64 = 0.05;
 /// Height of the lowest footprint on a car's front above which only the cabin was seen (m).
 const CABIN_ONLY_FROM_M: f64 = 0.95;
@@ -29,23 +32,25 @@ const CABIN_ONLY_FROM_M: f64 = 0.95;
 const BUMPER_OFFSET_M: f64 = 0.9;
 /// Standard deviation of that distance (m).
 const BUMPER_OFFSET_SD_M: f64 = 0.6;
-/// Distance from which only the rider of a motorcycle may be seen (m), because few beams hit the wheel, the lamp and
-/// the fairing.
+/// Distance from which only the rider of a motorcycle may be seen (m), because few beams hit the
+/// wheel, the lamp and the fairing.
 const RIDER_ONLY_FROM_M: f64 = 28.0;
 /// Mean distance by which a motorcycle's front is then ahead of the points that are seen (m).
 const RIDER_OFFSET_M: f64 = 0.2;
 /// Standard deviation of that distance (m).
 const RIDER_OFFSET_SD_M: f64 = 0.2;
-/// Additional standard deviation of a nearer motorcycle's front (m), because the wheel's tread may return too little
-/// light.
+/// Additional standard deviation of a nearer motorcycle's front (m), because the wheel's tread may
+/// return too little light.
 const WHEEL_SD_M: f64 = 0.08;
-/// Standard deviation of a front outside of the field of view if the rear end is seen (m): that of vehicle lengths.
+/// Standard deviation of a front outside of the field of view if the rear end is seen (m): the
+/// standard deviation of vehicle lengths.
 const TRUNCATED_LENGTH_SD_M: f64 = 0.5;
 /// Standard deviation of such a front if the rear end is not seen either (m).
 const TRUNCATED_SD_M: f64 = 3.0;
 /// Length of the visible side from which a vehicle's length counts as measured (m).
 const SIDE_SEEN_M: f64 = 3.0;
-/// Spacing of the columns on a side below which the farthest point of the side counts as its end (m).
+/// Spacing of the columns on a side below which the farthest point of the side counts as its end
+/// (m).
 const SIDE_SPACING_M: f64 = 0.5;
 
 /// The detector of the rear LiDAR. It keeps no state from scan to scan except allocated memory.
@@ -83,8 +88,8 @@ impl Detector {
         }
     }
 
-    /// Returns the detector with this implementation of DBSCAN, which is compared with another one
-    /// if `check` is given.
+    /// Returns the detector with this implementation of DBSCAN, and compares it with another
+    /// implementation if `check` is given.
     pub(crate) fn with_clustering(mut self, method: ClusteringMethod, check: Option<ClusteringCheck>) -> Self {
         self.clustering.method = method;
         self.check = check;
@@ -112,8 +117,8 @@ impl Detector {
 
     /// Merges each cluster into its parent.
     ///
-    /// Front and sides are those of the parent cluster, since the parts behind them would only blur the fit. A pair of headlamps has
-    /// a box around both.
+    /// Front and sides come from the parent cluster alone, since the parts behind them would only
+    /// blur the fit. A pair of headlamps has a box around both.
     fn merge_parts(&mut self, scan: &LidarScan, lane: &LaneGeometry) {
         self.clustering.merge(&self.parents);
         self.group_by_cluster();
@@ -186,7 +191,8 @@ impl Detector {
         Ok(())
     }
 
-    /// Returns the latest clustering, before parts of a vehicle are merged if [`Detector::cluster`] made it.
+    /// Returns the latest clustering, before parts of a vehicle are merged if [`Detector::cluster`]
+    /// made it.
     pub(crate) fn clustered(&self) -> ClusteredPoints {
         let (points, labels) = self.clustering.rows();
         ClusteredPoints { points: points.to_vec(), labels }
@@ -213,7 +219,7 @@ impl Detector {
                 *next += 1;
             }
         }
-        // The loop above has advanced each start to that of the next cluster. Shift them back.
+        // The loop above has advanced each start to the start of the next cluster. Shift them back.
         self.starts.rotate_right(1);
         self.starts[0] = 0;
     }
@@ -229,23 +235,24 @@ impl Detector {
 }
 
 impl Detector {
-    /// Finds the clusters that are part of a nearer cluster's vehicle, such as points below a truck's cabin or past a
-    /// rider.
+    /// Finds the clusters that are part of a nearer cluster's vehicle, such as points below a
+    /// truck's cabin or past a rider.
     ///
     /// Returns true if there is such a cluster.
     fn find_parents(&mut self, lane: &LaneGeometry) -> bool {
         self.parents.clear();
-        for (index, (fit, own)) in self.fits.iter().zip(0..).enumerate() {
+        for (index, (fit, own_index)) in self.fits.iter().zip(0..).enumerate() {
             let is_parent = |other: &usize| *other != index && contains(&self.fits[*other], fit, lane);
             let parent = (0..self.fits.len()).find(is_parent);
             #[expect(clippy::cast_possible_truncation, reason = "fewer clusters than points")]
-            self.parents.push(parent.map_or(own, |parent| parent as u32));
+            self.parents.push(parent.map_or(own_index, |parent| parent as u32));
         }
-        self.parents.iter().zip(0..).any(|(&parent, own)| parent != own)
+        self.parents.iter().zip(0..).any(|(&parent, own_index)| parent != own_index)
     }
 }
 
-/// Returns true if `part` lies behind the front of `whole` and within the typical size of its class.
+/// Returns true if `part` lies behind the front of `whole` and within the typical size of its
+/// class.
 fn contains(whole: &BoxFit, part: &BoxFit, lane: &LaneGeometry) -> bool {
     if part.range_m <= whole.range_m || part.points >= whole.points {
         return false;
@@ -258,13 +265,14 @@ fn contains(whole: &BoxFit, part: &BoxFit, lane: &LaneGeometry) -> bool {
     let middle = 0.5 * (whole.across_m[0] + whole.across_m[1]);
     let reach = length.max(whole.length_m());
     let half = 0.5 * width.max(whole.width_m());
-    // Wheels and mirrors protrude from the side, and the middle of the front is known only to one column.
+    // Wheels and mirrors protrude from the side, and the middle of the front is known only to one
+    // column.
     let half = half + SIDE_PROTRUSION_M + whole.spacing_m;
     class.vehicle() > 0.5 && u <= whole.front_u_m && u >= whole.front_u_m - reach && (v - middle).abs() <= half
 }
 
-/// Returns whether the edge at the least and at the greatest azimuth is occluded by a nearer cluster or truncated by
-/// the field of view.
+/// Returns whether the edge at the least and at the greatest azimuth is occluded by a nearer
+/// cluster or truncated by the field of view.
 fn occluded_edges(index: usize, fits: &[BoxFit]) -> [bool; 2] {
     let fit = &fits[index];
     let margin = OCCLUSION_COLUMNS * fit.spacing_m / fit.range_m.max(1.0);
@@ -279,10 +287,11 @@ fn occluded_edges(index: usize, fits: &[BoxFit]) -> [bool; 2] {
     [0, 1].map(|side| hides(fit.azimuth_rad[side]) || fit.truncated[side])
 }
 
-/// Returns the detection for a fitted box. `hidden` tells whether its edge at the least and at the greatest azimuth is
-/// hidden, `is_pair` whether it surrounds a pair of headlamps.
+/// Returns the detection for a fitted box. `hidden` tells whether its edge at the least and at the
+/// greatest azimuth is hidden, `is_pair` whether it surrounds a pair of headlamps.
 fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, lane: &LaneGeometry) -> Detection {
-    // Vehicles point in about the same direction as the ego: the edge at the least azimuth is also that at the least v.
+    // Vehicles point in about the same direction as the ego: the edge at the least azimuth is also
+    // that at the least v.
     let width_seen = !hidden[0] && !hidden[1];
     let class = class_scores(fit, width_seen, lane);
     let [typical_length, typical_width] = typical_size_m(class.best_vehicle_class() as usize);
@@ -322,7 +331,8 @@ fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
     let face_sd_m = if fit.sees_side() { maths::hypot(FACE_SD_M, CORNER_SD_M) } else { FACE_SD_M };
     let sd = maths::hypot(face_sd_m, fit.point_sd_m / (fit.front_points.max(1) as f64).sqrt());
     if fit.is_truncated() {
-        // The vehicle is partly or entirely beside the ego. The front follows from the rear end and the typical length.
+        // The vehicle is partly or entirely beside the ego. The front follows from the rear end and
+        // the typical length.
         let [typical_length, _] = typical_size_m(class.best_vehicle_class() as usize);
         return match sees_rear(fit) && fit.length_m() < typical_length {
             true => (fit.rear_u_m + typical_length, TRUNCATED_LENGTH_SD_M),
@@ -351,10 +361,11 @@ fn sees_rear(fit: &BoxFit) -> bool {
     side_spacing_m(fit, fit.rear_u_m) < SIDE_SPACING_M
 }
 
-/// Returns the spacing of the columns on the side at the position `u_m` along the box's heading (m); infinite if the box is straight
-/// behind the sensor, so that no side is seen.
+/// Returns the spacing of the columns on the side at the position `u_m` along the box's heading
+/// (m); infinite if the box is straight behind the sensor, so that no side is seen.
 fn side_spacing_m(fit: &BoxFit, u_m: f64) -> f64 {
-    // At distance r and lateral offset y, columns with the azimuth step Δφ hit a side every Δφ·r²/y.
+    // At distance r and lateral offset y, columns with the azimuth step Δφ hit a side every
+    // Δφ·r²/y.
     let (sin, cos) = maths::sin_cos(fit.heading_rad);
     let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);
     let (x, y) = (u_m * cos - middle * sin, u_m * sin + middle * cos);

@@ -1,7 +1,8 @@
 //! Echoes: the pulses that the receiver can distinguish along a beam.
 //!
-//! Sub-rays that end within the length of one pulse add up to one echo. Its power is the sum of their contributions. A
-//! beam that is split by an edge, or spread over the road at a grazing angle, gives several weaker echoes.
+//! Sub-rays that end within the length of one pulse add up to one echo. Its power is the sum of
+//! their contributions. A beam that is split by an edge, or spread over the road at a grazing
+//! angle, gives several weaker echoes.
 
 use std::ops::Mul;
 
@@ -30,8 +31,8 @@ pub(crate) struct Echo {
 }
 
 impl Echo {
-    /// Returns an echo of this power and moment, the sum of powers times ranges (thresholds · m). The strongest contribution gives the
-    /// face, and the range of an echo without power.
+    /// Returns an echo of this power and moment, the sum of powers times ranges (thresholds · m).
+    /// The strongest contribution gives the face, and the range of an echo without power.
     #[inline(always)]
     fn of_sums(power: f32, moment: f32, (strongest_m, face): (f32, u32)) -> Self {
         Self { range_m: if power > 0.0 { moment / power } else { strongest_m }, power, face }
@@ -57,7 +58,7 @@ impl Echoes {
         self.count = 0;
     }
 
-    /// Replaces the echoes by those of the faces that the sub-rays hit.
+    /// Replaces the echoes by the echoes of the faces that the sub-rays hit.
     #[inline(always)]
     pub(crate) fn set<S: Simd>(
         &mut self,
@@ -72,8 +73,8 @@ impl Echoes {
         if is_hit == 0 {
             return;
         }
-        // A sub-ray that hits nothing has the strength of some face, but no inverse range, and so no power. Usually all others hit the
-        // same face.
+        // A sub-ray that hits nothing has the strength of some face, but no inverse range, and so
+        // no power. Usually all others hit the same face.
         let first = hits.face[is_hit.trailing_zeros() as usize];
         let met = u32x8::load_array_ref(simd, &hits.face);
         let strength_m = match met.simd_eq(u32x8::splat(simd, first)).to_bitmask() as u8 & is_hit == is_hit {
@@ -90,13 +91,14 @@ impl Echoes {
         let zero = f32x8::splat(simd, 0.0);
         let reached_m = range_m.simd_lt(f32x8::splat(simd, f32::INFINITY)).select(range_m, zero);
         let (nearest_m, farthest_m) = (range_m.reduce_min(), reached_m.reduce_max());
-        // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to the sums.
+        // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to
+        // the sums.
         if farthest_m <= nearest_m + PULSE_M {
             if farthest_m > 0.0 {
                 let is_strongest = power.simd_eq(power.reduce_max()) & reached_m.simd_gt(zero);
                 let strongest = SUBRAYS - 1 - (is_strongest.to_bitmask() as u8).leading_zeros() as usize;
                 let (moment, power) = ((power * reached_m).to_array(), power.to_array());
-                let sum = |of: [f32; SUBRAYS]| of.into_iter().fold(0.0, |sum, one| sum + one);
+                let sum = |values: [f32; SUBRAYS]| values.into_iter().fold(0.0, |sum, value| sum + value);
                 let strongest_m = reached_m.to_array()[strongest];
                 self.list[0] = Echo::of_sums(sum(power), sum(moment), (strongest_m, hits.face[strongest]));
                 self.count = 1;
@@ -110,10 +112,10 @@ impl Echoes {
         self.merge();
     }
 
-    /// Replaces the echoes by those of a beam that hits only the road, which is face 0.
+    /// Replaces the echoes by the echoes of a beam that hits only the road, which is face 0.
     ///
-    /// The two columns of sub-rays count as equal. A higher sub-ray hits the road farther away, so the echoes are
-    /// already in order of range.
+    /// The two columns of sub-rays count as equal. A higher sub-ray hits the road farther away, so
+    /// the echoes are already in order of range.
     pub(crate) fn set_ground(&mut self, [cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &LinkBudget) {
         let strength = SUBRAY_COLUMNS as f32 * SHARE * link.gain_m2 * ground.strength_m;
         let level = ground.inverse[0] * cos + ground.inverse[1] * sin;
@@ -142,7 +144,7 @@ impl Echoes {
         self.count += 1;
     }
 
-    /// Merges each echo with those that follow it within the length of one pulse.
+    /// Merges each echo with the echoes that follow it within the length of one pulse.
     #[inline(always)]
     fn merge(&mut self) {
         let (mut from, mut echoes) = (0, 0);
@@ -173,8 +175,9 @@ fn sum(parts: impl Iterator<Item = Echo>) -> Echo {
 
 /// Returns the power that is received from sub-rays at the inverse range `per_range` (1/m).
 ///
-/// It is `strength` (thresholds · m³) over the third power of the range: two powers for the spreading of the light, and
-/// one because cos γ is the distance of the face's plane over the range.
+/// It is `strength` (thresholds · m³) over the third power of the range: two powers for the
+/// spreading of the light, and one because cos γ is the distance of the face's plane over the
+/// range.
 #[inline(always)]
 fn received_power<T: Copy + Mul<Output = T>>(per_range: T, strength: T) -> T {
     strength * per_range * per_range * per_range
@@ -201,10 +204,10 @@ mod tests {
         let level = Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         // At 10 m each sub-ray contributes 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
-        let mut found = Echoes::NONE;
-        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => found.set(simd, (&hits, &level), &[face(10.0)], &link));
+        let mut echoes = Echoes::NONE;
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => echoes.set(simd, (&hits, &level), &[face(10.0)], &link));
         let unit = link.gain_m2 / 100.0;
-        found.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
+        echoes.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
     }
 
     #[test]
@@ -222,9 +225,9 @@ mod tests {
 
     #[test]
     fn targets_within_one_pulse_length_give_one_echo() {
-        let one = echoes([10.0, 10.7, 10.2, 10.4, 10.1, 10.3, 10.5, 10.6].map(Some));
-        assert_eq!(one.len(), 1);
-        assert!(one[0].0 > 10.2 && one[0].0 < 10.4, "{one:?}");
+        let merged = echoes([10.0, 10.7, 10.2, 10.4, 10.1, 10.3, 10.5, 10.6].map(Some));
+        assert_eq!(merged.len(), 1);
+        assert!(merged[0].0 > 10.2 && merged[0].0 < 10.4, "{merged:?}");
         let two = echoes([10.0, 10.8, 10.2, 10.4, 10.1, 10.3, 10.5, 10.6].map(Some));
         assert_eq!(two.len(), 2);
     }

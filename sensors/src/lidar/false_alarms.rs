@@ -1,7 +1,9 @@
-//! False alarms: points where there is nothing, because the receiver's noise alone exceeds the detection threshold.
+//! False alarms: points where there is nothing, because the receiver's noise alone exceeds the
+//! detection threshold.
 //!
-//! Noise has no preferred time: within the time in which the receiver listens, every range is as likely as another. The power of a
-//! false alarm is that of the threshold, so that its intensity grows with the square of its range.
+//! Noise has no preferred time: within the listening time of the receiver, every range is equally
+//! likely. A false alarm has the power of the threshold, so its intensity grows with the square of
+//! its range.
 
 use super::noise::{Noise, Purpose};
 use super::pattern::Pattern;
@@ -10,8 +12,8 @@ use super::{LidarScan, Material, PointSource, PointTruth, ScanTruth};
 
 /// Least range of a false alarm (m).
 const NEAREST_M: f32 = 0.5;
-/// Number of beams among which the number of false alarms is drawn at once. Their rate is at most 0.1, so that the probability of none is
-/// that of a number in double precision.
+/// Number of beams among which the number of false alarms is drawn at once. Their rate is at most
+/// 0.1, so double precision can represent the probability of none.
 const BLOCK: usize = 4_096;
 
 /// The receiver of a scan whose noise exceeds its threshold in some beams.
@@ -27,10 +29,11 @@ pub(super) struct FalseAlarms<'a> {
 }
 
 impl FalseAlarms<'_> {
-    /// Appends the false alarms to the scan and to its ground truth. `pose_at` returns the pose of the sensor at the time of a column.
+    /// Appends the false alarms to the scan and to its ground truth. `pose_at` returns the pose of
+    /// the sensor at the time of a column.
     ///
-    /// Every beam has one with the same probability, independently of the others. There are few, so that their number is drawn instead of
-    /// each beam, and then different beams for them.
+    /// Every beam has one with the same probability, independently of the others. There are few, so
+    /// that their number is drawn instead of each beam, and then different beams for them.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pattern has at most 65,535 beams")]
     pub(super) fn append(
         &self,
@@ -79,8 +82,8 @@ impl FalseAlarms<'_> {
     }
 }
 
-/// Returns the number of successes in `trials` independent trials with the probability `rate` (below 1), for a uniform random number: the
-/// inverse of the cumulative probability.
+/// Returns the number of successes in `trials` independent trials with the probability `rate`
+/// (below 1), for a uniform random number: the inverse of the cumulative probability.
 fn binomial(trials: usize, rate: f64, uniform: f64) -> usize {
     let mut probability = power(1.0 - rate, trials);
     let (odds, mut below, mut successes) = (rate / (1.0 - rate), probability, 0);
@@ -111,7 +114,8 @@ mod tests {
 
     #[test]
     fn the_number_of_successes_has_the_probabilities_of_the_binomial_distribution() {
-        // The probabilities of 0 to 3 successes in three trials with 0.2 are 0.512, 0.384, 0.096 and 0.008.
+        // The probabilities of 0 to 3 successes in three trials with 0.2 are 0.512, 0.384, 0.096
+        // and 0.008.
         for (uniform, expected) in
             [(0.001, 0), (0.511, 0), (0.513, 1), (0.895, 1), (0.897, 2), (0.991, 2), (0.993, 3), (1.0, 3)]
         {
@@ -120,7 +124,7 @@ mod tests {
         let draws = 100_000;
         let number = |draw: usize| binomial(BLOCK, 1e-3, (draw as f64 + 0.5) / draws as f64) as f64;
         let (sum, squares) =
-            (0..draws).map(number).fold((0.0, 0.0), |(sum, squares), it| (sum + it, squares + it * it));
+            (0..draws).map(number).fold((0.0, 0.0), |(sum, squares), count| (sum + count, squares + count * count));
         let mean = sum / draws as f64;
         let variance = squares / draws as f64 - mean * mean;
         let expected = BLOCK as f64 * 1e-3;

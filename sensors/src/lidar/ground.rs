@@ -1,9 +1,11 @@
-//! Selection of the points that may belong to a vehicle: those in the region of interest that are not on the ground.
+//! Selection of the points that may belong to a vehicle: the points in the region of interest that
+//! are not on the ground.
 //!
-//! The road returns light only where beams meet it steeply enough: within about 20 m at the usual mounting height. A
-//! point near z = 0 therefore counts as ground up to [`ground_reach_m`]: 40 m, and more for a stronger or a higher sensor. Beyond
-//! that distance a low point is kept, since it can only originate from an object on the road. Its height is that of the beam's
-//! centre, and may be off by half a footprint.
+//! The road returns light only where beams meet it steeply enough: within about 20 m at the usual
+//! mounting height. A point near z = 0 therefore counts as ground up to [`ground_reach_m`]: 40 m,
+//! and more for a stronger or a higher sensor. Beyond that distance a low point is kept, since it
+//! can only originate from an object on the road. Its height is the height of the beam's centre,
+//! with an error of up to half a footprint.
 
 use crate::tracking::MAX_SIDE_AZIMUTH_RAD;
 use closecall_traffic::{Environment, Time, maths};
@@ -19,16 +21,17 @@ use crate::SensorError;
 
 /// Distance from the sensor up to which the road may give returns, at least (m).
 const MIN_GROUND_REACH_M: f32 = 40.0;
-/// Distance by which the pitch of the ego and the motion within a sweep may change the distance of a return (m).
+/// Distance by which the pitch of the ego and the motion within a sweep may change the distance of
+/// a return (m).
 const GROUND_MARGIN_M: f32 = 1.0;
 /// Height below which a point counts as ground, at distance zero (m).
 pub(crate) const GROUND_M: f32 = 0.10;
-/// Increase of that height per metre of distance (rad). It covers three standard deviations of the levelling error, and
-/// the footprint, whose near edge returns more light than its far edge.
+/// Increase of that height per metre of distance (rad). It covers three standard deviations of the
+/// levelling error, and the footprint, whose near edge returns more light than its far edge.
 pub(crate) const GROUND_SLOPE: f32 = 0.005;
-/// Intensity below which a near return is taken for a droplet. A tyre at 60° still has 0.025. The method is
-/// low-intensity outlier removal after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point
-/// clouds".
+/// Intensity below which a near return counts as a droplet. A tyre at 60° still has 0.025. The
+/// method is low-intensity outlier removal after Park et al. 2020, "Fast and accurate desnowing
+/// algorithm for LiDAR point clouds".
 const DROPLET_INTENSITY: f32 = 0.02;
 /// Distance up to which returns are checked for droplets (m).
 const DROPLET_REACH_M: f32 = 15.0;
@@ -36,7 +39,8 @@ const DROPLET_REACH_M: f32 = 15.0;
 /// Number of points that are tested side by side.
 const LANES: usize = 16;
 
-/// Returns the distance from this sensor up to which a dry road may give returns (m), in whole metres.
+/// Returns the distance from this sensor up to which a dry road may give returns (m), in whole
+/// metres.
 #[expect(clippy::cast_possible_truncation, reason = "distances are in single precision")]
 pub(crate) fn ground_reach_m(lidar: &Lidar) -> f32 {
     let link = LinkBudget::new(lidar, &Environment::CLEAR_DAY);
@@ -80,12 +84,13 @@ pub(crate) fn select_candidates(
             let range_m = (back_m * back_m + beside_m * beside_m).sqrt();
             let ground = (range_m < scan.resolution.ground_reach_m) & (z < GROUND_M + GROUND_SLOPE * range_m);
             let droplet = (range_m < DROPLET_REACH_M) & (intensity < DROPLET_INTENSITY);
-            // A sensor that is turned to a side also sees along the ego's flank, where a vehicle has no front that it could see.
+            // A sensor that is turned to a side also sees along the ego's flank, where a vehicle
+            // has no front that it could see.
             let is_behind = is_straight | (beside_m.abs() <= max_side_tan * back_m);
             *kept = inside & is_behind & !ground & !droplet;
         }
         if !are_finite {
-            return Err(SensorError::NotFinite { what: "a LiDAR point", time });
+            return Err(SensorError::NotFinite { quantity: "a LiDAR point", time });
         }
         for (lane, _) in kept.iter().enumerate().filter(|(_, kept)| **kept) {
             let [back_m, left_m] = position_m(scan.x_m[first + lane], scan.y_m[first + lane]);

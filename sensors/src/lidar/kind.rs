@@ -1,11 +1,12 @@
 //! The kinds of LiDAR: scan pattern, rate, footprint and range as a file describes them.
 //!
-//! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its `model`, or a file of its own by
-//! `pattern-file`.
+//! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its
+//! `model`, or a file of its own by `pattern-file`.
 //!
-//! The range of a target of reflectivity ρ that fills the beam follows from one published range R at the reflectivity ρ₀, which is
-//! reached with the probability p: the received power is then P = 1 + Φ⁻¹(p)/T thresholds (see [`super::power`]). The nominal
-//! range of the model, at ρ = 0.5 with probability 0.5, is R·√(P·0.5/ρ₀).
+//! The range of a target of reflectivity ρ that fills the beam follows from one published range R
+//! at the reflectivity ρ₀, which the sensor reaches with the probability p: the received power is
+//! then P = 1 + Φ⁻¹(p)/T thresholds (see [`super::power`]). The nominal range of the model, at ρ =
+//! 0.5 with probability 0.5, is R·√(P·0.5/ρ₀).
 
 use std::f64::consts::SQRT_2;
 use std::sync::{Mutex, PoisonError};
@@ -23,8 +24,9 @@ use super::{LidarModel, MirrorSide};
 const MOUNT_HEIGHT_M: f64 = 0.6;
 /// Distance up to which the road may give returns to a sensor if nothing else is said (m).
 const GROUND_REACH_M: f32 = 40.0;
-/// Power of a usual return from a vehicle (detection thresholds): assumption, that of a grey car that fills the beam at 130 m. The
-/// range of such a point of the SCALA has a standard deviation of 0.05 m.
+/// Power of a usual return from a vehicle (detection thresholds): an assumption, the power of a
+/// grey car that fills the beam at 130 m. The range of such a point of the SCALA has a standard
+/// deviation of 0.05 m.
 const USUAL_POWER: f64 = 2.25;
 /// Decimals to which that standard deviation is rounded, as a factor.
 const SD_DECIMALS: f64 = 1e4;
@@ -53,17 +55,19 @@ pub struct LidarKindConfig {
     pub name: String,
     /// Where the numbers are published.
     pub source: String,
-    /// Elevations of the layers at azimuth 0, without the mirror's contribution (deg): 1 to 64, from the lowest to the highest.
+    /// Elevations of the layers at azimuth 0, without the mirror's contribution (deg): 1 to 64,
+    /// from the lowest to the highest.
     pub layers_deg: Vec<f64>,
-    /// Number of successive layers that share an azimuth shift: a divisor of the number of layers, which makes 4 groups or fewer.
-    /// Default: all layers.
+    /// Number of successive layers that share an azimuth shift: a divisor of the number of layers,
+    /// which makes 4 groups or fewer. Default: all layers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layers_per_group: Option<usize>,
     /// Azimuth shift between successive groups (deg). Default: 0.
     #[serde(default)]
     pub group_shift_deg: f64,
-    /// Coefficients of 1, φ, φ² and φ³ of the elevation that one side of a two-sided mirror adds and the other subtracts (deg, with
-    /// the azimuth φ in deg). Default: the sensor has no such mirror.
+    /// Coefficients of 1, φ, φ² and φ³ of the elevation that one side of a two-sided mirror adds
+    /// and the other subtracts (deg, with the azimuth φ in deg). Default: the sensor has no such
+    /// mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mirror_cubic_deg: Option<[f64; 4]>,
     /// Half of the horizontal field of view (deg): a whole number of azimuth steps.
@@ -80,13 +84,14 @@ pub struct LidarKindConfig {
     pub beam_width_deg: f64,
     /// Height of a beam's footprint (deg).
     pub beam_height_deg: f64,
-    /// Spacing of the layers near the horizon (deg), from which the processing judges what a beam may have missed.
+    /// Spacing of the layers near the horizon (deg). The processing derives from it what a beam may
+    /// have missed.
     pub layer_spacing_deg: f64,
-    /// Scans per second (Hz), at most 25. A rate that does not divide 25 gives scans at alternating distances of whole control
-    /// steps of 40 ms.
+    /// Scans per second (Hz), at most 25. A rate that does not divide 25 gives scans at alternating
+    /// distances of whole control steps of 40 ms.
     pub rate_hz: f64,
-    /// Share of the period in which the field of view is swept (-). Default: that of a head or a mirror that passes 360° of azimuth
-    /// in each period.
+    /// Share of the period in which the field of view is swept (-). Default: the share of a head or
+    /// a mirror that passes 360° of azimuth in each period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sweep_share: Option<f64>,
     /// Range at which a target of `range-reflectivity` is detected with `range-probability` (m).
@@ -125,7 +130,8 @@ pub(crate) struct Resolution {
     pub(crate) mount_height_m: f64,
     /// Distance up to which the road may give returns (m).
     pub(crate) ground_reach_m: f32,
-    /// Intensity at the detection threshold at 1 m (1/m²), by which it grows with the square of the range.
+    /// Intensity at the detection threshold at 1 m (1/m²), by which it grows with the square of the
+    /// range.
     pub(crate) threshold_per_m2: f64,
 }
 
@@ -188,18 +194,21 @@ impl LidarKind {
         Time::from_ns(self.period_ns).s()
     }
 
-    /// Returns whether a scan ends at the control step of `time`: whether a period has ended since the previous step.
+    /// Returns whether a scan ends at the control step of `time`: whether a period has ended since
+    /// the previous step.
     pub(crate) fn is_due(&self, time: Time) -> bool {
         let periods_at = |time_ns: i64| time_ns.div_euclid(self.period_ns);
         periods_at(time.ns()) != periods_at(time.ns() - CONTROL_STEP.ns())
     }
 
-    /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
+    /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to
+    /// scan.
     pub(crate) fn mirror_side_at(&self, time: Time) -> MirrorSide {
         if time.ns().div_euclid(self.period_ns) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
     }
 
-    /// Returns the time after the scan's start at which a column at this azimuth is measured (s), clamped to the sweep.
+    /// Returns the time after the scan's start at which a column at this azimuth is measured (s),
+    /// clamped to the sweep.
     pub(crate) fn sweep_offset_s(&self, azimuth_deg: f64) -> f64 {
         let share = ((azimuth_deg + self.half_field_deg) / (2.0 * self.half_field_deg)).clamp(0.0, 1.0);
         share * self.sweep_ns * 1e-9
@@ -286,11 +295,11 @@ fn number(value: f64, key: &str, range: Range) -> Result<f64, ConfigError> {
 }
 
 /// Returns how many steps fit into a field.
-fn whole_steps(field_deg: f64, step_deg: f64, key: &str, of: &'static str) -> Result<i32, ConfigError> {
+fn whole_steps(field_deg: f64, step_deg: f64, key: &str, field_key: &'static str) -> Result<i32, ConfigError> {
     let steps = field_deg / step_deg;
     if (steps - steps.round()).abs() > STEP_TOLERANCE {
         let rule = format!("{field_deg}° must be a whole number of steps of {step_deg}°, not {steps:.3}");
-        return Err(ConfigError::new(key, Problem::Contradiction { other: of, rule }));
+        return Err(ConfigError::new(key, Problem::Contradiction { other: field_key, rule }));
     }
     #[expect(clippy::cast_possible_truncation, reason = "at most 85° in steps of at least 0.02°")]
     Ok(steps.round() as i32)
@@ -358,7 +367,7 @@ impl Check for LidarKindConfig {
             beam_width_deg: number(self.beam_width_deg, "beam-width-deg", beam)?,
             beam_height_deg: number(self.beam_height_deg, "beam-height-deg", beam)?,
             period_ns,
-            // At the rate of the control loop, the product is that of whole numbers.
+            // At the rate of the control loop, the product is a product of whole numbers.
             sweep_ns: match self.sweep_share {
                 None => period_ns as f64 * half_field_deg / 180.0,
                 Some(_) => period_ns as f64 * share,
@@ -377,12 +386,13 @@ impl Check for LidarKindConfig {
     }
 }
 
-/// Returns the one reference to this kind. A process sees few kinds, so that they are never released.
+/// Returns the one reference to this kind. A process sees few kinds, so that they are never
+/// released.
 fn intern(kind: LidarKind) -> &'static LidarKind {
     static KINDS: Mutex<Vec<&'static LidarKind>> = Mutex::new(Vec::new());
     let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
-    match kinds.iter().find(|known| ***known == kind) {
-        Some(known) => known,
+    match kinds.iter().find(|interned| ***interned == kind) {
+        Some(interned) => interned,
         None => {
             let kind: &'static LidarKind = Box::leak(Box::new(kind));
             kinds.push(kind);
@@ -393,8 +403,9 @@ fn intern(kind: LidarKind) -> &'static LidarKind {
 
 /// Ratio T of the detection threshold to the standard deviation of the receiver's noise.
 ///
-/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time: a rate of 3·10⁻⁵ in each
-/// beam. Makers state 10⁻⁴, and that is the rate of `false-alarm-rate`.
+/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every
+/// third time: a rate of 3·10⁻⁵ in each beam. Makers state 10⁻⁴, and that is the rate of
+/// `false-alarm-rate`.
 pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
 
 /// Reflectivity of the target that defines the nominal range.

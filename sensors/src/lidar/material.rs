@@ -1,8 +1,8 @@
 //! The materials of surfaces and their reflectivity for the laser's light.
 //!
-//! The reflectivity of a material is that of a Lambertian surface that returns the same power at the laser's
-//! wavelength, 905 nm, at normal incidence. If no measurement is cited, the value is an assumption within the usual
-//! range for the material.
+//! The reflectivity of a material is the reflectivity of the Lambertian surface that returns the
+//! same power at the laser's wavelength, 905 nm, at normal incidence. If no measurement is cited,
+//! the value is an assumption within the usual range for the material.
 
 use closecall_traffic::{Appearance, Environment, Plate};
 
@@ -37,12 +37,13 @@ pub enum Material {
     Water,
 }
 
-/// Windows transmit nearly all light or reflect it away from the sensor. Only dust and the edge of the dashboard return
-/// light (assumption).
+/// Windows transmit nearly all light or reflect it away from the sensor. Only dust and the edge of
+/// the dashboard return light (assumption).
 const GLASS: f64 = 0.05;
 /// A clear lens in front of a reflector (assumption).
 const LAMP: f64 = 1.0;
-/// Rubber with carbon black (assumption, in line with the reflectivity of dark rubber in the near infrared).
+/// Rubber with carbon black (assumption, in line with the reflectivity of dark rubber in the near
+/// infrared).
 const TYRE: f64 = 0.05;
 /// Dark moulded plastic (assumption).
 const PLASTIC: f64 = 0.10;
@@ -52,25 +53,27 @@ const TEXTILE: f64 = 0.35;
 const TARPAULIN: f64 = 0.5;
 /// Weathered zinc; only its diffuse reflection counts (assumption).
 const STEEL: f64 = 0.35;
-/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. EN 12899-1 asks 250 of new white
-/// sheeting of class RA2.
+/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ =
+/// π·R_A. EN 12899-1 asks 250 of new white sheeting of class RA2.
 const SIGN: f64 = std::f64::consts::PI * 250.0;
 /// Bark in the near infrared (assumption).
 const BARK: f64 = 0.3;
-/// Worn asphalt in the near infrared: 0.1 to 0.2 (Herold and Roberts 2005, "Spectral characteristics of asphalt road
-/// aging and deterioration").
+/// Worn asphalt in the near infrared: 0.1 to 0.2 (Herold and Roberts 2005, "Spectral
+/// characteristics of asphalt road aging and deterioration").
 const ASPHALT: f64 = 0.15;
-/// Factor on the reflectivity of a wet road. A wet rough surface reflects diffusely about half as much as a dry one
-/// (Lekner and Dorf 1988, "Why some things are darker when wet"). A closed film of water also reflects light away from
-/// a sensor at a grazing angle.
+/// Factor on the reflectivity of a wet road. A wet rough surface reflects diffusely about half as
+/// much as a dry one (Lekner and Dorf 1988, "Why some things are darker when wet"). A closed film
+/// of water also reflects light away from a sensor at a grazing angle.
 const WET_SHARE: f64 = 0.4;
 /// Height of the water film from which the surface counts as fully wet (mm).
 const WET_FILM_MM: f64 = 0.2;
 
 impl Material {
-    /// Returns the equivalent Lambertian reflectivity on a vehicle of this appearance, in this weather.
+    /// Returns the equivalent Lambertian reflectivity on a vehicle of this appearance, in this
+    /// weather.
     ///
-    /// The reflectivity of a plate is that of the LiDAR's configuration; the paint is seen where there is none.
+    /// The LiDAR's configuration gives the reflectivity of a plate. Without a plate, the paint is
+    /// seen.
     pub fn reflectivity(self, plate: Option<f64>, appearance: &Appearance, environment: &Environment) -> f64 {
         match self {
             Self::Paint => appearance.paint_reflectivity,
@@ -90,7 +93,8 @@ impl Material {
     }
 }
 
-/// Returns the reflectivity of a plate in this state, of those that have the reflectivity `usual`; `None` if there is none.
+/// Returns the reflectivity of a plate in this state, if plates usually have the reflectivity
+/// `usual`; `None` if there is none.
 fn plate_of(usual: Option<f64>, state: Plate) -> Option<f64> {
     match state {
         Plate::Clean => usual,
@@ -105,8 +109,8 @@ pub(crate) fn asphalt(environment: &Environment) -> f64 {
     ASPHALT * (1.0 - (1.0 - WET_SHARE) * wetness)
 }
 
-/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates have some
-/// tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
+/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ =
+/// π·R_A. New plates have some tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
 pub(super) const PLATE: f64 = std::f64::consts::PI * 20.0;
 
 /// Share of a plate's reflectivity that remains under dirt (assumption).

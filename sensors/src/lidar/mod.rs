@@ -1,4 +1,5 @@
-//! The rear LiDAR: a sensor model that turns a scene into points, and a processing chain that turns points into boxes.
+//! The rear LiDAR: a sensor model that turns a scene into points, and a processing chain that turns
+//! points into boxes.
 //!
 //! ```text
 //!  Scene ─▶ solids (shapes, roadside) ─▶ targets ─▶ cast ─▶ echoes ─▶ receiver ─▶ LidarScan      the sensor

@@ -6,8 +6,8 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) fn intern_name(name: &str) -> &'static str {
     static NAMES: Mutex<Vec<&'static str>> = Mutex::new(Vec::new());
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
-    match names.iter().find(|known| **known == name) {
-        Some(known) => known,
+    match names.iter().find(|interned| **interned == name) {
+        Some(interned) => interned,
         None => {
             let name: &'static str = Box::leak(name.into());
             names.push(name);

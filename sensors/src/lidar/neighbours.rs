@@ -10,12 +10,13 @@
 //!   └───┴───┴───┴───┘
 //! ```
 //!
-//! The searches of `linfa-nn` differ at the edge of the radius. A k-d tree returns the points that lie exactly at the radius,
-//! while the linear search and the ball tree leave them out (version 0.8.1). This index returns them, as DBSCAN is defined
-//! (Ester et al. 1996) and as scikit-learn does it. `linfa-clustering` counts whatever the index returns.
+//! The searches of `linfa-nn` differ at the edge of the radius. A k-d tree returns the points that
+//! lie exactly at the radius, while the linear search and the ball tree leave them out (version
+//! 0.8.1). This index returns them, as DBSCAN is defined (Ester et al. 1996) and as scikit-learn
+//! does it. `linfa-clustering` counts all points that the index returns.
 //!
-//! The coordinates are kept beside the views that `linfa-nn` asks for. Distances of views would make the clustering slower by two
-//! fifths.
+//! The index keeps the coordinates beside the views that `linfa-nn` requires. Distances between
+//! views would make the clustering slower by two fifths.
 
 use std::ops::Range;
 
@@ -29,7 +30,8 @@ const MAX_CELLS: f64 = 256.0;
 /// Share by which the cells of a query reach beyond its radius, so that rounding hides no point.
 const ROUNDING: f64 = 1e-5;
 
-/// The search on a grid, for points in the plane and `L2Dist`. It is fast if the radius of a query is about the side of a cell.
+/// The search on a grid, for points in the plane and `L2Dist`. It is fast if the radius of a query
+/// is about the side of a cell.
 #[derive(Clone, Debug)]
 pub(crate) struct GridSearch {
     /// Side of a cell, in the unit of the points.
@@ -96,7 +98,8 @@ impl<'a, F: Float> Grid<'a, F> {
             return;
         }
         let point = |row: usize| points.index_axis_move(Axis(0), row);
-        // The start of each cell is one place late, until the points that are sorted into the cell before have moved it.
+        // The start of each cell is one place late, until the points that are sorted into the cell
+        // before have moved it.
         self.starts.resize(self.size[0] * self.size[1] + 2, 0);
         for row in 0..count {
             let cell = self.cell(place(point(row)));
@@ -129,7 +132,8 @@ impl<'a, F: Float> Grid<'a, F> {
         column * self.size[1] + row
     }
 
-    /// Returns the indices in `sorted` of the points that may lie within `range` of a place: one run for each column of cells.
+    /// Returns the indices in `sorted` of the points that may lie within `range` of a place: one
+    /// run for each column of cells.
     fn runs(&self, at: [f64; 2], range: f64) -> impl Iterator<Item = Range<usize>> + Clone {
         let reach = range * (1.0 + ROUNDING);
         let [columns, rows] = [0, 1].map(|axis| {
@@ -154,17 +158,17 @@ fn query<F: Float>(point: ArrayView1<'_, F>) -> Result<[f64; 2], NnError> {
 }
 
 /// Returns the square of the distance of two places.
-fn square(one: [f64; 2], other: [f64; 2]) -> f64 {
-    let (x, y) = (one[0] - other[0], one[1] - other[1]);
+fn square(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (x, y) = (a[0] - b[0], a[1] - b[1]);
     x * x + y * y
 }
 
 impl<F: Float> NearestNeighbourIndex<F> for Grid<'_, F> {
-    /// Looks at every point: DBSCAN does not ask for the nearest ones.
+    /// Looks at every point: DBSCAN does not ask for the nearest neighbours.
     fn k_nearest(&self, point: ArrayView1<'_, F>, k: usize) -> Result<Vec<(ArrayView1<'_, F>, usize)>, NnError> {
         let at = query(point)?;
         let mut nearest: Vec<_> = self.sorted.iter().map(|&(other, row)| (other.reborrow(), row)).collect();
-        nearest.sort_by(|(one, _), (other, _)| square(at, place(*one)).total_cmp(&square(at, place(*other))));
+        nearest.sort_by(|(a, _), (b, _)| square(at, place(*a)).total_cmp(&square(at, place(*b))));
         nearest.truncate(k);
         Ok(nearest)
     }
@@ -237,7 +241,8 @@ mod tests {
         assert!(matches!(index.k_nearest(aview1(&[0.0, 0.0, 0.0]), 1), Err(NnError::WrongDimension)));
     }
 
-    /// Points in whole quarters in half of the cases, so that some lie exactly at a radius of whole quarters.
+    /// Points in whole quarters in half of the cases, so that some lie exactly at a radius of whole
+    /// quarters.
     fn points() -> impl Strategy<Value = Vec<[f64; 2]>> {
         let points = prop::collection::vec((-6.0..6.0_f64, -3.0..300.0_f64), 0..200);
         (points, any::<bool>(), prop::sample::select(vec![0.01, 1.0])).prop_map(|(points, in_quarters, stretch)| {
@@ -248,7 +253,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_neighbours_are_those_of_the_k_d_tree(
+        fn the_neighbours_equal_the_k_d_tree(
             points in points(),
             at in (-8.0..8.0_f64, -4.0..4.0_f64),
             quarters in 0..12_u8,
@@ -261,7 +266,7 @@ mod tests {
         }
 
         #[test]
-        fn the_nearest_are_as_far_as_those_of_the_linear_search(points in points(), k in 0..30_usize) {
+        fn the_nearest_are_as_far_as_in_the_linear_search(points in points(), k in 0..30_usize) {
             let points = ArrayView2::from(&points[..]);
             let (grid, linear) = (GRID.from_batch(&points, L2Dist).unwrap(), LinearSearch.from_batch(&points, L2Dist).unwrap());
             for at in points.rows() {

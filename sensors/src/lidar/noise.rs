@@ -1,8 +1,9 @@
 //! The noise of a scan. Its random numbers are addressed by beam instead of drawn in sequence.
 //!
-//! Each scan draws one key from its random stream. Every number then follows from (key, beam, purpose) through a 64-bit
-//! mix (the finaliser of SplitMix64, Steele et al. 2014). An additional vehicle in the scene therefore does not change
-//! the noise of the beams that do not hit it, as paired runs require.
+//! Each scan draws one key from its random stream. Every number then follows from (key, beam,
+//! purpose) through a 64-bit mix (the finaliser of SplitMix64, Steele et al. 2014). An additional
+//! vehicle in the scene therefore does not change the noise of the beams that do not hit it, as
+//! paired runs require.
 
 use closecall_traffic::Stream;
 use rand::Rng;
@@ -68,7 +69,8 @@ impl Noise {
         Self { key: self.key ^ FAULTS, scale: 1.0 }
     }
 
-    /// Returns other noise for the same scan, for the beams in which the receiver's noise alone exceeds the threshold.
+    /// Returns other noise for the same scan, for the beams in which the receiver's noise alone
+    /// exceeds the threshold.
     pub(crate) fn of_false_alarms(self) -> Self {
         Self { key: self.key ^ FALSE_ALARMS, scale: 1.0 }
     }
@@ -89,11 +91,11 @@ impl Noise {
         ((self.bits(beam, purpose) >> 41) as u32 as f32 + 0.5) * (1.0 / 8_388_608.0)
     }
 
-    /// Returns an approximately normal number with mean 0 and standard deviation 1: a sum of four uniform numbers,
-    /// hence within ±3.47.
+    /// Returns an approximately normal number with mean 0 and standard deviation 1: a sum of four
+    /// uniform numbers, hence within ±3.47.
     ///
-    /// It is faster than an exact normal number, and the same on every machine. The missing tails do not matter for the
-    /// measurement of a single point among several.
+    /// It is faster than an exact normal number, and the same on every machine. The missing tails
+    /// do not matter for the measurement of a single point among several.
     #[inline(always)]
     pub(crate) fn normal(self, beam: usize, purpose: Purpose) -> f32 {
         let bits = self.bits(beam, purpose);

@@ -1,4 +1,5 @@
-//! The scan pattern of a LiDAR: the direction and the footprint of every beam. Here that of the Valeo SCALA, second generation:
+//! The scan pattern of a LiDAR: the direction and the footprint of every beam. The picture shows
+//! the pattern of the Valeo SCALA, second generation:
 //!
 //! ```text
 //!        column 0                    column 326                   column 652
@@ -9,10 +10,11 @@
 //!   layer  0 ┘ group 0          one mirror side raises every layer by 0.14° at φ = 0, the other lowers it
 //! ```
 //!
-//! The azimuth φ is measured about the z axis of the sensor's frame, from its x axis, which points backward: column 0
-//! points to the ego's left, the last column to its right.
+//! The azimuth φ is measured about the z axis of the sensor's frame, from its x axis, which points
+//! backward: column 0 points to the ego's left, the last column to its right.
 //!
-//! A [`LidarKind`] says where the layers and the columns lie. A beam has a footprint. 2 × 4 sub-rays of equal weight sample it.
+//! A [`LidarKind`] says where the layers and the columns lie. A beam has a footprint. 2 × 4
+//! sub-rays of equal weight sample it.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -28,7 +30,8 @@ pub(crate) const SUBRAY_ROWS: usize = 4;
 /// Number of sub-rays in a footprint.
 pub(crate) const SUBRAYS: usize = SUBRAY_COLUMNS * SUBRAY_ROWS;
 
-/// Half of the horizontal field of view of the SCALA (°), which the object-level rear sensor shares.
+/// Half of the horizontal field of view of the SCALA (°), which the object-level rear sensor
+/// shares.
 pub(crate) const HALF_FIELD_DEG: f64 = 66.5;
 
 /// A column of the pattern: the values that its beams have in common.
@@ -66,10 +69,12 @@ pub(crate) struct Elevation {
     pub(crate) cos: [f32; SUBRAY_ROWS],
 }
 
-/// Number of layers, from the lowest, that may meet the road near enough to return light, at the usual heights and tilts.
+/// Number of layers, from the lowest, that may meet the road near enough to return light, at the
+/// usual heights and tilts.
 pub(crate) const ROAD_LAYERS: usize = 8;
 
-/// The centre lines and the lowest sub-rays of the lowest beams of a column, for a test of several layers at once.
+/// The centre lines and the lowest sub-rays of the lowest beams of a column, for a test of several
+/// layers at once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CentreLines {
     /// Cosines of the azimuths.
@@ -106,7 +111,8 @@ impl CentreLines {
 /// Number of successive columns that share bounds.
 pub(crate) const BLOCK_COLUMNS: usize = 16;
 
-/// Bounds of the [`CentreLines`] of a block of columns: the least and the greatest value of each layer.
+/// Bounds of the [`CentreLines`] of a block of columns: the least and the greatest value of each
+/// layer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LineBounds {
     /// Cosines of the azimuths.
@@ -126,32 +132,33 @@ pub(crate) struct LineBounds {
 impl LineBounds {
     /// Returns the bounds of the lines of a block.
     fn new(lines: &[CentreLines]) -> Self {
-        let of = |value: fn(&CentreLines) -> &[f32; ROAD_LAYERS]| {
+        let extremes = |value: fn(&CentreLines) -> &[f32; ROAD_LAYERS]| {
             let fold = |from, pick: fn(f32, f32) -> f32| {
-                std::array::from_fn(|layer| lines.iter().map(|of| value(of)[layer]).fold(from, pick))
+                std::array::from_fn(|layer| lines.iter().map(|column| value(column)[layer]).fold(from, pick))
             };
             [fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max)]
         };
         Self {
-            cos: of(|lines| &lines.cos),
-            sin: of(|lines| &lines.sin),
-            tan: of(|lines| &lines.tan),
-            cosine: of(|lines| &lines.cosine),
-            lowest_tan: of(|lines| &lines.lowest_tan),
-            lowest_cosine: of(|lines| &lines.lowest_cosine),
+            cos: extremes(|lines| &lines.cos),
+            sin: extremes(|lines| &lines.sin),
+            tan: extremes(|lines| &lines.tan),
+            cosine: extremes(|lines| &lines.cosine),
+            lowest_tan: extremes(|lines| &lines.lowest_tan),
+            lowest_cosine: extremes(|lines| &lines.lowest_cosine),
         }
     }
 }
 
 /// The scan pattern: all beams of both mirror sides, in the sensor's frame.
 ///
-/// A direction is stored as (cos φ, sin φ, tan θ). The horizontal part of this vector has length 1: multiplied by a
-/// horizontal distance, it gives the point at that distance.
+/// A direction is stored as (cos φ, sin φ, tan θ). The horizontal part of this vector has length 1:
+/// multiplied by a horizontal distance, it gives the point at that distance.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     kind: &'static LidarKind,
     pub(crate) columns: Vec<Column>,
-    /// Elevations of all beams, for each mirror side; once if the sensor has no mirror with two sides.
+    /// Elevations of all beams, for each mirror side; once if the sensor has no mirror with two
+    /// sides.
     elevations: Vec<Vec<Elevation>>,
     /// Centre lines of all columns, for each mirror side.
     centre_lines: Vec<Vec<CentreLines>>,
@@ -164,8 +171,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Returns the pattern of a kind of LiDAR, which all scanners of this kind share. A process sees few kinds, so that the patterns are
-    /// never released.
+    /// Returns the pattern of a kind of LiDAR, which all scanners of this kind share. A process
+    /// sees few kinds, so that the patterns are never released.
     pub(crate) fn shared(kind: &'static LidarKind) -> &'static Self {
         static PATTERNS: Mutex<Vec<&'static Pattern>> = Mutex::new(Vec::new());
         let mut patterns = PATTERNS.lock().unwrap_or_else(PoisonError::into_inner);
@@ -189,10 +196,10 @@ impl Pattern {
         let elevations: Vec<Vec<Elevation>> = sides
             .iter()
             .map(|mirror_side| {
-                let of = |column: &Column| -> Vec<Elevation> {
+                let column_elevations = |column: &Column| -> Vec<Elevation> {
                     (0..kind.layers()).map(|layer| elevation(kind, layer, column.azimuth_deg, *mirror_side)).collect()
                 };
-                columns.iter().flat_map(of).collect()
+                columns.iter().flat_map(column_elevations).collect()
             })
             .collect();
         let of_side = |elevations: &Vec<Elevation>| {
@@ -233,7 +240,8 @@ impl Pattern {
         &self.line_bounds[mirror_side as usize % self.line_bounds.len()][block]
     }
 
-    /// Returns the range of columns whose footprints may touch azimuths from `low_deg` to `high_deg`.
+    /// Returns the range of columns whose footprints may touch azimuths from `low_deg` to
+    /// `high_deg`.
     pub(crate) fn columns_between(&self, low_deg: f64, high_deg: f64) -> std::ops::Range<usize> {
         let half = 0.5 * self.kind.beam_width_deg;
         let shift = self.greatest_shift_deg();
@@ -254,7 +262,8 @@ impl Pattern {
         self.kind.group_shift_deg * (self.kind.groups() - 1) as f64
     }
 
-    /// Returns the range of layers whose footprints may touch elevations from `low_deg` to `high_deg`.
+    /// Returns the range of layers whose footprints may touch elevations from `low_deg` to
+    /// `high_deg`.
     pub(crate) fn layers_between(
         &self,
         mirror_side: MirrorSide,
@@ -393,7 +402,8 @@ mod tests {
         // φ = 0: c = 0.1412. Layer 7 is g = 1, l = 3: 1.8075 + 2.564 − 4.749 = −0.3775.
         assert!((at(MirrorSide::Plus, 326, 7).1.to_degrees() - -0.2363).abs() < 1e-9);
         assert!((at(MirrorSide::Minus, 326, 7).1.to_degrees() - -0.5187).abs() < 1e-9);
-        // φ = 66.5: 0.004447 − 0.022784 − 0.081995 + 0.1412 = 0.040868. Layer 15: 1.8075 + 7.692 − 4.749 = 4.7505.
+        // φ = 66.5: 0.004447 − 0.022784 − 0.081995 + 0.1412 = 0.040868. Layer 15: 1.8075 + 7.692 −
+        // 4.749 = 4.7505.
         assert!((at(MirrorSide::Plus, 652, 15).1.to_degrees() - 4.791_368).abs() < 1e-5);
         assert!((at(MirrorSide::Plus, 652, 15).0.to_degrees() - (66.5 + 3.0 * 0.0181)).abs() < 1e-9);
     }
@@ -416,15 +426,15 @@ mod tests {
     #[test]
     fn an_azimuth_range_includes_every_footprint_that_it_touches() {
         let pattern = scala();
-        let found = pattern.columns_between(-0.3, 0.3);
+        let columns = pattern.columns_between(-0.3, 0.3);
         for (index, column) in pattern.columns.iter().enumerate() {
             let reaches = (0..4).any(|g| {
                 let centre = column.azimuth_deg + 0.0181 * f64::from(g);
                 centre + 0.0625 >= -0.3 && centre - 0.0625 <= 0.3
             });
-            assert!(!reaches || found.contains(&index), "column {index}");
+            assert!(!reaches || columns.contains(&index), "column {index}");
         }
-        assert!(found.len() <= 7);
+        assert!(columns.len() <= 7);
         assert!(pattern.columns_between(70.0, 80.0).is_empty());
     }
 

@@ -1,35 +1,38 @@
 //! The link budget: received power, detection threshold and range noise.
 //!
-//! A surface element of reflectivity ρ covers the share f of the footprint, at range R and incidence angle γ. With the
-//! extinction coefficient α of the air, its received power is
+//! A surface element of reflectivity ρ covers the share f of the footprint, at range R and
+//! incidence angle γ. With the extinction coefficient α of the air, its received power is
 //!
 //! ```text
 //!   P ∝ f · ρ · cos γ · exp(−2·α·R) / R²
 //! ```
 //!
-//! Powers are in multiples of the detection threshold. The receiver adds normal noise with a standard deviation of 1/T
-//! of the threshold. It reports a return if the sum exceeds the threshold: with probability 0.5 at P = 1, and with 0.9
-//! at P = 1.26. This single step yields the detection probability, its dependence on all terms of the formula, and the
-//! scatter of the intensities.
+//! Powers are in multiples of the detection threshold. The receiver adds normal noise with a
+//! standard deviation of 1/T of the threshold. It reports a return if the sum exceeds the
+//! threshold: with probability 0.5 at P = 1, and with 0.9 at P = 1.26. This single step yields the
+//! detection probability, its dependence on all terms of the formula, and the scatter of the
+//! intensities.
 //!
-//! Calibration: P = 1 for a surface of reflectivity 0.5 that faces the sensor and fills the footprint at the nominal
-//! range, in air that does not attenuate. The nominal range of the SCALA, 200 m, is an assumption, and so are the reflectivity and the
-//! probability that it refers to: the maker publishes none of them. 150 to 250 m are plausible. A surface of reflectivity 0.8 is then
-//! detected with probability 0.9 up to 226 m, and one of reflectivity 0.1 up to 80 m.
+//! Calibration: P = 1 for a surface of reflectivity 0.5 that faces the sensor and fills the
+//! footprint at the nominal range, in air that does not attenuate. The nominal range of the SCALA,
+//! 200 m, is an assumption, and so are the reflectivity and the probability that it refers to: the
+//! maker publishes none of them. 150 to 250 m are plausible. A surface of reflectivity 0.8 is then
+//! detected with probability 0.9 up to 226 m, and a surface of reflectivity 0.1 up to 80 m.
 
 use closecall_traffic::{Environment, KOSCHMIEDER, maths, rain_db_per_km};
 
 use super::Lidar;
 use super::kind::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
 
-/// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations, and cannot raise the
-/// return above the threshold.
+/// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations,
+/// and cannot raise the return above the threshold.
 pub(crate) const MIN_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
-/// Extinction in dB/km that corresponds to an extinction of 1/m: decibels per neper of power, times metres per
-/// kilometre.
+/// Extinction in dB/km that corresponds to an extinction of 1/m: decibels per neper of power, times
+/// metres per kilometre.
 const DB_PER_KM_OVER_PER_M: f64 = 4_342.944_819;
 
-/// Extinction below which backscatter from the air cannot be distinguished from noise (1/m): a visibility of 1 km.
+/// Extinction below which backscatter from the air cannot be distinguished from noise (1/m): a
+/// visibility of 1 km.
 const FOG_FROM_PER_M: f32 = 0.004;
 
 /// The link budget between a surface and the receiver in given weather.
@@ -39,7 +42,8 @@ pub(crate) struct LinkBudget {
     pub(crate) gain_m2: f32,
     /// Extinction coefficient α of the air (1/m).
     pub(crate) extinction_per_m: f32,
-    /// Standard deviation of the measured range at high power, and the additional one at the detection threshold (m).
+    /// Standard deviation of the measured range at high power, and the additional one at the
+    /// detection threshold (m).
     range_sd_m: [f32; 2],
     /// Range beyond which nothing is reported (m).
     pub(crate) max_range_m: f32,
@@ -58,7 +62,8 @@ impl LinkBudget {
         }
     }
 
-    /// Returns the standard deviation of the measured range (m): 0.03 m for a strong return of the SCALA, 0.1 m at the threshold.
+    /// Returns the standard deviation of the measured range (m): 0.03 m for a strong return of the
+    /// SCALA, 0.1 m at the threshold.
     pub(crate) fn range_sd_m(&self, power: f32) -> f32 {
         let [strong, at_threshold] = self.range_sd_m;
         let weak = at_threshold / power.max(1.0);
@@ -76,9 +81,11 @@ impl LinkBudget {
     }
 }
 
-/// Returns the extinction coefficient of the air (1/m): the greater of the values for the visibility and for the rain.
+/// Returns the extinction coefficient of the air (1/m): the greater of the values for the
+/// visibility and for the rain.
 ///
-/// The two are not added, because a visibility observed in rain already includes the extinction of the rain.
+/// The two are not added, because a visibility observed in rain already includes the extinction of
+/// the rain.
 pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
     (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km(environment) / DB_PER_KM_OVER_PER_M)
 }

@@ -1,8 +1,9 @@
 //! The returns of guard rails that a scan can leave out, since the detector would discard them.
 //!
-//! On a straight road, each column meets the face of a rail at one distance in the plane. A point lies on the centre line of its
-//! beam, not nearer than that distance but for the error of its range. Along that line, the lateral distance from the road
-//! grows. If the nearest possible point is beyond the region of interest, all points of the column are:
+//! On a straight road, each column meets the face of a rail at one distance in the plane. A point
+//! lies on the centre line of its beam, at that distance or beyond, apart from the error of its
+//! range. Along that line, the lateral distance from the road grows. If the nearest possible point
+//! is beyond the region of interest, all points of the column are:
 //!
 //! ```text
 //!   sensor o--.__                      region of interest
@@ -11,8 +12,8 @@
 //!   =========================*====     rail
 //! ```
 //!
-//! A pulse that meets the rail and the road in front of it gives a point between them. The beam must then be higher than the
-//! rail's lower edge, which it is not up to [`narrow_to_m`].
+//! A pulse that meets the rail and the road in front of it gives a point between them. The beam
+//! must then be higher than the rail's lower edge, which it is not up to [`narrow_to_m`].
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -48,7 +49,8 @@ pub(crate) struct RailReturns {
     narrow_to_m: f32,
 }
 
-/// Returns the distance up to which a beam of this height (°) is lower than the lower edge of a rail (m): 30 m for 0.6°.
+/// Returns the distance up to which a beam of this height (°) is lower than the lower edge of a
+/// rail (m): 30 m for 0.6°.
 #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
 pub(crate) fn narrow_to_m(beam_height_deg: f64) -> f32 {
     let exact_m = BELOW_RAIL_M / maths::tan((BEAM_MARGIN * beam_height_deg).to_radians());
@@ -56,8 +58,8 @@ pub(crate) fn narrow_to_m(beam_height_deg: f64) -> f32 {
 }
 
 impl RailReturns {
-    /// Returns the limits for beams of this height (°), or `None` on a curved road, on which the distance of the rails varies within
-    /// a column.
+    /// Returns the limits for beams of this height (°), or `None` on a curved road, on which the
+    /// distance of the rails varies within a column.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     pub(crate) fn new(lane: &LaneGeometry, link: &LinkBudget, beam_height_deg: f64) -> Option<Self> {
         (lane.curvature_per_m == 0.0).then(|| Self {
@@ -68,8 +70,8 @@ impl RailReturns {
         })
     }
 
-    /// Returns true if the detector would discard every point that the column may give of the guard rails among these parts. `pose` is
-    /// the ego's estimate at the time of the column.
+    /// Returns true if the detector would discard every point that the column may give of the guard
+    /// rails among these parts. `pose` is the ego's estimate at the time of the column.
     #[inline(always)]
     pub(crate) fn are_discarded<S: Simd>(
         &self,
@@ -94,8 +96,8 @@ impl RailReturns {
         inverse == 0.0 || nearest_m > 0.0 && self.are_beyond(nearest_m, &column.centre, pose)
     }
 
-    /// Returns true for a sensor that is not turned if all points at least `nearest_m` from it, in these directions, are beyond the
-    /// region of interest.
+    /// Returns true for a sensor that is not turned if all points at least `nearest_m` from it, in
+    /// these directions, are beyond the region of interest.
     #[inline(always)]
     fn are_beyond(&self, nearest_m: f32, azimuths: &[[f32; 2]; GROUPS], pose: &SensorPoseEstimate) -> bool {
         let left_of_road = |[x_m, y_m, _]: [f32; 3]| y_m - self.slope * x_m;
@@ -129,8 +131,8 @@ impl<S: Simd> Azimuths<S> {
         Self { cos: lanes(column.cos), sin: lanes(column.sin) }
     }
 
-    /// Returns a bound on the inverse distance in the plane at which the sub-rays of each azimuth meet a solid (1/m); less than 0 if
-    /// none does.
+    /// Returns a bound on the inverse distance in the plane at which the sub-rays of each azimuth
+    /// meet a solid (1/m); less than 0 if none does.
     ///
     /// A ray meets a convex solid at the least inverse distance of its front-facing faces.
     #[inline(always)]

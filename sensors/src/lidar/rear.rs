@@ -1,4 +1,5 @@
-//! The rear LiDAR as the simulation loop uses it: one call turns a scene into points, another turns points into boxes.
+//! The rear LiDAR as the simulation loop uses it: one call turns a scene into points, another turns
+//! points into boxes.
 
 use closecall_traffic::Stream;
 
@@ -30,8 +31,8 @@ impl RearLidar {
         self.scanner.scan(scene, rng)
     }
 
-    /// Scans `scene` with a fault of the sensor. The processing takes the road to be that of `believed`, the scene as the ego
-    /// believes it to be. Draws exactly one number from `rng`.
+    /// Scans `scene` with a fault of the sensor. The processing assumes the road of `believed`, the
+    /// scene as the ego believes it to be. Draws exactly one number from `rng`.
     pub(crate) fn scan_with(
         &mut self,
         [scene, believed]: [&Scene<'_>; 2],
@@ -73,8 +74,8 @@ impl RearLidar {
         self.scanner.is_dark()
     }
 
-    /// Returns this LiDAR with the complete latest scan: with the points of the bare road, which the simulation leaves
-    /// out because the detector discards them. The detections are the same.
+    /// Returns this LiDAR with the complete latest scan: with the points of the bare road, which
+    /// the simulation leaves out because the detector discards them. The detections are the same.
     ///
     /// # Errors
     /// Returns the errors of [`Detector::detect`].
@@ -91,7 +92,8 @@ impl RearLidar {
         self.scanner.latest()
     }
 
-    /// Clusters the latest scan once more, and returns what DBSCAN has made of it. Returns no points before the first scan.
+    /// Clusters the latest scan once more, and returns what DBSCAN has made of it. Returns no
+    /// points before the first scan.
     ///
     /// # Errors
     /// Returns the errors of [`Detector::detect`].

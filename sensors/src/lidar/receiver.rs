@@ -1,7 +1,8 @@
-//! The receiver: decides which echoes are detected, and computes the points that are reported for them.
+//! The receiver: decides which echoes are detected, and computes the points that are reported for
+//! them.
 //!
-//! The first and the last detected echo of each beam are reported. Their points lie on the *centre* line of the beam,
-//! because the sensor cannot know which part of the footprint returned the light.
+//! The first and the last detected echo of each beam are reported. Their points lie on the *centre*
+//! line of the beam, because the sensor cannot know which part of the footprint returned the light.
 
 use fearless_simd::Simd;
 
@@ -48,7 +49,7 @@ impl SensorPoseEstimate {
             deskew: [1.0, 0.0, 0.0, 0.0],
             turned: lidar.is_turned().then(|| {
                 let axes = turned_axes(lidar, pitch_rad).inverse();
-                std::array::from_fn(|of| std::array::from_fn(|axis| axes[(axis, of)] as f32))
+                std::array::from_fn(|column| std::array::from_fn(|axis| axes[(axis, column)] as f32))
             }),
         }
     }
@@ -95,7 +96,8 @@ impl SensorPoseEstimate {
         self.at_end([along(0), along(1), along(2)])
     }
 
-    /// Does what [`SensorPoseEstimate::ego_frame_point_m`] does for a sensor that is not turned, without branches.
+    /// Does what [`SensorPoseEstimate::ego_frame_point_m`] does for a sensor that is not turned,
+    /// without branches.
     #[inline(always)]
     pub(crate) fn level_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let ahead = self.sensor_m[0] - self.cos * x + self.sin * z;
@@ -104,12 +106,14 @@ impl SensorPoseEstimate {
         self.at_end([ahead, left, above])
     }
 
-    /// Returns by how much a sensor that is not turned sees a point higher for each metre along its axis, and for each metre above it.
+    /// Returns by how much a sensor that is not turned sees a point higher for each metre along its
+    /// axis, and for each metre above it.
     pub(crate) fn level_slopes(&self) -> [f32; 2] {
         [self.sin, self.cos]
     }
 
-    /// Turns a direction of a sensor that is not turned from its frame to the ego's frame at the end of the sweep.
+    /// Turns a direction of a sensor that is not turned from its frame to the ego's frame at the
+    /// end of the sweep.
     #[inline(always)]
     pub(crate) fn level_direction(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let [cos, sin, ..] = self.deskew;
@@ -117,7 +121,8 @@ impl SensorPoseEstimate {
         [cos * ahead + sin * y, sin * ahead - cos * y, above]
     }
 
-    /// Transforms a point from the ego's frame at the time of the column to that at the end of the sweep (m).
+    /// Transforms a point from the ego's frame at the time of the column to that at the end of the
+    /// sweep (m).
     #[inline(always)]
     fn at_end(&self, [ahead, left, above]: [f32; 3]) -> [f32; 3] {
         let [cos, sin, shift_x, shift_y] = self.deskew;
@@ -160,7 +165,8 @@ pub(crate) struct Receiver<'a> {
 }
 
 impl Receiver<'_> {
-    /// Appends the detected returns of these layers (a bit mask) of this column to the scan and to its ground truth.
+    /// Appends the detected returns of these layers (a bit mask) of this column to the scan and to
+    /// its ground truth.
     #[inline(always)]
     pub(crate) fn receive<S: Simd>(
         &self,
@@ -203,8 +209,8 @@ impl Receiver<'_> {
         soft::droplet_effect(at, centre, self.plumes, (self.targets, self.link, self.noise))
     }
 
-    /// Returns the number of beams on which droplets give a return that may be detected, and of those that are looked at closely, whose
-    /// layers are given (a bit mask).
+    /// Returns two numbers of beams, of the layers in a bit mask: the beams on which droplets may
+    /// give a detectable return, and the beams that the model examines closely.
     #[cfg(test)]
     pub(crate) fn droplet_returns(&self, looked_at: u64) -> [usize; 2] {
         let mut counts = [0; 2];
@@ -218,7 +224,8 @@ impl Receiver<'_> {
         counts
     }
 
-    /// Appends the first and the last detected return of a beam to the scan and to its ground truth.
+    /// Appends the first and the last detected return of a beam to the scan and to its ground
+    /// truth.
     #[inline(always)]
     fn detect(
         &self,
@@ -237,7 +244,8 @@ impl Receiver<'_> {
         });
         let hard = echoes.iter().map(|echo| {
             let face = &self.targets.faces[echo.face as usize];
-            // The air can only attenuate: an echo that is too weak without attenuation needs no exponential.
+            // The air can only attenuate: an echo that is too weak without attenuation needs no
+            // exponential.
             let is_strong = echo.power > MIN_POWER;
             let through =
                 if is_strong { self.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
@@ -259,7 +267,8 @@ impl Receiver<'_> {
         }
     }
 
-    /// Returns the measurement if the power with noise exceeds the threshold and the return is not dropped.
+    /// Returns the measurement if the power with noise exceeds the threshold and the return is not
+    /// dropped.
     #[inline(always)]
     fn detect_one(&self, address: usize, potential: PotentialReturn) -> Option<DetectedReturn> {
         if !(potential.power > MIN_POWER) || potential.range_m > self.link.max_range_m {
@@ -276,20 +285,20 @@ impl Receiver<'_> {
 
     /// Appends a detected return to the scan and to its ground truth.
     #[inline(always)]
-    fn append(&self, layer: usize, found: &DetectedReturn, scan: &mut LidarScan, truth: &mut ScanTruth) {
+    fn append(&self, layer: usize, detected: &DetectedReturn, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let [tan, cosine] = self.elevations[layer].centre;
-        let level = found.measured_m * cosine;
+        let level = detected.measured_m * cosine;
         let [x, y, z] = self.pose.ego_frame_point_m([level * cos, level * sin, level * tan]);
         scan.x_m.push(x);
         scan.y_m.push(y);
         scan.z_m.push(z);
-        let square = found.measured_m * found.measured_m;
-        scan.intensity.push((found.measured_power * square / self.link.gain_m2).min(MAX_INTENSITY));
+        let square = detected.measured_m * detected.measured_m;
+        scan.intensity.push((detected.measured_power * square / self.link.gain_m2).min(MAX_INTENSITY));
         scan.offset_ns.push(self.column.offset_ns);
         #[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 65,535 beams")]
         scan.beam.push((self.column_index * self.elevations.len() + layer) as u16);
-        let PotentialReturn { range_m, source, material, .. } = found.potential;
+        let PotentialReturn { range_m, source, material, .. } = detected.potential;
         truth.points.push(PointTruth { source, material, range_m });
     }
 }

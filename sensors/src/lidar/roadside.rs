@@ -1,4 +1,5 @@
-//! What stands along the road: guard rails with their posts along both edges, signs, gantries and trees.
+//! Objects along the road: guard rails with their posts along both edges, signs, gantries and
+//! trees.
 
 use closecall_traffic::{PlanePose, Road};
 
@@ -9,13 +10,13 @@ use closecall_traffic::roadside::{BESIDE_M, GANTRY_M, LEG_HALF_M, SHEET_M, SIGN_
 
 const BEAM_LOW_M: f64 = 0.44;
 const POST_WIDTH_M: f64 = 0.10;
-/// Length of the modelled rails behind the ego (m). Beyond this distance steel at so grazing an angle gives no return,
-/// although the rail could still occlude something.
+/// Length of the modelled rails behind the ego (m). Beyond this distance steel at so grazing an
+/// angle gives no return, although the rail could still occlude something.
 const RAIL_REACH_M: f64 = 160.0;
 /// Length behind the ego on which posts are modelled (m).
 const POST_REACH_M: f64 = 60.0;
-/// Length of the chords that approximate a curved rail (m). At the tightest curvature that a road may have, a chord is
-/// 4 cm off the arc.
+/// Length of the chords that approximate a curved rail (m). At the tightest curvature that a road
+/// may have, a chord is 4 cm off the arc.
 const CHORD_M: f64 = 12.0;
 
 /// A solid, and the pose of its frame in the plane.
@@ -36,7 +37,8 @@ pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedS
             placed.push((beam, road.plane_pose(0.5 * (from + to), d_m, 0.0)));
             from = to;
         }
-        // Posts are fixed to the road: their positions along it are multiples of the spacing, wherever the ego is.
+        // Posts are fixed to the road: their positions along it are multiples of the spacing,
+        // wherever the ego is.
         let mut index = ((s_m - POST_REACH_M) / POST_SPACING_M).ceil();
         while index * POST_SPACING_M < s_m {
             let half = 0.5 * POST_WIDTH_M;

@@ -15,20 +15,24 @@ pub enum MirrorSide {
     Minus,
 }
 
-/// A LiDAR scan as a structure of arrays. All arrays have the same length: one entry for each return.
+/// A LiDAR scan as a structure of arrays. All arrays have the same length: one entry for each
+/// return.
 ///
-/// Coordinates are in the ego's vehicle frame *at the scan's end*: the ego's motion during the sweep and its measured
-/// pitch are compensated. The motion of other vehicles is not: a point lies where its target was when the point was
-/// measured. A beam that is split by an edge gives two returns, the nearer one first.
+/// Coordinates are in the ego's vehicle frame *at the scan's end*: the ego's motion during the
+/// sweep and its measured pitch are compensated. The motion of other vehicles is not: a point lies
+/// where its target was when the point was measured. A beam that is split by an edge gives two
+/// returns, the nearer one first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LidarScan {
     /// Time at which the first column was measured.
     pub start: Time,
-    /// Time at which the last column was measured. The coordinates refer to the ego's pose at this time.
+    /// Time at which the last column was measured. The coordinates refer to the ego's pose at this
+    /// time.
     pub end: Time,
     /// Side of the mirror that deflected this scan.
     pub mirror_side: MirrorSide,
-    /// Longitudinal position of the sensor in the ego's frame (m): negative, because it is in the rear bumper.
+    /// Longitudinal position of the sensor in the ego's frame (m): negative, because it is in the
+    /// rear bumper.
     pub sensor_x_m: f32,
     /// Lateral position of the sensor in the ego's frame, positive to the left (m).
     pub sensor_y_m: f32,
@@ -42,8 +46,8 @@ pub struct LidarScan {
     pub y_m: Vec<f32>,
     /// Height of each point above the ground (m).
     pub z_m: Vec<f32>,
-    /// Intensity of each point: received power × range², scaled to the reflectivity of a target that faces the sensor
-    /// and fills the beam.
+    /// Intensity of each point: received power × range², scaled to the reflectivity of a target
+    /// that faces the sensor and fills the beam.
     pub intensity: Vec<f32>,
     /// Time of measurement of each point after `start` (ns).
     pub offset_ns: Vec<u32>,
@@ -114,14 +118,15 @@ impl PointSource {
     }
 }
 
-/// The beam of a point, and what the sensor measured along it.
+/// The beam of a point, and the measurement of the sensor along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointBeam {
     /// Index of the column, in the order of the sweep.
     pub column: u16,
     /// Index of the layer, from the lowest.
     pub layer: u16,
-    /// Azimuth of the beam's centre about the sensor's vertical axis, from its viewing axis, counter-clockwise seen from above (rad).
+    /// Azimuth of the beam's centre about the sensor's vertical axis, from its viewing axis,
+    /// counter-clockwise seen from above (rad).
     pub azimuth_rad: f64,
     /// Elevation of the beam's centre (rad).
     pub elevation_rad: f64,
@@ -140,7 +145,8 @@ pub struct PointTruth {
     pub range_m: f32,
 }
 
-/// The ground truth of the points of a scan, in the same order. The processing chain has no access to it.
+/// The ground truth of the points of a scan, in the same order. The processing chain has no access
+/// to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanTruth {
     /// Ground truth of each point.

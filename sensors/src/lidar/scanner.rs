@@ -1,8 +1,9 @@
 //! The scanner: turns a scene into a scan, whose points have noise and a time of measurement each.
 //!
-//! The scan ends at the scene's time, and its sweep takes 14.8 ms. Each solid is frozen at the instant at which the
-//! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
-//! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
+//! The scan ends at the scene's time, and its sweep takes 14.8 ms. Each solid is frozen at the
+//! instant at which the sweep crosses the middle of its vehicle. The error is small: the sweep
+//! crosses the width of a vehicle in 0.4 ms at 30 m and in 4 ms at 3 m, and the vehicle moves
+//! relative to the ego by millimetres to centimetres in that time.
 
 use closecall_traffic::{Stream, Time};
 use fearless_simd::{Level, Simd};
@@ -26,7 +27,7 @@ use super::{LaneGeometry, Lidar, LidarScan, MirrorSide, ScanTruth};
 use crate::Scene;
 use crate::faults::LidarFault;
 
-/// What a sweep needs besides the targets. It is kept, so that the latest sweep can be repeated.
+/// The input of a sweep besides the targets. It is kept, so that the latest sweep can be repeated.
 #[derive(Clone, Copy, Debug)]
 struct Sweep {
     mirror_side: MirrorSide,
@@ -34,9 +35,10 @@ struct Sweep {
     pose: SensorPoseEstimate,
     link: LinkBudget,
     noise: Noise,
-    /// What tells the returns of guard rails that the detector would discard; `None` if the sensor has a fault.
+    /// What tells the returns of guard rails that the detector would discard; `None` if the sensor
+    /// has a fault.
     rails: Option<RailReturns>,
-    /// What a fault does to the points, and the road if guard rails stand along it.
+    /// The effect of a fault on the points, and the road if it has guard rails.
     fault: Option<(LidarFault, Option<LaneGeometry>)>,
 }
 
@@ -47,11 +49,13 @@ enum Extent {
     Complete,
     /// All returns, up to the first column that has one.
     UntilFirst,
-    /// All returns but those of the bare road and of guard rails that the detector would discard.
+    /// All returns except returns of the bare road and of guard rails that the detector would
+    /// discard.
     WithoutBackground,
 }
 
-/// The scanner of the rear LiDAR. It keeps no state from scan to scan except the latest sweep and allocated memory.
+/// The scanner of the rear LiDAR. It keeps no state from scan to scan except the latest sweep and
+/// allocated memory.
 #[derive(Clone, Debug)]
 pub struct Scanner {
     lidar: Lidar,
@@ -78,8 +82,9 @@ pub struct Scanner {
     false_alarms: usize,
 }
 
-/// Returns the vector registers of this processor in which a sweep is fastest. AVX-512 gains nothing over AVX2, since all lanes fit into
-/// registers of the latter, and takes longer where functions are called that use narrower registers.
+/// Returns the vector registers of this processor in which a sweep is fastest. AVX-512 gains
+/// nothing over AVX2, since all lanes fit into AVX2 registers. It takes longer where it calls
+/// functions that use narrower registers.
 fn fastest_level() -> Level {
     let widest = Level::new();
     #[cfg(target_arch = "x86_64")]
@@ -105,7 +110,7 @@ impl Scanner {
             active: ActiveParts::default(),
             hits: ColumnHits::new(lidar.kind.layers()),
             droplets: ColumnDroplets::new(lidar.kind.layers()),
-            // One return per beam. What is not used is never touched.
+            // One return per beam. Unused memory is never touched.
             scan: LidarScan::with_capacity(lidar.kind.beams()),
             truth: ScanTruth { points: Vec::with_capacity(lidar.kind.beams()) },
             added: Vec::new(),
@@ -114,7 +119,8 @@ impl Scanner {
         }
     }
 
-    /// Returns the latest scan, without the points of the bare road and of guard rails that the detector would discard.
+    /// Returns the latest scan, without the points of the bare road and of guard rails that the
+    /// detector would discard.
     pub fn latest(&self) -> &LidarScan {
         &self.scan
     }
@@ -149,7 +155,8 @@ impl Scanner {
         self.scan_with((scene, &LaneGeometry::from_scene(scene)), rng, None)
     }
 
-    /// Replaces the latest scan by one without points, as of a sensor that is silent. Draws exactly one number from `rng`.
+    /// Replaces the latest scan by one without points, as of a sensor that is silent. Draws exactly
+    /// one number from `rng`.
     pub(crate) fn blank(&mut self, time: Time, rng: &mut Stream) {
         Noise::draw(rng);
         self.clear();
@@ -157,14 +164,15 @@ impl Scanner {
         self.latest = None;
     }
 
-    /// Keeps the latest scan as the scan at `time`, as of a sensor that is frozen. Draws exactly one number from `rng`.
+    /// Keeps the latest scan as the scan at `time`, as of a sensor that is frozen. Draws exactly
+    /// one number from `rng`.
     pub(crate) fn hold(&mut self, time: Time, rng: &mut Stream) {
         Noise::draw(rng);
         self.stamp(time);
     }
 
-    /// Scans the scene with a fault of the sensor, as [`Scanner::scan`] does without one. `lane` is the road that the detector
-    /// assumes.
+    /// Scans the scene with a fault of the sensor, as [`Scanner::scan`] does without one. `lane` is
+    /// the road that the detector assumes.
     pub(crate) fn scan_with(
         &mut self,
         (scene, lane): (&Scene<'_>, &LaneGeometry),
@@ -180,8 +188,8 @@ impl Scanner {
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
         let link = LinkBudget::new(&actual, scene.environment);
         self.begin(scene.time, mirror_side, (&pose, &link));
-        // With a fault, a point may be elsewhere than its return.
-        // The limits hold for a sensor that looks straight back along a straight road, whatever the map says.
+        // With a fault, a point may be elsewhere than its return. The limits hold for a sensor that
+        // looks straight back along a straight road, whatever the map says.
         let is_plain = fault.is_none() && !self.lidar.is_turned() && scene.road.curvature_per_m() == 0.0;
         let rails = if is_plain { RailReturns::new(lane, &link, self.lidar.kind.beam_height_deg) } else { None };
         let fault = fault
@@ -224,21 +232,22 @@ impl Scanner {
     }
 
     /// Sweeps over all columns and appends their returns to the scan.
-    fn sweep(&mut self, of: &Sweep, extent: Extent) {
-        fearless_simd::dispatch!(self.level, simd => self.sweep_in(simd, of, extent));
+    fn sweep(&mut self, sweep: &Sweep, extent: Extent) {
+        fearless_simd::dispatch!(self.level, simd => self.sweep_in(simd, sweep, extent));
     }
 
-    /// Does what [`Scanner::sweep`] does in one kind of vector registers. The results have the same bits in all of them, since each
-    /// lane takes the steps of a single sub-ray, and what is summed over lanes is summed in their order.
+    /// Does what [`Scanner::sweep`] does in one kind of vector registers. The results have the same
+    /// bits in all registers: each lane takes the steps of a single sub-ray, and sums over lanes
+    /// follow the order of the lanes.
     #[inline(always)]
-    fn sweep_in<S: Simd>(&mut self, simd: S, of: &Sweep, extent: Extent) {
+    fn sweep_in<S: Simd>(&mut self, simd: S, sweep: &Sweep, extent: Extent) {
         let sweep_s = self.sweep_s();
         #[expect(clippy::cast_possible_truncation, reason = "a bound of a metre, with a margin")]
-        let max_shift_m = of.viewpoint.max_shift_m(sweep_s) as f32;
-        let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, [max_shift_m, self.ground_reach_m]);
+        let max_shift_m = sweep.viewpoint.max_shift_m(sweep_s) as f32;
+        let bare_road = BareRoad::new(&self.targets, &sweep.link, sweep.pose, [max_shift_m, self.ground_reach_m]);
         let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBackground);
-        let road = Road::new(&self.targets, &of.link);
-        let in_air = !self.plumes.is_empty() || of.link.has_fog();
+        let road = Road::new(&self.targets, &sweep.link);
+        let in_air = !self.plumes.is_empty() || sweep.link.has_fog();
         self.active.start(&self.targets);
         let columns = self.pattern.columns.len();
         let mut is_block_covered = false;
@@ -247,7 +256,7 @@ impl Scanner {
             let index = next;
             next += 1;
             if index % BLOCK_COLUMNS == 0 {
-                let bounds = self.pattern.line_bounds(of.mirror_side, index / BLOCK_COLUMNS);
+                let bounds = self.pattern.line_bounds(sweep.mirror_side, index / BLOCK_COLUMNS);
                 is_block_covered = omitted.is_some_and(|bare| bare.covers_block(bounds, &road));
             }
             self.active.advance_to(index, &self.targets);
@@ -257,25 +266,26 @@ impl Scanner {
                 continue;
             }
             let column = &self.pattern.columns[index];
-            let elevations = self.pattern.elevations(of.mirror_side, index);
+            let elevations = self.pattern.elevations(sweep.mirror_side, index);
             let before_end_s = sweep_s - f64::from(column.offset_ns) * 1e-9;
-            let pose = || of.pose.deskewed(of.viewpoint.deskew(before_end_s));
+            let pose = || sweep.pose.deskewed(sweep.viewpoint.deskew(before_end_s));
             let is_road_discarded = is_block_covered
-                || omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road));
+                || omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(sweep.mirror_side, index), &road));
             let are_rails_discarded = || {
-                let are_discarded =
-                    |of: RailReturns| of.are_discarded(simd, (column, elevations), &pose(), parts, &self.targets);
-                !self.active.has_rails() || of.rails.is_some_and(are_discarded)
+                let are_discarded = |returns: RailReturns| {
+                    returns.are_discarded(simd, (column, elevations), &pose(), parts, &self.targets)
+                };
+                !self.active.has_rails() || sweep.rails.is_some_and(are_discarded)
             };
-            // Where the detector would discard all returns of the road and of guard rails, those beams are left that may meet something
-            // else.
+            // Where the detector would discard all returns of the road and of guard rails, those
+            // beams are left that may meet something else.
             let solid = match is_road_discarded && are_rails_discarded() {
                 true => self.active.solid_layers(),
                 false => u64::MAX,
             };
             let with_droplets = if in_air {
                 if !self.plumes.is_empty() {
-                    soft::bound_clumps(index, elevations.len(), of.noise, &mut self.clumps);
+                    soft::bound_clumps(index, elevations.len(), sweep.noise, &mut self.clumps);
                 }
                 let air = AirColumn {
                     first_beam: index * elevations.len(),
@@ -284,7 +294,7 @@ impl Scanner {
                     least_cosine: self.pattern.least_cosine,
                     clumps: &self.clumps,
                 };
-                air.layers_with_returns(&of.link, of.noise)
+                air.layers_with_returns(&sweep.link, sweep.noise)
             } else {
                 0
             };
@@ -299,8 +309,8 @@ impl Scanner {
                 pose: pose(),
                 targets: &self.targets,
                 plumes: &self.plumes,
-                link: &of.link,
-                noise: of.noise,
+                link: &sweep.link,
+                noise: sweep.noise,
                 dropout: self.lidar.dropout as f32,
             };
             self.droplets.compute(with_droplets, |layer| receiver.droplet_effect(layer));

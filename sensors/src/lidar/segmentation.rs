@@ -1,5 +1,5 @@
-//! Segmentation quality: compares clusters with the ground truth, and counts vehicles that are split into several
-//! clusters or merged into one.
+//! Segmentation quality: compares clusters with the ground truth, and counts vehicles that are
+//! split into several clusters or merged into one.
 
 use super::{PointSource, ScanTruth};
 
@@ -67,14 +67,15 @@ mod tests {
 
     #[test]
     fn counts_split_merged_and_missed_vehicles() {
-        let of = |actor: Option<usize>| PointTruth {
+        let point_truth = |actor: Option<usize>| PointTruth {
             source: actor.map_or(PointSource::Ground, PointSource::Actor),
             material: Material::Paint,
             range_m: 10.0,
         };
         let actors = [0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3].map(Some).into_iter().chain([None; 3]);
-        let truth = ScanTruth { points: actors.map(of).collect() };
-        // Actor 0 is split, actors 1 and 2 are merged, and actor 3 is missed. The last cluster is ground.
+        let truth = ScanTruth { points: actors.map(point_truth).collect() };
+        // Actor 0 is split, actors 1 and 2 are merged, and actor 3 is missed. The last cluster is
+        // ground.
         let clusters: [&[u32]; 4] = [&[0, 1, 2], &[3, 4, 5], &[6, 7, 8, 9, 10, 11], &[15, 16, 17]];
         let mut report = SegmentationReport::default();
         report.observe(&truth, clusters.into_iter());

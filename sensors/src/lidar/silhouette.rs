@@ -1,4 +1,5 @@
-//! The elevations at which a solid appears between two azimuths: bounds that are narrower than those of the whole solid.
+//! The elevations at which a solid appears between two azimuths: bounds that are narrower than the
+//! bounds of the whole solid.
 //!
 //! ```text
 //!   tan θ ▲        ╭────────╮
@@ -8,12 +9,12 @@
 //!         └────────────┴─────────┴─▶ φ    corners of the box between them
 //! ```
 //!
-//! A ray of direction d = (cos φ, sin φ, t) with t = tan θ meets a convex solid if a u > 0 exists that satisfies the
-//! inequalities of [`super::targets`]: u ≤ m·d for each front-facing and u ≥ m·d for each back-facing face. At a given
-//! azimuth these are linear inequalities in t, and bound it.
+//! A ray of direction d = (cos φ, sin φ, t) with t = tan θ meets a convex solid if a u > 0 exists
+//! that satisfies the inequalities of [`super::targets`]: u ≤ m·d for each front-facing and u ≥ m·d
+//! for each back-facing face. At a given azimuth these are linear inequalities in t, and bound it.
 //!
-//! Along an edge, t = A·cos(φ − φ₀). Between two azimuths that are Δ apart, such an arc rises by at most the factor
-//! 1/cos Δ above the higher of its ends.
+//! Along an edge, t = A·cos(φ − φ₀). Between two azimuths that are Δ apart, such an arc rises by at
+//! most the factor 1/cos Δ above the higher of its ends.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -29,7 +30,8 @@ const MIN_OFFSET_M: f64 = 1e-3;
 
 /// The bounding box of a solid, as seen from the sensor.
 pub(super) struct Silhouette {
-    /// Vectors m = n/w of the front-facing and of the back-facing planes (1/m), and the number of each.
+    /// Vectors m = n/w of the front-facing and of the back-facing planes (1/m), and the number of
+    /// each.
     planes: [([[f64; 3]; BOX_FACES], usize); 2],
     /// Azimuth (rad) and tangent of the elevation of each corner.
     corners: [[f64; 2]; 8],
@@ -57,7 +59,8 @@ impl Silhouette {
         Self { planes, corners }
     }
 
-    /// Returns bounds of the elevation between two azimuths (°), or `None` if the solid does not appear there.
+    /// Returns bounds of the elevation between two azimuths (°), or `None` if the solid does not
+    /// appear there.
     pub(super) fn elevations_deg(&self, azimuths_deg: [f64; 2]) -> Option<[f64; 2]> {
         let ends = [azimuths_deg[0] - BOUND_MARGIN_DEG, azimuths_deg[1] + BOUND_MARGIN_DEG].map(f64::to_radians);
         let mut bounds = [f64::INFINITY, f64::NEG_INFINITY];
@@ -76,8 +79,8 @@ impl Silhouette {
         })
     }
 
-    /// Returns the least and the greatest tangent of the elevation at one azimuth, or `None` if the solid does not
-    /// appear there.
+    /// Returns the least and the greatest tangent of the elevation at one azimuth, or `None` if the
+    /// solid does not appear there.
     fn tangents_at(&self, azimuth_rad: f64) -> Option<[f64; 2]> {
         let (sin, cos) = maths::sin_cos(azimuth_rad);
         // Each plane as (constant, slope) of m·d in t.

@@ -1,4 +1,5 @@
-//! Droplets in the air: spray behind vehicles, fog and rain. They attenuate the beams and give false returns.
+//! Droplets in the air: spray behind vehicles, fog and rain. They attenuate the beams and give
+//! false returns.
 //!
 //! ```text
 //!        ┌──────┐ ░ ░ ▒▒        plume: as wide as the vehicle, as long as the distance it drives in 0.25 s
@@ -6,15 +7,17 @@
 //!        └o────o┘▒▒▒▒░▒ ░
 //! ```
 //!
-//! A layer of droplets with extinction α and depth ΔR reflects like a surface of ρ = π·α·ΔR/S, where S is the ratio of
-//! extinction to backscatter: 18.8 sr for water droplets at 905 nm (O'Connor, Illingworth and Hogan 2004). ΔR is the
-//! length of the pulse. Droplets occur in clumps: the extinction along a beam is exponentially distributed about its
-//! mean, and neighbouring columns share the same value.
+//! A layer of droplets with extinction α and depth ΔR reflects like a surface of ρ = π·α·ΔR/S,
+//! where S is the ratio of extinction to backscatter: 18.8 sr for water droplets at 905 nm
+//! (O'Connor, Illingworth and Hogan 2004). ΔR is the length of the pulse. Droplets occur in clumps:
+//! the extinction along a beam is exponentially distributed about its mean, and neighbouring
+//! columns share the same value.
 //!
-//! The density of spray has been measured only roughly. The values here are assumptions that reproduce published
-//! measurements (Walz et al. 2021, "A benchmark for spray from nearby cutting vehicles"; Linnhoff et al. 2022,
-//! "Simulating road spray effects in automotive lidar sensor models"): no spray below 40 to 50 km/h, a strong increase
-//! with speed and water, tens to hundreds of false points, most of them within 10 m behind a vehicle.
+//! The density of spray has been measured only roughly. The values here are assumptions that
+//! reproduce published measurements (Walz et al. 2021, "A benchmark for spray from nearby cutting
+//! vehicles"; Linnhoff et al. 2022, "Simulating road spray effects in automotive lidar sensor
+//! models"): no spray below 40 to 50 km/h, a strong increase with speed and water, tens to hundreds
+//! of false points, most of them within 10 m behind a vehicle.
 
 use std::ops::Range;
 
@@ -32,12 +35,13 @@ use super::{Material, PointSource};
 const LIDAR_RATIO_SR: f32 = 18.8;
 /// Speed below which tyres raise no spray (m/s).
 const SPRAY_FROM_MPS: f64 = 12.0;
-/// Mean extinction in the plume of a car, per mm of water film, at the reference speed (1/m per mm; assumption).
+/// Mean extinction in the plume of a car, per mm of water film, at the reference speed (1/m per mm;
+/// assumption).
 const SPRAY_PER_M_AND_MM: f64 = 0.008;
 /// Reference speed (m/s).
 const SPRAY_REFERENCE_MPS: f64 = 30.0;
-/// Depth of the water film above which more water raises no more spray, because it runs off to the sides (mm;
-/// assumption).
+/// Depth of the water film above which more water raises no more spray, because it runs off to the
+/// sides (mm; assumption).
 const MAX_FILM_MM: f64 = 3.0;
 /// Time after which a plume has dispersed (s; assumption).
 const PLUME_LIFE_S: f64 = 0.25;
@@ -45,11 +49,11 @@ const PLUME_LIFE_S: f64 = 0.25;
 const PLUME_HEIGHT_M: f64 = 1.4;
 /// Number of neighbouring columns that share a clump of droplets.
 const CLUMP_COLUMNS: usize = 3;
-/// Share of the backscatter of fog that varies within the length of a pulse (assumption). The receiver filters out the
-/// constant rest.
+/// Share of the backscatter of fog that varies within the length of a pulse (assumption). The
+/// receiver filters out the constant rest.
 const FOG_CLUMPINESS: f32 = 0.1;
-/// Distance at which the laser beam and the receiver's field of view overlap by half (m; assumption). They overlap
-/// fully only beyond some metres.
+/// Distance at which the laser beam and the receiver's field of view overlap by half (m;
+/// assumption). They overlap fully only beyond some metres.
 const OVERLAP_M: f32 = 2.0;
 /// Minimum distance of a return from droplets (m).
 const NEAREST_M: f32 = 0.5;
@@ -69,7 +73,8 @@ pub(crate) struct Plume {
 }
 
 impl Plume {
-    /// Returns a plume in the shape of a solid, of this mean extinction (1/m), whose pose in the sensor's frame is given.
+    /// Returns a plume in the shape of a solid, of this mean extinction (1/m), whose pose in the
+    /// sensor's frame is given.
     #[expect(clippy::cast_possible_truncation, reason = "bounds of metres")]
     pub(crate) fn new(
         (faces, columns): (FaceRange, Range<usize>),
@@ -111,14 +116,15 @@ impl DropletEffect {
         self.echo.is_some_and(|echo| echo.power > MIN_POWER)
     }
 
-    /// Returns the share of the light from `range_m` that the plumes transmit, on the way out and back.
+    /// Returns the share of the light from `range_m` that the plumes transmit, on the way out and
+    /// back.
     pub(crate) fn transmission(&self, range_m: f32) -> f32 {
         if self.optical_depth > 0.0 && range_m > self.near_m { maths::exp(-2.0 * self.optical_depth) } else { 1.0 }
     }
 }
 
-/// Returns the plume behind a vehicle, in the vehicle's own frame, and its mean extinction (1/m). Returns `None` if the
-/// road is dry or the vehicle slow.
+/// Returns the plume behind a vehicle, in the vehicle's own frame, and its mean extinction (1/m).
+/// Returns `None` if the road is dry or the vehicle slow.
 pub(crate) fn spray_plume(vehicle: &Vehicle, speed_mps: f64, environment: &Environment) -> Option<(Solid, f32)> {
     let film_mm = environment.water_film_mm.min(MAX_FILM_MM);
     let speed = (speed_mps - SPRAY_FROM_MPS) / (SPRAY_REFERENCE_MPS - SPRAY_FROM_MPS);
@@ -154,7 +160,7 @@ impl BeamIndex {
         self.column * self.layers + self.layer
     }
 
-    /// Returns the number that stands for the clump of droplets that the beam may meet.
+    /// Returns the number of the clump of droplets that the beam may meet.
     fn clump(self) -> usize {
         (self.column / CLUMP_COLUMNS) * self.layers + self.layer
     }
@@ -165,11 +171,11 @@ pub(crate) fn droplet_effect(
     at: BeamIndex,
     centre: [f32; 3],
     plumes: &[Plume],
-    of: (&Targets, &LinkBudget, Noise),
+    setting: (&Targets, &LinkBudget, Noise),
 ) -> DropletEffect {
-    let (targets, link, noise) = of;
+    let (targets, link, noise) = setting;
     let beam = at.beam();
-    let mut found = DropletEffect { echo: fog(beam, link, noise), near_m: f32::INFINITY, optical_depth: 0.0 };
+    let mut effect = DropletEffect { echo: fog(beam, link, noise), near_m: f32::INFINITY, optical_depth: 0.0 };
     // Logarithms are computed only if needed: not for a beam that crosses no plume, ...
     let mut clump = None;
     let depth = noise.uniform(beam, Purpose::Depth);
@@ -178,28 +184,28 @@ pub(crate) fn droplet_effect(
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
         let clump = *clump.get_or_insert_with(|| -maths::ln(noise.uniform(at.clump(), Purpose::Plume)));
         let extinction = plume.extinction_per_m * clump;
-        let before = found.optical_depth;
-        found.near_m = found.near_m.min(from);
-        found.optical_depth += extinction * (to - from);
+        let before = effect.optical_depth;
+        effect.near_m = effect.near_m.min(from);
+        effect.optical_depth += extinction * (to - from);
         // ... nor for one that surely returns no light from this plume, since −ln u ≥ 1 − u.
-        if has_echo || 0.5 * (1.0 - depth) >= found.optical_depth {
+        if has_echo || 0.5 * (1.0 - depth) >= effect.optical_depth {
             continue;
         }
         let ends_at = -0.5 * maths::ln(depth);
-        if ends_at < found.optical_depth {
+        if ends_at < effect.optical_depth {
             has_echo = true;
             let range_m = from + (ends_at - before) / extinction;
             let echo = SoftEcho { range_m, power: soft_power(extinction, range_m, link), source: PointSource::Spray };
-            if found.echo.is_none_or(|other| range_m < other.range_m) {
-                found.echo = Some(echo);
+            if effect.echo.is_none_or(|other| range_m < other.range_m) {
+                effect.echo = Some(echo);
             }
         }
     }
-    found
+    effect
 }
 
-/// Returns a bound of the optical depth in spray of the beams of a column, for clumps of mean density, times the cosine of their elevation.
-/// `sine` is the least sine of their azimuths.
+/// Returns a bound of the optical depth in spray of the beams of a column, for clumps of mean
+/// density, times the cosine of their elevation. `sine` is the least sine of their azimuths.
 pub(crate) fn greatest_depth(plumes: &[Plume], column: usize, sine: f32) -> f32 {
     let crossed = plumes.iter().filter(|plume| plume.columns.contains(&column));
     // A beam leaves a plume at its sides: the path times the sine is at most the extent across.
@@ -225,8 +231,8 @@ impl ColumnDroplets {
         Self { effects: vec![none; layers], ..Self::default() }
     }
 
-    /// Computes the effects on the beams of these layers (a bit mask) anew. The other beams must get no return from droplets that may be
-    /// detected.
+    /// Computes the effects on the beams of these layers (a bit mask) anew. The other beams must
+    /// get no return from droplets that may be detected.
     #[inline(always)]
     pub(crate) fn compute(&mut self, layers: u64, effect: impl Fn(usize) -> DropletEffect) {
         (self.computed, self.detectable) = (layers, 0);
@@ -264,8 +270,8 @@ pub(crate) struct AirColumn<'a> {
 }
 
 impl AirColumn<'_> {
-    /// Returns a bit mask of the layers on whose beams droplets may give a return that can be detected. On the others they surely do
-    /// not.
+    /// Returns a bit mask of the layers on whose beams droplets may give a return that can be
+    /// detected. On the others they surely do not.
     ///
     /// Written without branches, so that the layers are tested side by side in vector registers.
     #[inline(always)]
@@ -296,8 +302,9 @@ impl AirColumn<'_> {
     }
 }
 
-/// Sets, for each layer, a bound of the density of the clump in spray that the beams of a column meet, relative to the mean. There are
-/// bounds for a multiple of [`LANES`] layers; those beyond the pattern mean nothing.
+/// Sets, for each layer, a bound of the density of the clump in spray that the beams of a column
+/// meet, relative to the mean. There are bounds for a multiple of [`LANES`] layers; those beyond
+/// the pattern mean nothing.
 ///
 /// Neighbouring columns share clumps: nothing happens except at the first of them.
 #[inline(always)]
@@ -315,10 +322,11 @@ pub(crate) fn bound_clumps(column: usize, layers: usize, noise: Noise, bounds: &
     }
 }
 
-/// Returns false if spray surely gives no return on the beam, whose column has this [`greatest_depth`], whose elevation has at least this
-/// cosine, and whose clump has this bound.
+/// Returns false if spray surely gives no return on the beam, whose column has this
+/// [`greatest_depth`], whose elevation has at least this cosine, and whose clump has this bound.
 ///
-/// It does not know which plumes the beam crosses, and takes no logarithm: most beams need nothing else.
+/// It does not know which plumes the beam crosses, and takes no logarithm: most beams need nothing
+/// else.
 #[inline(always)]
 fn may_return_from_spray(beam: usize, [greatest_depth, cosine, clump]: [f32; 3], noise: Noise) -> bool {
     // −ln u ≥ 2·(1 − u)/(1 + u)
@@ -343,14 +351,15 @@ const ROUNDING: f32 = 1.001;
 /// Returns an upper bound of −ln u, for u between 0 and 1, by at most 0.06 too great.
 #[inline(always)]
 fn most_logarithm(u: f32) -> f32 {
-    // The bits of a number, read as an integer, are its exponent and what its mantissa exceeds 1 by, which is at most the logarithm of
-    // the mantissa to the base of two.
+    // The bits of a number, read as an integer, are its exponent and the excess of its mantissa
+    // over 1. The excess is at most the logarithm of the mantissa to the base of two.
     const BIAS: f32 = 127.0;
     const MANTISSA: f32 = 8_388_608.0;
     std::f32::consts::LN_2 * (BIAS - u.to_bits() as f32 / MANTISSA)
 }
 
-/// Returns the ranges at which a beam enters and leaves a plume (m), or `None` if it does not cross the plume.
+/// Returns the ranges at which a beam enters and leaves a plume (m), or `None` if it does not cross
+/// the plume.
 fn plume_interval_m([cos, sin, tan]: [f32; 3], faces: FaceRange, targets: &Targets) -> Option<[f32; 2]> {
     let slant = (1.0 + tan * tan).sqrt();
     let along = |[x, y, z]: [f32; 3]| x * cos + y * sin + z * tan;
@@ -380,7 +389,8 @@ fn power_in_clear_air(extinction_per_m: f32, range_m: f32, link: &LinkBudget) ->
     link.gain_m2 * reflectivity * overlap / square
 }
 
-/// Returns the return from the first clump of fog or rain that the beam hits, or `None` if the air is clear.
+/// Returns the return from the first clump of fog or rain that the beam hits, or `None` if the air
+/// is clear.
 fn fog(beam: usize, link: &LinkBudget, noise: Noise) -> Option<SoftEcho> {
     if !link.has_fog() {
         return None;

@@ -87,7 +87,8 @@ impl Solid {
 
     /// Creates a prism that is symmetric about y = 0 from a convex side profile.
     ///
-    /// The profile has at most six corners, in either direction around it. `side` is the material of both sides.
+    /// The profile has at most six corners, in either direction around it. `side` is the material
+    /// of both sides.
     pub(crate) fn prism(profile: &[Corner], width: HalfWidth, side: Material) -> Self {
         let max_half_m = width.bottom_m.max(width.top_m);
         let mut low = Vector3::new(f64::INFINITY, -max_half_m, f64::INFINITY);

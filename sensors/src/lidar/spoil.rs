@@ -1,16 +1,21 @@
-//! What faults of the LiDAR do to the points of a scan: losses, noise, and points where nothing is.
+//! Effects of the LiDAR's faults on the points of a scan: losses, noise, and points without an
+//! object.
 //!
-//! The sweep itself knows no faults. A scan with a fault is spoilt afterwards, so that a scan without one costs nothing. Every
-//! random number is addressed by the scan's key, a beam and a purpose.
+//! The sweep itself knows no faults. A fault spoils a scan after the scanner has measured it, so a
+//! scan without a fault costs nothing. Every random number is addressed by the scan's key, a beam
+//! and a purpose.
 //!
-//! - *Mirror images behind a guard rail.* A beam that a rail deflects to a vehicle and back measures the whole path. The point
-//!   appears behind the rail, at the mirror image of the vehicle. A rail is taken for a plane mirror. The region of interest
-//!   ends short of the rails on the map, so that the detector drops these points as it drops those of the rails.
-//! - *Crosstalk.* The pulses of another LiDAR that arrive within the listening time count as returns. Two scanners with nearly the
-//!   same pulse rate give bursts: neighbouring columns, whose false ranges drift (the mechanism of mutual interference:
-//!   Remote Sensing 14 (2022) 1129). Length and drift of a burst are assumptions.
-//! - *Blooming.* A retro-reflector that saturates the receiver is also seen by beams that only graze it. The halo has the
-//!   range of the plate, and fades to its edge.
+//! - *Mirror images behind a guard rail.* A beam that a rail deflects to a vehicle and back
+//!   measures the whole path. The point appears behind the rail, at the mirror image of the
+//!   vehicle. The model treats a rail as a plane mirror. The region of interest ends short of the
+//!   rails on the map. The detector therefore drops these points, as it drops the points of the
+//!   rails.
+//! - *Crosstalk.* The pulses of another LiDAR that arrive within the listening time count as
+//!   returns. Two scanners with nearly the same pulse rate give bursts: neighbouring columns, whose
+//!   false ranges drift (the mechanism of mutual interference: Remote Sensing 14 (2022) 1129).
+//!   Length and drift of a burst are assumptions.
+//! - *Blooming.* A retro-reflector that saturates the receiver is also seen by beams that only
+//!   graze it. The halo has the range of the plate, and fades to its edge.
 
 use super::noise::{Noise, Purpose};
 use super::pattern::{Elevation, Pattern};
@@ -22,17 +27,19 @@ use closecall_traffic::maths;
 
 /// Number of columns of a burst, from the fewest to the most.
 const BURST_COLUMNS: [usize; 2] = [3, 10];
-/// Number of adjacent layers of a burst: those of a group of detector cells of the SCALA (an assumption for other sensors).
+/// Number of adjacent layers of a burst: the layers of a group of detector cells of the SCALA (an
+/// assumption for other sensors).
 const BURST_LAYERS: usize = 4;
 /// Least and greatest range of the first point of a burst (m).
 const BURST_RANGE_M: [f32; 2] = [3.0, 150.0];
 /// Greatest change of the range from column to column of a burst (m).
 const BURST_DRIFT_M: f32 = 0.5;
-/// Intensity of a false point, as a reflectivity (assumption: that of a usual surface).
+/// Intensity of a false point, as a reflectivity (assumption: a usual surface).
 const FALSE_INTENSITY: f32 = 0.3;
 /// Standard deviation of the range of a point of a halo (m).
 const HALO_RANGE_SD_M: f32 = 0.1;
-/// Share of a plate's saturated returns that have a halo point at its centre; it falls linearly to zero at the edge.
+/// Share of a plate's saturated returns that have a halo point at its centre; it falls linearly to
+/// zero at the edge.
 const HALO_SHARE: f64 = 0.8;
 
 /// Returns the lateral positions of the two rails at a longitudinal position (m).
@@ -93,7 +100,8 @@ impl Spoiler<'_> {
 
     /// Returns a uniform random number for the point with this index and its beam.
     fn uniform(&self, index: usize, beam: u16, purpose: Purpose) -> f64 {
-        // Two returns of a beam are neighbours in the scan, so that the parity of the index tells them apart.
+        // Two returns of a beam are neighbours in the scan, so that the parity of the index tells
+        // them apart.
         f64::from(self.noise.uniform((index % 2) * self.pattern.kind().beams() + usize::from(beam), purpose))
     }
 
@@ -179,7 +187,7 @@ impl Spoiler<'_> {
         reason = "some bursts, and indices of the pattern"
     )]
     fn interfere(&self, added: &mut Vec<Added>) {
-        let uniform = |burst: usize, what: usize| self.noise.uniform((burst + 1) * 8 + what, Purpose::FogClump);
+        let uniform = |burst: usize, draw: usize| self.noise.uniform((burst + 1) * 8 + draw, Purpose::FogClump);
         let bursts = (self.fault.crosstalk + f64::from(uniform(0, 0))).floor() as usize;
         let kind = self.pattern.kind();
         let elevations_of = |column| self.pattern.elevations(self.mirror_side, column);
@@ -223,7 +231,7 @@ impl Spoiler<'_> {
         }
     }
 
-    /// Removes the points that are lost, and those in blocked sectors.
+    /// Removes the lost points, and the points in blocked sectors.
     fn lose(&self, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let (sensor, axis_deg) = (self.sensor_m(), scan.axis_azimuth_rad.to_degrees());
         let is_blocked = |x_m: f32, y_m: f32| {

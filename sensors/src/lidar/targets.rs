@@ -1,16 +1,17 @@
 //! The solids of a scene, as faces in the sensor's frame that are prepared for the ray cast.
 //!
-//! All rays start at the origin of the sensor's frame. A face is the half-space n·p ≤ w with the outward unit normal n.
-//! It is stored as m = n/w: a ray of direction d meets the plane of the face at the distance t with 1/t = m·d. In terms
-//! of the *inverse* distance u = 1/t, a ray is inside a convex solid if
+//! All rays start at the origin of the sensor's frame. A face is the half-space n·p ≤ w with the
+//! outward unit normal n. It is stored as m = n/w: a ray of direction d meets the plane of the face
+//! at the distance t with 1/t = m·d. In terms of the *inverse* distance u = 1/t, a ray is inside a
+//! convex solid if
 //!
 //! ```text
 //!   u ≤ m·d  for each front-facing face (w < 0: the sensor is on its outer side)
 //!   u ≥ m·d  for each back-facing face,    and u > 0
 //! ```
 //!
-//! The nearest point of the solid is therefore at the minimum of m·d over the front-facing faces. No division is
-//! needed.
+//! The nearest point of the solid is therefore at the minimum of m·d over the front-facing faces.
+//! No division is needed.
 
 use std::ops::Range;
 
@@ -22,12 +23,13 @@ use super::solid::{MAX_FACES, Solid, SolidFace};
 use super::{Material, MirrorSide, PointSource};
 use closecall_traffic::maths;
 
-/// Minimum distance of a face's plane from the sensor's centre (m). Nearer planes are moved to it, so that n/w stays
-/// finite.
+/// Minimum distance of a face's plane from the sensor's centre (m). Nearer planes are moved to it,
+/// so that n/w stays finite.
 const MIN_OFFSET_M: f64 = 1e-4;
 /// Margin added to a solid's bounds to cover rounding in single precision (°).
 pub(super) const BOUND_MARGIN_DEG: f64 = 0.02;
-/// Factor on the horizontal distance in the bounds of elevation, which covers the tilt of the sensor's frame.
+/// Factor on the horizontal distance in the bounds of elevation, which covers the tilt of the
+/// sensor's frame.
 const DISTANCE_MARGIN: f64 = 0.98;
 /// Minimum horizontal distance in the bounds of elevation (m).
 const MIN_DISTANCE_M: f64 = 0.05;
@@ -40,7 +42,8 @@ pub(crate) struct Face {
     /// Distance |w| of the plane from the sensor (m).
     #[cfg(test)]
     pub(crate) offset_m: f32,
-    /// ρ·|w| (m), with the reflectivity ρ. Times the inverse range it gives ρ·cos γ, with the incidence angle γ.
+    /// ρ·|w| (m), with the reflectivity ρ. Times the inverse range it gives ρ·cos γ, with the
+    /// incidence angle γ.
     pub(crate) strength_m: f32,
     pub(crate) material: Material,
     pub(crate) source: PointSource,
@@ -67,7 +70,8 @@ impl FaceRange {
     }
 }
 
-/// A convex solid of the scene, or a range of its columns: its faces, and the columns and layers that may hit it.
+/// A convex solid of the scene, or a range of its columns: its faces, and the columns and layers
+/// that may hit it.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) faces: FaceRange,
@@ -93,7 +97,7 @@ pub(crate) struct Surface<'a> {
     pub(crate) reflectivity: &'a dyn Fn(Material) -> f64,
 }
 
-/// The beams of a scan, used to find those that may hit a solid.
+/// The beams of a scan, used to find the beams that may hit a solid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beams<'a> {
     pub(crate) pattern: &'a Pattern,
@@ -137,7 +141,8 @@ impl Targets {
             self.parts.push(part(columns, layers));
             return;
         }
-        // A long solid, such as a guard rail, covers few layers in each column, but other layers in other columns.
+        // A long solid, such as a guard rail, covers few layers in each column, but other layers in
+        // other columns.
         let silhouette = Silhouette::of(solid, pose);
         for start in columns.clone().step_by(BLOCK_COLUMNS) {
             let block = start..(start + BLOCK_COLUMNS).min(columns.end);
@@ -164,7 +169,8 @@ impl Targets {
         self.faces.push(prepare_face(face, surface));
     }
 
-    /// Appends the faces of a solid with this pose in the sensor's frame, the front-facing ones first.
+    /// Appends the faces of a solid with this pose in the sensor's frame, the front-facing faces
+    /// first.
     #[expect(clippy::cast_possible_truncation, reason = "4 billion faces do not fit into memory")]
     pub(crate) fn push_faces(&mut self, solid: &Solid, pose: &Isometry3<f64>, surface: Surface<'_>) -> FaceRange {
         let first = self.faces.len() as u32;
@@ -209,7 +215,8 @@ fn prepare_face((normal, offset_m, material): PlacedFace, surface: Surface<'_>) 
     }
 }
 
-/// Conservative bounds of a solid's azimuth and elevation in the sensor's frame (°): too wide rather than too narrow.
+/// Conservative bounds of a solid's azimuth and elevation in the sensor's frame (°): too wide
+/// rather than too narrow.
 struct Bounds {
     azimuth_deg: [f64; 2],
     elevation_deg: [f64; 2],
@@ -218,16 +225,19 @@ struct Bounds {
 impl Bounds {
     fn of(solid: &Solid, pose: &Isometry3<f64>) -> Self {
         let corners = corners(solid).map(|corner| pose * corner);
-        let fold = |of: fn(&Point3<f64>) -> f64| {
-            corners.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        let fold = |coordinate: fn(&Point3<f64>) -> f64| {
+            corners
+                .iter()
+                .map(coordinate)
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
         };
         let [bottom, top] = fold(|corner| corner.z);
         let far = fold(|corner| corner.x * corner.x + corner.y * corner.y)[1].sqrt();
         let near = (distance_m(solid, pose) * DISTANCE_MARGIN).max(MIN_DISTANCE_M);
         let above =
             |z: f64, near_m: f64, far_m: f64| maths::atan(z / if z > 0.0 { near_m } else { far_m }).to_degrees();
-        // The azimuth jumps by 360° if the solid crosses the half-plane y = 0, x ≤ 0, which extends forward from the
-        // sensor.
+        // The azimuth jumps by 360° if the solid crosses the half-plane y = 0, x ≤ 0, which extends
+        // forward from the sensor.
         let crosses = fold(|corner| corner.x)[0] <= 0.0 && {
             let [min_y, max_y] = fold(|corner| corner.y);
             min_y <= 0.0 && max_y >= 0.0
@@ -240,11 +250,12 @@ impl Bounds {
     }
 }
 
-/// Returns the least and the greatest azimuth of the corners of a box (°), which must lie within a half-plane as seen from the sensor.
+/// Returns the least and the greatest azimuth of the corners of a box (°), which must lie within a
+/// half-plane as seen from the sensor.
 fn azimuths_deg(corners: &[Point3<f64>; 8]) -> [f64; 2] {
     let [mut least, mut greatest] = [corners[0]; 2];
     for corner in corners {
-        let turn_from = |of: Point3<f64>| of.x * corner.y - of.y * corner.x;
+        let turn_from = |point: Point3<f64>| point.x * corner.y - point.y * corner.x;
         if turn_from(least) < 0.0 {
             least = *corner;
         }
@@ -262,7 +273,8 @@ fn corners(solid: &Solid) -> [Point3<f64>; 8] {
     })
 }
 
-/// Returns the horizontal distance between the sensor and the solid's bounding box (m), in the solid's own frame.
+/// Returns the horizontal distance between the sensor and the solid's bounding box (m), in the
+/// solid's own frame.
 fn distance_m(solid: &Solid, pose: &Isometry3<f64>) -> f64 {
     let sensor = pose.inverse() * Point3::origin();
     let beyond = |axis: usize| (solid.low[axis] - sensor[axis]).max(sensor[axis] - solid.high[axis]).max(0.0);
@@ -278,7 +290,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_azimuths_of_a_box_are_those_of_its_outermost_corners(
+        fn the_azimuths_of_a_box_come_from_its_outermost_corners(
             at in prop::array::uniform3(-60.0..60.0), half in prop::array::uniform3(0.05..20.0), yaw_rad in -3.2..3.2,
         ) {
             let high: [f64; 3] = half;
@@ -292,8 +304,8 @@ mod tests {
             // A box around the sensor, or one across the half-plane ahead of it, has all azimuths.
             let is_around = distance_m(&solid, &pose) == 0.0;
             if !is_around && ends[1] - ends[0] < 180.0 {
-                let found = azimuths_deg(&corners);
-                prop_assert!((found[0] - ends[0]).abs() < 1e-9 && (found[1] - ends[1]).abs() < 1e-9, "{found:?} {ends:?}");
+                let computed = azimuths_deg(&corners);
+                prop_assert!((computed[0] - ends[0]).abs() < 1e-9 && (computed[1] - ends[1]).abs() < 1e-9, "{computed:?} {ends:?}");
             } else if !is_around {
                 prop_assert!(Bounds::of(&solid, &pose).azimuth_deg[1] > 180.0);
             }

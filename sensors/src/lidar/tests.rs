@@ -37,7 +37,8 @@ impl TestScene {
         Self { time: Time::ZERO, road: Road::straight(3), environment: Environment::CLEAR_DAY, ego, others: Vec::new() }
     }
 
-    /// Adds a vehicle whose front is `gap_m` behind the ego's rear and `left_m` to its left, at the ego's speed.
+    /// Adds a vehicle whose front is `gap_m` behind the ego's rear and `left_m` to its left, at the
+    /// ego's speed.
     fn with(mut self, class: VehicleClass, gap_m: f64, left_m: f64) -> Self {
         let half = 0.5 * class.typical_dimensions().length_m;
         let s_m = self.ego.state.s_m - REAR_BUMPER_M - gap_m - half;
@@ -50,7 +51,8 @@ impl TestScene {
         Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
     }
 
-    /// Scans once and returns the detections. `scan_index` determines the side of the mirror and the noise.
+    /// Scans once and returns the detections. `scan_index` determines the side of the mirror and
+    /// the noise.
     fn detect(&mut self, lidar: &mut RearLidar, scan_index: i64) -> Vec<Detection> {
         self.time = CONTROL_STEP * scan_index;
         lidar.scan(&self.scene(), &mut random(scan_index.unsigned_abs()));
@@ -83,9 +85,9 @@ fn road_with_guard_rails(curvature_per_m: f64) -> Road {
     closecall_traffic::Check::check(&config, &closecall_traffic::Parameters::default()).unwrap()
 }
 
-/// Returns the detection of the first of the other vehicles, and the longitudinal and lateral error of its front face
-/// (m).
-fn first_vehicle_error(setup: &TestScene, found: &[Detection]) -> Option<(Detection, f64, f64)> {
+/// Returns the detection of the first of the other vehicles, and the longitudinal and lateral error
+/// of its front face (m).
+fn first_vehicle_error(setup: &TestScene, detections: &[Detection]) -> Option<(Detection, f64, f64)> {
     let state: &VehicleState = &setup.others[0].state;
     let half = 0.5 * setup.others[0].vehicle.dimensions.length_m;
     let near = |detection: &&Detection| {
@@ -93,7 +95,7 @@ fn first_vehicle_error(setup: &TestScene, found: &[Detection]) -> Option<(Detect
         let x = state.s_m + half - SPEED_MPS * since_s - setup.ego.state.s_m;
         (detection.face_x_m - x).abs() < 2.5 && (detection.face_y_m - (state.d_m - LANE_D_M)).abs() < 1.5
     };
-    let detection = found.iter().find(near)?;
+    let detection = detections.iter().find(near)?;
     let since_s = (setup.time - detection.time).s();
     let x = state.s_m + half - SPEED_MPS * since_s - setup.ego.state.s_m;
     Some((detection.clone(), detection.face_x_m - x, detection.face_y_m - (state.d_m - LANE_D_M)))

@@ -3,8 +3,8 @@
 //! Three frames are used:
 //! - the *plane*, in which the road lies;
 //! - the ego's *vehicle frame*: level, with its origin on the ground below the ego's centre;
-//! - the *sensor's frame*: x backward along the sensor's axis, y to the ego's right, z up. It tilts with the ego's
-//!   body.
+//! - the *sensor's frame*: x backward along the sensor's axis, y to the ego's right, z up. It tilts
+//!   with the ego's body.
 //!
 //! ```text
 //!        ego's vehicle frame         x_s = (−cos a, 0, sin a)
@@ -12,7 +12,8 @@
 //!          │   x ──▶ travel          z_s = (sin a, 0, cos a)
 //! ```
 //!
-//! A nose-down pitch p turns the ego's body about its origin: the rear rises, and the beams turn up by p.
+//! A nose-down pitch p turns the ego's body about its origin: the rear rises, and the beams turn up
+//! by p.
 
 use closecall_traffic::{PlanePose, maths};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -32,12 +33,12 @@ pub(crate) struct Viewpoint {
     pub(crate) axis_rad: f64,
     /// Rotation of the sensor about the vertical axis, to the left seen from above (rad).
     yaw_rad: f64,
-    /// Rotation from the ego's level frame to that of the sensor, if the sensor is turned.
+    /// Rotation from the ego's level frame to the sensor's frame, if the sensor is turned.
     turned: Option<Rotation3<f64>>,
 }
 
-/// The ego's motion from an instant of the sweep to its end, as a rotation and a translation that transform a point
-/// from the earlier vehicle frame to the one at the end.
+/// The ego's motion from an instant of the sweep to its end, as a rotation and a translation that
+/// transform a point from the earlier vehicle frame to the vehicle frame at the end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deskew {
     /// Cosine of the angle of rotation.
@@ -69,7 +70,8 @@ impl Viewpoint {
         }
     }
 
-    /// Returns the ego's pose `before_end_s` before the end of the sweep, extrapolated from its speed and yaw rate.
+    /// Returns the ego's pose `before_end_s` before the end of the sweep, extrapolated from its
+    /// speed and yaw rate.
     fn ego_at(&self, before_end_s: f64) -> PlanePose {
         let turned = self.yaw_rate_radps * before_end_s;
         let (sin, cos) = maths::sin_cos(self.ego.yaw_rad - 0.5 * turned);
@@ -81,7 +83,8 @@ impl Viewpoint {
         }
     }
 
-    /// Returns the transform from the plane to the sensor's frame, `before_end_s` before the end of the sweep.
+    /// Returns the transform from the plane to the sensor's frame, `before_end_s` before the end of
+    /// the sweep.
     pub(crate) fn sensor_from_plane(&self, before_end_s: f64) -> Isometry3<f64> {
         let level_from_plane = plane_from_body(self.ego_at(before_end_s), 0.0).inverse();
         let level = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
@@ -93,12 +96,14 @@ impl Viewpoint {
         Isometry3::from_parts(Translation3::from(-(turn * self.sensor_position_m)), turn) * level_from_plane
     }
 
-    /// Returns a bound on the distance by which deskewing moves a point, apart from a rotation about the sensor (m).
+    /// Returns a bound on the distance by which deskewing moves a point, apart from a rotation
+    /// about the sensor (m).
     pub(crate) fn max_shift_m(&self, sweep_s: f64) -> f64 {
         (self.speed_mps.abs() + self.yaw_rate_radps.abs() * self.sensor_position_m.norm()) * sweep_s
     }
 
-    /// Returns the transform from the ego's frame `before_end_s` before the end of the sweep to its frame at the end.
+    /// Returns the transform from the ego's frame `before_end_s` before the end of the sweep to its
+    /// frame at the end.
     pub(crate) fn deskew(&self, before_end_s: f64) -> Deskew {
         let turned = self.yaw_rate_radps * before_end_s;
         let distance_m = self.speed_mps * before_end_s;
@@ -110,20 +115,23 @@ impl Viewpoint {
 
 /// Returns the sine and cosine of the angle by which the ego turns during a sweep.
 ///
-/// The angle is at most some hundredths of a radian. For such angles the error of these series is below 1e-10.
+/// The angle is at most some hundredths of a radian. For such angles the error of these series is
+/// below 1e-10.
 fn small_sin_cos(angle_rad: f64) -> (f64, f64) {
     let square = angle_rad * angle_rad;
     (angle_rad * (1.0 - square / 6.0), 1.0 - 0.5 * square * (1.0 - square / 12.0))
 }
 
-/// Returns the position in the ego's vehicle frame of a sensor that is mounted behind, to the left of and above the ego's origin (m).
+/// Returns the position in the ego's vehicle frame of a sensor that is mounted behind, to the left
+/// of and above the ego's origin (m).
 pub(crate) fn sensor_position_m([back_m, left_m, height_m]: [f64; 3], pitch_rad: f64) -> Vector3<f64> {
     let (sin, cos) = maths::sin_cos(pitch_rad);
     Vector3::new(-back_m * cos + height_m * sin, left_m, back_m * sin + height_m * cos)
 }
 
-/// Returns the rotation from the ego's vehicle frame to the frame of a turned sensor: that of the body by its pitch, of the sensor
-/// about the body's vertical axis, by its tilt, and about its own axis.
+/// Returns the rotation from the ego's vehicle frame to the frame of a turned sensor: the body
+/// turns by its pitch; the sensor turns about the body's vertical axis, by its tilt, and about its
+/// own axis.
 pub(crate) fn turned_axes(lidar: &Lidar, pitch_rad: f64) -> Rotation3<f64> {
     let about = |axis, angle_rad| Rotation3::from_axis_angle(&axis, angle_rad);
     about(Vector3::x_axis(), -lidar.roll_rad)
@@ -132,14 +140,15 @@ pub(crate) fn turned_axes(lidar: &Lidar, pitch_rad: f64) -> Rotation3<f64> {
         * about(Vector3::y_axis(), -pitch_rad)
 }
 
-/// Returns the rotation from the ego's vehicle frame to the frame of a sensor whose axis points `axis_rad` above the
-/// horizontal.
+/// Returns the rotation from the ego's vehicle frame to the frame of a sensor whose axis points
+/// `axis_rad` above the horizontal.
 fn sensor_axes(axis_rad: f64) -> Rotation3<f64> {
     let (sin, cos) = maths::sin_cos(axis_rad);
     Rotation3::from_matrix_unchecked(Matrix3::new(-cos, 0.0, sin, 0.0, -1.0, 0.0, sin, 0.0, cos))
 }
 
-/// Returns the transform to the plane from the frame of a body at `pose`, pitched nose down by `pitch_rad`.
+/// Returns the transform to the plane from the frame of a body at `pose`, pitched nose down by
+/// `pitch_rad`.
 pub(crate) fn plane_from_body(pose: PlanePose, pitch_rad: f64) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.yaw_rad)
         * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), pitch_rad);

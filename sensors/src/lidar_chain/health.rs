@@ -5,15 +5,16 @@ use crate::tracking::RearView;
 use super::ChainSensor;
 use crate::Health;
 
-/// Places behind the ego that the rear sensors must see for the margin increase system (m): in its lane and in both neighbouring
-/// lanes, near and far. Far is where a vehicle that closes in at 50 km/h is some 4 s away.
+/// Places behind the ego that the rear sensors must see for the margin increase system (m): in its
+/// lane and in both neighbouring lanes, near and far. Far is where a vehicle that closes in at 50
+/// km/h is some 4 s away.
 const REQUIRED_M: [[f64; 2]; 6] = [[5.0, 0.0], [5.0, 3.75], [5.0, -3.75], [60.0, 0.0], [60.0, 3.75], [60.0, -3.75]];
 
-/// Returns the health of all sensors together: failed if those that work no longer see all of the required places that all sensors
-/// see, and degraded if some sensor is not well.
+/// Returns the health of all sensors together: failed if the working sensors no longer see all of
+/// the required places that all sensors see, and degraded if any sensor is not healthy.
 pub(super) fn of_all(sensors: &[ChainSensor]) -> Health {
-    if let [one] = sensors {
-        return one.health;
+    if let [only] = sensors {
+        return only.health;
     }
     let sees = |sensor: &ChainSensor, [back_m, left_m]: [f64; 2]| {
         let view: RearView = sensor.view(0.0);

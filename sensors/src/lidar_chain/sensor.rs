@@ -15,7 +15,8 @@ use crate::object::{DEGRADED_SHARE, NoiseKey, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::{Detection, Health, Scene, SensorError};
 
-/// Number of scans that wait for the tracker, or whose memory does, for which a list is reserved. Late scans may need more.
+/// Number of scans that wait for the tracker, or whose memory does, for which a list is reserved.
+/// Late scans may need more.
 const RESERVED_SCANS: usize = 8;
 
 /// One scan whose processing latency has not elapsed.
@@ -55,7 +56,7 @@ pub(super) struct ChainSensor {
     pub(super) health: Health,
     rng: Stream,
     pub(super) pending: VecDeque<PendingScan>,
-    /// Memory of the scans that the tracker has processed, for later ones.
+    /// Memory of the scans that the tracker has processed. Later scans use it again.
     spare: Vec<Vec<Detection>>,
 }
 
@@ -93,8 +94,8 @@ impl ChainSensor {
         self.kind.is_due(time)
     }
 
-    /// Returns the fault of the LiDAR in this step, in which a lost scan counts as that of a dead sensor, and the number of steps
-    /// by which the scan is late.
+    /// Returns the fault of the LiDAR in this step, and the number of steps by which the scan is
+    /// late. A lost scan counts as a scan of a dead sensor.
     fn fault_now(&mut self, time: Time) -> (Option<LidarFault>, u64) {
         if self.faults.is_empty() {
             return (None, 0);
@@ -120,18 +121,19 @@ impl ChainSensor {
         };
         self.lidar.scan_with([seen, believed], &mut self.rng, fault.as_ref());
         let is_frozen = fault.is_some_and(|fault| fault.is_frozen && !fault.is_dead);
-        // The noise of a working sensor never repeats, so that a monitor finds a frozen one by comparing two scans.
+        // The noise of a working sensor never repeats, so that a monitor finds a frozen one by
+        // comparing two scans.
         self.frozen_scans = if is_frozen { self.frozen_scans.saturating_add(1) } else { 0 };
         self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
         self.health = self.judge_health(scene, fault.as_ref());
         let has_true_clusters = altered.has_true_clusters;
-        let found = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
+        let measured = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
         while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {
             self.spare.push(scan.detections);
         }
         let mut detections = self.spare.pop().unwrap_or_else(|| Vec::with_capacity(RESERVED_CLUSTERS));
         detections.clear();
-        detections.extend_from_slice(found);
+        detections.extend_from_slice(measured);
         if has_true_clusters {
             give_true_boxes(&mut detections, others, believed);
         }
@@ -156,8 +158,8 @@ impl ChainSensor {
         self.pending.push_back(scan);
     }
 
-    /// Returns the LiDAR's health: failed if no point has returned for a while, or the same ones again and again; degraded if weather or dirt cost more
-    /// than half of the range.
+    /// Returns the LiDAR's health: failed if no point has returned for a while, or if the same
+    /// points return again and again; degraded if weather or dirt cost more than half of the range.
     fn judge_health(&self, scene: &Scene<'_>, fault: Option<&LidarFault>) -> Health {
         let degraded_below_m = DEGRADED_SHARE * self.model.nominal_range_m;
         let clear_range_m = fault.map_or(self.clear_range_m, |fault| self.clear_range_m * fault.window_transmission);
@@ -188,7 +190,8 @@ impl ChainSensor {
         }
     }
 
-    /// Returns the field of view for the tracker, of a sensor whose ego has its rear end at `rear_x_m`.
+    /// Returns the field of view for the tracker, of a sensor whose ego has its rear end at
+    /// `rear_x_m`.
     pub(super) fn view(&self, rear_x_m: f64) -> RearView {
         RearView {
             half_angle_tan: self.kind.half_field_tan,
@@ -208,8 +211,8 @@ fn scans_in(time_s: f64, period_s: f64) -> u32 {
 }
 
 impl PendingScan {
-    /// Dates the scan `offset_s` later than it was measured: the ego then takes itself to have measured it from where it was
-    /// at that time.
+    /// Dates the scan `offset_s` later than it was measured: the ego then takes itself to have
+    /// measured it from where it was at that time.
     fn misdate(&mut self, offset_s: f64) {
         #[expect(clippy::cast_possible_truncation, reason = "some milliseconds")]
         let offset = Time::from_ns((offset_s * 1e9).round() as i64);

@@ -5,15 +5,17 @@ use super::config::MAX_LATENCY_STEPS;
 /// The steps in which the latest scans arrive. No scan overtakes an earlier one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Arrivals {
-    /// Step in which each of the latest scans arrives; the index is the number of the scan modulo the length.
+    /// Step in which each of the latest scans arrives; the index is the number of the scan modulo
+    /// the length.
     due_steps: [usize; MAX_LATENCY_STEPS + 1],
     /// The same of the scan before.
     previous_due_step: usize,
 }
 
 impl Arrivals {
-    /// Notes that the scan of `step` needs `latency_steps`, and returns the age in steps of the newest scan that has arrived by now.
-    /// Before the first arrival, it is that of the oldest scan that is kept.
+    /// Notes that the scan of `step` needs `latency_steps`, and returns the age in steps of the
+    /// newest scan that has arrived by now. Before the first arrival, it is the oldest scan that is
+    /// kept.
     pub(super) fn observe(&mut self, step: usize, latency_steps: usize) -> usize {
         let length = self.due_steps.len();
         let due_step = (step + latency_steps.min(MAX_LATENCY_STEPS)).max(self.previous_due_step);
@@ -40,8 +42,9 @@ mod tests {
     }
 
     #[test]
-    fn a_late_scan_holds_back_those_after_it() {
-        // The scan of step 2 is 3 steps late: those of steps 3 and 4 arrive with it in step 5, and that of step 5, too.
+    fn a_late_scan_delays_later_scans() {
+        // The scan of step 2 is 3 steps late: in step 5, the scans of steps 2, 3, 4 and 5 arrive
+        // together.
         assert_eq!(ages([0, 0, 3, 0, 0, 0, 0]), [0, 0, 1, 2, 3, 0, 0]);
     }
 }

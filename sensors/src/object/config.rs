@@ -14,13 +14,13 @@
 //! | `latency-s` | 0.08 (a) | 0.04 | 0.08 |
 //! | `dropout` | 0.02 | 0.02 | by vehicle (c) |
 //!
-//! - (a) Of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle; the half-angle is that
-//!   of its near scan.
-//! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m, taken
-//!   as two standard deviations.
-//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The rest is that of
-//!   the fit to the full chain ([`RearFit`]); the range is that of a usual car, and each vehicle has the
-//!   errors of its class and paint in this weather.
+//! - (a) Of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle;
+//!   the half-angle is the half-angle of its near scan.
+//! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14
+//!   m, error ±0.2 m, interpreted as two standard deviations.
+//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen
+//!   2's. The other values come from the fit to the full chain ([`RearFit`]). The range is the
+//!   range for a usual car, and each vehicle has the errors of its class and paint in this weather.
 //!
 //! All other values are assumptions.
 
@@ -39,37 +39,42 @@ use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 /// Maximum latency in control steps: 0.4 s.
 pub(super) const MAX_LATENCY_STEPS: usize = 10;
 
-/// Probability that clutter gives a wrong track a measurement in one scan; an assumption that enters the existence
-/// probability.
+/// Probability that clutter gives a wrong track a measurement in one scan; an assumption that
+/// enters the existence probability.
 const CLUTTER_PROBABILITY: f64 = 0.05;
 
-/// An object-level sensor as a scenario file describes it. Absent keys have the sensor's default values.
+/// An object-level sensor as a scenario file describes it. Absent keys have the sensor's default
+/// values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct ObjectSensorConfig {
-    /// Distance from the bumper to a vehicle's nearest face up to which the vehicle is seen on a clear day (m); behind the ego,
-    /// that of a usual car, in relation to which the ranges of other paints, plates, shapes and classes stand.
+    /// Distance from the bumper to a vehicle's nearest face up to which the vehicle is seen on a
+    /// clear day (m). Behind the ego, this is the range for a usual car; the ranges of other
+    /// paints, plates, shapes and classes are relative to it.
     pub range_m: Option<Num>,
-    /// Half of the horizontal field of view (deg); not allowed for the surround sensors, which see in all directions.
+    /// Half of the horizontal field of view (deg); not allowed for the surround sensors, which see
+    /// in all directions.
     pub half_angle_deg: Option<Num>,
-    /// Standard deviation of the white error of each measured position along the road (m). Behind the ego, an absent key stands for the
-    /// errors of the fit, by class, paint and weather.
+    /// Standard deviation of the white error of each measured position along the road (m). Behind
+    /// the ego, an absent key means the errors of the fit, by class, paint and weather.
     pub range_sd_m: Option<Num>,
-    /// Standard deviation of the white error of each measured position across the road (m). Behind the ego, an absent key stands for
-    /// those of the fit.
+    /// Standard deviation of the white error of each measured position across the road (m). Behind
+    /// the ego, an absent key means the value of the fit.
     pub lateral_sd_m: Option<Num>,
-    /// Standard deviation of the slowly varying part of the position error, along and across the road (m). Behind the ego, an absent
-    /// key stands for those of the fit.
+    /// Standard deviation of the slowly varying part of the position error, along and across the
+    /// road (m). Behind the ego, an absent key means the value of the fit.
     pub drift_sd_m: Option<Num>,
-    /// Correlation time of the slowly varying part of the position error (s). Behind the ego, an absent key stands for those of the fit.
+    /// Correlation time of the slowly varying part of the position error (s). Behind the ego, an
+    /// absent key means the value of the fit.
     pub drift_time_s: Option<Num>,
-    /// Standard deviation of each measured speed along the road (m/s). If absent, the front radar has 0.1, and the
-    /// other sensors do not measure speed.
+    /// Standard deviation of each measured speed along the road (m/s). If absent, the front radar
+    /// has 0.1, and the other sensors do not measure speed.
     pub speed_sd_mps: Option<Num>,
-    /// Age of a measurement when the controller receives it (s), rounded to whole control steps of 40 ms.
+    /// Age of a measurement when the controller receives it (s), rounded to whole control steps of
+    /// 40 ms.
     pub latency_s: Option<Num>,
-    /// Probability that a measurement of a visible vehicle is lost. Behind the ego, an absent key stands for the losses of the fit, which
-    /// depend on the distance.
+    /// Probability that a measurement of a visible vehicle is lost. Behind the ego, an absent key
+    /// means the losses of the fit, which depend on the distance.
     pub dropout: Option<Num>,
     /// Number of measurements in the latest `confirm-window` scans that confirm a track.
     pub confirm_hits: Option<u8>,
@@ -96,16 +101,17 @@ pub struct ObjectSensorModel {
     pub(super) speed_sd_mps: Option<f64>,
     pub(super) latency_steps: usize,
     pub(super) dropout: f64,
-    /// Which of the errors above hold for all vehicles, in place of those of the fit.
+    /// Which of the errors above hold for all vehicles, in place of the errors of the fit.
     pub(super) given: Given,
-    /// Errors of all vehicles, in place of those of the fit.
+    /// Errors of all vehicles, in place of the errors of the fit.
     pub(super) fixed_errors: Option<FittedErrors>,
     pub(super) rules: LifecycleRules,
     /// Score of the true class.
     pub(super) class_confidence: ByClass,
-    /// Distance up to which classes are known (m), in place of that of the fit.
+    /// Distance up to which classes are known (m), in place of the distance of the fit.
     pub(super) class_range_m: Option<f64>,
-    /// The fit to the full chain that ranges come from; `None` for a sensor with one range for all vehicles.
+    /// The fit to the full chain that ranges come from; `None` for a sensor with one range for all
+    /// vehicles.
     pub(super) fit: Option<&'static RearFit>,
     /// Whether every vehicle is classified as background.
     pub(super) is_class_background: bool,
@@ -129,24 +135,26 @@ impl ObjectSensorModel {
         self.speed_sd_mps.is_some()
     }
 
-    /// Returns the same sensor with one range for all vehicles, which the weather shortens by a power law, and with classes that
-    /// are known up to `class_range_m` (m).
+    /// Returns the same sensor with one range for all vehicles, which the weather shortens by a
+    /// power law, and with classes that are known up to `class_range_m` (m).
     pub(crate) fn without_fit(self, class_range_m: f64) -> Self {
         Self { fit: None, class_range_m: Some(class_range_m), ..self }
     }
 
-    /// Returns the same sensor with these errors for all vehicles, in place of those of the fit.
+    /// Returns the same sensor with these errors for all vehicles, in place of the errors of the
+    /// fit.
     pub(crate) fn with_errors(self, errors: FittedErrors) -> Self {
         Self { fixed_errors: Some(errors), ..self }
     }
 
-    /// Returns the same sensor with another fit, from which its ranges and class scores come, and its errors as far as the scenario
-    /// does not give them.
+    /// Returns the same sensor with another fit. The fit gives its ranges, its class scores, and
+    /// the errors that the scenario does not give.
     pub(crate) fn with_fit(self, fit: &'static RearFit) -> Self {
         Self { range_m: fit.usual_m(), class_confidence: fit.class_confidence, fit: Some(fit), ..self }
     }
 
-    /// Returns the errors of a vehicle that the scenario does not give: those of the fit, or those of all vehicles.
+    /// Returns the errors of a vehicle that the scenario does not give: from the fit, or the errors
+    /// of all vehicles.
     pub(super) fn fitted_errors(&self, at: impl FnOnce(&ErrorGrids) -> FittedErrors) -> Option<FittedErrors> {
         self.fixed_errors.or_else(|| self.fit.map(|fit| at(&fit.errors)))
     }
@@ -227,8 +235,8 @@ const SURROUND: Defaults = Defaults {
     fit: None,
 };
 
-/// Returns the default values of the sensor that replaces the rear LiDAR and camera: what the fit to them gives, and for the errors of
-/// all vehicles those of a usual car on a clear day.
+/// Returns the default values of the sensor that replaces the rear LiDAR and camera: the values of
+/// the fit, and as errors of all vehicles the errors of a usual car on a clear day.
 fn rear_object(fit: &'static RearFit) -> Defaults {
     let usual = fit.usual_errors();
     Defaults {
@@ -358,7 +366,8 @@ impl ObjectSensorConfig {
             // The first scan after the coasting time deletes the track.
             #[expect(clippy::cast_possible_truncation, reason = "10 s of coasting are 250 scans")]
             delete_after_misses: coast_steps as u32 + 1,
-            // The limit below 1 keeps a single miss from making existence impossible for a sensor without dropouts.
+            // The limit below 1 keeps a single miss from making existence impossible for a sensor
+            // without dropouts.
             detection_probability: (1.0 - dropout).min(0.99),
             clutter_probability: CLUTTER_PROBABILITY,
         })

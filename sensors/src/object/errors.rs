@@ -1,5 +1,5 @@
-//! How large the errors of the rear object-level sensor are, how long they last, and which measurements it loses, by class, paint and
-//! extinction of the air.
+//! The size and the duration of the rear object-level sensor's errors, and its lost measurements,
+//! by class, paint and extinction of the air.
 //!
 //! ```text
 //!   error = slow (deviation, correlation time) + white (deviation), along and across the road
@@ -9,13 +9,15 @@
 //!                        all-scans-share · range
 //! ```
 //!
-//! Dark paint and fog leave fewer returns of a vehicle, so that its box in the full chain is off by more. The LiDAR's mirror scans with
-//! another side each time, and one side loses a distant vehicle before the other does. Losses therefore alternate: of each two scans, the
-//! even one is lost only if more than half of all are. A vehicle without a confirmed track is measured in every scan: the range is
-//! that at which the full chain confirms it, so that it includes what losses cost before.
+//! Dark paint and fog leave fewer returns of a vehicle, and its box in the full chain has a larger
+//! error. The LiDAR's mirror scans with another side each time, and one side loses a distant
+//! vehicle before the other side does. Losses therefore alternate: of each two scans, the even scan
+//! is lost only if more than half of all scans are lost. A vehicle without a confirmed track is
+//! measured in every scan: the range is the distance at which the full chain confirms it, and so
+//! includes the cost of earlier losses.
 //!
-//! The figures stand in grids over paint and extinction, between whose points they are interpolated as ranges are. They hold for all plates
-//! and body shapes of a class.
+//! Grids over paint and extinction hold the figures. They are interpolated between the points of
+//! the grid as the ranges are. They hold for all plates and body shapes of a class.
 
 use closecall_traffic::{Appearance, CONTROL_STEP, Environment, VehicleClass, maths};
 use serde::{Deserialize, Serialize};
@@ -31,11 +33,13 @@ const TIME_RANGE_S: [f64; 2] = [0.04, 100.0];
 /// The errors of one vehicle's measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedErrors {
-    /// Standard deviations of the white errors along and across the road (m), of a vehicle that every scan measures.
+    /// Standard deviations of the white errors along and across the road (m), of a vehicle that
+    /// every scan measures.
     pub white_sd_m: [f64; 2],
     /// The same beyond, where some scans lose the vehicle.
     pub far_white_sd_m: [f64; 2],
-    /// Standard deviations of the slow errors along and across the road (m), of a vehicle that every scan measures.
+    /// Standard deviations of the slow errors along and across the road (m), of a vehicle that
+    /// every scan measures.
     pub slow_sd_m: [f64; 2],
     /// The same beyond.
     pub far_slow_sd_m: [f64; 2],
@@ -99,22 +103,23 @@ pub struct ErrorGrid {
 pub type NamedGrid<'a> = (&'static str, &'a [Vec<f64>], [f64; 2]);
 
 impl ErrorGrid {
-    /// Returns the grids of points that stand in rows of equal paint.
+    /// Returns the grids of points in rows of equal paint.
     pub fn of(rows: &[Vec<FittedErrors>]) -> Self {
-        let grid = |of: &dyn Fn(&FittedErrors) -> f64| rows.iter().map(|row| row.iter().map(of).collect()).collect();
+        let grid =
+            |value: &dyn Fn(&FittedErrors) -> f64| rows.iter().map(|row| row.iter().map(value).collect()).collect();
         Self {
-            white_along_m: grid(&|it| it.white_sd_m[0]),
-            white_across_m: grid(&|it| it.white_sd_m[1]),
-            far_white_along_m: grid(&|it| it.far_white_sd_m[0]),
-            far_white_across_m: grid(&|it| it.far_white_sd_m[1]),
-            slow_along_m: grid(&|it| it.slow_sd_m[0]),
-            slow_across_m: grid(&|it| it.slow_sd_m[1]),
-            far_slow_along_m: grid(&|it| it.far_slow_sd_m[0]),
-            far_slow_across_m: grid(&|it| it.far_slow_sd_m[1]),
-            slow_along_time_s: grid(&|it| it.slow_time_s[0]),
-            slow_across_time_s: grid(&|it| it.slow_time_s[1]),
-            all_scans_share: grid(&|it| it.all_scans_share),
-            lost_share: grid(&|it| it.lost_share),
+            white_along_m: grid(&|errors| errors.white_sd_m[0]),
+            white_across_m: grid(&|errors| errors.white_sd_m[1]),
+            far_white_along_m: grid(&|errors| errors.far_white_sd_m[0]),
+            far_white_across_m: grid(&|errors| errors.far_white_sd_m[1]),
+            slow_along_m: grid(&|errors| errors.slow_sd_m[0]),
+            slow_across_m: grid(&|errors| errors.slow_sd_m[1]),
+            far_slow_along_m: grid(&|errors| errors.far_slow_sd_m[0]),
+            far_slow_across_m: grid(&|errors| errors.far_slow_sd_m[1]),
+            slow_along_time_s: grid(&|errors| errors.slow_time_s[0]),
+            slow_across_time_s: grid(&|errors| errors.slow_time_s[1]),
+            all_scans_share: grid(&|errors| errors.all_scans_share),
+            lost_share: grid(&|errors| errors.lost_share),
         }
     }
 
@@ -192,7 +197,7 @@ impl ErrorGrids {
     }
 }
 
-/// Which errors the scenario gives for all vehicles, in place of those of the fit.
+/// Which errors the scenario gives for all vehicles, in place of the errors of the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Given {
     /// The white errors along and across the road.
@@ -228,14 +233,16 @@ impl<T: Copy> NearFar<T> {
 pub(super) enum Losses {
     /// Each with the same probability (-).
     Even(f64),
-    /// This share of those that are far (-).
+    /// This share of the far scans (-).
     Far(f64),
 }
 
-/// The errors of one vehicle in the weather of the latest scan, as the noise and the filter take them.
+/// The errors of one vehicle in the weather of the latest scan, as the noise and the filter take
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TargetErrors {
-    /// Standard deviations of the white errors along and across the road (m), of a near vehicle and of a far one.
+    /// Standard deviations of the white errors along and across the road (m), of a near vehicle and
+    /// of a far one.
     pub(super) white_sd_m: NearFar<[f64; 2]>,
     /// Distance beyond which a vehicle is far (m).
     pub(super) far_m: f64,
@@ -246,22 +253,24 @@ pub(super) struct TargetErrors {
     pub(super) losses: Losses,
 }
 
-/// Returns the share of a slow error with this correlation time (s) that remains after one scan (-).
+/// Returns the share of a slow error with this correlation time (s) that remains after one scan
+/// (-).
 pub(super) fn decay(time_s: f64) -> f64 {
     maths::exp(-CONTROL_STEP.s() / time_s)
 }
 
 impl TargetErrors {
-    /// Returns the errors of a vehicle with the range `range_m` (m): those of the fit, except those that the scenario gives.
+    /// Returns the errors of a vehicle with the range `range_m` (m): the errors of the fit, except
+    /// where the scenario gives them.
     pub(super) fn new(model: &ObjectSensorModel, fitted: Option<&FittedErrors>, range_m: f64) -> Self {
-        let own = Self {
+        let stated = Self {
             white_sd_m: NearFar::same(model.white_sd_m),
             far_m: f64::INFINITY,
             slow_sd_m: NearFar::same([model.drift_sd_m; 2]),
             slow_decay: [model.drift_decay; 2],
             losses: Losses::Even(model.dropout),
         };
-        let Some(fitted) = fitted else { return own };
+        let Some(fitted) = fitted else { return stated };
         let Given { white, slow, slow_time, dropout } = model.given;
         let white =
             |fitted_m: [f64; 2]| [0, 1].map(|axis| if white[axis] { model.white_sd_m[axis] } else { fitted_m[axis] });
@@ -269,17 +278,18 @@ impl TargetErrors {
             white_sd_m: NearFar { near: white(fitted.white_sd_m), far: white(fitted.far_white_sd_m) },
             far_m: fitted.all_scans_share * range_m,
             slow_sd_m: match slow {
-                true => own.slow_sd_m,
+                true => stated.slow_sd_m,
                 false => NearFar { near: fitted.slow_sd_m, far: fitted.far_slow_sd_m },
             },
-            slow_decay: if slow_time { own.slow_decay } else { fitted.slow_time_s.map(decay) },
-            losses: if dropout { own.losses } else { Losses::Far(fitted.lost_share) },
+            slow_decay: if slow_time { stated.slow_decay } else { fitted.slow_time_s.map(decay) },
+            losses: if dropout { stated.losses } else { Losses::Far(fitted.lost_share) },
         }
     }
 }
 
 impl Losses {
-    /// Returns the probability that the scan of this step loses a vehicle. `may_lose_far` tells whether it is far and has a confirmed track.
+    /// Returns the probability that the scan of this step loses a vehicle. `may_lose_far` tells
+    /// whether it is far and has a confirmed track.
     pub(super) fn probability(&self, step: usize, may_lose_far: bool) -> f64 {
         match *self {
             Self::Even(share) => share,
@@ -324,19 +334,19 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_those_of_class_and_paint_and_lie_between_the_points() {
+    fn errors_depend_on_class_and_paint_and_are_interpolated_between_the_points() {
         let grids = grids();
         assert_eq!(grids.check(), Ok(()));
-        let of = |class, paint_reflectivity| {
+        let errors_at = |class, paint_reflectivity| {
             let appearance = Appearance { paint_reflectivity, ..Vehicle::typical(class).appearance };
             grids.at(class, &appearance, &Environment::CLEAR_DAY)
         };
-        assert_eq!(of(VehicleClass::Truck, 0.1), POINT);
-        assert_eq!(of(VehicleClass::Car, 0.8), POINT);
-        assert_eq!(of(VehicleClass::Car, 0.05), FittedErrors { slow_sd_m: [0.03, 0.12], ..POINT });
-        assert_eq!(of(VehicleClass::Motorcycle, 0.4), FittedErrors { white_sd_m: [0.05, 0.02], ..POINT });
+        assert_eq!(errors_at(VehicleClass::Truck, 0.1), POINT);
+        assert_eq!(errors_at(VehicleClass::Car, 0.8), POINT);
+        assert_eq!(errors_at(VehicleClass::Car, 0.05), FittedErrors { slow_sd_m: [0.03, 0.12], ..POINT });
+        assert_eq!(errors_at(VehicleClass::Motorcycle, 0.4), FittedErrors { white_sd_m: [0.05, 0.02], ..POINT });
         // Halfway between the logarithms of the paints.
-        assert!((of(VehicleClass::Car, 0.2).slow_sd_m[1] - 0.08).abs() < 1e-12);
+        assert!((errors_at(VehicleClass::Car, 0.2).slow_sd_m[1] - 0.08).abs() < 1e-12);
     }
 
     #[test]
@@ -347,40 +357,46 @@ mod tests {
             wrong.check().unwrap_err()
         };
         for (message, key) in [
-            (refused(|it| it.truck.slow_along_m[1].truncate(1)), "errors.truck.slow-along-m"),
-            (refused(|it| it.car.white_across_m[0][0] = 0.0), "errors.car.white-across-m"),
-            (refused(|it| it.car.slow_across_time_s[0][1] = f64::NAN), "errors.car.slow-across-time-s"),
-            (refused(|it| it.motorcycle.lost_share[0][0] = 1.5), "errors.motorcycle.lost-share"),
-            (refused(|it| it.paints.reverse()), "errors.paints"),
+            (refused(|model| model.truck.slow_along_m[1].truncate(1)), "errors.truck.slow-along-m"),
+            (refused(|model| model.car.white_across_m[0][0] = 0.0), "errors.car.white-across-m"),
+            (refused(|model| model.car.slow_across_time_s[0][1] = f64::NAN), "errors.car.slow-across-time-s"),
+            (refused(|model| model.motorcycle.lost_share[0][0] = 1.5), "errors.motorcycle.lost-share"),
+            (refused(|model| model.paints.reverse()), "errors.paints"),
         ] {
             assert!(message.contains(key), "{message}");
         }
     }
 
     #[test]
-    fn what_the_scenario_gives_replaces_that_error_alone() {
+    fn an_error_in_the_scenario_replaces_that_error_alone() {
         let model = |text: &str| {
             let config: ObjectSensorConfig = toml::from_str(text).unwrap();
             config.check_rear_object(&Parameters::default()).unwrap()
         };
-        let of = |text| TargetErrors::new(&model(text), Some(&POINT), 100.0);
-        let fitted = of("");
+        let errors_with = |text| TargetErrors::new(&model(text), Some(&POINT), 100.0);
+        let fitted = errors_with("");
         let of_both = |near, far| NearFar { near, far };
         assert_eq!(fitted.white_sd_m, of_both([0.01, 0.02], [0.05, 0.06]));
         assert_eq!(fitted.slow_sd_m, of_both([0.03, 0.04], [0.07, 0.08]));
         assert_eq!((fitted.far_m, fitted.losses), (80.0, Losses::Far(0.5)));
-        assert_eq!(of("range-sd-m = 0.3"), TargetErrors { white_sd_m: of_both([0.3, 0.02], [0.3, 0.06]), ..fitted });
-        assert_eq!(of("lateral-sd-m = 0.3"), TargetErrors { white_sd_m: of_both([0.01, 0.3], [0.05, 0.3]), ..fitted });
-        assert_eq!(of("drift-sd-m = 0.0"), TargetErrors { slow_sd_m: NearFar::same([0.0; 2]), ..fitted });
-        assert_eq!(of("drift-time-s = 2.0"), TargetErrors { slow_decay: [decay(2.0); 2], ..fitted });
-        assert_eq!(of("dropout = 0.3"), TargetErrors { losses: Losses::Even(0.3), ..fitted });
+        assert_eq!(
+            errors_with("range-sd-m = 0.3"),
+            TargetErrors { white_sd_m: of_both([0.3, 0.02], [0.3, 0.06]), ..fitted }
+        );
+        assert_eq!(
+            errors_with("lateral-sd-m = 0.3"),
+            TargetErrors { white_sd_m: of_both([0.01, 0.3], [0.05, 0.3]), ..fitted }
+        );
+        assert_eq!(errors_with("drift-sd-m = 0.0"), TargetErrors { slow_sd_m: NearFar::same([0.0; 2]), ..fitted });
+        assert_eq!(errors_with("drift-time-s = 2.0"), TargetErrors { slow_decay: [decay(2.0); 2], ..fitted });
+        assert_eq!(errors_with("dropout = 0.3"), TargetErrors { losses: Losses::Even(0.3), ..fitted });
     }
 
     #[test]
     fn beyond_its_distance_one_of_two_scans_is_lost_first() {
-        let of = |share: f64, is_far| [0, 1].map(|step| Losses::Far(share).probability(step, is_far));
-        assert_eq!((of(0.5, true), of(0.25, true), of(0.75, true)), ([0.0, 1.0], [0.0, 0.5], [0.5, 1.0]));
-        assert_eq!(of(0.5, false), [0.0; 2]);
+        let losses = |share: f64, is_far| [0, 1].map(|step| Losses::Far(share).probability(step, is_far));
+        assert_eq!((losses(0.5, true), losses(0.25, true), losses(0.75, true)), ([0.0, 1.0], [0.0, 0.5], [0.5, 1.0]));
+        assert_eq!(losses(0.5, false), [0.0; 2]);
         assert_eq!([0, 1].map(|step| Losses::Even(0.2).probability(step, false)), [0.2; 2]);
     }
 }

@@ -1,4 +1,5 @@
-//! What faults make of the measurements and the tracks of an object-level sensor, and what its monitor notices of them.
+//! The effects of faults on the measurements and the tracks of an object-level sensor, and the
+//! faults that its monitor notices.
 
 use closecall_traffic::{
     CONTROL_STEP, ClassScores, Source, StandardNormal, Stream, Time, Track, TrackId, TrackStatus, VehicleClass, maths,
@@ -16,9 +17,9 @@ use super::visibility::{Direction, NEEDED_SHARE};
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, ObjectFault};
 use crate::surroundings::OtherVehicle;
 
-/// Length and width of a vehicle that is not there (m): those of a usual car.
+/// Length and width of a vehicle that does not exist (m): a usual car.
 const GHOST_SIZE_M: [f64; 2] = [4.6, 1.8];
-/// Standard deviations of its position (m) and speed (m/s): those of a settled track.
+/// Standard deviations of its position (m) and speed (m/s), as of a settled track.
 const GHOST_SD: [f64; 2] = [0.15, 0.3];
 /// Score of its class, car.
 const GHOST_CONFIDENCE: f64 = 0.97;
@@ -35,7 +36,8 @@ pub(super) struct FaultStreams {
 impl FaultStreams {
     /// Creates the streams for the vehicle with the index `actor`.
     pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize) -> Self {
-        let [losses, noise] = ["fault", "fault-noise"].map(|of| key.stream_about(&format!("{channel}-{of}"), actor));
+        let [losses, noise] =
+            ["fault", "fault-noise"].map(|purpose| key.stream_about(&format!("{channel}-{purpose}"), actor));
         Self { losses, noise }
     }
 }
@@ -53,7 +55,8 @@ pub(super) struct Faulty {
     /// Age of the newest scan that has arrived (steps).
     age_steps: usize,
     blocked: Blocked,
-    /// Number of latest successive steps in which the sensor delivered nothing, or the same tracks again.
+    /// Number of latest successive steps in which the sensor delivered nothing, or the same tracks
+    /// again.
     failed_steps: u32,
     /// The tracks that a frozen sensor repeats.
     held: Option<Vec<Track>>,
@@ -62,7 +65,8 @@ pub(super) struct Faulty {
 }
 
 impl Faulty {
-    /// Creates the memory of a sensor with these faults, whose scans are lost and late by random numbers of `rng`.
+    /// Creates the memory of a sensor with these faults, whose scans are lost and late by random
+    /// numbers of `rng`.
     pub(super) fn new(faults: FaultList<ObjectFault>, rng: Stream) -> Self {
         let rng = (!faults.is_empty()).then_some(rng);
         Self { faults, rng, ..Self::default() }
@@ -73,7 +77,8 @@ impl Faulty {
         self.rng.is_some()
     }
 
-    /// Begins a step of a sensor that looks in this direction and has a latency of `latency_steps` without faults.
+    /// Begins a step of a sensor that looks in this direction and has a latency of `latency_steps`
+    /// without faults.
     pub(super) fn begin(&mut self, time: Time, step: usize, (direction, latency_steps): (Direction, usize)) {
         let Some(rng) = &mut self.rng else { return };
         let [lost, late]: [f64; 2] = rng.random();
@@ -115,10 +120,11 @@ impl Faulty {
         self.is_frame_lost
     }
 
-    /// Returns the errors of a measurement with those that the faults add.
+    /// Returns the errors of a measurement plus the errors that the faults add.
     pub(super) fn spoil(&self, errors: MeasurementErrors, streams: Option<&mut FaultStreams>) -> MeasurementErrors {
         let Some(FaultStreams { losses, noise }) = streams else { return errors };
-        // Drawn in any case: whether the sensor itself loses the scan depends on the distance, which differs between two arms.
+        // Drawn in any case: whether the sensor itself loses the scan depends on the distance,
+        // which differs between two arms.
         let drawn: f64 = losses.random();
         let is_lost = errors.is_lost || drawn < self.fault.dropout;
         let [along, across, speed]: [f64; 3] = std::array::from_fn(|_| noise.sample(StandardNormal));
@@ -132,10 +138,12 @@ impl Faulty {
         }
     }
 
-    /// Returns by how much a wrong mounting and a wrong clock move a vehicle along and across the road (m).
+    /// Returns by how much a wrong mounting and a wrong clock move a vehicle along and across the
+    /// road (m).
     ///
-    /// A sensor at `mount_m` ahead of the ego's middle that is turned to the left sees everything turned to the right. A scan that
-    /// is dated too late counts as measured from where the ego is then, and the vehicle as having been there by then.
+    /// A sensor at `mount_m` ahead of the ego's middle that is turned to the left sees everything
+    /// turned to the right. A scan that is dated too late counts as measured from where the ego is
+    /// then, and the vehicle as having been there by then.
     pub(super) fn shift_m(&self, other: &OtherVehicle, mount_m: f64, input: &ScanInput<'_>) -> [f64; 2] {
         let [mut along_m, mut across_m] = [0.0; 2];
         if self.fault.yaw_rad != 0.0 {
@@ -148,19 +156,21 @@ impl Faulty {
         }
         let offset_s = self.fault.clock_offset_s;
         if offset_s != 0.0 {
-            let own = &input.scene.ego.state;
-            let (sin, cos) = maths::sin_cos(own.heading_rad);
-            let own_mps = [own.speed_mps * cos / input.frame.path_scale(own.d_m), own.speed_mps * sin];
+            let ego_state = &input.scene.ego.state;
+            let (sin, cos) = maths::sin_cos(ego_state.heading_rad);
+            let own_mps =
+                [ego_state.speed_mps * cos / input.frame.path_scale(ego_state.d_m), ego_state.speed_mps * sin];
             along_m += (own_mps[0] - other.road_mps[0]) * offset_s;
             across_m += (own_mps[1] - other.road_mps[1]) * offset_s;
         }
         [along_m, across_m]
     }
 
-    /// Counts one step. `in_view` are the numbers of vehicles in view, and of those whose measurement arrives.
+    /// Counts one step. `in_view` are the numbers of vehicles in view, and of those whose
+    /// measurement arrives.
     ///
-    /// A sensor whose scan does not arrive, or that loses the measurement of every vehicle in view, delivers nothing, whether it is
-    /// dead or not.
+    /// A sensor whose scan does not arrive, or that loses the measurement of every vehicle in view,
+    /// delivers nothing, whether it is dead or not.
     pub(super) fn observe(&mut self, [in_view, measured]: [usize; 2]) {
         let fault = &self.fault;
         let is_silent = fault.dropout > 0.0 && in_view > 0 && measured == 0;
@@ -173,13 +183,14 @@ impl Faulty {
         self.fault.is_dead
     }
 
-    /// Returns whether a monitor has noticed the fault. The monitor finds that nothing arrives, or that the noise of successive
-    /// measurements is the same.
+    /// Returns whether a monitor has noticed the fault. The monitor finds that nothing arrives, or
+    /// that the noise of successive measurements is the same.
     pub(super) fn is_noticed(&self) -> bool {
         self.failed_steps >= NOTICED_AFTER_SCANS
     }
 
-    /// Replaces the tracks from `before` on by those of the step in which the sensor froze, with the present time.
+    /// Replaces the tracks from `before` on by the tracks of the step in which the sensor froze,
+    /// with the present time.
     pub(super) fn hold(&mut self, before: usize, time: Time, list: &mut TrackList) {
         if !self.fault.is_frozen {
             self.held = None;
@@ -190,7 +201,8 @@ impl Faulty {
         list.tracks.extend(held.iter().map(|track| Track { time, ..track.clone() }));
     }
 
-    /// Returns the track without a vehicle, if there is one; `None` once it would have reached the ego.
+    /// Returns the track without a vehicle, if there is one; `None` once it would have reached the
+    /// ego.
     pub(super) fn ghost(
         &mut self,
         is_ahead: bool,

@@ -1,14 +1,16 @@
-//! The fit of the rear object-level sensor to the full chain: at which distance a vehicle is confirmed, and at which it is classified
-//! as a vehicle, by its class, paint, plate and body shape and by the extinction of the air; and how large the errors of its track
-//! are.
+//! The fit of the rear object-level sensor to the full chain. It holds the distance at which a
+//! vehicle is confirmed and the distance at which it is classified as a vehicle, by its class,
+//! paint, plate and body shape and by the extinction of the air. It also holds the errors of the
+//! vehicle's track.
 //!
 //! ```text
 //!  full chain ─▶ approaches ─▶ `perception::fit` ─▶ data/rear-object.toml ─▶ RearFit ─▶ ObjectSensor
 //! ```
 //!
-//! Ranges stand in a grid over paint and extinction, between whose points they are interpolated: linearly in the logarithm of the
-//! paint's reflectivity, and in the extinction. Beyond the grid, its border holds. The ratios of body shapes stand in a coarser grid
-//! of the same kind, and the errors in further ones ([`ErrorGrids`]).
+//! A grid over paint and extinction holds the ranges. Between its points they are interpolated
+//! linearly in the logarithm of the paint's reflectivity and in the extinction. Beyond the grid,
+//! its border holds. A coarser grid of the same kind holds the ratios of body shapes, and further
+//! grids hold the errors ([`ErrorGrids`]).
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -38,7 +40,8 @@ pub struct RearFit {
     pub origin: Origin,
     /// Score of the true class, by class.
     pub class_confidence: ByClass,
-    /// Standard deviation of the logarithm of the range of one vehicle about that of the grid (-).
+    /// Standard deviation of the logarithm of the range of one vehicle about the logarithm of the
+    /// grid's range (-).
     pub range_spread: f64,
     /// Reflectivities of the paint of the grid (-), in rising order.
     pub paints: Vec<f64>,
@@ -46,11 +49,12 @@ pub struct RearFit {
     pub extinctions_per_m: Vec<f64>,
     /// Ranges of each class and plate.
     pub range: Vec<RangeGrid>,
-    /// Ranges of body shapes relative to those of their class.
+    /// Ranges of body shapes, as ratios to the ranges of their class.
     pub shapes: ShapeRatios,
     /// Errors and losses of the measurements.
     pub errors: ErrorGrids,
-    /// How the tracks of the sensor compare with those of the full chain, if that was measured. No sensor reads it.
+    /// Comparison of the sensor's tracks with the tracks of the full chain, if it was measured. No
+    /// sensor reads it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub validation: Option<Validation>,
 }
@@ -75,11 +79,11 @@ pub struct Origin {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ByClass {
-    /// That of cars.
+    /// The value of cars.
     pub car: f64,
-    /// That of trucks.
+    /// The value of trucks.
     pub truck: f64,
-    /// That of motorcycles.
+    /// The value of motorcycles.
     pub motorcycle: f64,
 }
 
@@ -93,11 +97,12 @@ pub struct RangeGrid {
     pub plate: Plate,
     /// For each paint, the range in each extinction (m).
     pub range_m: Vec<Vec<f64>>,
-    /// For each paint, the distance in each extinction from which on a vehicle is classified as one (m): at most the range.
+    /// For each paint, the distance in each extinction from which on a vehicle is classified as one
+    /// (m): at most the range.
     pub class_range_m: Vec<Vec<f64>>,
 }
 
-/// The ranges of body shapes relative to those of the first shape of their class.
+/// The ranges of body shapes, as ratios to the ranges of the first shape of their class.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ShapeRatios {
@@ -105,9 +110,11 @@ pub struct ShapeRatios {
     pub paints: Vec<f64>,
     /// Extinctions of the grid (1/m), in rising order.
     pub extinctions_per_m: Vec<f64>,
-    /// For each shape and paint, the ratio of the ranges in each extinction (-); 1 if a shape is absent.
+    /// For each shape and paint, the ratio of the ranges in each extinction (-); 1 if a shape is
+    /// absent.
     pub range: BTreeMap<String, Vec<Vec<f64>>>,
-    /// For each shape and paint, the ratio of the distances from which on a vehicle is classified as one (-); 1 if a shape is absent.
+    /// For each shape and paint, the ratio of the distances from which on a vehicle is classified
+    /// as one (-); 1 if a shape is absent.
     pub class_range: BTreeMap<String, Vec<Vec<f64>>>,
 }
 
@@ -167,7 +174,8 @@ impl RearFit {
         self.validation.as_ref().map_or(Ok(()), Validation::check)
     }
 
-    /// Returns the range of a usual car on a clear day (m): grey, with a clean plate. Like the grid, it has decimetres.
+    /// Returns the range of a usual car on a clear day (m): grey, with a clean plate. Like the
+    /// grid, it has decimetres.
     pub(super) fn usual_m(&self) -> f64 {
         let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
         let [range_m, _] = self.grid_m(VehicleClass::Car, Plate::Clean, [USUAL_PAINT, clear_per_m]);
@@ -180,7 +188,7 @@ impl RearFit {
         self.errors.at(usual.class, &usual.appearance, &Environment::CLEAR_DAY)
     }
 
-    /// Returns what the sensors are a fit of, for reports.
+    /// Returns the origin of the fit, for reports.
     pub fn origin_text(&self) -> String {
         let Origin { version, scenario, seed, approaches, .. } = &self.origin;
         format!("fit of {version} to the full chain of {scenario}, seed {seed}, {approaches} approaches of each point")
@@ -198,17 +206,18 @@ impl RearFit {
         let [range_m, class_range_m] = self.grid_m(class, appearance.plate, at);
         let ShapeRatios { paints, extinctions_per_m, range, class_range } = &self.shapes;
         let shape = appearance.body_shape.name();
-        let ratio = |of: &BTreeMap<String, Vec<Vec<f64>>>| {
-            of.get(shape).map_or(1.0, |ratios| interpolated([paints, extinctions_per_m], ratios, at))
+        let ratio = |ratios_by_shape: &BTreeMap<String, Vec<Vec<f64>>>| {
+            ratios_by_shape.get(shape).map_or(1.0, |ratios| interpolated([paints, extinctions_per_m], ratios, at))
         };
         [range_m * ratio(range), class_range_m * ratio(class_range)]
     }
 
-    /// Returns the ranges of the first body shape of a class, of a paint in air of an extinction (1/m).
+    /// Returns the ranges of the first body shape of a class, of a paint in air of an extinction
+    /// (1/m).
     fn grid_m(&self, class: VehicleClass, plate: Plate, at: [f64; 2]) -> [f64; 2] {
-        let of = |plate| self.range.iter().find(|grid| grid.class == class && grid.plate == plate);
+        let grid_with = |plate| self.range.iter().find(|grid| grid.class == class && grid.plate == plate);
         // A motorcycle has no plate at its front, so that its state does not matter.
-        let Some(grid) = of(plate).or_else(|| of(Plate::Clean)) else { return [0.0; 2] };
+        let Some(grid) = grid_with(plate).or_else(|| grid_with(Plate::Clean)) else { return [0.0; 2] };
         let knots = [&*self.paints, &*self.extinctions_per_m];
         [interpolated(knots, &grid.range_m, at), interpolated(knots, &grid.class_range_m, at)]
     }
@@ -231,10 +240,11 @@ pub(super) fn interpolated(
     in_row(row) + row_share * (in_row(row + 1) - in_row(row))
 }
 
-/// Reflectivity of the paint of a usual car (-): that of a vehicle whose paint is not given.
+/// Reflectivity of the paint of a usual car (-), and of a vehicle whose paint is not given.
 const USUAL_PAINT: f64 = 0.5;
 
-/// Returns the index of the last knot at or below `value`, and the share of the way to the next one.
+/// Returns the index of the last knot at or below `value`, and the share of the way to the next
+/// knot.
 fn place(knots: &[f64], value: f64) -> (usize, f64) {
     let index = knots.partition_point(|knot| *knot <= value).saturating_sub(1);
     match knots.get(index + 1) {
@@ -258,9 +268,9 @@ fn rising(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), String> {
     Err(format!("`{key}` needs at least two numbers in rising order"))
 }
 
-pub(super) fn check_knots(of: &str, [paints, extinctions_per_m]: [&[f64]; 2]) -> Result<(), String> {
-    rising(&format!("{of}paints"), paints, [0.01, 1.0])?;
-    rising(&format!("{of}extinctions-per-m"), extinctions_per_m, [0.0, 1.0])
+pub(super) fn check_knots(prefix: &str, [paints, extinctions_per_m]: [&[f64]; 2]) -> Result<(), String> {
+    rising(&format!("{prefix}paints"), paints, [0.01, 1.0])?;
+    rising(&format!("{prefix}extinctions-per-m"), extinctions_per_m, [0.0, 1.0])
 }
 
 pub(super) fn check_grid(

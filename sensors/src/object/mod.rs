@@ -1,21 +1,24 @@
-//! Object-level sensors: models of the tracks that a radar, or a LiDAR with its own tracking, delivers.
+//! Object-level sensors: models of the tracks that a radar, or a LiDAR with its own tracking,
+//! delivers.
 //!
-//! They leave out the physics of the measurement. One sensor looks ahead, one around the ego, and one behind. Each has
-//! a field of view, a range, errors (white and slowly varying), a latency, lost measurements, and a filter whose
-//! covariance follows from the errors. The rear sensor replaces LiDAR and camera in fast campaigns. Its ranges and errors
-//! are fitted to theirs ([`RearFit`]), so that dark paint, fog and rain shorten its range and enlarge its errors, too. In fog, the LiDAR sees the plate or
-//! the lamps of a vehicle that the camera does not recognise yet: its track is confirmed, and classified as background
-//! until the vehicle has come within the distance at which the full chain classifies it as a vehicle. The other two sensors are part
-//! of the full chain.
+//! They leave out the physics of the measurement. One sensor looks ahead, one around the ego, and
+//! one behind. Each has a field of view, a range, errors (white and slowly varying), a latency,
+//! lost measurements, and a filter whose covariance follows from the errors. The rear sensor
+//! replaces LiDAR and camera in fast campaigns. Its ranges and errors are fitted to the ranges and
+//! errors of these two ([`RearFit`]): dark paint, fog and rain shorten its range and enlarge its
+//! errors, too. In fog, the LiDAR sees the plate or the lamps of a vehicle that the camera does not
+//! recognise yet: its track is confirmed, and classified as background until the vehicle has come
+//! within the distance at which the full chain classifies it as a vehicle. The other two sensors
+//! are part of the full chain.
 //!
 //! The models deviate from real sensors on purpose:
 //!
-//! - The vehicle that a measurement belongs to is known.
-//! - Lengths and widths are the true ones.
+//! - The model knows which vehicle a measurement belongs to.
+//! - Lengths and widths are true.
 //! - There are no ghost objects, unless the scenario injects one.
 //! - The radar's angle error does not grow with range.
-//! - The ego's own motion and its position in the lane are known exactly (odometry and map), unless the scenario gives them
-//!   errors.
+//! - The ego's own motion and its position in the lane are known exactly (odometry and map), unless
+//!   the scenario gives them errors.
 
 mod arrivals;
 mod config;

@@ -1,17 +1,20 @@
-//! The errors of one sensor's measurements of one vehicle: white noise, a slow drift, and lost measurements.
+//! The errors of one sensor's measurements of one vehicle: white noise, a slow drift, and lost
+//! measurements.
 //!
-//! The drift is a first-order Gauss–Markov process with the standard deviation σ and the correlation time τ (Gelb,
-//! *Applied Optimal Estimation*, 1974):
+//! The drift is a first-order Gauss–Markov process with the standard deviation σ and the
+//! correlation time τ (Gelb, *Applied Optimal Estimation*, 1974):
 //!
 //! ```text
 //!   bₖ₊₁ = φ·bₖ + σ·√(1 − φ²)·w        φ = exp(−Δt/τ), w: standard normal
 //! ```
 //!
-//! It models a radar's centre of reflection, which wanders over the vehicle's body instead of jumping from scan to scan.
+//! It models a radar's centre of reflection, which wanders over the vehicle's body instead of
+//! jumping from scan to scan.
 //!
-//! Every step takes the same number of random values, whether the vehicle is seen or not. Two runs that differ only in
-//! the ego's behaviour (with and without MIS) therefore have the same errors at the same times. The values of a vehicle that is
-//! not in view are drawn once it is seen, and never if it is not.
+//! Every step takes the same number of random values, whether the vehicle is seen or not. Two runs
+//! that differ only in the ego's behaviour (with and without MIS) therefore have the same errors at
+//! the same times. The values of a vehicle outside the field of view are drawn once it is seen, and
+//! never if it is not seen.
 
 use std::sync::Arc;
 
@@ -31,8 +34,9 @@ pub struct NoiseKey {
     pub ego: ActorId,
     /// The scenario's actors, in the order of its list.
     ///
-    /// The errors of each actor's measurements are keyed by the actor's name, so that neither the order nor a further
-    /// actor changes them. An actor whose index is beyond the list is keyed by its index.
+    /// The errors of each actor's measurements are keyed by the actor's name, so that neither the
+    /// order nor a further actor changes them. An actor whose index is beyond the list is keyed by
+    /// its index.
     pub actors: Arc<[ActorId]>,
 }
 
@@ -70,12 +74,13 @@ pub(super) struct MeasurementErrors {
     pub(super) speed_mps: f64,
     /// Whether the measurement is lost.
     pub(super) is_lost: bool,
-    /// Standard deviations of the white and of the slow part of the position's errors, along and across the road (m).
+    /// Standard deviations of the white and of the slow part of the position's errors, along and
+    /// across the road (m).
     pub(super) white_sd_m: [f64; 2],
     pub(super) slow_sd_m: [f64; 2],
 }
 
-/// What the errors of a scan depend on beside the vehicle.
+/// Conditions of a scan that its errors depend on, beside the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Scan {
     /// Whether the vehicle is far.
@@ -89,8 +94,8 @@ pub(super) struct Scan {
 impl MeasurementErrors {
     /// Returns the same errors for a road on which vehicles overtake on `overtaking_side`.
     ///
-    /// The lateral error is mirrored for overtaking on the right, so that the errors in left-hand traffic mirror those
-    /// in right-hand traffic.
+    /// The lateral error is mirrored for overtaking on the right, so the errors in left-hand
+    /// traffic mirror the errors in right-hand traffic.
     pub(super) fn mirrored_for(self, overtaking_side: Side) -> Self {
         let [along_m, across_m] = self.position_m;
         match overtaking_side {
@@ -101,19 +106,22 @@ impl MeasurementErrors {
 }
 
 impl TargetNoise {
-    /// Creates the error process for the vehicle with the index `actor`; the slow errors start in their stationary distribution.
+    /// Creates the error process for the vehicle with the index `actor`; the slow errors start in
+    /// their stationary distribution.
     pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize) -> Self {
         let mut rng = key.stream_about(channel, actor);
         let slow = std::array::from_fn(|_| normal(&mut rng));
         Self { rng, slow, skipped: 0 }
     }
 
-    /// Passes over the errors of a scan that does not see the vehicle. They are drawn before the next ones that are needed.
+    /// Passes over the errors of a scan that does not see the vehicle. They are drawn before the
+    /// next errors that are needed.
     pub(super) fn skip(&mut self) {
         self.skipped += 1;
     }
 
-    /// Returns the errors of the next scan. Those of scans that were passed over have the same correlation times.
+    /// Returns the errors of the next scan. The errors of skipped scans have the same correlation
+    /// times.
     pub(super) fn draw(&mut self, errors: &TargetErrors, scan: Scan) -> MeasurementErrors {
         self.draw_skipped(errors);
         let [white_sd_m, slow_sd_m] = [errors.white_sd_m, errors.slow_sd_m].map(|sd_m| sd_m.of(scan.is_far));
@@ -133,7 +141,8 @@ impl TargetNoise {
         }
     }
 
-    /// Draws the slow errors of the next scan, and returns its white ones, in standard deviations (-).
+    /// Draws the slow errors of the next scan, and returns its white errors, in standard deviations
+    /// (-).
     fn draw_position(&mut self, errors: &TargetErrors) -> [f64; 2] {
         std::array::from_fn(|axis| {
             let decay = errors.slow_decay[axis];
@@ -192,7 +201,8 @@ mod tests {
         for is_far in [false, true] {
             let drawn: Vec<_> = (0..20_000).map(|_| noise.draw(&white_only, Scan { is_far, ..SCAN })).collect();
             for axis in 0..2 {
-                let mean_square = drawn.iter().map(|it| it.position_m[axis].powi(2)).sum::<f64>() / drawn.len() as f64;
+                let mean_square =
+                    drawn.iter().map(|error| error.position_m[axis].powi(2)).sum::<f64>() / drawn.len() as f64;
                 let sd_m = white_only.white_sd_m.of(is_far)[axis];
                 assert!((mean_square.sqrt() / sd_m - 1.0).abs() < 0.03, "{mean_square}");
                 assert_eq!(drawn[0].white_sd_m[axis], sd_m);

@@ -19,8 +19,8 @@ pub struct ObjectPerception {
 }
 
 impl ObjectPerception {
-    /// Creates the front radar, the surround sensors and the rear sensor (`models` in this order), with random streams
-    /// keyed by `key`.
+    /// Creates the front radar, the surround sensors and the rear sensor (`models` in this order),
+    /// with random streams keyed by `key`.
     pub fn new(models: [ObjectSensorModel; 3], key: &NoiseKey) -> Self {
         let [front, surround, rear] = models;
         Self {

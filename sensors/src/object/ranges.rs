@@ -1,4 +1,4 @@
-//! How far an object-level sensor sees in the weather of the latest scan.
+//! The range of an object-level sensor in the weather of the latest scan.
 
 use closecall_traffic::{Environment, Vehicle, VehicleClass, maths};
 
@@ -17,7 +17,7 @@ pub(super) struct Ranges {
 }
 
 impl Ranges {
-    /// Creates the ranges before the first scan: those in clear air.
+    /// Creates the ranges before the first scan: the ranges in clear air.
     pub(super) fn new(model: &ObjectSensorModel) -> Self {
         Self { weather: None, usual_m: model.range_m }
     }
@@ -44,8 +44,8 @@ impl Ranges {
         true
     }
 
-    /// Returns the distances up to which one vehicle is seen, and up to which its class is known (m). `deviation` is that of the
-    /// vehicle's ranges, in standard deviations.
+    /// Returns the distances up to which one vehicle is seen, and up to which its class is known
+    /// (m). `deviation` is the deviation of the vehicle's ranges, in standard deviations.
     pub(super) fn of_m(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> [f64; 2] {
         let [range_m, class_range_m] = match (model.fit, &self.weather) {
             (Some(fit), Some(weather)) => {

@@ -24,7 +24,8 @@ impl Blocked {
         let ends_rad = sectors.iter().flatten().map(|ends_deg| ends_deg.map(f64::to_radians));
         match direction {
             Direction::Around => self.azimuths_rad.extend(ends_rad),
-            // Ahead, the left is on the left of the ego. Behind, a slope is the distance to the left, too.
+            // Ahead, the left is on the left of the ego. Behind, a slope is the distance to the
+            // left, too.
             Direction::Ahead | Direction::Behind => self.slopes.extend(ends_rad.map(|ends| ends.map(maths::tan))),
         }
     }

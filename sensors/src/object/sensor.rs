@@ -1,12 +1,13 @@
-//! One object-level sensor: it measures each vehicle in view, filters, confirms tracks, and reports them after its
-//! latency.
+//! One object-level sensor: it measures each vehicle in view, filters, confirms tracks, and reports
+//! them after its latency.
 //!
 //! ```text
 //!  truth ─▶ in view? ─▶ + noise, lost? ─▶ filter (road axes) ─▶ lifecycle ─▶ predict by L ─▶ wait L steps ─▶ ego frame
 //! ```
 //!
-//! L is the latency in control steps. The vehicle that a measurement belongs to is known, because an object-level
-//! sensor models the output of a sensor with its own tracking. Only the full LiDAR chain can confuse two vehicles.
+//! L is the latency in control steps. The model knows which vehicle a measurement belongs to,
+//! because an object-level sensor models the output of a sensor with its own tracking. Only the
+//! full LiDAR chain can confuse two vehicles.
 
 use rand::RngExt;
 
@@ -33,7 +34,8 @@ use crate::tracking::road_filter::{LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD
 use crate::{Health, Scene};
 use closecall_traffic::ego_frame::EgoFrame;
 
-/// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.
+/// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function
+/// could act on it yet.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
 /// Share of the nominal range below which a sensor counts as degraded.
 pub(crate) const DEGRADED_SHARE: f64 = 0.5;
@@ -83,8 +85,8 @@ impl ObjectSensor {
         channel: &'static str,
         key: &NoiseKey,
     ) -> Self {
-        // One mode is enough for the radar, which measures speed, and for the surround sensors, which see a vehicle
-        // only for a short time.
+        // One mode is enough for the radar, which measures speed, and for the surround sensors,
+        // which see a vehicle only for a short time.
         let modes = match direction {
             Direction::Behind => [ALONG_MODES, ACROSS_MODES],
             Direction::Ahead | Direction::Around => [ALONG_WHITE_MODE, ACROSS_WHITE_MODE],
@@ -120,7 +122,8 @@ impl ObjectSensor {
             speed_mps: state.speed_mps,
             half_lane_m: 0.5 * input.scene.road.lane_width_m(),
         };
-        // Fog and rain matter to the rear sensor only, which is optical. Radars are unaffected over these distances.
+        // Fog and rain matter to the rear sensor only, which is optical. Radars are unaffected over
+        // these distances.
         if self.direction == Direction::Behind && self.ranges.update(&self.model, input.scene.environment) {
             // Each vehicle gets its own when it is seen next.
             self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
@@ -145,7 +148,8 @@ impl ObjectSensor {
         self.step += 1;
     }
 
-    /// Returns the errors of the measurement of a vehicle at this place in the list; `None` if it is not in view, or no scan arrives.
+    /// Returns the errors of the measurement of a vehicle at this place in the list; `None` if it
+    /// is not in view, or no scan arrives.
     fn errors(
         &mut self,
         index: usize,
@@ -175,7 +179,8 @@ impl ObjectSensor {
             target.noise.skip();
             return None;
         }
-        // The errors are drawn whether the vehicle is seen or not, so that the faults' own draws stay in step with the scans.
+        // The errors are drawn whether the vehicle is seen or not, so that the faults' own draws
+        // stay in step with the scans.
         let errors = target.noise.draw(&target.errors, scan);
         let errors = self.faulty.spoil(errors, target.fault_streams.as_mut()).mirrored_for(side);
         let mount_m = 0.5 * size.length_m * self.direction.sign();
@@ -184,8 +189,9 @@ impl ObjectSensor {
         (is_seen && !self.faulty.is_frame_lost()).then_some(MeasurementErrors { position_m, ..errors })
     }
 
-    /// Changes the tracks of this step, which are those from `before` on, as the faults do: none of a dead sensor, the former ones
-    /// of a frozen one, and one without a vehicle. `in_view` are the numbers of vehicles in view, and of those measured.
+    /// Applies the faults to the tracks of this step, which begin at the index `before`. A dead
+    /// sensor has no tracks, a frozen sensor repeats its last tracks, and a ghost adds a track
+    /// without a vehicle. `in_view` are the numbers of vehicles in view, and of those measured.
     fn degrade(&mut self, in_view: [usize; 2], before: usize, input: &ScanInput<'_>, list: &mut TrackList) {
         self.faulty.observe(in_view);
         if self.faulty.is_dead() {
@@ -202,8 +208,8 @@ impl ObjectSensor {
         list.tracks.extend(track);
     }
 
-    /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a while; degraded if weather and dirt
-    /// cost more than half of the range.
+    /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a
+    /// while; degraded if weather and dirt cost more than half of the range.
     pub(crate) fn health(&self) -> Health {
         if self.faulty.is_noticed() {
             Health::Failed
@@ -219,8 +225,8 @@ impl ObjectSensor {
         FieldOfView::straight_back(self.model.half_angle_tan, self.ranges.usual_m())
     }
 
-    /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It is usually `position`, that in
-    /// the list of other vehicles.
+    /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It
+    /// is usually `position`, that in the list of other vehicles.
     fn target_index(&mut self, other: &OtherVehicle, position: usize) -> usize {
         let actor = other.actor;
         let is_at = |target: &Target| target.actor == actor;
@@ -263,8 +269,9 @@ impl ObjectSensor {
         self.targets.len() - 1
     }
 
-    /// Predicts and corrects the filters of one vehicle. `seen` holds the errors of the measurement, and whether the vehicle is near
-    /// enough for its class to be known; it is `None` if the vehicle is not in view.
+    /// Predicts and corrects the filters of one vehicle. `seen` holds the errors of the
+    /// measurement, and whether the vehicle is near enough for its class to be known; it is `None`
+    /// if the vehicle is not in view.
     fn update_target(
         &mut self,
         index: usize,
@@ -301,7 +308,7 @@ impl ObjectSensor {
                     is_classified: false,
                 }
             });
-            // What the camera has once recognised, it does not lose again.
+            // A vehicle that the camera has recognised stays recognised.
             track.is_classified |= is_classified;
             let Filters { lifecycle, axes: [along, across], .. } = track;
             for (road_axis, axis) in [&mut *along, across].into_iter().enumerate() {
@@ -330,7 +337,8 @@ impl ObjectSensor {
         }
     }
 
-    /// Stores the current estimate in the ring buffer, and appends the one stored `latency_steps` ago to `list`.
+    /// Stores the current estimate in the ring buffer, and appends the estimate stored
+    /// `latency_steps` ago to `list`.
     fn report(&mut self, index: usize, other: &OtherVehicle, input: &ScanInput<'_>, list: &mut TrackList) {
         let has_faults = self.faulty.has_faults();
         let latency_steps = if has_faults { self.faulty.age_steps() } else { self.model.latency_steps };
@@ -384,14 +392,16 @@ impl ObjectSensor {
     }
 }
 
-/// Returns the scores of a vehicle that is not recognised yet: the full chain takes it for background.
+/// Returns the scores of a vehicle that is not recognised yet: the full chain takes it for
+/// background.
 fn unrecognised(confidence: f64) -> ClassScores {
     let mut scores = [(1.0 - confidence) / 3.0; 4];
     scores[ClassScores::BACKGROUND] = confidence;
     ClassScores(scores)
 }
 
-/// Returns class scores with `confidence` for `class` and equal shares of the rest for the three others.
+/// Returns class scores with `confidence` for `class` and equal shares of the rest for the three
+/// others.
 fn class_scores(class: VehicleClass, confidence: f64) -> ClassScores {
     let mut scores = [(1.0 - confidence) / 3.0; 4];
     scores[class as usize] = confidence;

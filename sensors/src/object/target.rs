@@ -1,4 +1,4 @@
-//! What an object-level sensor keeps for one vehicle.
+//! The state of an object-level sensor for one vehicle.
 
 use crate::tracking::axis::{AxisEstimate, AxisFilter};
 use crate::tracking::lifecycle::Lifecycle;
@@ -47,9 +47,11 @@ pub(super) struct Target {
     pub(super) filters: Option<Filters>,
     /// Ring buffer of the latest reports; the index is the step modulo the length.
     pub(super) reports: [Option<Report>; MAX_LATENCY_STEPS + 1],
-    /// The latest filters, in the same order, if the sensor has faults: a latency that changes predicts them by their own age.
+    /// The latest filters, in the same order, if the sensor has faults: a latency that changes
+    /// predicts them by their own age.
     pub(super) history: Vec<Option<Filters>>,
-    /// What faults do to the measurements of the vehicle; drawn from in each step if the sensor has faults.
+    /// What faults do to the measurements of the vehicle; drawn from in each step if the sensor has
+    /// faults.
     pub(super) fault_streams: Option<FaultStreams>,
 }
 

@@ -1,5 +1,5 @@
-//! Tests of the properties that the controllers rely on: timely confirmation, a consistent covariance, and bitwise
-//! reproducibility.
+//! Tests of the properties that the controllers rely on: timely confirmation, a consistent
+//! covariance, and bitwise reproducibility.
 
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Environment, Parameters, Road, Source, Track, TrackStatus, VehicleClass,
@@ -32,7 +32,8 @@ fn altered_perception(sample: u64, altered: &Alterations) -> ObjectPerception {
     ObjectPerception::new(models, &key(sample))
 }
 
-/// The ego at 30 m/s, a lead vehicle at the same speed, and a rear vehicle that approaches at 40 m/s.
+/// The ego at 30 m/s, a lead vehicle at the same speed, and a rear vehicle that approaches at 40
+/// m/s.
 struct Encounter {
     road: Road,
     ego: SceneVehicle,
@@ -111,8 +112,8 @@ fn the_covariance_covers_the_errors() {
     for curvature_per_m in [0.0, 0.001] {
         let samples = 200;
         let mean = (0..samples).map(|sample| rear_error_squared(sample, curvature_per_m)).sum::<f64>() / samples as f64;
-        // The vehicle does not manoeuvre, so its errors are smaller than the process noise allows for: about 4, the
-        // number of dimensions, at most, but not much less.
+        // The vehicle does not manoeuvre, so its errors are smaller than the process noise allows
+        // for: about 4, the number of dimensions, at most, but not much less.
         assert!((1.0..4.4).contains(&mean), "mean normalised error squared {mean} at curvature {curvature_per_m}");
     }
 }
@@ -131,7 +132,8 @@ fn the_radar_follows_a_braking_lead_vehicle() {
     }
     let truth_mps = encounter.others[0].state.speed_mps;
     let track = confirmed_track(perception.step(&encounter.scene()).unwrap(), Source::Front).unwrap().clone();
-    // A latency of two scans at 6 m/s² makes an error of 0.48 m/s; the filter may add as much again.
+    // A latency of two scans at 6 m/s² makes an error of 0.48 m/s; the filter may add as much
+    // again.
     assert!((track.vx_mps() - truth_mps).abs() < 1.2, "{} {truth_mps}", track.vx_mps());
     assert_eq!(track.lane, [0.0, 1.0, 0.0]);
 }
@@ -193,7 +195,8 @@ fn the_track_of_a_hidden_vehicle_coasts_and_is_then_deleted() {
     assert!(tracks.iter().all(|track| track.x_m() > -40.0), "{tracks:?}");
 }
 
-/// Returns the gaps behind the ego at which the rear vehicle, of a class and in fog of a visibility, is confirmed and classified (m).
+/// Returns the gaps behind the ego at which the rear vehicle, of a class and in fog of a
+/// visibility, is confirmed and classified (m).
 fn confirmed_and_classified_m(class: VehicleClass, visibility_m: f64, altered: &Alterations) -> [f64; 2] {
     let mut encounter = Encounter::new();
     encounter.environment.visibility_m = visibility_m;
@@ -229,7 +232,7 @@ fn in_fog_a_truck_is_confirmed_by_its_plate_long_before_it_is_recognised() {
     let [confirmed_m, classified_m] = confirmed_and_classified_m(VehicleClass::Truck, 10_000.0, &fitted);
     // The drive begins at a gap of some 120 m, within the range of a truck.
     assert!(classified_m == confirmed_m && confirmed_m > 110.0, "in clear air at once: {confirmed_m} {classified_m}");
-    let known = Alterations { has_true_class: true, ..Alterations::default() };
-    let [confirmed_m, classified_m] = confirmed_and_classified_m(VehicleClass::Truck, 100.0, &known);
+    let with_true_class = Alterations { has_true_class: true, ..Alterations::default() };
+    let [confirmed_m, classified_m] = confirmed_and_classified_m(VehicleClass::Truck, 100.0, &with_true_class);
     assert_eq!(classified_m, confirmed_m, "a class that is given is known at once");
 }

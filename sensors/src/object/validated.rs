@@ -1,7 +1,8 @@
-//! How the tracks of the object-level sensor compare with those of the full chain that it is fitted to.
+//! Comparison of the object-level sensor's tracks with the tracks of the full chain that it is
+//! fitted to.
 //!
-//! The figures stand beside the parameters in `data/rear-object.toml`. No sensor reads them: they say how far the sensor may be
-//! trusted, and `perception` measures them anew in its tests.
+//! The figures are in `data/rear-object.toml`, beside the parameters. No sensor reads them: they
+//! state how accurate the sensor is, and the tests of `perception` measure them again.
 
 use closecall_traffic::VehicleClass;
 use serde::{Deserialize, Serialize};
@@ -34,7 +35,8 @@ pub enum Chain {
     Object,
 }
 
-/// The figures of one class in one of the sensors. Each has a row for each paint, and in it a number for each weather.
+/// The figures of one class, of the object-level sensor or of the full chain. Each has a row for
+/// each paint, and in it a number for each weather.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ValidationFigures {
@@ -54,7 +56,8 @@ pub struct ValidationFigures {
     pub across_time_s: Vec<Vec<f64>>,
     /// Correlation time of the error of the speed (s).
     pub speed_time_s: Vec<Vec<f64>>,
-    /// Time from the appearance of a vehicle 40 m behind the ego until its track is confirmed (s); infinite if it is not within 4 s.
+    /// Time from the appearance of a vehicle 40 m behind the ego until its track is confirmed (s);
+    /// infinite if it is not within 4 s.
     pub confirmed_after_s: Vec<Vec<f64>>,
     /// Time until it is classified as a vehicle, too (s).
     pub classified_after_s: Vec<Vec<f64>>,
@@ -105,7 +108,7 @@ impl Validation {
                 let is_whole = rows.len() == self.paints.len()
                     && rows
                         .iter()
-                        .all(|row| row.len() == self.visibilities_m.len() && !row.iter().any(|it| it.is_nan()));
+                        .all(|row| row.len() == self.visibilities_m.len() && !row.iter().any(|value| value.is_nan()));
                 if !is_whole {
                     let key = format!("validation.figures[{index}].{name}");
                     return Err(format!(

@@ -1,12 +1,13 @@
-//! Visibility of vehicles for an object-level sensor: field of view, range, and occlusion by other vehicles.
+//! Visibility of vehicles for an object-level sensor: field of view, range, and occlusion by other
+//! vehicles.
 //!
 //! ```text
 //!        sensor at the bumper ▷ ─ ─ ─ ─ ─ ─ ─ ─ high ▕▔▔▔▏
 //!                              `─ ─ ─ ─ ─ ─ ─ ─ low  ▕▁▁▁▏   a box covers the slopes low … high from `near_m` on
 //! ```
 //!
-//! A slope is the distance to the left divided by the distance outward. Slopes order directions as angles do, without
-//! an arc tangent.
+//! A slope is the distance to the left divided by the distance outward. Slopes order directions as
+//! angles do, without an arc tangent.
 
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Dimensions, maths};
@@ -25,7 +26,8 @@ pub(super) enum Direction {
 }
 
 impl Direction {
-    /// Returns on which side of the ego's middle the sensor is: 1 ahead, −1 behind, 0 for those around.
+    /// Returns on which side of the ego's middle the sensor is: 1 ahead, −1 behind, 0 for those
+    /// around.
     pub(super) fn sign(self) -> f64 {
         match self {
             Self::Ahead => 1.0,
@@ -47,12 +49,12 @@ pub(super) struct Field<'a> {
     pub(super) blocked: &'a [[f64; 2]],
 }
 
-/// Share of a vehicle's angular width that must be in view for a detection (assumption: a quarter of a car's rear still
-/// returns more than the thresholds of radar or LiDAR need).
+/// Share of a vehicle's angular width that must be in view for a detection (assumption: a quarter
+/// of a car's rear still returns more than the thresholds of radar or LiDAR need).
 pub(super) const NEEDED_SHARE: f64 = 0.25;
 
-/// Least outward distance for which slopes are computed (m). Parts of a box that are nearer to the sensor's plane are
-/// treated as if at this distance, so that slopes stay finite.
+/// Least outward distance for which slopes are computed (m). Parts of a box that are nearer to the
+/// sensor's plane are treated as if at this distance, so that slopes stay finite.
 const MIN_OUTWARD_M: f64 = 0.1;
 
 /// The range of slopes that one vehicle covers.
@@ -76,7 +78,8 @@ pub(super) struct Visibility {
 }
 
 impl Visibility {
-    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, of the size `ego`.
+    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, of the size
+    /// `ego`.
     pub(super) fn update(&mut self, direction: Direction, others: &[OtherVehicle], ego: &Dimensions) {
         self.silhouettes.clear();
         self.silhouettes.reserve(others.len());
@@ -91,8 +94,8 @@ impl Visibility {
         self.silhouettes.extend(silhouettes);
     }
 
-    /// Returns whether the nearest part of the vehicle with this place in the list is at most `range_m` away in the direction of
-    /// view (m).
+    /// Returns whether the nearest part of the vehicle with this place in the list is at most
+    /// `range_m` away in the direction of view (m).
     pub(super) fn is_within(&self, range_m: f64, place: usize) -> bool {
         range_m == f64::INFINITY || self.silhouette(place).is_some_and(|seen| seen.near_m <= range_m)
     }
@@ -101,7 +104,8 @@ impl Visibility {
         self.silhouettes.get(place).copied().flatten()
     }
 
-    /// Returns whether `other`, with this place in the list, is within the field of view, in range, and not hidden.
+    /// Returns whether `other`, with this place in the list, is within the field of view, in range,
+    /// and not hidden.
     pub(super) fn sees(&mut self, field: &Field<'_>, place: usize, other: &OtherVehicle, ego: &Dimensions) -> bool {
         if field.direction == Direction::Around {
             return box_distance_m(other, ego) <= field.range_m;
@@ -129,9 +133,10 @@ impl Visibility {
     }
 }
 
-/// Returns the silhouette of `other`, seen from the bumper at the distance `mount_m` from the ego's centre.
+/// Returns the silhouette of `other`, seen from the bumper at the distance `mount_m` from the ego's
+/// centre.
 ///
-/// Returns `None` if `other` lies wholly on the inner side of the sensor's plane.
+/// Returns `None` if `other` lies entirely on the inner side of the sensor's plane.
 fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhouette> {
     let (ahead_m, left_m) = (0.5 * other.length_m, 0.5 * other.width_m);
     let corners = [(ahead_m, left_m), (ahead_m, -left_m), (-ahead_m, left_m), (-ahead_m, -left_m)];
@@ -148,7 +153,7 @@ fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhou
     (far_m > MIN_OUTWARD_M).then_some(seen)
 }
 
-/// Returns the distance between the boxes of the ego and of `other`, both taken as parallel (m).
+/// Returns the distance between the boxes of the ego and of `other` as if both were parallel (m).
 fn box_distance_m(other: &OtherVehicle, ego: &Dimensions) -> f64 {
     let along_m = bumper_gap_m(other.x_m.abs(), other.length_m, ego.length_m);
     let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego.width_m);
@@ -218,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blot_hides_a_vehicle_of_which_less_than_a_quarter_is_free() {
+    fn a_blot_hides_a_vehicle_if_less_than_a_quarter_of_it_is_free() {
         // The car 60 m behind, with its front at 55.4 m, covers the slopes of ±0.0167.
         let in_line = [car(1, -60.0, 0.0)];
         for (blocked, is_seen) in

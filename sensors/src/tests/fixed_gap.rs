@@ -1,5 +1,6 @@
-//! The whole chain from the point cloud to the track, at a constant gap: the beams then hit the same places in each scan
-//! of one side of the mirror, and the errors of the boxes never average out.
+//! Tests the whole chain from the point cloud to the track at a constant gap. The beams then hit
+//! the same places in each scan of one side of the mirror, and the errors of the boxes never
+//! average out.
 
 use rand::RngExt;
 
@@ -21,8 +22,9 @@ const GAPS_M: [f64; 8] = [30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0];
 const PAINTS: [f64; 5] = [0.1, 0.2, 0.35, 0.5, 0.8];
 
 /// The track of a car straight behind, from 10 s on, over 100 scans of either side of the mirror.
-struct Found {
-    /// Number of scans of either side of the mirror after which the track was confirmed. It coasts after a scan that misses it.
+struct FollowedTrack {
+    /// Number of scans of either side of the mirror after which the track was confirmed. It coasts
+    /// after a scan that misses it.
     scans: [u32; 2],
     /// Mean lateral error after these scans (m).
     errors_m: [f64; 2],
@@ -30,7 +32,7 @@ struct Found {
 }
 
 /// Follows a car with this paint at a constant gap for 18 s.
-fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
+fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> FollowedTrack {
     let road = Road::straight(3);
     let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 30.0);
     let behind_m = gap_m + ego.vehicle.dimensions.length_m;
@@ -67,7 +69,7 @@ fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
         }
     }
     let errors_m = [0, 1].map(|side| error_sums_m[side] / f64::from(scans[side]));
-    Found { scans, errors_m, audit }
+    FollowedTrack { scans, errors_m, audit }
 }
 
 /// Mean lateral error that a track may have (m).
@@ -78,12 +80,14 @@ fn a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     let mut runs = Vec::new();
     for (row, &gap_m) in (0..).zip(&GAPS_M) {
         for (column, &paint) in (0..).zip(&PAINTS) {
-            let Found { scans, errors_m, audit } = at_gap(gap_m, paint, 10 * row + column);
-            // The plate carries every car as far as 86 m (docs/evidence/perception.md); beyond, the body of a bright one.
+            let FollowedTrack { scans, errors_m, audit } = at_gap(gap_m, paint, 10 * row + column);
+            // Up to 86 m, the plate of every car returns enough light
+            // (docs/evidence/perception.md); beyond, the body of a bright car does.
             let is_followed = gap_m <= 80.0 || paint >= 0.5;
             let most = scans[0].max(scans[1]);
             assert!(!is_followed || most >= 99, "{scans:?} scans at {gap_m} m with {paint}");
-            // A track that comes and goes after scans of the same side is not at a constant distance from what the beams hit.
+            // A track that comes and goes after scans of the same side is not at a constant
+            // distance from the points that the beams hit.
             if most < 99 {
                 continue;
             }
@@ -100,18 +104,20 @@ fn a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     assert!(consistency.mean < 4.0, "{consistency:?}");
 }
 
-/// Largest mean lateral error at every half metre (m): after scans that always confirm the track, and after those that do so now and
-/// then. Weak returns hide half beams, and columns are up to 0.21 m apart and always the same: the beams then cannot tell more.
+/// Largest mean lateral error at every half metre (m): after scans that always confirm the track,
+/// and after scans that confirm it sometimes. Weak returns hide half beams, and columns are up to
+/// 0.21 m apart and always the same: the beams then cannot tell more.
 const EVERYWHERE_M: [f64; 2] = [0.051, 0.07];
 /// Numbers of scans, of 100, from which on each of these holds.
 const SCANS: [u32; 2] = [90, 20];
 
 #[test]
 fn at_every_half_metre_a_track_at_a_constant_gap_is_where_the_vehicle_is() {
-    // At some gaps, one side of the mirror sees the plate of a dark car, and the other always the same lamp.
-    let of = |half_metres: u32, paint: f64| {
+    // At some gaps, one side of the mirror sees the plate of a dark car, and the other always the
+    // same lamp.
+    let check_at = |half_metres: u32, paint: f64| {
         let gap_m = 0.5 * f64::from(half_metres);
-        let Found { scans, errors_m, audit } = at_gap(gap_m, paint, half_metres.into());
+        let FollowedTrack { scans, errors_m, audit } = at_gap(gap_m, paint, half_metres.into());
         for (scans, error_m) in scans.into_iter().zip(errors_m) {
             for (limit_m, _) in EVERYWHERE_M.into_iter().zip(SCANS).filter(|(_, least)| scans >= *least) {
                 assert!(error_m.abs() <= limit_m, "{error_m} at {gap_m} m with {paint}, after {scans} scans");
@@ -124,7 +130,7 @@ fn at_every_half_metre_a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     };
     for half_metres in 60..=200 {
         let paints = if half_metres % 2 == 0 { [0.1, 0.16, 0.35, 0.8] } else { [0.14, 0.2, 0.25, 0.5] };
-        paints.into_iter().for_each(|paint| of(half_metres, paint));
+        paints.into_iter().for_each(|paint| check_at(half_metres, paint));
     }
 }
 
@@ -137,7 +143,8 @@ struct Boxes {
     nees: f64,
 }
 
-/// Measures cars with this paint, up to `most_m` behind and up to 0.3 m aside of a LiDAR, 600 scans.
+/// Measures cars with this paint, up to `most_m` behind and up to 0.3 m aside of a LiDAR, 600
+/// scans.
 fn boxes(lidar: &str, step_deg: f64, paint: f64, most_m: f64) -> Boxes {
     let config: LidarConfig = toml::from_str(lidar).unwrap();
     let lidar = config.check(&Parameters::default()).unwrap();
@@ -153,11 +160,11 @@ fn boxes(lidar: &str, step_deg: f64, paint: f64, most_m: f64) -> Boxes {
         others[0].vehicle.appearance.paint_reflectivity = paint;
         let environment = &Environment::CLEAR_DAY;
         rear.scan(&Scene { time: CONTROL_STEP * scan, road: &road, environment, ego, others: &others }, &mut rng);
-        let [found] = rear.detect().unwrap() else { continue };
-        let error_m = found.face_y_m - off_m;
+        let [detection] = rear.detect().unwrap() else { continue };
+        let error_m = detection.face_y_m - off_m;
         squares[0] += error_m * error_m;
         squares[1] += (error_m / (gap_m * step_deg.to_radians())).powi(2);
-        nees += (error_m / found.lateral_sd_m).powi(2);
+        nees += (error_m / detection.lateral_sd_m).powi(2);
         count += 1.0;
     }
     Boxes { count, rms: squares.map(|sum: f64| (sum / count).sqrt()), nees: nees / count }
@@ -167,17 +174,18 @@ fn boxes(lidar: &str, step_deg: f64, paint: f64, most_m: f64) -> Boxes {
 fn the_powers_of_the_beams_tell_where_within_a_column_an_edge_lies() {
     // The paint and the greatest gap with which half a beam exceeds the detection threshold.
     for (paint, most_m) in [(0.2, 45.0), (0.35, 60.0), (0.8, 85.0)] {
-        let found = boxes("", 0.125, paint, most_m);
-        assert!(found.count > 590.0, "{} boxes with {paint}", found.count);
+        let statistics = boxes("", 0.125, paint, most_m);
+        assert!(statistics.count > 590.0, "{} boxes with {paint}", statistics.count);
         // Edges anywhere within a column would give 0.2.
-        assert!(found.rms[1] < 0.15, "{} with {paint}", found.rms[1]);
-        assert!((0.4..1.6).contains(&found.nees), "{} with {paint}", found.nees);
+        assert!(statistics.rms[1] < 0.15, "{} with {paint}", statistics.rms[1]);
+        assert!((0.4..1.6).contains(&statistics.nees), "{} with {paint}", statistics.nees);
     }
 }
 
 #[test]
 fn a_box_is_as_sure_as_the_pattern_of_its_lidar_allows() {
-    // Gaps between footprints, footprints as wide as a step, overlapping ones, and a face across the end of the fine field.
+    // Gaps between footprints, footprints as wide as a step, overlapping ones, and a face across
+    // the end of the fine field.
     let of_width = |deg: &str| {
         let width = format!("beam-width-deg = {deg}");
         format!("[pattern]\n{}", include_str!("../../lidars/scala-2.toml").replace("beam-width-deg = 0.125", &width))
@@ -195,15 +203,15 @@ fn a_box_is_as_sure_as_the_pattern_of_its_lidar_allows() {
         ("window-transmission = 0.6", 0.125, 60.0),
     ] {
         for paint in [0.2, 0.5] {
-            let found = boxes(lidar, step_deg, paint, most_m);
-            let text = format!("{lidar} with {paint}: {} {:?} {}", found.count, found.rms, found.nees);
-            assert!(found.count > 590.0 && (0.25..1.6).contains(&found.nees), "{text}");
+            let statistics = boxes(lidar, step_deg, paint, most_m);
+            let text = format!("{lidar} with {paint}: {} {:?} {}", statistics.count, statistics.rms, statistics.nees);
+            assert!(statistics.count > 590.0 && (0.25..1.6).contains(&statistics.nees), "{text}");
         }
     }
 }
 
-/// Returns position and speed of the tracks after each of 100 scans. The first is the scan of step `first`. A car
-/// approaches at 5 m/s.
+/// Returns position and speed of the tracks after each of 100 scans. The first is the scan of step
+/// `first`. A car approaches at 5 m/s.
 fn states_from(first: i64) -> Vec<Vec<[f64; 4]>> {
     let road = Road::straight(3);
     let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 0.0);
@@ -232,7 +240,7 @@ fn states_from(first: i64) -> Vec<Vec<[f64; 4]>> {
 }
 
 #[test]
-fn the_tracks_of_scans_before_time_zero_are_those_of_later_scans() {
+fn scans_before_time_zero_give_the_same_tracks_as_later_scans() {
     let later = states_from(0);
     assert!(!later[99].is_empty());
     assert!(states_from(-50) == later);

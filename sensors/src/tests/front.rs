@@ -15,7 +15,8 @@ fn perception(sensors: &str) -> Box<dyn Perception> {
     sensors.build(&key).unwrap()
 }
 
-/// Lets the ego drive at 30 m/s behind a vehicle, and returns the confirmed front tracks of the last step with the true gap.
+/// Lets the ego drive at 30 m/s behind a vehicle, and returns the confirmed front tracks of the
+/// last step with the true gap.
 fn follow(sensors: &str, road: &Road, class: VehicleClass, [gap_m, speed_mps]: [f64; 2]) -> (Vec<Track>, f64) {
     let mut perception = perception(sensors);
     let environment = Environment::CLEAR_DAY;
@@ -50,7 +51,8 @@ fn a_vehicle_ahead_gives_one_track_with_gap_speed_and_lane() {
         assert_follows("front-lidar = {}", &Road::straight(3).with_guard_rails(), class, [45.0, 28.0]);
         assert_follows("front-lidar = {}", &Road::straight(3), class, [30.0, 33.0]);
     }
-    // On a bend the gap along the path of the ego differs from that along the reference line by less than the tolerance.
+    // On a bend the gap along the path of the ego differs from that along the reference line by
+    // less than the tolerance.
     let bend = Road::straight(3).with_curvature(0.000_5).with_guard_rails();
     assert_follows("front-lidar = {}", &bend, VehicleClass::Car, [40.0, 29.0]);
 }
@@ -122,7 +124,8 @@ fn the_front_lidar_measures_the_vehicle_at_points() {
         [("front-lidar", true), ("rear-lidar", false)]
     );
     assert!(front.lidar.latest().len() > 100);
-    // In the turned frame, the rear of the vehicle ahead is 30 m less two half lengths behind the sensor.
+    // In the turned frame, the rear of the vehicle ahead is 30 m less two half lengths behind the
+    // sensor.
     let [detection] = front.detections else { panic!("{:?}", front.detections) };
     assert!((detection.face_x_m + 30.0 - 2.3).abs() < 0.3, "{}", detection.face_x_m);
 }

@@ -1,7 +1,8 @@
-//! Long vehicles beside the ego: the whole chain follows each as one vehicle, whichever of its parts the sensor sees.
+//! Long vehicles beside the ego: the whole chain follows each as one vehicle, whatever part of it
+//! the sensor sees.
 //!
-//! Beside the ego, the beams pass below the load of a truck. They show a cab, the guards and the wheels on both sides as separate
-//! clusters, and the field of view cuts off the front.
+//! Beside the ego, the beams pass below the load of a truck. They show a cab, the guards and the
+//! wheels on both sides as separate clusters, and the field of view cuts off the front.
 
 use std::collections::BTreeSet;
 
@@ -35,7 +36,7 @@ struct Passing {
 
 /// The rear tracks of a passing.
 #[derive(Debug, Default)]
-struct Found {
+struct Observed {
     /// Numbers of the confirmed tracks.
     ids: BTreeSet<u32>,
     steps: usize,
@@ -46,12 +47,13 @@ struct Found {
     speed_mps: f64,
     /// Number of steps in which a track has another class.
     misclassified: usize,
-    /// Number of steps in which a track is not in the lane of the vehicle, so that the lane would count as free.
+    /// Number of steps in which a track is not in the lane of the vehicle, so that the lane would
+    /// count as free.
     in_other_lane: usize,
 }
 
 /// Lets the vehicle pass, with the random numbers of this sample.
-fn pass(passing: &Passing, sample: u64) -> Found {
+fn pass(passing: &Passing, sample: u64) -> Observed {
     let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
     let key = NoiseKey { seed: 9, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() };
     let mut perception = sensors.build(&key).unwrap();
@@ -62,7 +64,7 @@ fn pass(passing: &Passing, sample: u64) -> Found {
     let mut truck = scene_vehicle(1, VehicleClass::Truck, s_m, OWN_LANE_M + passing.left_m);
     truck.vehicle.dimensions.length_m = passing.length_m;
     truck.state.speed_mps = EGO_MPS + passing.faster_mps;
-    let mut found = Found::default();
+    let mut observed = Observed::default();
     let mut confirmed_at: Vec<(TrackId, usize)> = Vec::new();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds")]
     let steps = (passing.seconds / PERIOD_S) as usize;
@@ -81,53 +83,54 @@ fn pass(passing: &Passing, sample: u64) -> Found {
             track.source == Source::Rear && track.status != TrackStatus::Tentative
         };
         let confirmed: Vec<_> = tracks.iter().filter(is_confirmed).collect();
-        found.steps += 1;
-        found.several += usize::from(confirmed.len() > 1);
-        found.confirmed_steps += usize::from(!confirmed.is_empty());
+        observed.steps += 1;
+        observed.several += usize::from(confirmed.len() > 1);
+        observed.confirmed_steps += usize::from(!confirmed.is_empty());
         for track in confirmed {
-            found.ids.insert(track.id.0);
+            observed.ids.insert(track.id.0);
             if !confirmed_at.iter().any(|(id, _)| *id == track.id) {
                 confirmed_at.push((track.id, step));
             }
             let since = confirmed_at.iter().find(|(id, _)| *id == track.id).unwrap().1;
             if step >= since + SETTLED_STEPS {
-                found.speed_mps = found.speed_mps.max((track.vx_mps() - truck.state.speed_mps).abs());
-                found.misclassified += usize::from(track.class.best_vehicle_class() != VehicleClass::Truck);
+                observed.speed_mps = observed.speed_mps.max((track.vx_mps() - truck.state.speed_mps).abs());
+                observed.misclassified += usize::from(track.class.best_vehicle_class() != VehicleClass::Truck);
                 let lane = if passing.left_m > 0.0 { 0 } else { 2 };
-                found.in_other_lane += usize::from(!(track.lane[lane] >= 0.5));
+                observed.in_other_lane += usize::from(!(track.lane[lane] >= 0.5));
             }
         }
         for vehicle in [&mut ego, &mut truck] {
             vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
         }
     }
-    found
+    observed
 }
 
-/// Returns passings of a vehicle of this length: it overtakes slowly and fast, the ego passes it slowly and fast, and it is beside the ego
-/// from the start.
+/// Returns passings of a vehicle of this length: it overtakes slowly and fast, the ego passes it
+/// slowly and fast, and it is beside the ego from the start.
 fn passings(length_m: f64, left_m: f64) -> Vec<Passing> {
-    let of = |faster_mps: f64, front_m: f64, seconds: f64| Passing { length_m, left_m, faster_mps, front_m, seconds };
+    let passing =
+        |faster_mps: f64, front_m: f64, seconds: f64| Passing { length_m, left_m, faster_mps, front_m, seconds };
     vec![
-        of(2.0, -30.0, 19.0 + 0.5 * length_m),
-        of(6.0, -60.0, 13.0 + length_m / 6.0),
-        of(-2.0, length_m + 8.0, 20.0 + 0.5 * length_m),
-        of(-6.0, length_m + 8.0, 10.0 + length_m / 6.0),
-        of(0.0, 3.0, 8.0),
-        of(0.5, 0.0, 16.0),
-        of(-0.5, 10.0, 16.0),
+        passing(2.0, -30.0, 19.0 + 0.5 * length_m),
+        passing(6.0, -60.0, 13.0 + length_m / 6.0),
+        passing(-2.0, length_m + 8.0, 20.0 + 0.5 * length_m),
+        passing(-6.0, length_m + 8.0, 10.0 + length_m / 6.0),
+        passing(0.0, 3.0, 8.0),
+        passing(0.5, 0.0, 16.0),
+        passing(-0.5, 10.0, 16.0),
     ]
 }
 
 fn assert_one_track(cases: &[Passing]) {
     let mut wrong = Vec::new();
     for (passing, sample) in cases.iter().zip(0..) {
-        let found = pass(passing, sample);
-        let is_one = found.ids.len() == 1 && found.several == 0;
-        let is_followed = 4 * found.confirmed_steps > found.steps;
-        let is_right = found.speed_mps <= SPEED_MPS && found.misclassified == 0 && found.in_other_lane == 0;
+        let observed = pass(passing, sample);
+        let is_one = observed.ids.len() == 1 && observed.several == 0;
+        let is_followed = 4 * observed.confirmed_steps > observed.steps;
+        let is_right = observed.speed_mps <= SPEED_MPS && observed.misclassified == 0 && observed.in_other_lane == 0;
         if !(is_one && is_followed && is_right) {
-            wrong.push(format!("{passing:?}: {found:?}"));
+            wrong.push(format!("{passing:?}: {observed:?}"));
         }
     }
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));

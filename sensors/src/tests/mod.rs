@@ -1,4 +1,5 @@
-//! Tests of the chain behind the rear LiDAR, and of the tracker on simulated detections, against the true states.
+//! Tests of the chain behind the rear LiDAR, and of the tracker on simulated detections, against
+//! the true states.
 
 mod fixed_gap;
 mod front;

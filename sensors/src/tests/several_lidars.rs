@@ -32,7 +32,7 @@ fn faults(text: &str) -> Faults {
     FaultEntries { rear_lidar: &rear, ..FaultEntries::default() }.check(&Parameters::default()).unwrap()
 }
 
-/// What a drive of 4 s shows.
+/// The results of a drive of 4 s.
 #[derive(Default)]
 struct Drive {
     /// The confirmed rear tracks of each step.
@@ -52,17 +52,17 @@ fn drive(sensors: &str, fault: &str, others: &[SceneVehicle]) -> Drive {
     let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
     let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), 30.0);
     let mut others = others.to_vec();
-    let mut found = Drive::default();
+    let mut outcome = Drive::default();
     for step in 0..100 {
         let scene = Scene { time: CONTROL_STEP * step, road: &road, environment: &environment, ego, others: &others };
         let tracks = perception.step(&scene).unwrap().to_vec();
-        found.audit.observe(&tracks, &scene).unwrap();
+        outcome.audit.observe(&tracks, &scene).unwrap();
         let is_shown = |track: &Track| track.source == Source::Rear && track.status != TrackStatus::Tentative;
-        found.tracks.push(tracks.into_iter().filter(is_shown).collect());
-        found.health.push(perception.health().rear);
+        outcome.tracks.push(tracks.into_iter().filter(is_shown).collect());
+        outcome.health.push(perception.health().rear);
         let lidars = perception.lidars();
-        found.points.resize(lidars.len(), Vec::new());
-        for (points, lidar) in found.points.iter_mut().zip(lidars) {
+        outcome.points.resize(lidars.len(), Vec::new());
+        for (points, lidar) in outcome.points.iter_mut().zip(lidars) {
             let scan = lidar.lidar.latest();
             points.extend((0..scan.len()).map(|at| [scan.x_m[at], scan.y_m[at], scan.z_m[at]]));
         }
@@ -70,7 +70,7 @@ fn drive(sensors: &str, fault: &str, others: &[SceneVehicle]) -> Drive {
             vehicle.state.s_m += CONTROL_STEP.s() * vehicle.state.speed_mps;
         }
     }
-    found
+    outcome
 }
 
 #[test]
@@ -127,12 +127,12 @@ fn a_vehicle_that_both_sensors_see_has_one_consistent_track() {
     for (gap_m, d_m) in [(40.0, OWN_LANE_M), (25.0, LEFT_LANE_M), (60.0, OWN_LANE_M - 3.75)] {
         let mut runs = Vec::new();
         for closing_mps in [0.0, 2.0, 4.0] {
-            let found = drive(CORNERS, "", &[behind(1, gap_m, d_m, 30.0 + closing_mps)]);
-            let [track] = &found.tracks[99][..] else { panic!("{} tracks", found.tracks[99].len()) };
+            let outcome = drive(CORNERS, "", &[behind(1, gap_m, d_m, 30.0 + closing_mps)]);
+            let [track] = &outcome.tracks[99][..] else { panic!("{} tracks", outcome.tracks[99].len()) };
             assert!((track.y_m() - (d_m - OWN_LANE_M)).abs() < 0.1, "{gap_m} m: {}", track.y_m());
             assert!((track.vx_mps() - 30.0 - closing_mps).abs() < 0.3, "{gap_m} m: {}", track.vx_mps());
-            assert_eq!((found.audit.id_switches, found.audit.false_tracks()), (0, 0));
-            runs.push(found.audit.nees);
+            assert_eq!((outcome.audit.id_switches, outcome.audit.false_tracks()), (0, 0));
+            runs.push(outcome.audit.nees);
         }
         let consistency = Consistency::of(&runs).unwrap();
         assert!(consistency.mean < 4.0, "{gap_m} m, {d_m} m: {consistency:?}");
@@ -144,10 +144,10 @@ fn a_vehicle_that_only_the_slower_of_two_sensors_sees_is_confirmed_and_kept() {
     // The fast sensor looks to the right, the slow one to the left, where the car is.
     let sensors = "rear-lidar.azimuth-deg = -80\n\
                    additional-rear-lidars = [{ name = \"slow\", model = \"os1-64\", azimuth-deg = 20 }]\n";
-    let found = drive(sensors, "", &[behind(1, 20.0, LEFT_LANE_M, 30.0)]);
-    let first = found.tracks.iter().position(|tracks| !tracks.is_empty()).unwrap();
+    let outcome = drive(sensors, "", &[behind(1, 20.0, LEFT_LANE_M, 30.0)]);
+    let first = outcome.tracks.iter().position(|tracks| !tracks.is_empty()).unwrap();
     assert!(first < 25, "{first}");
-    assert!(found.tracks[first..].iter().all(|tracks| tracks.len() == 1));
+    assert!(outcome.tracks[first..].iter().all(|tracks| tracks.len() == 1));
     let alone = drive("rear-lidar.azimuth-deg = -80\n", "", &[behind(1, 20.0, LEFT_LANE_M, 30.0)]);
     assert!(alone.tracks.iter().all(Vec::is_empty), "the fast sensor does not see it");
 }
@@ -156,32 +156,33 @@ fn a_vehicle_that_only_the_slower_of_two_sensors_sees_is_confirmed_and_kept() {
 fn a_further_sensor_leaves_the_points_of_the_first_as_they_are() {
     let others = [behind(1, 40.0, OWN_LANE_M, 32.0)];
     let further = "additional-rear-lidars = [{ name = \"left\", left-m = 0.8, azimuth-deg = 40 }]\n";
-    let (one, two) = (drive("", "", &others), drive(further, "", &others));
-    assert_eq!((one.points.len(), two.points.len()), (1, 2));
-    assert!(one.points[0] == two.points[0] && one.points[0] != two.points[1]);
+    let (alone, with_further) = (drive("", "", &others), drive(further, "", &others));
+    assert_eq!((alone.points.len(), with_further.points.len()), (1, 2));
+    assert!(alone.points[0] == with_further.points[0] && alone.points[0] != with_further.points[1]);
 }
 
 #[test]
 fn a_fault_hits_the_sensor_that_it_names_or_all() {
     let others = [behind(1, 40.0, OWN_LANE_M, 30.0)];
     let usual = drive(CORNERS, "", &others);
-    let one = drive(CORNERS, "dead = true\nfrom-s = 1.0\nsensor = \"left\"", &others);
-    assert!(one.points[0].len() < usual.points[0].len() / 2);
-    assert!(one.points[1] == usual.points[1], "the other sensor does not notice");
-    assert_eq!(one.tracks[99].len(), 1, "the other sensor sees the vehicle");
+    let outcome = drive(CORNERS, "dead = true\nfrom-s = 1.0\nsensor = \"left\"", &others);
+    assert!(outcome.points[0].len() < usual.points[0].len() / 2);
+    assert!(outcome.points[1] == usual.points[1], "the other sensor does not notice");
+    assert_eq!(outcome.tracks[99].len(), 1, "the other sensor sees the vehicle");
     let both = drive(CORNERS, "dead = true\nfrom-s = 1.0", &others);
     assert!(both.points[1].len() < usual.points[1].len() / 2 && both.tracks[99].is_empty());
     assert_eq!((usual.health[99], both.health[99]), (Health::Ok, Health::Failed));
-    // 40° to the left and 66.5° to each side: the right lane near the ego is the right sensor's alone, and that of the left lane
-    // the left one's.
-    assert_eq!(one.health[99], Health::Failed);
-    // Two that look straight back stand in for each other.
+    // 40° to the left and 66.5° to each side: only the right sensor sees the right lane near the
+    // ego, and only the left sensor sees the left lane there.
+    assert_eq!(outcome.health[99], Health::Failed);
+    // Two sensors that look straight back replace each other.
     let twins = "additional-rear-lidars = [{ name = \"twin\", left-m = 0.5 }]\n";
-    let one = drive(twins, "dead = true\nfrom-s = 1.0\nsensor = \"rear-lidar\"", &others);
-    assert_eq!((one.health[99], one.tracks[99].len()), (Health::Degraded, 1));
+    let outcome = drive(twins, "dead = true\nfrom-s = 1.0\nsensor = \"rear-lidar\"", &others);
+    assert_eq!((outcome.health[99], outcome.tracks[99].len()), (Health::Degraded, 1));
 }
 
-/// A car 40 m straight behind, which two sensors that look straight back follow. Returns the confirmed tracks of each step.
+/// A car 40 m straight behind, which two sensors that look straight back follow. Returns the
+/// confirmed tracks of each step.
 fn followed(sensors: &str, faults: &[String]) -> Vec<Vec<Track>> {
     let faults = faults.join("\n---\n");
     drive(sensors, &faults, &[behind(1, 40.0, OWN_LANE_M, 30.0)]).tracks
@@ -190,7 +191,7 @@ fn followed(sensors: &str, faults: &[String]) -> Vec<Vec<Track>> {
 const TWINS: &str = "additional-rear-lidars = [{ name = \"twin\", left-m = 0.5 }]\n";
 
 #[test]
-fn a_small_error_of_one_mounting_of_two_pulls_the_track_half_as_far() {
+fn a_small_mounting_error_of_one_of_two_sensors_pulls_the_track_half_as_far() {
     let y_m = |fault: String| followed(TWINS, &[fault])[99][0].y_m();
     let usual_m = y_m("yaw-deg = 0.0".into());
     for yaw_deg in [0.03, 0.05] {
@@ -206,7 +207,7 @@ fn a_small_error_of_one_mounting_of_two_pulls_the_track_half_as_far() {
 }
 
 #[test]
-fn a_track_is_that_of_the_sensor_that_found_it_if_the_other_contradicts_it() {
+fn a_track_follows_its_first_sensor_if_the_other_contradicts_it() {
     let slow_first = "rear-lidar.model = \"os1-64\"\n\
                       additional-rear-lidars = [{ name = \"twin\", left-m = 0.5, model = \"scala-2\" }]\n";
     let slow_second = "additional-rear-lidars = [{ name = \"twin\", left-m = 0.5, model = \"os1-64\" }]\n";
@@ -218,7 +219,7 @@ fn a_track_is_that_of_the_sensor_that_found_it_if_the_other_contradicts_it() {
         for (sensor, yaw_deg) in [("twin", 0.4), ("twin", 0.5), ("twin", 0.8), ("twin", -0.6), ("rear-lidar", 0.5)] {
             let askew = format!("yaw-deg = {yaw_deg}\nsensor = \"{sensor}\"");
             let tracks = followed(sensors, &[Some(askew), more.clone()].into_iter().flatten().collect::<Vec<_>>());
-            // The first sensor may be the one that is mounted askew.
+            // The first sensor may be the misaligned one.
             let expected_m = if sensor == "twin" { 0.0 } else { 40.0 * f64::to_radians(yaw_deg) };
             for (step, tracks) in tracks.iter().enumerate().skip(60) {
                 let [track] = &tracks[..] else { panic!("{} tracks, step {step}, {sensors}", tracks.len()) };

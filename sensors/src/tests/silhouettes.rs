@@ -9,9 +9,11 @@ use crate::lidar::append_solids;
 const END_TOLERANCE_M: f64 = 0.05;
 /// Largest difference of the ends of the roof and of the windows (m), where surfaces are inclined.
 const ROOF_TOLERANCE_M: f64 = 0.1;
-/// Heights at which the ends are compared (shares of the height): in the middle of the windows, and below the roof.
+/// Heights at which the ends are compared (shares of the height): in the middle of the windows, and
+/// below the roof.
 const LEVELS: [f64; 2] = [0.70, 0.93];
-/// Lateral position of the compared side view (m): next to the centre line, on which edges of the mesh lie.
+/// Lateral position of the compared side view (m): next to the centre line, on which edges of the
+/// mesh lie.
 const SLICE_Y_M: f64 = 0.02;
 /// Distance between two compared positions along the vehicle (m).
 const STEP_M: f64 = 0.01;

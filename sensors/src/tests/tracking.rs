@@ -102,8 +102,8 @@ impl Bench {
         }
     }
 
-    /// Moves all vehicles by one scan period. With `manoeuvre`, the others accelerate, coast, weave and brake as in
-    /// traffic.
+    /// Moves all vehicles by one scan period. With `manoeuvre`, the others accelerate, coast, weave
+    /// and brake as in traffic.
     fn advance(&mut self, manoeuvre: bool) {
         self.scans += 1;
         for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
@@ -123,7 +123,8 @@ impl Bench {
         }
     }
 
-    /// Performs one scan that detects the vehicles for which `sees` is true, and returns the tracks after it.
+    /// Performs one scan that detects the vehicles for which `sees` is true, and returns the tracks
+    /// after it.
     fn scan(&mut self, sees: impl Fn(usize) -> bool) -> &[Track] {
         let (road, ego, others) = (self.road, self.ego, self.others.clone());
         let time = CONTROL_STEP * self.scans;
@@ -314,7 +315,8 @@ fn a_track_hidden_by_a_nearer_one_coasts_and_keeps_its_existence_probability() {
     }
     let back = bench.scan(|_| true);
     assert_eq!((back[0].id, back[0].status), (TrackId(0), TrackStatus::Confirmed));
-    // The nearer vehicle is in view: without detections it loses its existence probability, and then its track.
+    // The nearer vehicle is in view: without detections it loses its existence probability, and
+    // then its track.
     for _ in 0..30 {
         bench.advance(false);
         bench.scan(|actor| actor == 1);

@@ -1,12 +1,14 @@
 //! The assignment of rows to columns with the least total cost, by the Kuhn–Munkres algorithm.
 //!
-//! The algorithm grows a tree of alternating edges from one row after the other until it reaches a free column, and keeps
-//! for each column outside of the tree the least slack of an edge to it (H. W. Kuhn, "The Hungarian method for the
-//! assignment problem", 1955; the slacks are those of Edmonds and Karp, 1972). It follows the function `kuhn_munkres_min`
-//! of the `pathfinding` crate step by step, so that both choose the same one of several optima; a test compares them. The
-//! crate allocates about ten lists in each call, this one keeps its lists.
+//! The algorithm grows a tree of alternating edges from one row after the other until it reaches a
+//! free column, and keeps for each column outside of the tree the least slack of an edge to it (H.
+//! W. Kuhn, "The Hungarian method for the assignment problem", 1955; the slacks follow Edmonds and
+//! Karp, 1972). It follows the function `kuhn_munkres_min` of the `pathfinding` crate step by step.
+//! Of several optima, both therefore choose the same; a test compares them. The crate allocates
+//! about ten lists in each call; this implementation keeps its lists.
 
-/// Number of tracks, and of detections, for which memory is reserved. More need more, and no error follows.
+/// Number of tracks, and of detections, for which memory is reserved. More need more, and no error
+/// follows.
 pub(crate) const RESERVED: usize = 32;
 
 /// An assignment problem, and the memory of its solution.
@@ -19,12 +21,13 @@ pub(crate) struct Assignment {
     column_of: Vec<Option<usize>>,
     /// Row of each column.
     row_of: Vec<Option<usize>>,
-    /// Label of each row: no less than the negative cost of each of its pairs, less the label of the column.
+    /// Label of each row: no less than the negative cost of each of its pairs, less the label of
+    /// the column.
     row_labels: Vec<i64>,
     column_labels: Vec<i64>,
     /// Rows of the tree.
     reached: Vec<usize>,
-    /// For each column of the tree, the row through which it was reached.
+    /// For each column of the tree, the row that reached it.
     reached_from: Vec<Option<usize>>,
     /// For each other column, the least slack of an edge from a row of the tree, and that row.
     slacks: Vec<(i64, usize)>,
@@ -46,7 +49,8 @@ impl Assignment {
         }
     }
 
-    /// Begins a problem in which all pairs cost the same. There must be at least as many columns as rows.
+    /// Begins a problem in which all pairs cost the same. There must be at least as many columns as
+    /// rows.
     pub(crate) fn begin(&mut self, rows: usize, columns: usize, cost: i64) {
         debug_assert!(rows <= columns, "{rows} rows, {columns} columns");
         self.columns = columns;
@@ -87,7 +91,8 @@ impl Assignment {
         self.row_labels[row] + self.column_labels[column] + self.cost(row, column)
     }
 
-    /// Grows the tree from the row `root` until it reaches a column without a row, and returns this column.
+    /// Grows the tree from the row `root` until it reaches a column without a row, and returns this
+    /// column.
     fn reach_free_column(&mut self, root: usize) -> usize {
         self.reached.clear();
         self.reached.push(root);
@@ -135,7 +140,8 @@ impl Assignment {
         }
     }
 
-    /// Assigns the columns on the path of the tree to `column` to the rows through which they were reached.
+    /// Assigns the columns on the path of the tree to `column` to the rows through which they were
+    /// reached.
     fn invert_path_to(&mut self, column: usize) {
         let mut next = Some(column);
         while let Some(column) = next {
@@ -153,7 +159,8 @@ mod tests {
 
     use super::*;
 
-    /// Returns the costs of a problem: row by row, with no fewer columns than rows. A small range of costs gives ties.
+    /// Returns the costs of a problem: row by row, with no fewer columns than rows. A small range
+    /// of costs gives ties.
     fn costs() -> impl Strategy<Value = Vec<Vec<i64>>> {
         (1..7_usize, 0..5_usize, 1..60_i64).prop_flat_map(|(rows, more, range)| {
             prop::collection::vec(prop::collection::vec(-range..range, rows + more), rows)
@@ -162,10 +169,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_same_optimum_is_chosen_as_by_the_library_among_equal_ones_too(
+        fn of_several_optima_the_algorithm_chooses_the_same_as_the_library(
             problems in prop::collection::vec(costs(), 1..4),
         ) {
-            // One memory for all: what an earlier problem leaves behind must not matter.
+            // One memory for all problems: the remains of an earlier problem must not matter.
             let mut assignment = Assignment::new();
             for costs in problems {
                 assignment.begin(costs.len(), costs[0].len(), 0);

@@ -1,10 +1,11 @@
 //! Association of detections with tracks: gating, then the assignment with the least total cost.
 //!
-//! The cost of a pair is its negative log-likelihood up to constants, d² + ln det S. Here d is the Mahalanobis distance
-//! and S the innovation covariance, enlarged for a manoeuvre that has just begun. A pair is allowed if d² does not
-//! exceed the gate. A track may also stay without a detection, at the cost of a detection at the edge of the gate, so
-//! that an implausible pair is never forced. The Kuhn–Munkres algorithm finds the optimum ([`super::assignment`]). It works
-//! on integers, so that the result does not depend on rounding.
+//! The cost of a pair is its negative log-likelihood up to constants, d² + ln det S. Here d is the
+//! Mahalanobis distance and S the innovation covariance, enlarged for a manoeuvre that has just
+//! begun. A pair is allowed if d² does not exceed the gate. A track may also stay without a
+//! detection, at the cost of a detection at the edge of the gate. An implausible pair is therefore
+//! never forced. The Kuhn–Munkres algorithm finds the optimum ([`super::assignment`]). It works on
+//! integers, so the result does not depend on rounding.
 
 use super::assignment::Assignment;
 use super::axis::AxisFit;
@@ -12,8 +13,8 @@ use super::road_filter::{Measurement, RoadFilter};
 
 /// Gate for d²: the 99.9 % quantile of χ² with 2 degrees of freedom.
 ///
-/// A true pair lies outside of the gate once in a thousand scans. It does so even less often at short range, where the
-/// allowance for a manoeuvre dominates S.
+/// A true pair lies outside of the gate once in a thousand scans. It does so even less often at
+/// short range, where the allowance for a manoeuvre dominates S.
 pub(crate) const GATE: f64 = 13.8;
 
 /// Integer cost per unit of d² + ln det S.
@@ -29,9 +30,11 @@ fn to_integer(cost: f64) -> i64 {
     cost.clamp(-FORBIDDEN / 1_000, FORBIDDEN / 1_000)
 }
 
-/// Writes into `assigned` the index in `measurements` of each track's detection, or `None` if it has none.
+/// Writes into `assigned` the index in `measurements` of each track's detection, or `None` if it
+/// has none.
 ///
-/// Each track is given by its filter, half of its length (m), and whether it follows a face. `costs` is memory that the next call may reuse.
+/// Each track is given by its filter, half of its length (m), and whether it follows a face.
+/// `costs` is memory that the next call may reuse.
 pub(crate) fn assign<'a>(
     tracks: impl ExactSizeIterator<Item = (&'a RoadFilter, f64, bool)>,
     measurements: &[Measurement],
@@ -44,7 +47,7 @@ pub(crate) fn assign<'a>(
         assigned.resize(rows, None);
         return;
     }
-    // The additional column of each track stands for "no detection".
+    // The additional column of each track means "no detection".
     costs.begin(rows, detections + rows, FORBIDDEN);
     for (row, (track, half_length_m, has_face)) in tracks.enumerate() {
         let mut largest_log_variance = f64::NEG_INFINITY;
@@ -52,7 +55,7 @@ pub(crate) fn assign<'a>(
         let whole = measurements.iter().enumerate().filter(|(_, measurement)| has_face && !measurement.seen.is_cut);
         for (column, measurement) in whole {
             let axes = track.fit(measurement, half_length_m);
-            let sum = |of: fn(&AxisFit) -> f64| of(&axes[0]) + of(&axes[1]);
+            let sum = |term: fn(&AxisFit) -> f64| term(&axes[0]) + term(&axes[1]);
             if sum(|axis| axis.squared_distance) <= GATE {
                 costs.set_cost(row, column, to_integer(sum(|axis| axis.cost)));
                 largest_log_variance = largest_log_variance.max(sum(|axis| axis.log_variance));
@@ -94,7 +97,8 @@ mod tests {
 
     #[test]
     fn the_least_total_cost_wins_over_the_best_single_pair() {
-        // The first track is nearest to measurement 1, but taking it would leave the second track without one.
+        // The first track is nearest to measurement 1, but that pair would leave the second track
+        // without a measurement.
         let tracks = [track(0.0, 0.0), track(2.0, 0.0)];
         let measurements = [measurement(-1.2, 0.0), measurement(0.9, 0.0)];
         assert_eq!(assignment(&tracks, &measurements), [Some(0), Some(1)]);

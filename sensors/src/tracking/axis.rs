@@ -1,20 +1,22 @@
-//! A filter for one axis of the road: it estimates a vehicle's position and speed under one or several modes of motion,
-//! with the sensor's slow error in the state.
+//! A filter for one axis of the road: it estimates a vehicle's position and speed under one or
+//! several modes of motion, with the sensor's slow error in the state.
 //!
-//! The state of each mode is `[p, v, a, β]`: position, speed, correlated acceleration, and the slow part of the
-//! measurement error in units of its standard deviation σ_β. β is a Gauss–Markov process. A measured position is
+//! The state of each mode is `[p, v, a, β]`: position, speed, correlated acceleration, and the slow
+//! part of the measurement error in units of its standard deviation σ_β. β is a Gauss–Markov
+//! process. A measured position is
 //!
 //! ```text
 //!   z = p + τ·v + σ_β·β + white noise          τ: time offset (s), such as the negative age of the measurement
 //! ```
 //!
-//! With β in the state, the covariance stays consistent although the errors of successive scans are correlated
-//! (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 8.2: state
-//! augmentation for autocorrelated noise). The modes are mixed before each prediction, and their probabilities updated
-//! with each measurement (the same, section 11.6.6: the interacting multiple model estimator). The reported estimate is
-//! the mean over the modes, and its covariance includes the differences between them. The two axes of the road are
-//! independent. In road coordinates, a vehicle that follows a bend at constant speed moves uniformly, so a bend is not
-//! a manoeuvre.
+//! With β in the state, the covariance stays consistent although the errors of successive scans are
+//! correlated (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and
+//! Navigation*, 2001, section 8.2: state augmentation for autocorrelated noise). The modes are
+//! mixed before each prediction, and their probabilities updated with each measurement (the same,
+//! section 11.6.6: the interacting multiple model estimator). The reported estimate is the mean
+//! over the modes, and its covariance includes the differences between them. The two axes of the
+//! road are independent. In road coordinates, a vehicle that follows a bend at constant speed moves
+//! uniformly, so a bend is not a manoeuvre.
 
 use closecall_traffic::{CONTROL_STEP, maths};
 use nalgebra::{Matrix4, Vector4};
@@ -25,11 +27,11 @@ use crate::tracking::gaussian::Gaussian;
 
 mod estimate;
 
-/// Standard deviation of a vehicle's deviation from the prediction when a manoeuvre has just begun (m): 2.5 m/s² for
-/// 0.4 s.
+/// Standard deviation of a vehicle's deviation from the prediction when a manoeuvre has just begun
+/// (m): 2.5 m/s² for 0.4 s.
 ///
-/// Only the gate uses it. The gate is therefore at least 0.7 m wide, which is less than the distance between two
-/// vehicles in any direction.
+/// Only the gate uses it. The gate is therefore at least 0.7 m wide, which is less than the
+/// distance between two vehicles in any direction.
 const MANOEUVRE_SD_M: f64 = 0.2;
 /// Maximum step of a prediction over a horizon (s).
 const MAX_STEP_S: f64 = CONTROL_STEP.s();
@@ -48,11 +50,11 @@ struct Remaining {
 }
 
 impl Remaining {
-    fn after(mode: &Mode, own: usize, step_s: f64) -> Self {
+    fn after(mode: &Mode, index: usize, step_s: f64) -> Self {
         Self {
             persistence: if mode.persistence_s > 0.0 { maths::exp(-step_s / mode.persistence_s) } else { 0.0 },
             speed: maths::exp(-step_s / mode.speed_decay_s),
-            stays: staying_probability(&mode.rates_per_s(Situation::FREE), own, step_s),
+            stays: staying_probability(&mode.rates_per_s(Situation::FREE), index, step_s),
         }
     }
 }
@@ -71,11 +73,13 @@ pub struct AxisFilter {
 /// How well a measurement fits the estimate along one axis.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisFit {
-    /// Squared innovation over its variance, which allows for a manoeuvre, under the mode in which this is least.
+    /// Squared innovation over its variance, which allows for a manoeuvre, under the mode in which
+    /// this is least.
     pub squared_distance: f64,
     /// −2 · the logarithm of the likelihood over all modes, up to a constant.
     pub cost: f64,
-    /// Logarithm of that variance's mean over all modes: the cost of a measurement without deviation.
+    /// Logarithm of that variance's mean over all modes: the cost of a measurement without
+    /// deviation.
     pub log_variance: f64,
 }
 
@@ -88,13 +92,14 @@ pub struct AxisMeasurement {
     pub white_sd_m: f64,
     /// Standard deviation of the slow error (m).
     pub slow_sd_m: f64,
-    /// Time after which the vehicle is at the measured position at its present speed (s); negative for an old
-    /// measurement.
+    /// Time after which the vehicle is at the measured position at its present speed (s); negative
+    /// for an old measurement.
     pub time_offset_s: f64,
 }
 
 impl AxisMeasurement {
-    /// Returns the measured position at the filter's time (m), for a vehicle of this speed, and its variance (m²).
+    /// Returns the measured position at the filter's time (m), for a vehicle of this speed, and its
+    /// variance (m²).
     pub(crate) fn position_now(&self, speed_mps: f64) -> [f64; 2] {
         let variance_m2 = self.white_sd_m * self.white_sd_m + self.slow_sd_m * self.slow_sd_m;
         [self.position_m - self.time_offset_s * speed_mps, variance_m2]
@@ -117,7 +122,8 @@ pub struct AxisEstimate {
 }
 
 impl AxisFilter {
-    /// Creates a filter before its first measurement, with the prior distributions of position and speed.
+    /// Creates a filter before its first measurement, with the prior distributions of position and
+    /// speed.
     #[inline]
     pub fn prior(modes: &'static [Mode], position_m: Gaussian, speed_mps: Gaussian) -> Self {
         let estimates = std::array::from_fn(|index| {
@@ -136,7 +142,8 @@ impl AxisFilter {
         Self { modes, estimates, usual, situation: Situation::FREE }
     }
 
-    /// Predicts by `step_s` in this situation, after which the share `slow_share` of the slow error remains.
+    /// Predicts by `step_s` in this situation, after which the share `slow_share` of the slow error
+    /// remains.
     #[inline]
     pub fn predict(&mut self, step_s: f64, slow_share: f64, situation: Situation) {
         self.situation = situation;
@@ -156,7 +163,8 @@ impl AxisFilter {
         }
     }
 
-    /// Replaces each mode's estimate by the mixture of the estimates that may switch to the mode within the step.
+    /// Replaces each mode's estimate by the mixture of the estimates that may switch to the mode
+    /// within the step.
     fn mix(&mut self, step_s: f64, remaining: &[Remaining; MODES]) {
         let before = self.estimates;
         let count = self.modes.len();
@@ -176,10 +184,10 @@ impl AxisFilter {
 
     /// Returns how well a measurement fits.
     ///
-    /// The least distance over all modes counts: after a vehicle has kept its lane for long, the lane-keeping mode
-    /// alone would reject the start of a lane change. The allowance for a manoeuvre is needed in addition at short
-    /// range, where the position is known to millimetres and all modes would reject the measurements of a swerving
-    /// vehicle.
+    /// The least distance over all modes counts: after a vehicle has kept its lane for long, the
+    /// lane-keeping mode alone would reject the start of a lane change. The allowance for a
+    /// manoeuvre is needed in addition at short range, where the position is known to millimetres
+    /// and all modes would reject the measurements of a swerving vehicle.
     #[inline]
     pub fn fit(&self, measurement: &AxisMeasurement) -> AxisFit {
         let (mut squared_distance, mut likelihood, mut variance) = (f64::INFINITY, 0.0, 0.0);
@@ -194,7 +202,7 @@ impl AxisFilter {
         AxisFit { squared_distance, cost: -2.0 * maths::ln(likelihood), log_variance: maths::ln(variance) }
     }
 
-    /// Forgets the slow error: the next measurement has another one.
+    /// Forgets the slow error: the next measurement has another slow error.
     pub(crate) fn renew_slow_error(&mut self) {
         for estimate in &mut self.estimates[..self.modes.len()] {
             estimate.state[3] = 0.0;
@@ -204,7 +212,8 @@ impl AxisFilter {
         }
     }
 
-    /// Moves the point that the filter follows by `offset_m`, which is known with the variance `variance_m2`.
+    /// Moves the point that the filter follows by `offset_m`, which is known with the variance
+    /// `variance_m2`.
     pub(crate) fn shift(&mut self, offset_m: f64, variance_m2: f64) {
         for estimate in &mut self.estimates[..self.modes.len()] {
             estimate.state[0] += offset_m;
@@ -248,7 +257,8 @@ impl AxisFilter {
         let weights: [f64; MODES] =
             std::array::from_fn(|index| self.estimates[index].probability * maths::exp(logs[index] - max_log));
         let sum: f64 = weights.iter().sum();
-        // If the measurement is not a number, neither is any likelihood. The probabilities then stay unchanged.
+        // If the measurement is not a number, neither is any likelihood. The probabilities then
+        // stay unchanged.
         if sum > 0.0 && sum.is_finite() {
             for (estimate, weight) in self.estimates.iter_mut().zip(weights) {
                 estimate.probability = weight / sum;
@@ -273,7 +283,8 @@ impl AxisFilter {
         }
     }
 
-    /// Returns position and speed of the mixture of all modes, and their [`COVARIANCES`]: the same as [`mixture`].
+    /// Returns position and speed of the mixture of all modes, and their [`COVARIANCES`]: the same
+    /// as [`mixture`].
     fn mean(&self, estimates: &[ModeEstimate]) -> ([f64; 2], [f64; 3]) {
         let sum: f64 = self.estimates.iter().map(|estimate| estimate.probability).sum();
         let mut state = [0.0; 2];
@@ -287,8 +298,9 @@ impl AxisFilter {
         for estimate in estimates {
             let share = estimate.probability / sum;
             for (value, (row, column)) in covariance.iter_mut().zip(COVARIANCES) {
-                let (one, other) = (estimate.state[row] - state[row], estimate.state[column] - state[column]);
-                *value += (estimate.covariance[(row, column)] + one * other) * share;
+                let (row_error, column_error) =
+                    (estimate.state[row] - state[row], estimate.state[column] - state[column]);
+                *value += (estimate.covariance[(row, column)] + row_error * column_error) * share;
             }
         }
         (state, covariance)
@@ -296,7 +308,8 @@ impl AxisFilter {
 
     /// Returns the estimate predicted by `horizon_s`, in the situation of the latest prediction.
     ///
-    /// A negative horizon, as a clock that runs ahead causes it, moves the position back at constant speed. The covariance stays.
+    /// A negative horizon, as a clock that runs ahead causes it, moves the position back at
+    /// constant speed. The covariance stays.
     #[inline]
     pub fn predicted(&self, horizon_s: f64) -> AxisEstimate {
         if horizon_s < -ROUNDING_S {
@@ -314,10 +327,12 @@ impl AxisFilter {
     }
 }
 
-/// Indices of the variance of the position, its covariance with the speed, and the variance of the speed.
+/// Indices of the variance of the position, its covariance with the speed, and the variance of the
+/// speed.
 const COVARIANCES: [(usize, usize); 3] = [(0, 0), (0, 1), (1, 1)];
 
-/// Returns the rate of leaving the mode with the index `from` (1/s), whose rates of switching are `rates_per_s`.
+/// Returns the rate of leaving the mode with the index `from` (1/s), whose rates of switching are
+/// `rates_per_s`.
 fn leaving_per_s(rates_per_s: &[f64; MODES], from: usize) -> f64 {
     (0..MODES).filter(|other| *other != from).map(|other| rates_per_s[other]).sum()
 }
@@ -327,8 +342,8 @@ fn staying_probability(rates_per_s: &[f64; MODES], from: usize, step_s: f64) -> 
     maths::exp(-leaving_per_s(rates_per_s, from) * step_s)
 }
 
-/// Returns the probabilities that the mode changes from the index `from` to each mode in a step, in which it goes on with the
-/// probability `stays`. At most one switch per step is considered.
+/// Returns the probabilities that the mode changes from the index `from` to each mode in a step, in
+/// which it goes on with the probability `stays`. At most one switch per step is considered.
 fn transition_probabilities(rates_per_s: &[f64; MODES], from: usize, stays: f64) -> [f64; MODES] {
     let leaving_per_s = leaving_per_s(rates_per_s, from);
     std::array::from_fn(|to| {

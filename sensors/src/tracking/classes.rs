@@ -1,16 +1,18 @@
 //! The class of a track: class scores of many scans, fused by Bayes' rule.
 //!
-//! Each scan multiplies the probabilities by its scores. The scores are probabilities under equal priors, and therefore
-//! proportional to the likelihoods. The errors of successive scans of a vehicle are correlated (same distance, light
-//! and shape), so each scan counts only as a share of an independent observation.
+//! Each scan multiplies the probabilities by its scores. The scores are probabilities under equal
+//! priors, and therefore proportional to the likelihoods. The errors of successive scans of a
+//! vehicle are correlated (same distance, light and shape), so each scan counts only as a share of
+//! an independent observation.
 
 use closecall_traffic::{ClassScores, maths};
 
-/// Weight of one scan relative to an independent observation; assumption: about three scans make one observation.
+/// Weight of one scan relative to an independent observation; assumption: about three scans make
+/// one observation.
 const SCAN_WEIGHT: f64 = 0.3;
 
-/// Number of points from which on a box has the full weight of a scan; fewer could be one lamp of a dark car
-/// (assumption).
+/// Number of points from which on a box has the full weight of a scan; fewer could be one lamp of a
+/// dark car (assumption).
 const FULL_WEIGHT_POINTS: f64 = 12.0;
 
 /// Least probability of a class, so that later evidence can raise it again.
@@ -52,11 +54,12 @@ fn weight(points: usize) -> f64 {
     SCAN_WEIGHT * (points as f64 / FULL_WEIGHT_POINTS).min(1.0)
 }
 
-/// Returns the log-likelihood ratio of these scores for a vehicle of any class against background, with the same weight
-/// as in [`FusedClass`].
+/// Returns the log-likelihood ratio of these scores for a vehicle of any class against background,
+/// with the same weight as in [`FusedClass`].
 pub(crate) fn vehicle_log_likelihood_ratio(seen: &ClassScores, points: usize) -> f64 {
     let background = seen.0[ClassScores::BACKGROUND].clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
-    // Under equal priors of the four classes, a vehicle of any class has three times the prior of background.
+    // Under equal priors of the four classes, a vehicle of any class has three times the prior of
+    // background.
     weight(points) * maths::ln((1.0 - background) / (3.0 * background))
 }
 

@@ -12,14 +12,16 @@ use super::lifecycle::{LifecycleRules, MAX_WINDOW};
 pub struct TrackerConfig {
     /// Number of detections in the latest `confirm-window` scans that confirm a track.
     pub confirm_hits: u8,
-    /// Number of latest scans in which `confirm-hits` are counted: 1 to 16. The default of 3 hits in 6 scans confirms a
-    /// distant low car even if it is detected with one side of the mirror only.
+    /// Number of latest scans in which `confirm-hits` are counted: 1 to 16. The default of 3 hits
+    /// in 6 scans confirms a distant low car even if it is detected with one side of the mirror
+    /// only.
     pub confirm_window: u8,
     /// Time for which a confirmed track is kept without further detections (s).
     pub coast_s: Num,
     /// Time from the end of a scan to its tracks (s), rounded to whole control steps of 40 ms.
     pub latency_s: Num,
-    /// Standard deviation of a track's speed along the road above which the track is not confirmed (m/s).
+    /// Standard deviation of a track's speed along the road above which the track is not confirmed
+    /// (m/s).
     pub settled_speed_sd_mps: Num,
 }
 
@@ -49,8 +51,8 @@ impl TrackerModel {
         self.latency_steps as usize
     }
 
-    /// Returns the same tracker for a sensor that scans once in `period_s`, in place of once in a control step: it coasts for the
-    /// same time.
+    /// Returns the same tracker for a sensor that scans once in `period_s`, in place of once in a
+    /// control step: it coasts for the same time.
     #[must_use]
     pub fn with_scan_period_s(self, period_s: f64) -> Self {
         let coast_s = f64::from(self.rules.delete_after_misses - 1) * CONTROL_STEP.s();
@@ -63,7 +65,8 @@ impl TrackerModel {
         Self { rules: LifecycleRules { delete_after_misses, ..self.rules }, ..self }
     }
 
-    /// Returns the same tracker with a latency of `steps` control steps, at most [`MAX_LATENCY_STEPS`].
+    /// Returns the same tracker with a latency of `steps` control steps, at most
+    /// [`MAX_LATENCY_STEPS`].
     #[must_use]
     pub fn with_latency_steps(self, steps: usize) -> Self {
         let steps = steps.min(MAX_LATENCY_STEPS);
@@ -83,8 +86,8 @@ pub const MAX_LATENCY_STEPS: usize = 10;
 
 /// Maximum latency (s).
 const MAX_LATENCY_S: f64 = 0.4;
-/// Probability that a scan detects a vehicle in view: between one in two scans (distant low vehicle) and every scan
-/// (near).
+/// Probability that a scan detects a vehicle in view: between one in two scans (distant low
+/// vehicle) and every scan (near).
 pub const DETECTION_PROBABILITY: f64 = 0.75;
 /// Probability that clutter gives a detection inside the gate of a false track in one scan.
 const CLUTTER_PROBABILITY: f64 = 0.1;

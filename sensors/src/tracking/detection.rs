@@ -1,8 +1,9 @@
 //! A detection: a box fitted to one cluster of points of one scan.
 //!
-//! The LiDAR looks back, so it sees the *front* face of a vehicle that follows in the lane, and one side of a vehicle
-//! in a neighbouring lane. The extent of a face that is not seen is assumed from the class's usual size. The tracker
-//! may trust measured extents only, so a detection says which extents are measured.
+//! The LiDAR looks back, so it sees the *front* face of a vehicle that follows in the lane, and one
+//! side of a vehicle in a neighbouring lane. The extent of a face that is not seen is assumed from
+//! the class's usual size. The tracker may trust measured extents only, so a detection says which
+//! extents are measured.
 
 use closecall_traffic::{ClassScores, Time, maths};
 
@@ -14,26 +15,30 @@ pub const SIDE_PROTRUSION_M: f64 = 0.25;
 pub enum Extent {
     /// Measured: both ends are seen.
     Seen,
-    /// Assumed: not both ends are seen. The extent is the class's usual one, or the seen part if that is larger.
+    /// Assumed: not both ends are seen. The extent is the class's usual one, or the seen part if
+    /// that is larger.
     Assumed,
 }
 
 /// The part of a vehicle that a scan shows, relative to the middle of the detection's face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenPart {
-    /// Whether the field of view cuts off the vehicle's side, so that its nearest face is out of view. The face of the detection is then
-    /// an assumption.
+    /// Whether the field of view cuts off the vehicle's side, so that its nearest face is out of
+    /// view. The face of the detection is then an assumption.
     pub is_cut: bool,
-    /// Distances along the box's heading of the rearmost and of the foremost point (m), positive ahead of the face.
+    /// Distances along the box's heading of the rearmost and of the foremost point (m), positive
+    /// ahead of the face.
     pub along_m: [f64; 2],
-    /// Distances across the box's heading of the rightmost and of the leftmost point (m), positive to the left.
+    /// Distances across the box's heading of the rightmost and of the leftmost point (m), positive
+    /// to the left.
     pub across_m: [f64; 2],
-    /// Spacing of the columns on the side at the rearmost and at the foremost point (m), infinite if no side is seen.
+    /// Spacing of the columns on the side at the rearmost and at the foremost point (m), infinite
+    /// if no side is seen.
     pub spacing_m: [f64; 2],
 }
 
 impl SeenPart {
-    /// A face of which no extent is known.
+    /// A face of unknown extent.
     pub const FACE: Self = Self { is_cut: false, along_m: [0.0; 2], across_m: [0.0; 2], spacing_m: [f64::INFINITY; 2] };
 }
 
@@ -42,19 +47,22 @@ impl SeenPart {
 pub enum SeenBy {
     /// The LiDAR, whose clusters confirm tracks.
     Lidar,
-    /// The camera without the LiDAR. Such a detection keeps a track and corrects it, but counts towards no confirmation: its distance
-    /// rests on a flat road.
+    /// The camera without the LiDAR. Such a detection keeps a track and corrects it, but counts
+    /// towards no confirmation: its distance rests on a flat road.
     CameraAlone,
 }
 
 /// A box fitted to one cluster, in the ego's vehicle frame at the end of the scan.
 ///
-/// The box shows where the target was at `time`, relative to where the ego is at the end of the scan.
+/// The box shows where the target was at `time`, relative to where the ego is at the end of the
+/// scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// Time at which the position holds: the mean measurement time of the points, compensated for the ego's motion.
+    /// Time at which the position holds: the mean measurement time of the points, compensated for
+    /// the ego's motion.
     pub time: Time,
-    /// Position ahead of the ego of the middle of the box's nearest face (m); negative behind the ego.
+    /// Position ahead of the ego of the middle of the box's nearest face (m); negative behind the
+    /// ego.
     pub face_x_m: f64,
     /// Position to the left of the ego of the middle of that face (m).
     pub face_y_m: f64,
@@ -62,7 +70,8 @@ pub struct Detection {
     pub range_sd_m: f64,
     /// Standard deviation of the face's position across the line of sight (m).
     pub lateral_sd_m: f64,
-    /// Heading of the vehicle relative to the ego's (rad), within ±π/2: it is taken to travel in the ego's direction.
+    /// Heading of the vehicle relative to the ego's (rad), within ±π/2: it is taken to travel in
+    /// the ego's direction.
     pub heading_rad: f64,
     /// Length of the box (m).
     pub length_m: f64,
@@ -78,8 +87,8 @@ pub struct Detection {
     pub seen_by: SeenBy,
     /// Number of points in the cluster.
     pub points: usize,
-    /// Whether the seen parts are symmetric about the middle of the vehicle, as a plate or both headlamps are. Otherwise, a few points
-    /// may be a part off the middle.
+    /// Whether the seen parts are symmetric about the middle of the vehicle, as a plate or both
+    /// headlamps are. Otherwise, a few points may be a part off the middle.
     pub is_centred: bool,
     /// The part of the vehicle that is seen.
     pub seen: SeenPart,

@@ -8,28 +8,32 @@
 //!                 ◀───── behind_m ──────────┃
 //! ```
 //!
-//! The ends of the parts that a scan shows are those of the load, the cab, a guard or a wheel: beams at another height meet other parts,
-//! and weak returns are lost. Each of these points keeps its place on the vehicle. Other ends do not: where a layer of beams passes below
-//! the load, the end of what is seen moves over the vehicle.
+//! The parts that a scan shows end at the load, the cab, a guard or a wheel: beams at another
+//! height meet other parts, and weak returns are lost. Each of these points keeps its place on the
+//! vehicle. Other ends do not: where a layer of beams passes below the load, the end of the visible
+//! part moves over the vehicle.
 //!
-//! [`Ends`] remember the distances of the points behind the followed point. A point measures it once it has kept its distance for some
-//! scans. The estimate does not jump when the visible end changes. The end of a box whose front or length follows from the visible end of
-//! each scan does.
+//! [`Ends`] remember the distances of the points behind the followed point. A point measures it
+//! once it has kept its distance for some scans. The estimate does not jump when the visible end
+//! changes. The end of a box would jump if its front or length followed from the visible end of
+//! each scan.
 
 /// Number of distances that are remembered: the ends of cab, load, guard and wheels (assumption).
 const POINTS: usize = 8;
-/// Difference up to which a point may be one that is remembered, in addition to the spacing of the columns and the deviation of the
-/// estimate (m; assumption): more than the noise of a range, less than the distance of two wheels.
+/// Largest difference at which a point matches a remembered point, in addition to the spacing of
+/// the columns and the deviation of the estimate (m; assumption): more than the noise of a range,
+/// less than the distance of two wheels.
 const SAME_POINT_M: f64 = 0.15;
-/// Greatest difference up to which it may be (m; assumption).
+/// Upper bound of that difference (m; assumption).
 const MAX_SAME_POINT_M: f64 = 0.8;
-/// Difference up to which a point keeps its distance (m; assumption), in addition to a share of the spacing of the columns: the noise of
-/// a range.
+/// Difference up to which a point keeps its distance (m; assumption), in addition to a share of the
+/// spacing of the columns: the noise of a range.
 const KEPT_M: f64 = 0.05;
 /// That share.
 const KEPT_COLUMNS: f64 = 0.5;
-/// Number of scans in which a point keeps its distance before it measures (assumption). Where the end of what is seen stays beside the
-/// ego, a vehicle that is faster by 0.5 m/s moves on by 0.16 m meanwhile.
+/// Number of scans in which a point keeps its distance before it measures (assumption). Where the
+/// end of the visible part stays beside the ego, a vehicle that is faster by 0.5 m/s moves on by
+/// 0.16 m meanwhile.
 const PROVEN_SCANS: u8 = 8;
 /// Least share by which a remembered distance is corrected while the front is seen (assumption).
 const LEARNING_SHARE: f64 = 0.05;
@@ -43,7 +47,7 @@ pub(crate) struct SidePoint {
     pub(crate) spacing_m: f64,
 }
 
-/// What is known of the ends of a track's vehicle.
+/// The known ends of a track's vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ends {
     /// Whether the followed point is the front.
@@ -67,7 +71,8 @@ struct Remembered {
 impl Ends {
     /// Creates the ends of a vehicle whose followed point is the front, or else its rear end.
     ///
-    /// The rear end is the first point of a vehicle of which nothing else is seen, and measures from the start.
+    /// If nothing else of the vehicle is seen, the rear end is its first point, and measures from
+    /// the start.
     pub(crate) const fn new(has_front: bool) -> Self {
         let mut points = [None; POINTS];
         points[0] = Some(Remembered { behind_m: 0.0, scans: PROVEN_SCANS });
@@ -81,10 +86,12 @@ impl Ends {
         self.points.iter_mut().flatten().for_each(|point| point.behind_m += offset_m);
     }
 
-    /// Returns how far ahead of its estimate the followed point is by these points, and the spacing of the columns on the best of them
-    /// (m). The estimate has the standard deviation `sd_m`. Returns `None` if no point measures it.
+    /// Returns how far ahead of its estimate the followed point is by these points, and the spacing
+    /// of the columns on the best of them (m). The estimate has the standard deviation `sd_m`.
+    /// Returns `None` if no point measures it.
     ///
-    /// Of several points, those that agree with the one nearest to the prediction count.
+    /// Of several points, the point nearest to the prediction counts, and all points that agree
+    /// with it.
     pub(crate) fn measure(&mut self, points: &[SidePoint], sd_m: f64) -> Option<[f64; 2]> {
         let offset_m = |remembered: &Remembered, point: &SidePoint| remembered.behind_m - point.behind_m;
         let proven = points.iter().filter_map(|point| {
@@ -158,7 +165,8 @@ mod tests {
         for _ in 0..=PROVEN_SCANS {
             assert_eq!(ends.measure(&points([18.0]), 0.0), None);
         }
-        // The next scan of the mirror's other side ends at an axle, and the one after it at the rear end again.
+        // The next scan of the mirror's other side ends at an axle, and the scan after it at the
+        // rear end again.
         assert_eq!(ends.measure(&points([16.8]), 0.0), None);
         let [offset_m, _] = ends.measure(&points([18.08]), 0.0).unwrap();
         assert!((offset_m + 0.08).abs() < 1e-9);

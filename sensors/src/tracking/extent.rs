@@ -1,17 +1,19 @@
 //! Length and width of a track.
 //!
-//! An extent (length or width) that was measured is averaged over the scans. An extent that was never measured is the
-//! usual one of the most probable class, or the extent that the latest detection assumed if that is larger.
+//! An extent (length or width) that was measured is averaged over the scans. An extent that was
+//! never measured is the larger of two values: the usual extent of the most probable class, and the
+//! extent that the latest detection assumed.
 
 use closecall_traffic::{ClassScores, Dimensions};
 
 use crate::tracking::{Detection, Extent};
 
-/// Standard deviation of an extent measured in one scan (m): beam spacing and range noise at both ends (assumption).
+/// Standard deviation of an extent measured in one scan (m): beam spacing and range noise at both
+/// ends (assumption).
 const MEASURED_SD_M: f64 = 0.3;
 /// Least variance of an averaged extent (m²), so that later scans can still correct a slow error.
 const MIN_VARIANCE_M2: f64 = 0.003;
-/// Share of a length beyond the present one by which it grows in one scan (assumption).
+/// Share of the excess over the present length by which the length grows in one scan (assumption).
 const GROWTH_SHARE: f64 = 0.3;
 
 /// The estimate of one extent.
@@ -61,14 +63,17 @@ impl TrackExtent {
         self.width.update(detection.width_m, detection.width);
     }
 
-    /// Lets the length grow towards the distance between two ends of the vehicle's parts, which it has at least.
+    /// Lets the length grow towards the distance between two ends of the vehicle's parts. The
+    /// vehicle is at least that long.
     ///
-    /// A single scan that takes a part of another vehicle for one of this vehicle changes it little.
+    /// A single scan that takes a part of another vehicle for one of this vehicle changes it
+    /// little.
     pub(crate) fn span_length(&mut self, length_m: f64) {
         self.length.least_m += GROWTH_SHARE * (length_m - self.length.least_m).max(0.0);
     }
 
-    /// Returns the length that parts of the vehicle have shown together (m); 0 before there are several.
+    /// Returns the length that parts of the vehicle have shown together (m); 0 before there are
+    /// several.
     pub(crate) fn spanned_m(&self) -> f64 {
         self.length.least_m
     }

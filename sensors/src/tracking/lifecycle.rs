@@ -1,18 +1,19 @@
-//! Lifecycle of a track: confirmation by M hits in N scans, coasting over misses, deletion, and the existence
-//! probability.
+//! Lifecycle of a track: confirmation by M hits in N scans, coasting over misses, deletion, and the
+//! existence probability.
 //!
-//! The existence probability follows from Bayes' rule for the two hypotheses "vehicle" and "clutter". P_D is the
-//! probability that a scan detects a vehicle in view, and P_F the probability that clutter gives a detection inside the
-//! gate. A hit multiplies the odds by P_D/P_F, and a miss by (1 − P_D)/(1 − P_F) (Bar-Shalom, Willett, Tian: *Tracking
-//! and Data Fusion*, 2011, chapter on track-score functions; here the score is kept as log-odds).
+//! The existence probability follows from Bayes' rule for the two hypotheses "vehicle" and
+//! "clutter". P_D is the probability that a scan detects a vehicle in view, and P_F the probability
+//! that clutter gives a detection inside the gate. A hit multiplies the odds by P_D/P_F, and a miss
+//! by (1 − P_D)/(1 − P_F) (Bar-Shalom, Willett, Tian: *Tracking and Data Fusion*, 2011, chapter on
+//! track-score functions; here the score is kept as log-odds).
 
 use closecall_traffic::{TrackStatus, maths};
 
 /// Maximum number of scans in the confirmation window.
 pub const MAX_WINDOW: u8 = 16;
 
-/// Maximum absolute value of the log-odds (an existence probability of 0.9999), so that misses can still lower it
-/// for a track that was detected a thousand times.
+/// Maximum absolute value of the log-odds (an existence probability of 0.9999), so that misses can
+/// still lower it for a track that was detected a thousand times.
 const MAX_LOG_ODDS: f64 = 9.2;
 
 /// Log-odds of existence before the first detection: even odds.
@@ -74,14 +75,16 @@ impl Lifecycle {
         self.add_evidence(maths::ln(rules.detection_probability / rules.clutter_probability));
     }
 
-    /// Adds a scan in which only a sensor that confirms nothing has detected the track. It ends coasting, and is no hit in the window.
+    /// Adds a scan in which only a sensor that confirms nothing has detected the track. It ends
+    /// coasting, and is no hit in the window.
     pub fn keep(&mut self, rules: &LifecycleRules) {
         self.history <<= 1;
         self.misses = 0;
         self.add_evidence(maths::ln(rules.detection_probability / rules.clutter_probability));
     }
 
-    /// Makes the latest scan, which [`Self::keep`] has added, a hit: a sensor that confirms has detected the track at the same time.
+    /// Makes the latest scan, which [`Self::keep`] has added, a hit: a sensor that confirms has
+    /// detected the track at the same time.
     pub fn count_kept_as_hit(&mut self, rules: &LifecycleRules, is_settled: bool) {
         self.history |= 1;
         self.confirmed |= is_settled && self.hits_in_window(rules) >= rules.confirm_hits;
@@ -96,7 +99,8 @@ impl Lifecycle {
 
     /// Adds a scan that could not detect the track, because it was hidden or out of view.
     ///
-    /// Such a scan leaves the existence probability unchanged, but counts against the coasting time.
+    /// Such a scan leaves the existence probability unchanged, but counts against the coasting
+    /// time.
     #[inline]
     pub fn skip(&mut self) {
         self.history <<= 1;
@@ -109,8 +113,8 @@ impl Lifecycle {
         self.log_odds = (self.log_odds + log_likelihood_ratio).clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
     }
 
-    /// Returns whether the track has ended: a tentative track that can no longer reach M hits in N scans, or a
-    /// confirmed track that was not detected for too long.
+    /// Returns whether the track has ended: a tentative track that can no longer reach M hits in N
+    /// scans, or a confirmed track that was not detected for too long.
     #[inline]
     pub fn should_delete(&self, rules: &LifecycleRules) -> bool {
         if self.confirmed {
@@ -190,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_keeps_a_track_counts_towards_no_confirmation() {
+    fn kept_scans_do_not_count_towards_confirmation() {
         let mut track = Lifecycle::first_kept(&RULES);
         for _ in 0..20 {
             track.keep(&RULES);

@@ -1,9 +1,11 @@
-//! Conversion of a detection to a measurement in road axes, with its error split into a slow and a white part.
+//! Conversion of a detection to a measurement in road axes, with its error split into a slow and a
+//! white part.
 //!
-//! The error of a fitted box depends on where the scan's columns and layers hit the vehicle. This changes slowly as the
-//! vehicle approaches, so most of the error is the same from scan to scan. Only the range noise is new in each scan.
-//! The shares below were measured on the boxes of the library's scenarios. At 2 to 50 m, the errors of scans 0.4 s
-//! apart correlate by 0.9 and more along the road, and by 0.5 across; at 50 to 80 m by 0.7; beyond by less than 0.1.
+//! The error of a fitted box depends on where the scan's columns and layers hit the vehicle. This
+//! changes slowly as the vehicle approaches, so most of the error is the same from scan to scan.
+//! Only the range noise is new in each scan. The shares below were measured on the boxes of the
+//! library's scenarios. At 2 to 50 m, the errors of scans 0.4 s apart correlate by 0.9 and more
+//! along the road, and by 0.5 across; at 50 to 80 m by 0.7; beyond by less than 0.1.
 
 use closecall_traffic::{Time, VehicleClass, maths};
 
@@ -14,15 +16,16 @@ use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of the slow error along the line of sight, by vehicle class (m).
 ///
-/// It depends on the part of the bumper or grille that is taken for the face. On a motorcycle, wheel, fork and rider
-/// stand behind each other.
+/// It depends on the part of the bumper or grille that counts as the face. On a motorcycle, wheel,
+/// fork and rider stand behind each other.
 const FACE_SLOW_SD_M: [f64; 3] = [0.034, 0.034, 0.15];
-/// Slow share of the error variance across the road: it depends on where the outermost columns hit the edges.
+/// Slow share of the error variance across the road: it depends on where the outermost columns hit
+/// the edges.
 const ACROSS_SLOW_SHARE: f64 = 0.7;
 /// Number of points from which on [`ALONG_SLOW_SHARE`] applies.
 ///
-/// The error along the road then depends almost only on where the points lie, which is the same in the next scan. Fewer
-/// points jump from layer to layer with the sides of the mirror.
+/// The error along the road then depends almost only on where the points lie, which is the same in
+/// the next scan. Fewer points jump from layer to layer with the sides of the mirror.
 const MANY_POINTS: usize = 25;
 /// Slow share of the error variance along the road for a box of many points.
 const ALONG_SLOW_SHARE: f64 = 0.9;
@@ -30,17 +33,19 @@ const ALONG_SLOW_SHARE: f64 = 0.9;
 const MIN_WHITE_SHARE: f64 = 0.02;
 /// Number of points below which a box may be one lamp or the plate of a dark car.
 const MIN_WHOLE_FACE_POINTS: usize = 6;
-/// Standard deviation of the distance from the vehicle's middle beyond which a box is a part of it, rather than its face (m): that of
-/// a box half as wide as a car. Up to the same deviation across the road, a face whose edges or whose plate are seen shows the middle.
+/// Standard deviation of the distance from the vehicle's middle beyond which a box is a part of the
+/// vehicle, rather than its face (m): the value of a box half as wide as a car. Up to the same
+/// deviation across the road, a face whose edges or whose plate are seen shows the middle.
 const PART_SD_M: f64 = 0.2;
-/// Maximum distance of a lamp or a plate from the middle of a car or truck (m). Nothing else is seen of a vehicle with
-/// dark paint or in fog.
+/// Maximum distance of a lamp or a plate from the middle of a car or truck (m). Nothing else is
+/// seen of a vehicle with dark paint or in fog.
 const MAX_PART_OFFSET_M: f64 = 0.8;
 
 /// Score from which a class is sure enough to tell a vehicle from a part of a truck (assumption).
 pub(crate) const SURE_SCORE: f64 = 0.7;
 
-/// Converts a detection to a measurement, for a scan that ended at `time` with the ego's frame `frame`.
+/// Converts a detection to a measurement, for a scan that ended at `time` with the ego's frame
+/// `frame`.
 pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Time) -> Measurement {
     let (s_m, d_m) = frame.road_position_m(detection.face_x_m, detection.face_y_m);
     let class = detection.class.best_vehicle_class();
@@ -82,14 +87,15 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
     }
 }
 
-/// Returns whether a detection shows the face of a vehicle rather than a wheel, a guard or the tail of a truck: both of its edges are
-/// seen, and it is classified as a vehicle. A classifier alone takes the wheels of a truck for a car.
+/// Returns whether a detection shows the face of a vehicle rather than a wheel, a guard or the tail
+/// of a truck: both of its edges are seen, and it is classified as a vehicle. A classifier alone
+/// takes the wheels of a truck for a car.
 fn is_face(detection: &Detection) -> bool {
     detection.width == Extent::Seen && detection.class.0[detection.class.best_vehicle_class() as usize] >= SURE_SCORE
 }
 
-/// Returns the standard deviation of a uniform distribution over ±`half_width_m` (m), or 0 if `half_width_m` is
-/// negative.
+/// Returns the standard deviation of a uniform distribution over ±`half_width_m` (m), or 0 if
+/// `half_width_m` is negative.
 fn uniform_sd_m(half_width_m: f64) -> f64 {
     half_width_m.max(0.0) / 3.0_f64.sqrt()
 }
@@ -101,7 +107,8 @@ mod tests {
     use super::*;
     use crate::tracking::{SeenBy, SeenPart};
 
-    /// Returns the standard deviation of the measured position across the road for a box 40 m behind the ego (m).
+    /// Returns the standard deviation of the measured position across the road for a box 40 m
+    /// behind the ego (m).
     fn across_sd_m(width_m: f64, points: usize, class: VehicleClass) -> f64 {
         let Measurement { across, .. } = of_box(width_m, Extent::Seen, points, class);
         maths::hypot(across.white_sd_m, across.slow_sd_m)
@@ -135,21 +142,21 @@ mod tests {
 
     #[test]
     fn a_lamp_is_a_part_and_a_face_with_both_edges_shows_the_middle() {
-        let of = |width_m, width, points| {
+        let shape = |width_m, width, points| {
             let Measurement { is_part, knows_middle, .. } = of_box(width_m, width, points, VehicleClass::Car);
             (is_part, knows_middle)
         };
-        assert_eq!(of(0.4, Extent::Seen, 12), (true, false));
-        assert_eq!(of(1.7, Extent::Seen, 4), (true, false));
-        assert_eq!(of(1.7, Extent::Seen, 12), (false, true));
-        // One edge is hidden: the width is that of the class.
-        assert_eq!(of(1.8, Extent::Assumed, 12), (false, false));
+        assert_eq!(shape(0.4, Extent::Seen, 12), (true, false));
+        assert_eq!(shape(1.7, Extent::Seen, 4), (true, false));
+        assert_eq!(shape(1.7, Extent::Seen, 12), (false, true));
+        // One edge is hidden: the width is the class's width.
+        assert_eq!(shape(1.8, Extent::Assumed, 12), (false, false));
     }
 
     #[test]
     fn a_box_that_may_be_a_lamp_or_a_plate_has_a_larger_lateral_deviation() {
-        // In fog and on dark paint, only retroreflectors are seen: a plate with a width of 0.5 m, or the plate and one
-        // lamp.
+        // In fog and on dark paint, only retroreflectors are seen: a plate with a width of 0.5 m,
+        // or the plate and one lamp.
         let parts_m = [0.5, 1.1].map(|width_m| across_sd_m(width_m, 12, VehicleClass::Car));
         assert!(parts_m[0] > 0.3 && parts_m[1] > 0.14 && parts_m[1] < parts_m[0], "{parts_m:?}");
         assert!((across_sd_m(1.7, 12, VehicleClass::Car) - 0.05).abs() < 1e-12);

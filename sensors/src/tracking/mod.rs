@@ -1,4 +1,5 @@
-//! Multi-object tracking of the rear LiDAR's detections: association, filter, extent, class and lifecycle.
+//! Multi-object tracking of the rear LiDAR's detections: association, filter, extent, class and
+//! lifecycle.
 //!
 //! The crate knows no truth: it sees detections, the ego's odometry and the map.
 //!
@@ -8,10 +9,11 @@
 //!                      ego odometry and map                      tracks ◀─ ego frame ◀─ predict to now
 //! ```
 //!
-//! Along the road, a track follows the middle of the face that the ego sees (a follower's front), not the centre of the
-//! box: the face is measured, and it defines the gap. The centre lies half a length behind it, with the uncertainty of
-//! the length. State and noise are in road axes, so that neither the ego's braking and turning nor a bend of the road
-//! looks like a manoeuvre of another vehicle.
+//! Along the road, a track follows the middle of the face that the ego sees (a follower's front),
+//! not the centre of the box: the face is measured, and it defines the gap. The centre lies half a
+//! length behind it, with the uncertainty of the length. State and noise are in road axes: neither
+//! the ego's braking and turning nor a bend of the road then looks like a manoeuvre of another
+//! vehicle.
 
 mod assignment;
 mod association;

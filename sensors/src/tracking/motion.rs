@@ -1,9 +1,10 @@
 //! Motion models of vehicles along one axis of the road: the modes between which a filter switches.
 //!
-//! White acceleration does not describe driving. A vehicle holds its speed and its lane for many seconds, and then
-//! brakes or changes lanes for a few. A single spectral density for both is far too conservative in the first case and
-//! far too confident in the second. Each axis therefore has a few modes, and one of them holds at a time, and switches
-//! between them at given rates (interacting multiple models: Blom and Bar-Shalom 1988). The acceleration of a mode is
+//! White acceleration does not describe driving. A vehicle holds its speed and its lane for many
+//! seconds, and then brakes or changes lanes for a few. A single spectral density for both is far
+//! too conservative in the first case and far too confident in the second. Each axis therefore has
+//! a few modes. One mode holds at a time, and the vehicle switches between them at given rates
+//! (interacting multiple models: Blom and Bar-Shalom 1988). The acceleration of a mode is
 //! exponentially correlated (Singer 1970).
 //!
 //! | axis | mode | acceleration | mean duration |
@@ -14,18 +15,20 @@
 //! | across | keeps its lane | 0.46 m/s² for 0.36 s drives a lateral speed that decays in the same time: weaving with 0.12 m/s | 60 s |
 //! | across | changes lanes | 1.1 m/s² for 2 s: 3.75 m on a quintic within 3.4 to 8 s (the 5 to 95 % of lane changes on US-101) reach 1.9 to 0.3 m/s² | 1 s |
 //!
-//! A driver with a standard deviation of lateral position (SDLP) of 0.2 m whose steering has the lags of those on US-101 (4.1, 0.4 and 0.4 s
-//! at 30 m/s) weaves with 0.12 m/s and 0.36 m/s² at 33 m/s. The mode that keeps its lane has the last two lags at this speed, and a
-//! driving acceleration that gives this speed.
+//! A driver with a standard deviation of lateral position (SDLP) of 0.2 m whose steering has the
+//! lags of the drivers on US-101 (4.1, 0.4 and 0.4 s at 30 m/s) weaves with 0.12 m/s and 0.36 m/s²
+//! at 33 m/s. The mode that keeps its lane has the last two lags at this speed, and a driving
+//! acceleration that gives this speed.
 //!
 //! White acceleration is added: 0.0001 to 0.1 m²/s³ along, 0.001 m²/s³ across.
 //!
-//! The rates depend on the [`Situation`]. A vehicle that approaches the ego in the ego's lane has to brake or to change
-//! lanes, the sooner the nearer it is. A vehicle with a free lane ahead has no reason to. The rates rise with 1/TTC
-//! (time to collision).
+//! The rates depend on the [`Situation`]. A vehicle that approaches the ego in the ego's lane has
+//! to brake or to change lanes, the sooner the nearer it is. A vehicle with a free lane ahead has
+//! no reason to. The rates rise with 1/TTC (time to collision).
 //!
-//! The values without a source above (the rates, their rise with 1/TTC, and the drivers' anticipation time) were tuned
-//! on the library's scenarios with separate seeds. The example `validate_perception` judges them on other seeds.
+//! The values without a source above (the rates, their rise with 1/TTC, and the drivers'
+//! anticipation time) were tuned on the library's scenarios with separate seeds. The example
+//! `validate_perception` judges them on other seeds.
 
 /// Maximum number of modes of an axis.
 pub const MODES: usize = 3;
@@ -44,7 +47,8 @@ pub struct EgoRear {
     pub d_m: f64,
     /// Speed along the road (m/s).
     pub speed_mps: f64,
-    /// Half of the lane width (m). A vehicle drives in the ego's lane if its lateral offset from the ego is smaller.
+    /// Half of the lane width (m). A vehicle drives in the ego's lane if its lateral offset from
+    /// the ego is smaller.
     pub half_lane_m: f64,
 }
 
@@ -62,7 +66,8 @@ pub struct RearVehicle {
 /// The traffic situation of a vehicle, which determines its rates of switching between modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Situation {
-    /// 1/TTC to the ego minus its value at the time of the first reaction (1/s); 0 without a reason to react.
+    /// 1/TTC to the ego minus its value at the time of the first reaction (1/s); 0 without a reason
+    /// to react.
     urgency_per_s: f64,
 }
 
@@ -103,14 +108,17 @@ pub struct Mode {
     pub prior_probability: f64,
 }
 
-/// Spectral density of the white acceleration along the direction of travel (m²/s³), for a single mode.
+/// Spectral density of the white acceleration along the direction of travel (m²/s³), for a single
+/// mode.
 ///
-/// It follows from the trajectory data of NGSIM US-101 (10,212 pairs of speeds 1 s apart). The variance of the speed
-/// change is 0.75, 0.79, 0.75 and 0.76 m²/s² per second of lag at lags of 0.5, 1, 2 and 3 s. A variance in proportion
-/// to the lag is the property of white acceleration, here as an average over all manoeuvres.
+/// It follows from the trajectory data of NGSIM US-101 (10,212 pairs of speeds 1 s apart). The
+/// variance of the speed change is 0.75, 0.79, 0.75 and 0.76 m²/s² per second of lag at lags of
+/// 0.5, 1, 2 and 3 s. A variance in proportion to the lag is the property of white acceleration,
+/// here as an average over all manoeuvres.
 const ALONG_WHITE_M2PS3: f64 = 0.75;
 
-/// Spectral density of the white acceleration across the direction of travel (m²/s³), for a single mode.
+/// Spectral density of the white acceleration across the direction of travel (m²/s³), for a single
+/// mode.
 ///
 /// The same data give 0.034 to 0.069, measurement errors included.
 const ACROSS_WHITE_M2PS3: f64 = 0.05;

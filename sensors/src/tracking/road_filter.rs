@@ -1,9 +1,9 @@
 //! The filter of one track in road coordinates, with one axis along the road and one across.
 //!
-//! Along the road, the filter follows the face that the ego sees (a follower's front): the face is measured, and it
-//! defines the gap. Across the road, the filter follows the vehicle's centre. The middle of the front lies half a
-//! length ahead of the centre along the heading, and is therefore offset by ½·L·v_d/v_s to the side (L: length; v_s,
-//! v_d: speeds along and across the road).
+//! Along the road, the filter follows the face that the ego sees (a follower's front): the face is
+//! measured, and it defines the gap. Across the road, the filter follows the vehicle's centre. The
+//! middle of the front lies half a length ahead of the centre along the heading, and is therefore
+//! offset by ½·L·v_d/v_s to the side (L: length; v_s, v_d: speeds along and across the road).
 
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
@@ -20,27 +20,29 @@ pub const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 pub const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
 pub const POSITION_PRIOR_SD_M: f64 = 1_000.0;
-/// Time after the middle of a face was seen during which parts of it correct nothing across the road (s; assumption). A driver who
-/// weaves with 0.12 m/s moves by a tenth of a metre meanwhile, while a part is up to 0.8 m off the middle.
+/// Time after the middle of a face was seen during which parts of it correct nothing across the
+/// road (s; assumption). A driver who weaves with 0.12 m/s moves by a tenth of a metre meanwhile,
+/// while a part is up to 0.8 m off the middle.
 const MIDDLE_KNOWN_S: f64 = 1.0;
 /// Correlation time of the slow measurement error (s).
 pub const SLOW_TIME_S: f64 = 5.0;
-/// Correlation length of the slow measurement error (m). The error also changes with the distance to the ego, as the
-/// beams wander over the vehicle.
+/// Correlation length of the slow measurement error (m). The error also changes with the distance
+/// to the ego, as the beams wander over the vehicle.
 pub const SLOW_DISTANCE_M: f64 = 5.0;
-/// Gate for the squared distance along one axis: the 99.9 % quantile of χ² with one degree of freedom.
+/// Gate for the squared distance along one axis: the 99.9 % quantile of χ² with one degree of
+/// freedom.
 const AXIS_GATE: f64 = 10.8;
-/// Time without a measurement after which a track follows another sensor (s): a sensor of 10 Hz may lose a scan. One of less than 4 Hz is
-/// followed only where no other one measures.
+/// Time without a measurement after which a track follows another sensor (s): a sensor of 10 Hz may
+/// lose a scan. A sensor of less than 4 Hz is followed only where no other sensor measures.
 const FOLLOWED_S: f64 = 0.25;
-/// Acceleration of a manoeuvre that may have begun since the latest measurement of the sensor that a track follows (m/s²): that of the
-/// allowance of the gate.
+/// Acceleration of a manoeuvre that may have begun since the latest measurement of the sensor that
+/// a track follows (m/s²): the acceleration in the allowance of the gate.
 const MANOEUVRE_MPS2: f64 = 2.5;
 /// Standard deviation of half of a vehicle's length (m).
 ///
-/// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is therefore within ±0.4
-/// m of the typical one. The same value is used for measured lengths and for trucks: it matters only while a vehicle
-/// moves across the road.
+/// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is
+/// therefore within ±0.4 m of the typical one. The same value is used for measured lengths and for
+/// trucks: it matters only while a vehicle moves across the road.
 const HALF_LENGTH_SD_M: f64 = 0.4;
 /// Speed below which the direction of motion does not determine the heading (m/s).
 pub const HEADING_SPEED_MPS: f64 = 3.0;
@@ -74,10 +76,11 @@ pub(crate) struct Span {
 }
 
 impl Measurement {
-    /// Returns the measurement across the road for a vehicle with half the length `half_length_m` and the given motion.
+    /// Returns the measurement across the road for a vehicle with half the length `half_length_m`
+    /// and the given motion.
     ///
-    /// It accounts for the offset between the middle of the front and the centre, and for the uncertainty of the
-    /// length.
+    /// It accounts for the offset between the middle of the front and the centre, and for the
+    /// uncertainty of the length.
     fn across_for(&self, half_length_m: f64, [along, across]: &[AxisEstimate; 2]) -> AxisMeasurement {
         if !(along.speed_mps > HEADING_SPEED_MPS) {
             return self.across;
@@ -116,18 +119,21 @@ struct Followed {
 pub(crate) struct RoadFilter {
     along: AxisFilter,
     across: AxisFilter,
-    /// Variance of the slow error along and across the road, as it is smoothed over the measurements (m²).
+    /// Variance of the slow error along and across the road, as it is smoothed over the
+    /// measurements (m²).
     slow_m2: [f64; 2],
     /// Share of the slow error along and across the road that remains since the latest measurement.
     slow_share: [f64; 2],
-    /// Time since the middle of the face was last seen (s); infinite if it has not been, or a part has counted since.
+    /// Time since the middle of the face was last seen (s); infinite if it has not been, or a part
+    /// has counted since.
     since_middle_s: f64,
     /// The sensor that is followed along and across the road.
     followed: [Followed; 2],
 }
 
 impl RoadFilter {
-    /// Creates a filter at its first measurement, which is one of `sensor`. The prior speed along the road is `speed_mps`.
+    /// Creates a filter at its first measurement, which is one of `sensor`. The prior speed along
+    /// the road is `speed_mps`.
     pub(crate) fn new(measurement: &Measurement, speed_mps: f64, sensor: Option<usize>) -> Self {
         let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
         let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
@@ -159,14 +165,16 @@ impl RoadFilter {
         self.followed.iter_mut().for_each(|followed| followed.age_s += step_s);
     }
 
-    /// Corrects the filter with a measurement of the face, which lies half a length of `half_length_m` ahead of the
-    /// centre.
+    /// Corrects the filter with a measurement of the face, which lies half a length of
+    /// `half_length_m` ahead of the centre.
     ///
-    /// A part says nothing across the road for a while after the middle has been seen: one side of the mirror may see the plate, and
-    /// the other always the same lamp, whose distance from the middle never averages out.
+    /// A part says nothing across the road for a while after the middle has been seen: one side of
+    /// the mirror may see the plate, and the other always the same lamp, whose distance from the
+    /// middle never averages out.
     ///
-    /// Along each axis, the filter follows one sensor. What another one measures corrects nothing there if it contradicts that one:
-    /// two sensors, one of them mounted askew, would pull the track apart in every scan, always in the same order.
+    /// Along each axis, the filter follows one sensor. A measurement of another sensor that
+    /// contradicts the followed sensor corrects nothing: two sensors, one of them misaligned, would
+    /// pull the track to and fro in every scan, always in the same order.
     pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64, sensor: Option<usize>) {
         let estimate = self.estimate();
         if Self::counts(&mut self.followed[0], &measurement.along, &estimate[0], sensor) {
@@ -180,7 +188,7 @@ impl RoadFilter {
         }
         let is_first_part = measurement.is_part && self.since_middle_s.is_finite();
         if is_first_part || measurement.knows_middle && !self.is_middle_known() {
-            // The slow error so far was that of the middle, or that of parts.
+            // The slow error so far was the error of the middle, or of parts.
             self.across.renew_slow_error();
             self.slow_m2[1] = measurement.slow_m2()[1];
             self.slow_share[1] = 1.0;
@@ -195,7 +203,8 @@ impl RoadFilter {
         self.across.measure_position(&self.smoothed(measurement).across_for(half_length_m, &estimate));
     }
 
-    /// Corrects the filter along the road with a position of the face that follows from another part of the vehicle.
+    /// Corrects the filter along the road with a position of the face that follows from another
+    /// part of the vehicle.
     pub(crate) fn correct_along(&mut self, measured: &AxisMeasurement, sensor: Option<usize>) {
         let [along, _] = self.estimate();
         if Self::counts(&mut self.followed[0], measured, &along, sensor) {
@@ -204,7 +213,8 @@ impl RoadFilter {
         }
     }
 
-    /// Corrects the filter across the road with a position of the centre that follows from a side of the vehicle.
+    /// Corrects the filter across the road with a position of the centre that follows from a side
+    /// of the vehicle.
     pub(crate) fn correct_across(&mut self, measured: &AxisMeasurement, sensor: Option<usize>) {
         let [_, across] = self.estimate();
         if Self::counts(&mut self.followed[1], measured, &across, sensor) {
@@ -213,15 +223,18 @@ impl RoadFilter {
         }
     }
 
-    /// Moves the point that the filter follows along the road by `offset_m`, which is known with the variance `variance_m2`.
+    /// Moves the point that the filter follows along the road by `offset_m`, which is known with
+    /// the variance `variance_m2`.
     pub(crate) fn shift_along(&mut self, offset_m: f64, variance_m2: f64) {
         self.along.shift(offset_m, variance_m2);
         self.followed[0].age_s = f64::INFINITY;
     }
 
-    /// Returns whether the measurement of a sensor along or across the road counts: if it is that of the camera alone (`None`), if it is the sensor that the axis follows, if that one
-    /// has not measured for a while, and it is followed from now on, or if it agrees with what that one has measured last.
-    /// `estimate` is that of the axis.
+    /// Returns whether the measurement of a sensor along or across the road counts. It counts if it
+    /// comes from the camera alone (`None`), or from the sensor that the axis follows. It counts if
+    /// the followed sensor has not measured for a while: the axis then follows the new sensor. It
+    /// also counts if it agrees with the last measurement of the followed sensor. `estimate` is the
+    /// estimate of the axis.
     fn counts(
         followed: &mut Followed,
         measurement: &AxisMeasurement,
@@ -246,7 +259,8 @@ impl RoadFilter {
         self.since_middle_s <= MIDDLE_KNOWN_S
     }
 
-    /// Smooths the variance of the slow error along or across the road with that of the latest measurement.
+    /// Smooths the variance of the slow error along or across the road with the variance of the
+    /// latest measurement.
     fn smooth(&mut self, axis: usize, measurement: &Measurement) {
         self.smooth_axis(axis, measurement.slow_m2()[axis]);
     }
@@ -259,10 +273,10 @@ impl RoadFilter {
 
     /// Returns the measurement with the smoothed standard deviations of the slow error.
     ///
-    /// The slow error is part of the state in units of its standard deviation, and stays the same while the two sides of the
-    /// mirror alternate. Their boxes have different standard deviations. With these, the filter would take the difference
-    /// between the two sides for information on the slow error. A part has another slow error than the
-    /// middle that was just seen.
+    /// The slow error is part of the state in units of its standard deviation, and stays the same
+    /// while the two sides of the mirror alternate. Their boxes have different standard deviations.
+    /// With these, the filter would take the difference between the two sides for information on
+    /// the slow error. A part has another slow error than the middle that was just seen.
     fn smoothed(&self, measurement: &Measurement) -> Measurement {
         let with = |axis: AxisMeasurement, slow_m2: f64| AxisMeasurement { slow_sd_m: slow_m2.sqrt(), ..axis };
         let new = |axis: AxisMeasurement| AxisMeasurement {
@@ -280,7 +294,8 @@ impl RoadFilter {
         }
     }
 
-    /// Returns how well a measurement fits, along and across the road, for half a length of `half_length_m`.
+    /// Returns how well a measurement fits, along and across the road, for half a length of
+    /// `half_length_m`.
     pub(crate) fn fit(&self, measurement: &Measurement, half_length_m: f64) -> [AxisFit; 2] {
         let measurement = self.smoothed(measurement);
         let across = measurement.across_for(half_length_m, &self.estimate());
@@ -309,7 +324,8 @@ pub struct EgoEstimate {
     pub heading_rad: f64,
 }
 
-/// Transforms the estimates along and across the road to the ego's frame. The covariance is rotated with them.
+/// Transforms the estimates along and across the road to the ego's frame. The covariance is rotated
+/// with them.
 #[inline]
 pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
     let point = frame.point(along.position_m, across.position_m);

@@ -1,4 +1,4 @@
-//! The tracker: it updates all tracks with one scan after the other.
+//! The tracker: it updates all tracks with each scan in turn.
 
 use closecall_traffic::{ClassScores, Road, Source, Time, Track, TrackId, VehicleClass, VehicleState, maths};
 
@@ -18,39 +18,47 @@ use super::view::{Face, RearView};
 use crate::tracking::{Detection, SIDE_PROTRUSION_M, SeenBy};
 use closecall_traffic::ego_frame::EgoFrame;
 
-/// Speed difference below which a track inside another track's box is a part of the same vehicle (m/s).
+/// Speed difference below which a track inside another track's box is a part of the same vehicle
+/// (m/s).
 const MAX_PART_SPEED_MPS: f64 = 3.0;
 /// Least width assumed for a box that may contain parts (m).
 ///
-/// A car that shows one lamp is as wide as a car, and two vehicles never drive side by side in the middle of a
-/// lane.
+/// A car that shows one lamp is as wide as a car, and two vehicles never drive side by side in the
+/// middle of a lane.
 const MIN_WHOLE_WIDTH_M: f64 = 1.9;
-/// Maximum distance by which a part stands out ahead of a vehicle's face (m).
+/// Maximum distance by which a part protrudes ahead of a vehicle's face (m).
 const FRONT_MARGIN_M: f64 = 1.0;
 
 /// Length beyond which a vehicle is no car (m; assumption): vans are up to 6.2 m long.
 const LONGEST_CAR_M: f64 = 6.5;
-/// Width by which a truck is wider than a car (m).
+/// Difference of width between a truck and a car (m).
 const MAX_WIDER_M: f64 = 0.7;
-/// Distance by which something of a vehicle must be ahead of what was taken for its front (m; assumption).
+/// Least distance between the assumed front of a vehicle and a part ahead of it that refutes the
+/// assumption (m; assumption).
 const FALSE_FRONT_M: f64 = 0.5;
-/// Greatest length of a truck (m): that of the European modular system, Council Directive 96/53/EC.
+/// Greatest length of a truck (m): European modular system, Council Directive 96/53/EC.
 const LONGEST_TRUCK_M: f64 = 25.25;
-/// Standard deviation of the followed point up to which parts tell the length of a vehicle (m; assumption).
+/// Standard deviation of the followed point up to which parts tell the length of a vehicle (m;
+/// assumption).
 const SPAN_SD_M: f64 = 0.5;
-/// Standard deviation of the speed beyond which a track is lost whose front is unknown (m/s; assumption).
+/// Standard deviation of the speed beyond which a track is lost whose front is unknown (m/s;
+/// assumption).
 const LOST_SPEED_SD_MPS: f64 = 3.0;
-/// Greatest distance between two axles of a truck, between which nothing else may be seen (m; assumption).
+/// Greatest distance between two axles of a truck, between which nothing else may be seen (m;
+/// assumption).
 const WHEELS_APART_M: f64 = 8.0;
-/// Distance up to which parts of a vehicle adjoin (m; assumption): that of cab and load, less than the gap between vehicles.
+/// Distance up to which parts of a vehicle adjoin (m; assumption): the distance of cab and load,
+/// less than the gap between vehicles.
 const ADJOINING_M: f64 = 2.0;
-/// Spacing of the columns on a part's side below which the part would show a face if it were one (m; assumption): up to 15 m.
+/// Spacing of the columns on a part's side below which the part would show a face if it were one
+/// (m; assumption): up to 15 m.
 const NEAR_SPACING_M: f64 = 0.15;
 /// Class scores of a vehicle that is longer (assumption).
 const LONG_VEHICLE: ClassScores = ClassScores([0.01, 0.97, 0.01, 0.01]);
 /// Number of points from which on a box has the full weight of a scan.
 const LONG_VEHICLE_POINTS: usize = 12;
-/// Spacing of the columns on a side up to which its rearmost point is a point of the vehicle rather than of the pattern (m; assumption).
+/// Spacing of the columns on a side up to which its rearmost point is a point of the vehicle rather
+/// than of the pattern (m; assumption).
 const MAX_SPACING_M: f64 = 1.0;
 /// Standard deviation of the end of a side within the last step of the columns (columns): 1/√12.
 const SIDE_SD_COLUMNS: f64 = 0.3;
@@ -58,17 +66,21 @@ const SIDE_SD_COLUMNS: f64 = 0.3;
 const SIDE_SD_M: f64 = 0.05;
 /// Distance across the road up to which parts are on the same side of a vehicle (m; assumption).
 const SAME_SIDE_M: f64 = 0.3;
-/// Slow standard deviation of a front or a centre that follows from a side (m; assumption): wheels, guards and panels lie within 0.1 m.
+/// Slow standard deviation of a front or a centre that follows from a side (m; assumption): wheels,
+/// guards and panels lie within 0.1 m.
 const SIDE_SLOW_SD_M: f64 = 0.1;
-/// Difference up to which the nearer side of a vehicle shows its centre (m; assumption): beyond it, it is a part on the far side.
+/// Difference up to which the nearer side of a vehicle shows its centre (m; assumption): beyond it,
+/// it is a part on the far side.
 const SIDE_GATE_M: f64 = 0.7;
-/// Standard deviation of the length of a vehicle whose front has not been in view (m; assumption), by class: trucks are 7 to 19 m long.
+/// Standard deviation of the length of a vehicle whose front has not been in view (m; assumption),
+/// by class: trucks are 7 to 19 m long.
 const LENGTH_SD_M: [f64; 3] = [0.5, 4.0, 0.2];
 
 /// The detections of one scan, all in the ego's frame at `time`.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackerScan<'a> {
-    /// Number of the sensor. A track follows the sensor that found it, and others as long as they agree.
+    /// Number of the sensor. A track follows the sensor that found it, and others as long as they
+    /// agree.
     pub sensor: usize,
     /// Reference time of the scan. [`Detection::time`] is the time at which a box's position holds.
     pub time: Time,
@@ -93,11 +105,11 @@ struct TrackState {
     class: FusedClass,
     extent: TrackExtent,
     ends: Ends,
-    /// What the scans of the present update show of it.
+    /// The evidence of the present update's scans about the track.
     seen: Seen,
 }
 
-/// What the scans of one time show of a track, from the least to the most.
+/// The evidence of the scans of one time about a track, from the weakest to the strongest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 enum Seen {
     /// No sensor could see it.
@@ -133,7 +145,8 @@ impl TrackState {
         s_m >= rear_m && s_m <= front_m && (d_m - across.position_m).abs() <= self.half_width_m()
     }
 
-    /// Returns whether something seen belongs to this vehicle: it overlaps the track's box along and across the road.
+    /// Returns whether something seen belongs to this vehicle: it overlaps the track's box along
+    /// and across the road.
     fn covers(&self, measurement: &Measurement, ego_d_m: f64) -> bool {
         let [along, across] = self.filter.estimate();
         let seen = &measurement.seen;
@@ -142,7 +155,7 @@ impl TrackState {
             seen.along_m.map(|s_m| s_m - measurement.along.time_offset_s * along.speed_mps);
         let [right_m, left_m] = seen.across_m.map(|d_m| d_m - across.position_m);
         let rear_m = if seen.is_face { rear_m } else { rear_m - self.beyond_m() };
-        // The far side of a vehicle of which only a part is seen may be that of a truck.
+        // If only a part of a vehicle is seen, it may be a truck.
         let half_width_m = self.half_width_m();
         let far_m = if self.ends.has_front { half_width_m } else { half_width_m + MAX_WIDER_M };
         let [to_right_m, to_left_m] =
@@ -150,8 +163,8 @@ impl TrackState {
         seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
     }
 
-    /// Returns the positions along the road between which parts of the vehicle lie (m). A front that is out of view may be that of the
-    /// longest truck.
+    /// Returns the positions along the road between which parts of the vehicle lie (m). A front
+    /// that is out of view may belong to the longest truck.
     fn span_m(&self) -> [f64; 2] {
         let [along, _] = self.filter.estimate();
         match self.ends.has_front {
@@ -163,7 +176,8 @@ impl TrackState {
         }
     }
 
-    /// Returns how far behind the track's box parts of the vehicle may be seen, such as a wheel of a trailer below which the beams pass (m).
+    /// Returns the largest distance behind the track's box at which parts of the vehicle may be
+    /// seen (m). Such a part is the wheel of a trailer when the beams pass below the trailer.
     fn beyond_m(&self) -> f64 {
         let is_truck = self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE;
         let may_be_long = is_truck || !self.ends.has_front;
@@ -175,15 +189,16 @@ impl TrackState {
         0.5 * self.size_m().1.max(MIN_WHOLE_WIDTH_M) + SIDE_PROTRUSION_M
     }
 
-    /// Returns whether speed and kind of the vehicle are known well enough to confirm the track. A single end that is seen beside the ego
-    /// belongs to a vehicle of any kind and length.
+    /// Returns whether speed and kind of the vehicle are known well enough to confirm the track. A
+    /// single end that is seen beside the ego belongs to a vehicle of any kind and length.
     fn is_settled(&self, model: &TrackerModel) -> bool {
         let [along, _] = self.filter.estimate();
         let is_known = self.ends.has_front || self.extent.spanned_m() > LONGEST_CAR_M;
         is_known && along.speed_variance_m2ps2.sqrt() <= model.settled_speed_sd_mps
     }
 
-    /// Lets the vehicle reach back from a point `ahead_m` ahead of the followed one over those of these parts that adjoin.
+    /// Lets the vehicle reach back over the adjoining parts, from a point `ahead_m` ahead of the
+    /// followed point.
     fn span<'a>(&mut self, ahead_m: f64, parts: impl Iterator<Item = &'a Measurement> + Clone) {
         let [along, _] = self.filter.estimate();
         if along.position_variance_m2.sqrt() > SPAN_SD_M {
@@ -223,7 +238,8 @@ impl TrackState {
 #[derive(Clone, Debug)]
 pub struct Tracker {
     model: TrackerModel,
-    /// Time of the tracks: that of the latest scan, and the earliest possible one before the first scan.
+    /// Time of the tracks: the time of the latest scan, and the earliest possible time before the
+    /// first scan.
     time: Time,
     tracks: Vec<TrackState>,
     measurements: Vec<Measurement>,
@@ -254,17 +270,19 @@ impl Tracker {
 
     /// Updates all tracks with one scan. `list` issues the ids of new tracks.
     ///
-    /// A scan that is dated before the previous one, as an error of the clock causes it, counts as measured at the time of the
-    /// previous one: no filter is predicted backwards. Its measurements keep their own times, which lie before that of the filters.
+    /// An error of the clock can date a scan before the previous scan. Such a scan counts as
+    /// measured at the time of the previous scan: no filter is predicted backwards. Its
+    /// measurements keep their own times, which lie before the time of the filters.
     pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
         self.update_together([*scan], [], list);
     }
 
-    /// Updates all tracks with the scans of several sensors that have the same time, one after the other. `idle` has the views of
-    /// the sensors without a scan of this time.
+    /// Updates all tracks with the scans of several sensors that have the same time, one after the
+    /// other. `idle` has the views of the sensors without a scan of this time.
     ///
-    /// The scans count as one for the lifecycle of a track: it is hit if one of the sensors detects it, and missed if one of them
-    /// could see it and none does. A track that only idle sensors could see keeps its state.
+    /// The scans count as one for the lifecycle of a track: it is hit if one of the sensors detects
+    /// it, and missed if one of them could see it and none does. A track that only idle sensors
+    /// could see keeps its state.
     pub fn update_together<'a>(
         &mut self,
         scans: impl IntoIterator<Item = TrackerScan<'a>>,
@@ -296,9 +314,11 @@ impl Tracker {
         self.delete_tracks();
     }
 
-    /// Predicts all tracks to the time of a scan, and corrects or starts those that it detects.
+    /// Predicts all tracks to the time of a scan, and corrects or starts the tracks that it
+    /// detects.
     fn measure(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
-        // The time before the start of a run is negative. Before the first scan, there is nothing to predict.
+        // The time before the start of a run is negative. Before the first scan, there is nothing
+        // to predict.
         let elapsed_s =
             if scan.time > self.time && !self.tracks.is_empty() { (scan.time - self.time).s() } else { 0.0 };
         self.time = scan.time.max(self.time);
@@ -342,7 +362,8 @@ impl Tracker {
         self.start_tracks(scan, ego_mps, list);
     }
 
-    /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that time.
+    /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that
+    /// time.
     pub fn report(&self, time: Time, frame: &EgoFrame<'_>, list: &mut TrackList) {
         for track in &self.tracks {
             let ahead_s = (time - self.time).s();
@@ -368,7 +389,8 @@ impl Tracker {
         track.lifecycle.add_evidence(vehicle_log_likelihood_ratio(&detection.class, detection.points));
     }
 
-    /// Finds, for each detection without a track, the track whose vehicle it is a part of: the earliest one that covers it.
+    /// Finds, for each detection without a track, the track whose vehicle it is a part of: the
+    /// earliest one that covers it.
     fn find_owners(&mut self, ego_d_m: f64) {
         self.owners.clear();
         for (detection_index, measurement) in self.measurements.iter().enumerate() {
@@ -378,8 +400,8 @@ impl Tracker {
         }
     }
 
-    /// Makes a detection that a track is assigned as its front a part, if more of the vehicle is seen ahead of it, where the field of view
-    /// cuts it off.
+    /// Turns the detection that a track takes for its front into a part, if more of the vehicle is
+    /// seen ahead of the detection, where the field of view cuts it off.
     fn release_false_fronts(&mut self, scan: &TrackerScan<'_>) {
         for track_index in 0..self.tracks.len() {
             let Some(detection_index) = self.assigned[track_index] else { continue };
@@ -396,9 +418,11 @@ impl Tracker {
         }
     }
 
-    /// Lists the ends of a track's parts, and of the detection that it is assigned, on the side that faces the ego.
+    /// Lists the ends of a track's parts, and of the detection that it is assigned, on the side
+    /// that faces the ego.
     ///
-    /// What is seen on the far side below the vehicle ends where something nearer hides it: such an end is no point of the vehicle.
+    /// Parts on the far side, seen below the vehicle, end where something nearer hides them: such
+    /// an end is no point of the vehicle.
     fn find_side_points(&mut self, track_index: usize, assigned: Option<usize>, ego_d_m: f64) {
         let mut points = std::mem::take(&mut self.side_points);
         points.clear();
@@ -410,7 +434,7 @@ impl Tracker {
         for part in parts().filter(|part| near_side_m(part, is_left) <= nearest_m + SAME_SIDE_M) {
             let ends = part.seen.along_m.into_iter().zip(part.seen.spacing_m).enumerate();
             for (end, (s_m, spacing_m)) in ends {
-                // The foremost point of a part that is cut off is that of the field of view.
+                // The foremost point of a part that is cut off is the edge of the field of view.
                 if spacing_m <= MAX_SPACING_M && !(end == 1 && part.seen.is_cut) {
                     let now_m = s_m - part.along.time_offset_s * along.speed_mps;
                     points.push(SidePoint { behind_m: along.position_m - now_m, spacing_m });
@@ -434,7 +458,8 @@ impl Tracker {
 
     /// Corrects a track with the parts of its vehicle that are seen beside the ego.
     ///
-    /// Along the road, the points on its side tell how the vehicle has moved. Across the road, its nearer side shows its centre.
+    /// Along the road, the points on its side tell how the vehicle has moved. Across the road, its
+    /// nearer side shows its centre.
     fn correct_by_parts(&mut self, track_index: usize, scan: &TrackerScan<'_>) {
         let [along, across] = self.tracks[track_index].filter.estimate();
         let now_m = |part: &Measurement, s_m: f64| s_m - part.along.time_offset_s * along.speed_mps;
@@ -442,7 +467,7 @@ impl Tracker {
         let Some((front_m, front_index)) = foremost.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
         let has_cut = self.parts(track_index).any(|(_, part)| part.seen.is_cut);
         let has_front = self.tracks[track_index].ends.has_front;
-        // An axle that is seen alone may be that of a vehicle whose next one is still out of view.
+        // An axle that is seen alone may belong to a vehicle whose next axle is still out of view.
         let behind_m = scan.ego.s_m + scan.rear_x_m - front_m;
         let is_face = self.measurements[front_index].seen.is_face || behind_m > WHEELS_APART_M;
         if !has_front && !has_cut && is_face {
@@ -470,7 +495,7 @@ impl Tracker {
                 track.filter.correct_across(&measured, sensor);
             }
         }
-        // Something of the vehicle is ahead of what was taken for its front.
+        // A part of the vehicle is ahead of its assumed front.
         let sd_m = along.position_variance_m2.sqrt();
         track.ends.has_front &= !has_cut || front_m - along.position_m <= FRONT_MARGIN_M + 3.0 * sd_m;
         let measured = track.ends.measure(&self.side_points, sd_m);
@@ -514,9 +539,11 @@ impl Tracker {
         }));
     }
 
-    /// Starts a track for each detection that is assigned to no track and does not lie within a track's box.
+    /// Starts a track for each detection that is assigned to no track and does not lie within a
+    /// track's box.
     fn start_tracks(&mut self, scan: &TrackerScan<'_>, ego_mps: f64, list: &mut TrackList) {
-        // A vehicle that the field of view cuts off comes before its parts, and its near side before its far side.
+        // A vehicle that the field of view cuts off comes before its parts, and its near side
+        // before its far side.
         let nearest_cut = |tracker: &Self, after_m: f64| {
             let cut = tracker.measurements.iter().enumerate().filter(|(_, measurement)| measurement.seen.is_cut);
             let aside_m = cut.map(|(index, measurement)| {
@@ -537,7 +564,8 @@ impl Tracker {
         }
     }
 
-    /// Starts a track for a detection unless it is assigned to a track or lies within a track's box.
+    /// Starts a track for a detection unless it is assigned to a track or lies within a track's
+    /// box.
     fn start_track(&mut self, detection_index: usize, scan: &TrackerScan<'_>, ego_mps: f64, list: &mut TrackList) {
         let detection = &scan.detections[detection_index];
         let measurement = &self.measurements[detection_index];
@@ -571,8 +599,8 @@ impl Tracker {
 
     /// Deletes tracks that have ended, and tracks that are parts of other tracks.
     ///
-    /// The face nearest to the ego is the vehicle's. Of two tracks that are parts of each other, the later one is
-    /// deleted.
+    /// The face nearest to the ego is the vehicle's. Of two tracks that are parts of each other,
+    /// the later one is deleted.
     fn delete_tracks(&mut self) {
         let rules = self.model.rules;
         self.tracks.retain(|track| !track.lifecycle.should_delete(&rules));
@@ -592,7 +620,8 @@ impl Tracker {
     }
 }
 
-/// Returns the sensor that a track may follow for this detection: none if only the camera sees it, which comes with the scan of any LiDAR.
+/// Returns the sensor that a track may follow for this detection: none if only the camera sees it,
+/// which comes with the scan of any LiDAR.
 fn followed_sensor(detection: &Detection, scan: &TrackerScan<'_>) -> Option<usize> {
     (detection.seen_by == SeenBy::Lidar).then_some(scan.sensor)
 }
@@ -605,14 +634,14 @@ fn of_rear(measurement: &Measurement) -> Measurement {
     Measurement { along, across, ..*measurement }
 }
 
-/// Returns the position across the road of the side of a part that faces the ego (m), with the sign that makes it grow with the distance
-/// from the ego.
+/// Returns the position across the road of the side of a part that faces the ego (m), with the sign
+/// that makes it grow with the distance from the ego.
 fn near_side_m(part: &Measurement, is_left: bool) -> f64 {
     let [right_m, left_m] = part.seen.across_m;
     if is_left { right_m } else { -left_m }
 }
 
-/// Returns what a scan shows of a track that a detection by these sensors belongs to.
+/// Returns the evidence of a scan about the track that a detection by these sensors belongs to.
 fn seen_in(seen_by: SeenBy) -> Seen {
     match seen_by {
         SeenBy::Lidar => Seen::Hit,
@@ -622,8 +651,9 @@ fn seen_in(seen_by: SeenBy) -> Seen {
 
 /// Transforms a track to the ego's frame.
 ///
-/// The estimate along the road is that of the face that the ego sees, which is a front. The centre lies half a length
-/// behind it. The reported covariance along the road is that of the face, because the face defines the gap.
+/// The estimate along the road is the position of the face that the ego sees, which is a front. The
+/// centre lies half a length behind it. The reported covariance along the road is the covariance of
+/// the face, because the face defines the gap.
 fn to_track(track: &TrackState, [along, across]: [AxisEstimate; 2], frame: &EgoFrame<'_>, time: Time) -> Track {
     let (length_m, width_m) = track.size_m();
     let half_length_m = 0.5 * length_m / frame.path_scale(across.position_m);

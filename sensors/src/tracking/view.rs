@@ -1,7 +1,7 @@
 //! Visibility of tracks for the rear sensor: field of view, range, and occlusion by nearer tracks.
 //!
-//! A missing detection counts against a track only if the sensor could have seen the vehicle. A track behind a nearer
-//! one coasts and keeps its existence probability.
+//! A missing detection counts against a track only if the sensor could have seen the vehicle. A
+//! track behind a nearer track coasts and keeps its existence probability.
 
 use closecall_traffic::maths;
 
@@ -12,7 +12,8 @@ pub struct RearView {
     pub half_angle_tan: f64,
     /// Range beyond which no detection is expected (m).
     pub range_m: f64,
-    /// Position of the sensor ahead of the ego's origin (m); negative, because the sensor is at the rear bumper.
+    /// Position of the sensor ahead of the ego's origin (m); negative, because the sensor is at the
+    /// rear bumper.
     pub sensor_x_m: f64,
     /// Position of the sensor to the left of the ego's centre line (m).
     pub sensor_y_m: f64,
@@ -36,8 +37,8 @@ const HIDDEN_SHARE: f64 = 0.5;
 /// Least distance from the sensor's plane (m). Nearer faces are alongside the ego and out of view.
 const MIN_DISTANCE_M: f64 = 0.1;
 
-/// Greatest azimuth from straight behind at which a turned sensor is expected to detect a vehicle (rad): 80°. Beyond it, a vehicle
-/// reaches past the sensor, and its front is not seen.
+/// Greatest azimuth from straight behind at which a turned sensor is expected to detect a vehicle
+/// (rad): 80°. Beyond it, a vehicle reaches past the sensor, and its front is not seen.
 pub const MAX_SIDE_AZIMUTH_RAD: f64 = 80.0 * std::f64::consts::PI / 180.0;
 
 impl RearView {
@@ -46,8 +47,8 @@ impl RearView {
         self.face(x_m, y_m, 0.0).is_some()
     }
 
-    /// Returns the face of width `width_m` whose middle is at (`x_m`, `y_m`) in the ego's frame. Returns `None` if it
-    /// is out of view.
+    /// Returns the face of width `width_m` whose middle is at (`x_m`, `y_m`) in the ego's frame.
+    /// Returns `None` if it is out of view.
     pub(crate) fn face(&self, x_m: f64, y_m: f64, width_m: f64) -> Option<Face> {
         let (distance_m, y_m) = (self.sensor_x_m - x_m, y_m - self.sensor_y_m);
         let in_range = distance_m >= MIN_DISTANCE_M && distance_m <= self.range_m;
@@ -101,7 +102,8 @@ mod tests {
         let sees = |x, y| corner.face(x, y, 1.8).is_some();
         assert!(sees(-5.0, 4.0) && sees(-40.0, 0.0) && sees(-40.0, 3.75));
         assert!(!sees(-6.0, -3.75) && VIEW.face(-6.0, -3.75, 1.8).is_some());
-        // 10 m to the side and 1 m behind, the vehicle is within the field of the sensor, but reaches past it.
+        // 10 m to the side and 1 m behind, the vehicle is within the field of the sensor, but
+        // reaches past it.
         assert!(!sees(-2.8, 10.0));
     }
 }

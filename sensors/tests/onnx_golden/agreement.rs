@@ -1,4 +1,5 @@
-//! A few crops, and the class probabilities that the shipped network gives for them in Python's ONNX Runtime.
+//! A few crops, and the class probabilities that the shipped network gives for them in Python's
+//! ONNX Runtime.
 
 use closecall_sensors::camera::{CHANNELS, CROP_PX, Classifier, Crop};
 

@@ -1,4 +1,5 @@
-//! Body shapes: the proportions from which the LiDAR and the camera both build the bodies of vehicles.
+//! Body shapes: the proportions from which the LiDAR and the camera both build the bodies of
+//! vehicles.
 //!
 //! ```text
 //!                  ┌─▶ lidar/shapes   convex solids with materials ─▶ points
@@ -6,8 +7,8 @@
 //!                  └─▶ camera/shapes  meshes with colours and lamps ─▶ images
 //! ```
 //!
-//! Proportions are scaled to the vehicle's own length, width and height. They are typical values read off drawings, not
-//! those of a specific model.
+//! Proportions are scaled to the vehicle's own length, width and height. They are typical values
+//! read off drawings, not the values of a specific model.
 
 mod car;
 mod motorcycle;

@@ -1,4 +1,5 @@
-//! The proportions of motorcycles with their riders. The rider is the larger part of the visible area.
+//! The proportions of motorcycles with their riders. The rider is the larger part of the visible
+//! area.
 
 /// Radius of the wheels (m).
 pub const WHEEL_RADIUS_M: f32 = 0.31;

@@ -6,11 +6,11 @@ use crate::BodyShape;
 /// The proportions of a body shape.
 #[derive(Clone, Copy, Debug)]
 pub enum Proportions {
-    /// Those of a car.
+    /// The proportions of a car.
     Car(&'static CarProportions),
-    /// Those of a truck.
+    /// The proportions of a truck.
     Truck(&'static TruckProportions),
-    /// Those of a motorcycle.
+    /// The proportions of a motorcycle.
     Motorcycle(&'static MotorcycleProportions),
 }
 
@@ -44,7 +44,8 @@ impl Proportions {
     }
 }
 
-/// Half of the width and half of the height of a part of the front, as shares of the vehicle's width and height.
+/// Half of the width and half of the height of a part of the front, as shares of the vehicle's
+/// width and height.
 #[derive(Clone, Copy, Debug)]
 pub struct HalfExtent {
     /// Half of the width (share of the width).

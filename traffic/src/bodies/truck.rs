@@ -18,7 +18,8 @@ pub const LOAD_GAP_M: f32 = 0.35;
 pub const LOAD_FLOOR_M: f32 = 1.15;
 /// Height of a tank's underside (m).
 pub const TANK_FLOOR_M: f32 = 1.1;
-/// Distance by which the upper edge of the windscreen, and the front edge of the roof, lie behind its lower edge (m).
+/// Distance by which the upper edge of the windscreen, and the front edge of the roof, lie behind
+/// its lower edge (m).
 pub const SCREEN_RAKE_M: [f32; 2] = [0.12, 0.45];
 /// The deck of an open platform.
 pub const DECK: Slab = Slab { centre_m: 1.15, half_height_m: 0.12 };

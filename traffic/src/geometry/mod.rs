@@ -1,7 +1,8 @@
-//! Plane geometry of vehicles: oriented boxes, the distance between them, and the first contact of two moving ones.
+//! Plane geometry of vehicles: oriented boxes, the distance between them, and the first contact of
+//! two moving boxes.
 //!
-//! [`OrientedBox`] is a vehicle seen from above. Whether and when two vehicles touch is decided by parry, the geometry library
-//! of the rapier family; the module `queries` is the only place that calls it.
+//! [`OrientedBox`] is a vehicle seen from above. parry, the geometry library of the rapier family,
+//! decides whether and when two vehicles touch. Only the module `queries` calls it.
 
 mod oriented_box;
 mod queries;

@@ -72,7 +72,8 @@ impl OrientedBox {
         Vector2::new(self.x_m, self.y_m)
     }
 
-    /// Returns the four corners (m), counter-clockwise: front left, rear left, rear right, front right.
+    /// Returns the four corners (m), counter-clockwise: front left, rear left, rear right, front
+    /// right.
     pub fn corners_m(&self) -> [Vector2<f64>; 4] {
         let (sin, cos) = maths::sin_cos(self.yaw_rad);
         let along = Vector2::new(cos, sin) * (0.5 * self.length_m);

@@ -1,4 +1,5 @@
-//! Tests of parry's answers against closed forms, and property tests against an independent brute-force implementation.
+//! Tests of parry's answers against closed forms, and property tests against an independent
+//! brute-force implementation.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, SQRT_2};
 
@@ -34,8 +35,8 @@ fn between(from: &OrientedBox, to: &OrientedBox, fraction: f64) -> OrientedBox {
     OrientedBox { x_m, y_m, yaw_rad: at(from.yaw_rad, to.yaw_rad), ..*from }
 }
 
-/// Computes the distance from all pairs of edges and a test for corners inside; it shares no code with the
-/// implementation.
+/// Computes the distance from all pairs of edges and a test for corners inside; it shares no code
+/// with the implementation.
 fn brute_force_distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
     let edges = |shape: &OrientedBox| {
         let corners = shape.corners_m();
@@ -126,7 +127,8 @@ fn a_side_swipe_strikes_right_and_left() {
 
 #[test]
 fn a_cut_in_with_the_front_corner_strikes_a_side() {
-    // It comes from the left and is turned to the right: its front right corner meets the left side of the other box.
+    // It comes from the left and is turned to the right: its front right corner meets the left side
+    // of the other box.
     let contact = first_contact(&car(-2.0, 3.5, -0.3), &car(-1.5, 2.0, -0.3), &CAR, &CAR).unwrap();
     assert_eq!(contact.sides[1], BoxSide::Left);
     let corner_beside = 2.0 * maths::sin(0.3) + maths::cos(0.3);
@@ -135,14 +137,15 @@ fn a_cut_in_with_the_front_corner_strikes_a_side() {
 
 #[test]
 fn a_turning_corner_in_closed_form() {
-    // The corner at the angle atan(1/2) rises as √5·sin(angle) and meets the lower side of the wall at 1.8 m.
+    // The corner at the angle atan(1/2) rises as √5·sin(angle) and meets the lower side of the wall
+    // at 1.8 m.
     let wall = OrientedBox { x_m: 0.0, y_m: 2.3, yaw_rad: 0.0, length_m: 50.0, width_m: 1.0 };
     let contact = first_contact(&CAR, &car(0.0, 0.0, 0.8), &wall, &wall).unwrap();
     let angle = maths::asin(1.8 / 5.0_f64.sqrt()) - maths::atan(0.5);
     assert!((contact.fraction - angle / 0.8).abs() < 1e-9, "{} {}", contact.fraction, angle / 0.8);
     assert_eq!(contact.sides[1], BoxSide::Right);
-    // The corner reaches at most √5 m = 2.236 m, so it never touches a wall at 2.3 m. A wall just beyond √5 m stays
-    // untouched; one just below it is touched.
+    // The corner reaches at most √5 m = 2.236 m, so it never touches a wall at 2.3 m. A wall just
+    // beyond √5 m stays untouched; one just below it is touched.
     let at = |y_m: f64| OrientedBox { y_m: y_m + 0.5, ..wall };
     let touches = |y_m: f64| first_contact(&CAR, &car(0.0, 0.0, 2.0), &at(y_m), &at(y_m)).is_some();
     assert!(!touches(5.0_f64.sqrt() + 1e-9) && touches(5.0_f64.sqrt() - 1e-9));
@@ -175,7 +178,8 @@ fn vehicles_that_meet_head_on_cannot_tunnel() {
 
 #[test]
 fn a_tail_that_swings_out_and_back_within_a_step_touches() {
-    // The corner of a truck rises by 0.01 m above the lower side of a wall half-way through the step.
+    // The corner of a truck rises by 0.01 m above the lower side of a wall half-way through the
+    // step.
     let truck = |yaw_rad: f64| OrientedBox { yaw_rad, length_m: 16.0, width_m: 2.5, ..CAR };
     let upright = FRAC_PI_2 - maths::atan(1.25 / 8.0_f64);
     let reach_m = truck(0.0).radius_m();
@@ -217,8 +221,9 @@ fn edges_that_touch_are_in_contact() {
 
 #[test]
 fn corners_that_pass_a_millimetre_apart_do_not_touch() {
-    // The front right corner of a car that moves away to the left passes the rear left corner of the one ahead. parry's cast
-    // (`cast_shapes_nonlinear`) takes this for a contact half-way through the step.
+    // The front right corner of a car that moves away to the left passes the rear left corner of
+    // the car ahead. parry's cast (`cast_shapes_nonlinear`) reports a contact half-way through the
+    // step.
     let ahead = car(5.0, 0.0, 0.0);
     let passes = |beside_m: f64| {
         let y_m = 1.0 + beside_m;
@@ -315,8 +320,8 @@ proptest! {
     fn a_slight_graze_is_a_contact_and_a_near_miss_is_not(
         yaw in -PI..PI, turn in -0.2..0.2_f64, half_way in 1.0..20.0_f64, x_m in -1.5..1.5, depth in 1e-8..1e-3_f64,
     ) {
-        // A car turns while it moves in a straight line along a long wall. Its outermost corner either dips `depth`
-        // into the wall at one instant or stays as far away from it.
+        // A car turns while it moves in a straight line along a long wall. Its outermost corner
+        // either dips `depth` into the wall at one instant or stays as far away from it.
         let long = OrientedBox { x_m, y_m: 0.0, yaw_rad: 0.0, length_m: 200.0, width_m: 0.2 };
         let outermost = |fraction: f64| {
             let shape = car(0.0, 0.0, yaw + fraction * turn);
@@ -336,9 +341,9 @@ proptest! {
         (a0, a1) in any_step(), (b0, b1) in any_step(), turn in -PI..PI, x in -500.0..500.0,
     ) {
         let fraction = |contact: Option<Contact>| contact.map(|contact| contact.fraction);
-        let near = |one: Option<f64>, other: Option<f64>| match (one, other) {
-            (Some(one), Some(other)) => (one - other).abs() < 1e-7,
-            (one, other) => one == other,
+        let near = |first: Option<f64>, second: Option<f64>| match (first, second) {
+            (Some(first), Some(second)) => (first - second).abs() < 1e-7,
+            (first, second) => first == second,
         };
         let contact = first_contact(&a0, &a1, &b0, &b1);
         let swapped = first_contact(&b0, &b1, &a0, &a1);

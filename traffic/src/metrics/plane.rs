@@ -1,8 +1,9 @@
 //! Time to and distance at the closest encounter of two oriented boxes at constant velocity.
 //!
-//! Seen from box *a*, box *b* moves along the line d + v·t (d: vector between the centres, v: relative velocity). The
-//! boxes touch while that point lies in their Minkowski difference. This is a convex polygon of up to eight sides,
-//! symmetric about the origin, and spanned by the four half axes gᵢ of the boxes (a *zonogon*).
+//! Seen from box *a*, box *b* moves along the line d + v·t (d: vector between the centres, v:
+//! relative velocity). The boxes touch while that point lies in their Minkowski difference. This is
+//! a convex polygon of up to eight sides, symmetric about the origin, and spanned by the four half
+//! axes gᵢ of the boxes (a *zonogon*).
 //!
 //! ```text
 //!            ╱‾‾‾‾‾╲                 extent of the zonogon along a unit vector u:  h(u) = Σ |gᵢ·u|
@@ -12,25 +13,28 @@
 //!           TTCE
 //! ```
 //!
-//! The distance between the boxes is a convex function of t. If c > h(n), the line passes the zonogon at the distance
-//! DCE = c − h(n), beside the corner Σ sign(gᵢ·n)·gᵢ. Otherwise the line enters the zonogon at TTCE with DCE = 0,
-//! through the last of the four slabs |d·m + v·m·t| ≤ h(m), m ⊥ gᵢ. Both results are exact.
+//! The distance between the boxes is a convex function of t. If c > h(n), the line passes the
+//! zonogon at the distance DCE = c − h(n), beside the corner Σ sign(gᵢ·n)·gᵢ. Otherwise the line
+//! enters the zonogon at TTCE with DCE = 0, through the last of the four slabs |d·m + v·m·t| ≤
+//! h(m), m ⊥ gᵢ. Both results are exact.
 //!
-//! parry, which decides contacts ([`crate::geometry`]), has no closest encounter of moving shapes. Its cast of boxes that do
-//! not turn (`cast_shapes`) finds the same contacts (60,128 of 60,128 random pairs, 3e-10 s between the times) in 0.27 instead
-//! of 0.20 µs. The time to a contact is nevertheless computed here, so that touching and passing meet without a gap. A test
-//! compares it with the first contact of the geometry.
+//! parry, which decides contacts ([`crate::geometry`]), has no closest encounter of moving shapes.
+//! Its cast of boxes that do not turn (`cast_shapes`) finds the same contacts (60,128 of 60,128
+//! random pairs, 3e-10 s between the times) in 0.27 instead of 0.20 µs. The time to a contact is
+//! nevertheless computed here, so that touching and passing meet without a gap. A test compares it
+//! with the first contact of the geometry.
 //!
-//! The metrics are those of the criticality literature (time to closest encounter and distance of closest encounter: J.
-//! Eggert, *Predictive risk estimation for intelligent ADAS functions*, ITSC 2014), which defines them for points. This
-//! module extends them to boxes.
+//! The metrics are defined in the criticality literature (time to closest encounter and distance of
+//! closest encounter: J. Eggert, *Predictive risk estimation for intelligent ADAS functions*, ITSC
+//! 2014), which defines them for points. This module extends them to boxes.
 
 use nalgebra::Vector2;
 
 use crate::geometry::OrientedBox;
 use crate::{Absent, Measured, maths};
 
-/// Difference below which the ends of a side pass equally near, so that the side counts as parallel to the course (m).
+/// Difference below which the ends of a side pass equally near, so that the side counts as parallel
+/// to the course (m).
 const PARALLEL_M: f64 = 1e-9;
 
 /// A box that moves at constant velocity.
@@ -47,7 +51,8 @@ pub struct Moving {
 /// The closest encounter of two vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encounter {
-    /// Time to closest encounter (s): the first time at which the distance between the vehicles is smallest.
+    /// Time to closest encounter (s): the first time at which the distance between the vehicles is
+    /// smallest.
     pub ttce_s: f64,
     /// Distance of closest encounter (m); 0 on a collision course.
     pub dce_m: f64,
@@ -55,13 +60,14 @@ pub struct Encounter {
 
 /// Computes the time and distance of the closest encounter of two boxes that keep their velocities.
 ///
-/// On a collision course the encounter is the first contact, with a distance of 0. If the boxes touch already, both
-/// values are 0. If a side of one box passes a corner of the other in parallel, the distance stays at its minimum for a
-/// while; the encounter is then the beginning of that interval.
+/// On a collision course the encounter is the first contact, with a distance of 0. If the boxes
+/// touch already, both values are 0. If a side of one box passes a corner of the other in parallel,
+/// the distance stays at its minimum for a while; the encounter is then the beginning of that
+/// interval.
 ///
 /// # Errors
-/// [`Absent::NotApproaching`] if the distance never shrinks; [`Absent::BeyondHorizon`] if it still shrinks after
-/// `horizon_s`.
+/// [`Absent::NotApproaching`] if the distance never shrinks; [`Absent::BeyondHorizon`] if it still
+/// shrinks after `horizon_s`.
 pub fn closest_encounter(a: &Moving, b: &Moving, horizon_s: f64) -> Result<Encounter, Absent> {
     let course = Course::new(a, b);
     let encounter = match course.touch()? {
@@ -74,8 +80,8 @@ pub fn closest_encounter(a: &Moving, b: &Moving, horizon_s: f64) -> Result<Encou
 /// Returns the time until two boxes that keep their velocities touch (s); 0 if they touch already.
 ///
 /// # Errors
-/// [`Absent::NotApproaching`] if their distance never shrinks; [`Absent::NoCollisionCourse`] if it shrinks, but the
-/// boxes pass each other.
+/// [`Absent::NotApproaching`] if their distance never shrinks; [`Absent::NoCollisionCourse`] if it
+/// shrinks, but the boxes pass each other.
 pub fn time_to_touch_s(a: &Moving, b: &Moving) -> Measured {
     let course = Course::new(a, b);
     match course.touch()? {
@@ -86,7 +92,7 @@ pub fn time_to_touch_s(a: &Moving, b: &Moving) -> Measured {
 
 /// The movement of one box relative to another, and their Minkowski difference.
 struct Course {
-    /// Vector from the centre of a to that of b (m).
+    /// Vector from the centre of a to the centre of b (m).
     offset_m: Vector2<f64>,
     /// Velocity of b relative to a (m/s).
     velocity_mps: Vector2<f64>,
@@ -149,8 +155,8 @@ impl Course {
         if across.dot(&self.offset_m) < 0.0 {
             across = -across;
         }
-        // The corner that is passed, and half the length of a side of the difference there that is parallel to the
-        // course.
+        // The corner that is passed, and half the length of a side of the difference there that is
+        // parallel to the course.
         let mut corner_m = 0.0;
         let mut parallel_m = 0.0;
         for (axis, _) in self.half_axes {
@@ -173,7 +179,8 @@ impl Course {
     }
 }
 
-/// Returns the half axes of a box along its length and width (m), each with a unit vector perpendicular to it.
+/// Returns the half axes of a box along its length and width (m), each with a unit vector
+/// perpendicular to it.
 fn half_axes(shape: &OrientedBox) -> [(Vector2<f64>, Vector2<f64>); 2] {
     let (sin, cos) = maths::sin_cos(shape.yaw_rad);
     let (forward, left) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));

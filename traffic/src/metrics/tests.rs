@@ -1,4 +1,5 @@
-//! Tests of encounters in the plane against closed forms, and property tests against a dense scan in time.
+//! Tests of encounters in the plane against closed forms, and property tests against a dense scan
+//! in time.
 
 use std::f64::consts::{FRAC_PI_4, PI, SQRT_2};
 
@@ -15,32 +16,34 @@ fn moving(x_m: f64, y_m: f64, yaw_rad: f64, vx_mps: f64, vy_mps: f64) -> Moving 
     Moving { shape: OrientedBox { x_m, y_m, yaw_rad, length_m: 4.0, width_m: 2.0 }, vx_mps, vy_mps }
 }
 
-fn after(of: &Moving, time_s: f64) -> OrientedBox {
-    OrientedBox { x_m: of.shape.x_m + of.vx_mps * time_s, y_m: of.shape.y_m + of.vy_mps * time_s, ..of.shape }
+fn after(body: &Moving, time_s: f64) -> OrientedBox {
+    OrientedBox { x_m: body.shape.x_m + body.vx_mps * time_s, y_m: body.shape.y_m + body.vy_mps * time_s, ..body.shape }
 }
 
 fn distance_after_m(a: &Moving, b: &Moving, time_s: f64) -> f64 {
     after(a, time_s).distance_m(&after(b, time_s))
 }
 
-fn transformed(of: &Moving, turn_rad: f64, shift: Vector2<f64>) -> Moving {
+fn transformed(body: &Moving, turn_rad: f64, shift: Vector2<f64>) -> Moving {
     let rotation = Rotation2::new(turn_rad);
-    let centre = rotation * of.shape.centre_m() + shift;
-    let velocity = rotation * Vector2::new(of.vx_mps, of.vy_mps);
-    let yaw_rad = of.shape.yaw_rad + turn_rad;
-    let shape = OrientedBox { x_m: centre.x, y_m: centre.y, yaw_rad, ..of.shape };
+    let centre = rotation * body.shape.centre_m() + shift;
+    let velocity = rotation * Vector2::new(body.vx_mps, body.vy_mps);
+    let yaw_rad = body.shape.yaw_rad + turn_rad;
+    let shape = OrientedBox { x_m: centre.x, y_m: centre.y, yaw_rad, ..body.shape };
     Moving { shape, vx_mps: velocity.x, vy_mps: velocity.y }
 }
 
-fn mirrored(of: &Moving) -> Moving {
-    let shape = OrientedBox { y_m: -of.shape.y_m, yaw_rad: -of.shape.yaw_rad, ..of.shape };
-    Moving { shape, vx_mps: of.vx_mps, vy_mps: -of.vy_mps }
+fn mirrored(body: &Moving) -> Moving {
+    let shape = OrientedBox { y_m: -body.shape.y_m, yaw_rad: -body.shape.yaw_rad, ..body.shape };
+    Moving { shape, vx_mps: body.vx_mps, vy_mps: -body.vy_mps }
 }
 
-fn same(one: Result<Encounter, Absent>, other: Result<Encounter, Absent>) -> bool {
-    match (one, other) {
-        (Ok(one), Ok(other)) => (one.ttce_s - other.ttce_s).abs() < 1e-6 && (one.dce_m - other.dce_m).abs() < 1e-8,
-        (one, other) => one == other,
+fn same(first: Result<Encounter, Absent>, second: Result<Encounter, Absent>) -> bool {
+    match (first, second) {
+        (Ok(first), Ok(second)) => {
+            (first.ttce_s - second.ttce_s).abs() < 1e-6 && (first.dce_m - second.dce_m).abs() < 1e-8
+        }
+        (first, second) => first == second,
     }
 }
 
@@ -66,7 +69,8 @@ fn passing_in_the_next_lane_is_closest_when_the_bumpers_are_level() {
     let (slow, fast) = (moving(54.0, 0.0, 0.0, 30.0, 0.0), moving(0.0, 3.75, 0.0, 35.0, 0.0));
     assert_eq!(closest_encounter(&slow, &fast, 20.0), Ok(Encounter { ttce_s: 10.0, dce_m: 1.75 }));
     assert_eq!(time_to_touch_s(&slow, &fast), Err(Absent::NoCollisionCourse));
-    // Alongside, the distance stays the same, so the encounter is now. Once the vehicle is past, the encounter is over.
+    // Alongside, the distance stays the same, so the encounter is now. Once the vehicle is past,
+    // the encounter is over.
     let alongside = moving(55.0, 3.75, 0.0, 35.0, 0.0);
     assert_eq!(closest_encounter(&slow, &alongside, 20.0), Ok(Encounter { ttce_s: 0.0, dce_m: 1.75 }));
     let past = moving(58.1, 3.75, 0.0, 35.0, 0.0);
@@ -75,7 +79,8 @@ fn passing_in_the_next_lane_is_closest_when_the_bumpers_are_level() {
 
 #[test]
 fn a_crossing_course_passes_a_corner_in_closed_form() {
-    // A square turned by 45° crosses ahead of a standing one; its lowest corner passes the side of the other.
+    // A square turned by 45° crosses ahead of a standing one; its lowest corner passes the side of
+    // the other.
     let square = |x_m, y_m, yaw_rad, vx_mps| Moving {
         shape: OrientedBox { x_m, y_m, yaw_rad, length_m: 2.0, width_m: 2.0 },
         vx_mps,
@@ -103,11 +108,11 @@ fn vehicles_that_do_not_approach_have_no_encounter() {
 
 #[test]
 fn boxes_that_touch_already_have_time_and_distance_zero() {
-    let (one, other) = (moving(0.0, 0.0, 0.0, 30.0, 0.0), moving(3.0, 1.0, 0.3, 35.0, 0.0));
-    assert_eq!(closest_encounter(&one, &other, HORIZON_S), Ok(Encounter { ttce_s: 0.0, dce_m: 0.0 }));
-    assert_eq!(time_to_touch_s(&one, &other), Ok(0.0));
+    let (first, second) = (moving(0.0, 0.0, 0.0, 30.0, 0.0), moving(3.0, 1.0, 0.3, 35.0, 0.0));
+    assert_eq!(closest_encounter(&first, &second, HORIZON_S), Ok(Encounter { ttce_s: 0.0, dce_m: 0.0 }));
+    assert_eq!(time_to_touch_s(&first, &second), Ok(0.0));
     let at_rest = moving(3.0, 1.0, 0.3, 30.0, 0.0);
-    assert_eq!(time_to_touch_s(&one, &at_rest), Ok(0.0));
+    assert_eq!(time_to_touch_s(&first, &at_rest), Ok(0.0));
 }
 
 #[test]
@@ -116,7 +121,8 @@ fn a_far_encounter_lies_beyond_the_horizon() {
     assert_eq!(closest_encounter(&lead, &follower, 9.9), Err(Absent::BeyondHorizon));
 }
 
-/// Headings that differ only by rounding must not move the encounter from the front bumper to the rear one.
+/// Headings that differ only by rounding must not move the encounter from the front bumper to the
+/// rear one.
 #[test]
 fn nearly_parallel_sides_count_as_parallel() {
     for noise in [1e-13, -1e-13] {
@@ -129,13 +135,13 @@ fn nearly_parallel_sides_count_as_parallel() {
 #[cfg(not(debug_assertions))]
 #[test]
 fn nan_never_looks_safe() {
-    let known = moving(0.0, 0.0, 0.0, 30.0, 0.0);
+    let vehicle = moving(0.0, 0.0, 0.0, 30.0, 0.0);
     const ARGUMENTS: usize = 5;
     for unknown in 0..ARGUMENTS {
         let at = |i: usize, value: f64| if i == unknown { f64::NAN } else { value };
         let other = moving(at(0, 50.0), at(1, 20.0), at(2, 0.3), at(3, 60.0), at(4, 1.0));
-        assert_eq!(time_to_touch_s(&known, &other), Ok(0.0), "{other:?}");
-        assert_eq!(closest_encounter(&known, &other, HORIZON_S), Ok(Encounter { ttce_s: 0.0, dce_m: 0.0 }));
+        assert_eq!(time_to_touch_s(&vehicle, &other), Ok(0.0), "{other:?}");
+        assert_eq!(closest_encounter(&vehicle, &other, HORIZON_S), Ok(Encounter { ttce_s: 0.0, dce_m: 0.0 }));
     }
 }
 
@@ -165,8 +171,8 @@ proptest! {
     }
 
     #[test]
-    fn the_time_to_touch_is_that_of_the_first_contact(a in any_moving(), b in any_moving()) {
-        let [a_then, b_then] = [&a, &b].map(|one| after(one, HORIZON_S));
+    fn the_time_to_touch_equals_the_first_contact(a in any_moving(), b in any_moving()) {
+        let [a_then, b_then] = [&a, &b].map(|vehicle| after(vehicle, HORIZON_S));
         let contact = first_contact(&a.shape, &a_then, &b.shape, &b_then);
         match (time_to_touch_s(&a, &b), contact) {
             (Ok(touch_s), Some(contact)) => {
@@ -180,7 +186,7 @@ proptest! {
     }
 
     #[test]
-    fn the_time_to_touch_is_that_of_an_encounter_at_distance_zero(a in any_moving(), b in any_moving()) {
+    fn the_time_to_touch_equals_an_encounter_at_distance_zero(a in any_moving(), b in any_moving()) {
         match (time_to_touch_s(&a, &b), closest_encounter(&a, &b, f64::MAX)) {
             (Ok(touch_s), Ok(Encounter { ttce_s, dce_m })) => {
                 prop_assert_eq!((touch_s, 0.0), (ttce_s, dce_m));
@@ -204,7 +210,7 @@ proptest! {
 
     #[test]
     fn a_common_velocity_changes_nothing(a in any_moving(), b in any_moving(), vx in -40.0..40.0, vy in -40.0..40.0) {
-        let faster = |of: &Moving| Moving { vx_mps: of.vx_mps + vx, vy_mps: of.vy_mps + vy, ..*of };
+        let faster = |body: &Moving| Moving { vx_mps: body.vx_mps + vx, vy_mps: body.vy_mps + vy, ..*body };
         prop_assert!(same(closest_encounter(&a, &b, HORIZON_S), closest_encounter(&faster(&a), &faster(&b), HORIZON_S)));
     }
 

@@ -1,16 +1,18 @@
 //! Test of a filter's covariance: the mean NEES of many runs against its 95 % bounds.
 //!
-//! The statistic is the normalised estimation error squared (NEES) averaged over all steps of independent runs. If the
-//! covariance is consistent, its expectation is the number of dimensions n (Bar-Shalom, Li, Kirubarajan, *Estimation
-//! with Applications to Tracking and Navigation*, 2001, section 5.4.2). The bounds are n ± t standard errors, where t
-//! is Student's quantile for the number of runs. The standard error follows from the scatter of the runs about the
-//! mean, because runs are independent while the steps of one run are correlated. Runs of several scenarios with the
-//! same seed and sample have the same noise, and count as one run.
+//! The statistic is the normalised estimation error squared (NEES) averaged over all steps of
+//! independent runs. If the covariance is consistent, its expectation is the number of dimensions n
+//! (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+//! section 5.4.2). The bounds are n ± t standard errors, where t is Student's quantile for the
+//! number of runs. The standard error follows from the scatter of the runs about the mean, because
+//! runs are independent while the steps of one run are correlated. Runs of several scenarios with
+//! the same seed and sample have the same noise, and count as one run.
 //!
-//! The usual bounds for N independent values are the quantiles of χ²(n·N)/N. They require normal errors. Here, a motion
-//! that switches between modes puts much of the sum into the few steps after a switch. The bounds used here do not
-//! require normal errors, but widely scattered runs widen them. Bounds wider than a quarter of n to either side are no
-//! evidence; the result is then [`Credibility::Undecided`].
+//! The usual bounds for N independent values are the quantiles of χ²(n·N)/N. They require normal
+//! errors. Here, a motion that switches between modes puts much of the sum into the few steps after
+//! a switch. The bounds used here do not require normal errors, but widely scattered runs widen
+//! them. Bounds wider than a quarter of n to either side are no evidence; the result is then
+//! [`Credibility::Undecided`].
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -46,7 +48,8 @@ pub enum Credibility {
 }
 
 impl Consistency {
-    /// Combines the NEES values of independent runs. Returns `None` if fewer than two runs have any.
+    /// Combines the NEES values of independent runs. Returns `None` if fewer than two runs have
+    /// any.
     pub fn of(runs: &[Vec<f64>]) -> Option<Self> {
         let runs: Vec<(f64, f64)> =
             runs.iter().filter(|run| !run.is_empty()).map(|run| (run.iter().sum::<f64>(), run.len() as f64)).collect();
@@ -86,8 +89,9 @@ mod tests {
 
     use super::*;
 
-    /// Draws runs of squared errors in four dimensions. Each dimension is a first-order process that keeps the share
-    /// `memory` of the last step's value. Its variance is `variance` times the claimed one.
+    /// Draws runs of squared errors in four dimensions. Each dimension is a first-order process
+    /// that keeps the share `memory` of the last step's value. Its variance is `variance` times the
+    /// claimed one.
     fn runs(count: u64, memory: f64, variance: f64) -> Vec<Vec<f64>> {
         let run = |sample| {
             let mut rng = stream(1, sample, &ActorId::new("ego").unwrap(), "consistency");
@@ -134,8 +138,8 @@ mod tests {
     #[test]
     fn correlated_steps_widen_the_interval() {
         let [without, with] = [0.0, 0.9].map(|memory| Consistency::of(&runs(400, memory, 1.0)).unwrap());
-        // Squares of a process with a memory of 0.9 are correlated by 0.81 per step, so (1 + 0.81)/(1 − 0.81) = 9.5
-        // steps count as one independent value.
+        // Squares of a process with a memory of 0.9 are correlated by 0.81 per step, so (1 +
+        // 0.81)/(1 − 0.81) = 9.5 steps count as one independent value.
         let expected = 1.966 * (2.0 * DIMENSIONS / 160_000.0).sqrt();
         assert!((0.9..1.1).contains(&(without.half_width / expected)), "{without:?}");
         assert!((0.9..1.1).contains(&(with.half_width / (9.5_f64.sqrt() * expected))), "{with:?}");
@@ -143,10 +147,10 @@ mod tests {
 
     #[test]
     fn wrong_covariances_are_detected() {
-        let of = |variance| Consistency::of(&runs(40, 0.9, variance)).unwrap();
-        assert_eq!(of(0.8).credibility(), Credibility::Conservative);
-        assert_eq!(of(1.25).credibility(), Credibility::Overconfident);
-        assert_eq!(Consistency { mean: f64::NAN, ..of(1.0) }.credibility(), Credibility::Overconfident);
+        let with_variance = |variance| Consistency::of(&runs(40, 0.9, variance)).unwrap();
+        assert_eq!(with_variance(0.8).credibility(), Credibility::Conservative);
+        assert_eq!(with_variance(1.25).credibility(), Credibility::Overconfident);
+        assert_eq!(Consistency { mean: f64::NAN, ..with_variance(1.0) }.credibility(), Credibility::Overconfident);
     }
 
     #[test]

@@ -1,11 +1,12 @@
-//! How probabilities and shares are printed.
+//! The printed form of probabilities and shares.
 
 use crate::maths;
 
 /// Significant digits of a printed share.
 const DIGITS: i32 = 3;
 
-/// Returns a share in percent, with three significant digits and without trailing zeros: 0.00994 is `0.994 %`.
+/// Returns a share in percent, with three significant digits and without trailing zeros: 0.00994 is
+/// `0.994 %`.
 pub fn percent(share: f64) -> String {
     let value = 100.0 * share;
     if !(value > 0.0) || !value.is_finite() {

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
-/// Number of low bits of a value's mantissa that are rounded away: 13 of 52 are left, so that values are exact to one part in 16,384.
+/// Number of low bits of a value's mantissa that are rounded away: 13 of 52 are left, so that
+/// values are exact to one part in 16,384.
 const ROUNDED_BITS: u32 = 39;
 
-/// A histogram with equal bins within each power of two, like that of G. Tene's *HdrHistogram*: each value counts as the nearest of the
-/// 8,192 values in its octave. Memory depends on the range of the values, not on their number.
+/// A histogram with equal bins within each power of two, like that of G. Tene's *HdrHistogram*:
+/// each value counts as the nearest of the 8,192 values in its octave. Memory depends on the range
+/// of the values, not on their number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogLinearHistogram {
     /// Counts by the bits of the rounded value, in an order in which they rise with it.
@@ -28,7 +30,8 @@ impl LogLinearHistogram {
         self.len == 0
     }
 
-    /// Returns the quantile at probability `u` of one or more values, by [`quantile`](crate::statistics::quantiles::quantile)'s rule.
+    /// Returns the quantile at probability `u` of one or more values, by
+    /// [`quantile`](crate::statistics::quantiles::quantile)'s rule.
     ///
     /// # Panics
     /// Panics if there are no values.
@@ -77,19 +80,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn quantiles_are_those_of_the_values(mut values in prop::collection::vec(-50.0..5e3, 1..200), u in 0.0..1.0) {
-            let found = histogram(&values).quantile(u);
+        fn quantiles_of_the_histogram_equal_the_quantiles_of_the_values(mut values in prop::collection::vec(-50.0..5e3, 1..200), u in 0.0..1.0) {
+            let estimate = histogram(&values).quantile(u);
             values.sort_by(f64::total_cmp);
             let largest = values[0].abs().max(values[values.len() - 1].abs());
-            prop_assert!((found - quantile(&values, u)).abs() <= largest / 16_384.0);
+            prop_assert!((estimate - quantile(&values, u)).abs() <= largest / 16_384.0);
         }
     }
 
     #[test]
     fn a_part_in_16384_is_lost_and_no_more() {
         for value in [1e-3, 0.471_3, 1.0, 2.6, 1_234.5, -3.3] {
-            let found = histogram(&[value]).quantile(0.5);
-            assert!((found - value).abs() <= value.abs() / 16_384.0, "{value}: {found}");
+            let estimate = histogram(&[value]).quantile(0.5);
+            assert!((estimate - value).abs() <= value.abs() / 16_384.0, "{value}: {estimate}");
         }
         assert_eq!(histogram(&[0.0, 0.0, 2.0]).quantile(0.0).to_bits(), 0.0_f64.to_bits());
         assert_eq!(histogram(&[0.0, 0.0, 2.0]).quantile(0.75), 1.0);

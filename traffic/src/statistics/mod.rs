@@ -1,4 +1,5 @@
-//! Statistical inference about probabilities from samples, and about the difference of two arms from paired samples.
+//! Statistical inference about probabilities from samples, and about the difference of two arms
+//! from paired samples.
 //!
 //! ```text
 //!   number of samples n fixed in advance ─▶ exact intervals (Clopper–Pearson), exact McNemar test
@@ -9,7 +10,8 @@
 //! * [`consistency`]: whether a filter's covariance agrees with its errors
 //! * [`format`](mod@format): shares as text
 //! * [`interval`]: exact bounds of a probability for a number of samples that is fixed in advance
-//! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be inspected at any time
+//! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be
+//!   inspected at any time
 //! * [`needed`]: the number of samples that a bound needs
 //! * [`mcnemar`]: whether two arms differ on the same samples
 //! * [`holm`]: p-values corrected for the number of tests
@@ -19,7 +21,8 @@
 //! * [`normal`]: the truncated normal distribution
 //! * [`sensitivity`]: which input of a function moves its output most
 //!
-//! All methods for probabilities assume independent, identically distributed samples, as in the random sampling design.
+//! All methods for probabilities assume independent, identically distributed samples, as in the
+//! random sampling design.
 
 pub mod binomial;
 mod cholesky;

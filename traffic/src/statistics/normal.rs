@@ -1,8 +1,9 @@
 //! The standard normal distribution, truncated at two bounds and accurate in both tails.
 //!
-//! The distribution function Φ and its inverse are evaluated in the smaller tail, so that neither 1 − 10⁻²⁰ nor a
-//! truncation at five standard deviations loses digits. [`erfc_inv`] is accurate to 11 digits. One step of
-//! Newton's method with the complementary error function improves this to 15 digits.
+//! The distribution function Φ and its inverse are evaluated in the smaller tail, so that neither 1
+//! − 10⁻²⁰ nor a truncation at five standard deviations loses digits. [`erfc_inv`] is accurate to
+//! 11 digits. One step of Newton's method with the complementary error function improves this to 15
+//! digits.
 
 mod erfc_inv;
 
@@ -41,7 +42,8 @@ pub struct TruncatedStandardNormal {
 }
 
 impl TruncatedStandardNormal {
-    /// Truncates the distribution at `low` and `high`. Returns `None` if no probability is left between them.
+    /// Truncates the distribution at `low` and `high`. Returns `None` if no probability is left
+    /// between them.
     pub fn new(low: f64, high: f64) -> Option<Self> {
         let mass = probability_between(low, high);
         // A division by a subnormal mass would lose digits.
@@ -62,7 +64,8 @@ impl TruncatedStandardNormal {
     }
 }
 
-/// Returns the probability between two bounds, as a difference in the tail in which it does not cancel.
+/// Returns the probability between two bounds, as a difference in the tail in which it does not
+/// cancel.
 fn probability_between(low: f64, high: f64) -> f64 {
     if low > 0.0 { below(-low) - below(-high) } else { below(high) - below(low) }
 }

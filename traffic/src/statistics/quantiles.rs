@@ -1,11 +1,11 @@
 //! Quantiles of sorted values, and the distribution that they define.
 //!
-//! Values at equally spaced probabilities from 0 to 1 are joined by straight lines: Hyndman and Fan's type 7, the default
-//! of R and NumPy (R. J. Hyndman and Y. Fan, *Sample quantiles in statistical packages*, The American Statistician 50
-//! (1996) 361–365).
+//! Values at equally spaced probabilities from 0 to 1 are joined by straight lines: Hyndman and
+//! Fan's type 7, the default of R and NumPy (R. J. Hyndman and Y. Fan, *Sample quantiles in
+//! statistical packages*, The American Statistician 50 (1996) 361–365).
 
-/// Returns the quantile at probability `u` of one or more `sorted` values without NaN. A probability below 0 or above 1
-/// is taken as 0 or 1.
+/// Returns the quantile at probability `u` of one or more `sorted` values without NaN. A
+/// probability below 0 counts as 0, and a probability above 1 as 1.
 ///
 /// # Panics
 /// Panics if there are no values.
@@ -28,8 +28,8 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     quantile(&values, 0.5)
 }
 
-/// Returns the cumulative probability at `x` of the distribution with two or more quantiles, which are sorted values at
-/// equally spaced probabilities from 0 to 1.
+/// Returns the cumulative probability at `x` of the distribution with two or more quantiles, which
+/// are sorted values at equally spaced probabilities from 0 to 1.
 pub fn cdf(quantiles: &[f64], x: f64) -> f64 {
     let intervals = quantiles.len() - 1;
     match quantiles.partition_point(|&quantile| quantile <= x) {

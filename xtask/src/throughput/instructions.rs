@@ -1,19 +1,23 @@
-//! Counts the instructions of a simulated second with Callgrind, and compares them with the counts of the repository.
+//! Counts the instructions of a simulated second with Callgrind, and compares them with the counts
+//! of the repository.
 //!
-//! A count does not depend on the speed of the machine or on other programs. That of a mode is the difference between a process
-//! that runs several samples and one that runs fewer, so that the start of the process and of the network is not in it. Counts
-//! of the same sources differ between compilers and, by the functions that the C library chooses, between processors.
+//! A count does not depend on the speed of the machine or on other programs. The count of a mode is
+//! the difference between a process that runs several samples and a process that runs fewer. It
+//! thus excludes the start of the process and of the network. Counts of the same sources differ
+//! between compilers and, by the functions that the C library chooses, between processors.
 //!
-//! The check fails if a mode needs more than 5 % more than `instructions.json` states. If that is intended, a line in the
-//! unreleased section of `CHANGELOG.md` raises the limit, and says why:
+//! The check fails if a mode needs more than 5 % more than `instructions.json` states. If that is
+//! intended, a line in the unreleased section of `CHANGELOG.md` raises the limit, and says why:
 //!
 //! ```text
 //! - Instructions of `object`: 1.35 million per simulated second, since drivers also look into their mirrors.
 //! ```
 //!
-//! It fails as well if sixty vehicles cost more than 32 times as much per simulated second as three.
+//! It fails as well if sixty vehicles cost more than 32 times as much per simulated second as
+//! three.
 //!
-//! `instructions write` writes the counts to the file, for a change that saves instructions and before a release.
+//! `instructions write` writes the counts to the file, for a change that saves instructions and
+//! before a release.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -26,8 +30,8 @@ use super::modes::{Mode, modes};
 
 /// First argument of a process that runs samples of one mode.
 pub(crate) const RUN: &str = "run";
-/// The modes that are counted. Callgrind runs them 50 times slower: bad weather, and the full sensors in traffic, are cut short, and the
-/// loading of the network counts there.
+/// The modes that are counted. Callgrind runs them 50 times slower: bad weather, and the full
+/// sensors in traffic, are cut short, and the loading of the network counts there.
 const COUNTED: [Counted; 14] = [
     Counted::whole("ground-truth", [1, 7]),
     Counted::whole("object", [1, 7]),
@@ -46,9 +50,10 @@ const COUNTED: [Counted; 14] = [
 ];
 /// The depths of the sensor simulation whose cost may not grow faster than traffic.
 const SCALED: [&str; 3] = ["ground-truth", "object", "full"];
-/// The numbers of vehicles that are compared, and the largest ratio of their costs per simulated second (-): the traffic grows twentyfold,
-/// and six tenths more are left for the neighbours that each vehicle has in dense traffic (assumption). Of three vehicles hardly any
-/// driver has a second leader to perceive, of sixty nearly each. A search of all pairs would cost 400 times as much.
+/// The numbers of vehicles that are compared, and the largest ratio of their costs per simulated
+/// second (-): the traffic grows twentyfold, and six tenths more are left for the neighbours that
+/// each vehicle has in dense traffic (assumption). Of three vehicles hardly any driver has a second
+/// leader to perceive, of sixty nearly each. A search of all pairs would cost 400 times as much.
 const FEW_MANY: [u32; 2] = [3, 60];
 const LARGEST_RATIO: f64 = 32.0;
 /// Growth above which the check fails (-).
@@ -78,9 +83,10 @@ impl Counted {
     }
 }
 
-/// Runs the first `samples` samples of a mode, cut to `duration_s` (s) if it is given, and prints their simulated time (s).
+/// Runs the first `samples` samples of a mode, cut to `duration_s` (s) if it is given, and prints
+/// their simulated time (s).
 pub(crate) fn run(mode: &str, samples: u64, duration_s: Option<f64>) -> Result<(), Box<dyn Error>> {
-    let mode = modes(|known| known == mode)?.pop().ok_or("no such mode")?;
+    let mode = modes(|name| name == mode)?.pop().ok_or("no such mode")?;
     let mode = duration_s.into_iter().try_fold(mode, Mode::cut)?;
     // A mode with one sample repeats it.
     let scenarios = mode.scenarios(mode.samples)?;
@@ -92,7 +98,7 @@ pub(crate) fn run(mode: &str, samples: u64, duration_s: Option<f64>) -> Result<(
     Ok(())
 }
 
-/// Compares the counts of all modes with those of the repository.
+/// Compares the counts of all modes with the counts in the repository.
 pub(crate) fn check() -> Result<(), Box<dyn Error>> {
     let stated: BTreeMap<String, f64> = serde_json::from_str(&std::fs::read_to_string(file())?)?;
     let raised = raised(&std::fs::read_to_string(at_root("CHANGELOG.md"))?);
@@ -133,18 +139,19 @@ pub(crate) fn write() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns the number of instructions of each mode per simulated second, in millions. As many modes are counted at a time as there are cores.
+/// Returns the number of instructions of each mode per simulated second, in millions. As many modes
+/// are counted at a time as there are cores.
 pub(crate) fn count_all() -> Result<BTreeMap<String, f64>, Box<dyn Error>> {
     let count = |counted: &Counted| Ok((counted.mode.to_owned(), millions_per_s(counted)?));
     let counts: Result<_, String> = COUNTED.par_iter().with_max_len(1).map(count).collect();
     Ok(counts?)
 }
 
-/// Returns what is wrong with the growth of the costs with the traffic.
+/// Returns the modes whose costs grow too fast with the traffic.
 fn steep(counts: &BTreeMap<String, f64>) -> Vec<String> {
     let [few, many] = FEW_MANY;
-    let of = |sensors: &str, vehicles: u32| counts.get(&format!("{sensors}, {vehicles} vehicles"));
-    let ratio = |sensors: &str| Some(of(sensors, many)? / of(sensors, few)?);
+    let instructions = |sensors: &str, vehicles: u32| counts.get(&format!("{sensors}, {vehicles} vehicles"));
+    let ratio = |sensors: &str| Some(instructions(sensors, many)? / instructions(sensors, few)?);
     let wrong = |sensors: &&str| {
         // A count that is missing is as wrong as one that is too large.
         let ratio = ratio(sensors).unwrap_or(f64::NAN);
@@ -159,8 +166,8 @@ fn steep(counts: &BTreeMap<String, f64>) -> Vec<String> {
 
 /// Returns the number of instructions of a mode per simulated second, in millions.
 fn millions_per_s(counted: &Counted) -> Result<f64, String> {
-    let of = |samples| count(counted, samples).map_err(|error| error.to_string());
-    let [few, many] = [of(counted.samples[0])?, of(counted.samples[1])?];
+    let instructions = |samples| count(counted, samples).map_err(|error| error.to_string());
+    let [few, many] = [instructions(counted.samples[0])?, instructions(counted.samples[1])?];
     Ok(1e-6 * (many.instructions - few.instructions) / (many.simulated_s - few.simulated_s))
 }
 

@@ -1,18 +1,23 @@
-//! Measures the speed of the whole loop for each depth of the sensor simulation, kind of road and number of vehicles.
+//! Measures the speed of the whole loop for each depth of the sensor simulation, kind of road and
+//! number of vehicles.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- throughput [ROUNDS [MODE]...]
 //! cargo run --release -p closecall-xtask -- throughput instructions
 //! ```
 //!
-//! The first command prints one line of JSON per mode, with the simulated seconds per second of processor time. The modes
-//! take turns, so that other programs on the machine disturb all of them alike, and time is that of this thread alone
-//! (`/proc/thread-self/schedstat`; wall time where there is none). Before each mode a fixed loop is timed:
-//! `per_calibration` is the number of simulated seconds in the time of that loop, which makes figures of different machines
-//! comparable. Where Callgrind is installed, the lines have the instructions of the counted modes. A second line for each
-//! mode has the wall time of each stage, see [`stages`]. If modes are named, only these are timed, without instructions. No validity check is run; a campaign's checks come on top.
+//! The first command prints one line of JSON per mode, with the simulated seconds per second of
+//! processor time. The modes take turns: other programs on the machine then disturb all modes
+//! alike. The time is the time of this thread alone (`/proc/thread-self/schedstat`; wall time where
+//! there is none). Before each mode a fixed loop is timed: `per_calibration` is the number of
+//! simulated seconds in the time of that loop, which makes figures of different machines
+//! comparable. Where Callgrind is installed, the lines have the instructions of the counted modes.
+//! A second line for each mode has the wall time of each stage, see [`stages`]. If modes are named,
+//! only these are timed, without instructions. No validity check is run; a campaign's checks come
+//! on top.
 //!
-//! The second command counts instructions with Callgrind (Debian's package `valgrind`), see [`instructions`].
+//! The second command counts instructions with Callgrind (Debian's package `valgrind`), see
+//! [`instructions`].
 
 #![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
 
@@ -53,7 +58,8 @@ impl Timing {
     /// Runs every sample once.
     fn measure(&mut self) -> Result<(), Box<dyn Error>> {
         self.calibration_s += timed(calibrate).1;
-        // The kernel counts processor time in steps of a few milliseconds: all samples are timed together.
+        // The kernel counts processor time in steps of a few milliseconds: all samples are timed
+        // together.
         let run = |(sample, scenario): (u64, &Scenario)| self.mode.run(scenario, sample);
         let (simulated_s, cpu_s) = timed(|| (0..).zip(&self.scenarios).map(run).sum::<Result<f64, _>>());
         self.simulated_s += simulated_s?;
@@ -61,7 +67,8 @@ impl Timing {
         Ok(())
     }
 
-    /// Prints the figures. `millions` are the counted instructions per simulated second, in millions.
+    /// Prints the figures. `millions` are the counted instructions per simulated second, in
+    /// millions.
     fn print(&self, rounds: u32, millions: Option<f64>) {
         let speed = self.simulated_s / self.cpu_s;
         let calibration_s = self.calibration_s / f64::from(rounds);
@@ -95,7 +102,8 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (result, from.zip(thread_s()).map_or(wall_s, |(from, to)| to - from))
 }
 
-/// The calibration loop: integer and floating-point operations that depend on each other, without memory.
+/// The calibration loop: integer and floating-point operations that depend on each other, without
+/// memory.
 fn calibrate() {
     let (mut bits, mut sum) = (1_u64, 0.0_f64);
     for _ in 0..CALIBRATION_STEPS {

@@ -1,4 +1,5 @@
-//! The modes of the loop that are measured: depth of the sensor simulation, kind of road, and number of vehicles.
+//! The modes of the loop that are measured: depth of the sensor simulation, kind of road, and
+//! number of vehicles.
 
 use std::error::Error;
 use std::path::Path;
@@ -67,7 +68,8 @@ struct Chosen<W> {
 }
 
 impl<W: Fn(&str) -> bool> Chosen<W> {
-    /// Adds a mode if it is wanted. Its scenario is read then only: all of them take 200 million instructions.
+    /// Adds a mode if it is wanted. Its scenario is read then only: all of them take 200 million
+    /// instructions.
     fn add(
         &mut self,
         name: &str,
@@ -89,7 +91,7 @@ fn library(name: &str, settings: &[&str]) -> Result<ScenarioFile, Box<dyn Error>
     Ok(ScenarioFile::load(&path, &settings)?)
 }
 
-/// Returns the modes that are measured, as far as they are wanted by their names.
+/// Returns the modes to measure: all modes, or the modes with the wanted names.
 pub(crate) fn modes(is_wanted: impl Fn(&str) -> bool) -> Result<Vec<Mode>, Box<dyn Error>> {
     use SensorMode::{Full, GroundTruth, Object};
     let mut chosen = Chosen { is_wanted, modes: Vec::new() };

@@ -1,4 +1,4 @@
-//! The time of each stage of the loop, measured where one ends and the next begins.
+//! The time of each stage of the loop, measured where one stage ends and the next begins.
 //!
 //! ```text
 //!  physics step    ├ neighbours, margins ┤                               ├ drivers, motion ┤
@@ -6,11 +6,13 @@
 //!                  moved                           asked       answered  reported          moved
 //! ```
 //!
-//! No part of the simulation reads a clock. The marks are the calls of an observer (`moved`, `reported`) and of a controller (`asked`,
-//! `answered`), which both belong to this program. Neighbours and sensors have no mark between them: a physics step without
-//! a control step has no sensors, and gives the time of the neighbours. A mark takes some 30 ns, which is in
-//! the figures. After the full sensors the caches are cold, so that no time is left to tell the neighbours by: they are then part of the motion.
-//! Each run is made three times, and the shortest time between two marks counts, as other programs interrupt it.
+//! No part of the simulation reads a clock. The marks are the calls of an observer (`moved`,
+//! `reported`) and of a controller (`asked`, `answered`), which both belong to this program.
+//! Neighbours and sensors have no mark between them: a physics step without a control step has no
+//! sensors, and gives the time of the neighbours. A mark takes some 30 ns, which is in the figures.
+//! After the full sensors the caches are cold, and the time of the neighbours cannot be told apart:
+//! it is then part of the motion. Each run is made three times, and the shortest time between two
+//! marks counts, as other programs interrupt it.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -92,8 +94,8 @@ fn mark(mark: Mark) {
     });
 }
 
-/// Returns the spans of the shortest of several equal runs, span by span: a run does the same each time, and what interrupts it does not. Also
-/// returns the simulated time (s).
+/// Returns the spans of the shortest of several equal runs, span by span: a run does the same each
+/// time, and what interrupts it does not. Also returns the simulated time (s).
 fn spans(scenario: &Scenario, key: RunKey, arm: &Arm) -> Result<(Vec<Span>, f64), SampleError> {
     let (mut shortest, mut simulated_s): (Vec<Span>, f64) = (Vec::new(), 0.0);
     for _ in 0..REPETITIONS {
@@ -113,12 +115,12 @@ fn spans(scenario: &Scenario, key: RunKey, arm: &Arm) -> Result<(Vec<Span>, f64)
 
 /// Returns the sum of the times between two marks (s), and their number.
 fn sum(spans: &[Span], between: [Mark; 2]) -> (f64, f64) {
-    let of = spans.iter().filter(|span| span.between == between);
-    of.fold((0.0, 0.0), |(sum_s, count), span| (sum_s + span.time_s, count + 1.0))
+    let matching = spans.iter().filter(|span| span.between == between);
+    matching.fold((0.0, 0.0), |(sum_s, count), span| (sum_s + span.time_s, count + 1.0))
 }
 
-/// Returns the time of each stage in all runs. What happens after a collision of the ego, which then neither perceives nor acts, counts as
-/// physics steps.
+/// Returns the time of each stage in all runs. What happens after a collision of the ego, which
+/// then neither perceives nor acts, counts as physics steps.
 fn stages_of(spans: &[Span], simulated_s: f64) -> Stages {
     let mean_s = |(sum_s, count): (f64, f64)| if count > 0.0 { sum_s / count } else { 0.0 };
     let step = sum(spans, [Mark::Moved, Mark::Moved]);

@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 /// Duration of the runs in dense traffic (s).
 const TRAFFIC_S: f64 = 10.0;
-/// Distance between two vehicles of a lane in dense traffic (m): a time headway of 1.8 s at 30 m/s, bumper to bumper.
+/// Distance between two vehicles of a lane in dense traffic (m): a time headway of 1.8 s at 30 m/s,
+/// bumper to bumper.
 const SPACING_M: f64 = 60.0;
 
 /// Returns the text of a scenario with `vehicles` vehicles in three lanes, the ego in their middle.

@@ -1,12 +1,13 @@
-//! Writes the tables of `docs/evidence` that rest on outcomes of runs.
+//! Writes the tables of `docs/evidence` that depend on outcomes of runs.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- write-evidence
 //! cargo run --release -p closecall-xtask -- write-evidence twins --samples 10000
 //! ```
 //!
-//! Each section of a page stands between two markers, and everything else on the page stays as it is. A section names the
-//! commit, the date, the machine, the command, and the outcomes that it rests on: a test fails when the outcomes change.
+//! Each section of a page lies between two markers, and everything else on the page stays as it is.
+//! A section names the commit, the date, the machine, the command, and the outcomes that it depends
+//! on: a test fails when the outcomes change.
 
 pub(crate) mod page;
 mod printed;
@@ -27,7 +28,8 @@ pub(crate) struct Args {
     /// Number of samples of each campaign
     #[arg(short = 'n', long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
     samples: u64,
-    /// Number of samples of each member of the driver ensemble, of each scenario with surrounding traffic and of each fault
+    /// Number of samples of each member of the driver ensemble, of each scenario with surrounding
+    /// traffic and of each fault
     #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..))]
     member_samples: u64,
     /// Seed of the random numbers
@@ -35,7 +37,7 @@ pub(crate) struct Args {
     seed: u64,
 }
 
-/// Returns what a section has between its markers.
+/// Returns the text of a section between its markers.
 pub(crate) fn written(section: Section, size: Size) -> Result<String, Box<dyn Error>> {
     let table = match section {
         Section::Scenarios => scenarios::library(size),

@@ -11,7 +11,8 @@ use clap::ValueEnum;
 pub(crate) struct Size {
     /// Of each campaign.
     pub(crate) samples: u64,
-    /// Of each member of the driver ensemble, of each scenario with surrounding traffic, of each fault.
+    /// Of each member of the driver ensemble, of each scenario with surrounding traffic, of each
+    /// fault.
     pub(crate) member_samples: u64,
     pub(crate) seed: u64,
 }
@@ -19,7 +20,8 @@ pub(crate) struct Size {
 /// A section of a page, which stands between markers of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Section {
-    /// Every scenario with its own drivers and full sensors, and the agreement of the object-level sensors
+    /// Every scenario with its own drivers and full sensors, and the agreement of the object-level
+    /// sensors
     Scenarios,
     /// The driver ensemble with object-level sensors
     Ensemble,
@@ -106,7 +108,7 @@ pub(crate) fn root() -> PathBuf {
     if folder.ends_with("xtask") { folder.join("..") } else { folder.to_owned() }
 }
 
-/// Returns what a section has between its markers.
+/// Returns the text of a section between its markers.
 pub(crate) fn between_markers(page: &str, section: Section) -> Result<&str, String> {
     let [begin, end] = section.markers();
     let (_, after) = page.split_once(&begin).ok_or_else(|| format!("the page has no line `{begin}`"))?;
@@ -121,8 +123,8 @@ pub(crate) fn with_section(page: &str, section: Section, written: &str) -> Resul
     Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}\n\n{}\n\n{end}", written.trim_end()), 1))
 }
 
-/// Returns the outcomes that a section rests on, in a few digits: those of [`DIGESTS`], and with full sensors also the verdict of the
-/// headline that the README shows.
+/// Returns the outcomes that a section depends on, in a few digits: the outcomes of [`DIGESTS`],
+/// and with full sensors also the verdict of the headline that the README shows.
 pub(crate) fn outcomes(section: Section) -> Result<String, Box<dyn Error>> {
     let digests: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(root().join(DIGESTS))?)?;
     let mut hasher = blake3::Hasher::new();
@@ -148,7 +150,7 @@ pub(crate) fn provenance(section: Section, size: Size) -> Result<String, Box<dyn
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     let commit = printed("git", &["rev-parse", "--short", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
-    // What is not the program, such as these pages, may differ.
+    // Files outside the program, such as these pages, may differ.
     let changes = printed("git", &["status", "--porcelain", "--", "*.rs", "*.toml", "*.onnx", "Cargo.lock"]);
     let is_whole = changes.is_some_and(|changes| changes.is_empty());
     let commit = if is_whole { commit } else { format!("{commit}, modified") };

@@ -1,11 +1,12 @@
-//! Sections that are what a command prints.
+//! Sections that consist of a command's output.
 
 use std::error::Error;
 use std::process::Command;
 
 use super::page::{self, Size};
 
-/// Returns a command and what it prints, as blocks of Markdown. The program lies beside this one.
+/// Returns a command and its output, as blocks of Markdown. The program is in the folder of this
+/// program.
 fn printed(words: &[&str]) -> Result<String, Box<dyn Error>> {
     let program = std::env::current_exe()?.with_file_name("closecall");
     let output = Command::new(program).args(words).current_dir(page::root()).env("COLUMNS", "120").output()?;

@@ -36,7 +36,8 @@ const DISTRIBUTIONS: [Row; 9] = [
     Row { words: "cc1: 0.15 s", settings: &["rear-cc1-s=0.15"] },
 ];
 
-/// Scenarios in which nothing happens ahead: the twins of those with a hazard, and those that never had one.
+/// Scenarios in which nothing happens ahead: the twins of scenarios with a hazard, and scenarios
+/// that never had a hazard.
 pub(super) const TWINS: [&str; 10] = [
     "cut-in-into-margin-without-cut-in",
     "overtake-without-brake",
@@ -115,7 +116,8 @@ pub(super) fn slowing(size: Size) -> Result<String, Box<dyn Error>> {
     changes("lead vehicle", size, &[Row { words: "brakes to 20 m/s", settings }])
 }
 
-/// Every controller that ships, on the headline with object-level sensors: what it prevents, induces and costs.
+/// Every controller that ships, on the headline with object-level sensors: the collisions that it
+/// prevents and induces, and its costs.
 pub(super) fn arms(size: Size) -> Result<String, Box<dyn Error>> {
     let summary = run(vec![load(HEADLINE, &[])?], size, Some(SensorMode::Object), &ARMS)?;
     let (_, counts) = summary.scenarios.first().ok_or("a campaign without a scenario")?;
@@ -163,7 +165,8 @@ pub(super) fn twins(size: Size) -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// Every fault of the library, with the sensors that its scenario states, beside the headline without one.
+/// Every fault of the library, with the sensors that its scenario states, beside the headline
+/// without one.
 pub(super) fn faults(size: Size) -> Result<String, Box<dyn Error>> {
     let size = Size { samples: size.member_samples, ..size };
     let mut text = format!(

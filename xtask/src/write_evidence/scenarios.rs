@@ -1,4 +1,5 @@
-//! Every scenario of the library: in every arm, with every member of the driver ensemble, and in both sensor modes.
+//! Every scenario of the library: in every arm, with every member of the driver ensemble, and in
+//! both sensor modes.
 
 use std::error::Error;
 use std::fmt::Write;
@@ -27,7 +28,8 @@ const ARMS: [(&str, &str); 4] = [
     ("gap-1.6", "a constant gap of 1.6 s"),
 ];
 
-/// The member of the ensemble that has columns of its own: drivers who see only the vehicle directly ahead.
+/// The member of the ensemble that has columns of its own: drivers who see only the vehicle
+/// directly ahead.
 const NO_ANTICIPATION: &str = "anticipation-none";
 
 /// A scenario of the library, with the number of samples that its table rests on.
@@ -36,9 +38,9 @@ struct Entry {
     samples: u64,
 }
 
-/// Returns what the table of a section compares.
+/// Returns the description of the table of a section.
 fn head(sentence: &str) -> String {
-    let arms: Vec<String> = ARMS.iter().map(|(name, what)| format!(" `{name}` is {what}")).collect();
+    let arms: Vec<String> = ARMS.iter().map(|(name, meaning)| format!(" `{name}` is {meaning}")).collect();
     format!(
         "{sentence} All arms run on the same samples. Intervals are exact (Clopper-Pearson, 95 %). Shares of prevented \
          collisions refer to the collisions without the system, shares of induced collisions to all samples. Arms:{}.\n",
@@ -46,7 +48,8 @@ fn head(sentence: &str) -> String {
     )
 }
 
-/// Returns the table of the scenarios with their own drivers, and the agreement of the sensor modes.
+/// Returns the table of the scenarios with their own drivers, and the agreement of the sensor
+/// modes.
 pub(super) fn library(size: Size) -> Result<String, Box<dyn Error>> {
     let Size { samples, member_samples, seed } = size;
     let mut text = head(&format!(
@@ -114,7 +117,8 @@ pub(super) fn ensemble(size: Size) -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// Returns the scenarios of the library in alphabetical order; those with surrounding traffic come last.
+/// Returns the scenarios of the library in alphabetical order; scenarios with surrounding traffic
+/// come last.
 fn entries(size: Size) -> Result<Vec<Entry>, Box<dyn Error>> {
     let mut entries = Vec::new();
     for (folder, samples) in [("", size.samples), ("traffic", size.member_samples)] {
@@ -128,7 +132,8 @@ fn entries(size: Size) -> Result<Vec<Entry>, Box<dyn Error>> {
     Ok(entries)
 }
 
-/// Runs scenarios in arms, the baseline first; with the sensors of the scenario if `mode` is `None`.
+/// Runs scenarios in arms, the baseline first; with the sensors of the scenario if `mode` is
+/// `None`.
 pub(super) fn run(
     files: Vec<ScenarioFile>,
     size: Size,
@@ -151,10 +156,10 @@ fn ensemble_rows(summary: &Summary) -> String {
     let mut text = String::new();
     for (tested, arm) in summary.controllers.iter().enumerate().skip(1) {
         for verdict in verdicts_of_arm(summary, &[], tested) {
-            let of = |quantity: Quantity| verdict.spreads.iter().find(|spread| spread.quantity == quantity);
+            let spread_of = |quantity: Quantity| verdict.spreads.iter().find(|spread| spread.quantity == quantity);
             let mut cells = vec![format!("`{}`", verdict.scenario), format!("`{arm}`")];
             for quantity in [Quantity::Prevented, Quantity::Induced] {
-                let spread = of(quantity);
+                let spread = spread_of(quantity);
                 let unseen =
                     spread.and_then(|spread| spread.values.iter().find(|value| value.member == NO_ANTICIPATION));
                 cells.push(share_cell(spread.map(|spread| &spread.median), true));
@@ -162,10 +167,10 @@ fn ensemble_rows(summary: &Summary) -> String {
                 cells.push(share_cell(unseen, false));
             }
             let harm = |value: Option<&MemberValue>| {
-                value.map_or("-".to_owned(), |found| format!("{:+.5} `{}`", found.value, found.member))
+                value.map_or("-".to_owned(), |extreme| format!("{:+.5} `{}`", extreme.value, extreme.member))
             };
-            cells.push(harm(of(Quantity::HarmChange).map(|spread| &spread.median)));
-            cells.push(harm(of(Quantity::HarmChange).map(|spread| &spread.worst)));
+            cells.push(harm(spread_of(Quantity::HarmChange).map(|spread| &spread.median)));
+            cells.push(harm(spread_of(Quantity::HarmChange).map(|spread| &spread.worst)));
             text.push_str(&format!("| {} |\n", cells.join(" | ")));
         }
     }
@@ -194,10 +199,10 @@ fn rows_of(name: &str, samples: u64, summary: &Summary) -> Result<String, Box<dy
 }
 
 /// Returns a share in per cent with its exact interval.
-pub(super) fn share(summary: &Summary, hits: u64, of: u64) -> String {
-    match summary.inference.interval_95(hits, of) {
-        Some([low, high]) if of > 0 => {
-            let share = 100.0 * hits as f64 / of as f64;
+pub(super) fn share(summary: &Summary, hits: u64, total: u64) -> String {
+    match summary.inference.interval_95(hits, total) {
+        Some([low, high]) if total > 0 => {
+            let share = 100.0 * hits as f64 / total as f64;
             format!("{share:.1} % ({:.1} to {:.1})", 100.0 * low, 100.0 * high)
         }
         _ => "-".to_owned(),

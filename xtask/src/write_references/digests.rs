@@ -1,7 +1,8 @@
-//! Digests of the outcomes of every scenario of the library, with true tracks and with object-level sensors.
+//! Digests of the outcomes of every scenario of the library, with true tracks and with object-level
+//! sensors.
 //!
-//! They say whether a change moves an outcome by a bit. The mathematical functions have a digest of their own, so that it is seen if these
-//! are the cause, see `docs/explanation/determinism.md`.
+//! They show whether a change moves an outcome by a bit. A separate digest of the mathematical
+//! functions shows whether these are the cause, see `docs/explanation/determinism.md`.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -49,7 +50,8 @@ fn short(hasher: &blake3::Hasher) -> String {
 
 /// Returns the digest of the values of the mathematical functions.
 ///
-/// The arguments cover the sizes at which the simulation calls them: angles, speeds, distances and probabilities.
+/// The arguments cover the sizes at which the simulation calls them: angles, speeds, distances and
+/// probabilities.
 pub(crate) fn functions() -> String {
     let mut hasher = blake3::Hasher::new();
     for step in 1..=ARGUMENTS {
@@ -93,19 +95,20 @@ pub(crate) fn functions() -> String {
 }
 
 /// Adds the files of the scenarios below a folder.
-fn scenario_files(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>> {
+fn scenario_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         if path.is_dir() && !NO_SCENARIOS.iter().any(|name| path.ends_with(name)) {
-            scenario_files(&path, found)?;
+            scenario_files(&path, files)?;
         } else if path.extension().is_some_and(|end| end == "toml") {
-            found.push(path);
+            files.push(path);
         }
     }
     Ok(())
 }
 
-/// Returns the digest of the outcomes of a scenario's first samples with `seed` and these sensors. A sample without an outcome counts by its error.
+/// Returns the digest of the outcomes of a scenario's first samples with `seed` and these sensors.
+/// A sample without an outcome counts by its error.
 pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> Result<String, Box<dyn Error>> {
     let mut hasher = blake3::Hasher::new();
     let sampling = Sampling { seed, design: Design::Random, samples: SAMPLES };

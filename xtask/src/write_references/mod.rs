@@ -1,13 +1,15 @@
-//! Writes `docs/reference/scenario.md`, the reference of the scenario file, and `docs/evidence/determinism.json`, the digests of the library's outcomes.
+//! Writes `docs/reference/scenario.md`, the reference of the scenario file, and
+//! `docs/evidence/determinism.json`, the digests of the library's outcomes.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- write-references
 //! ```
 //!
-//! The tables, keys, types and descriptions come from the JSON Schema of the scenario file, and so from the doc comments
-//! of the configuration structs. The allowed ranges come from the checks themselves: `probe` sets each key of
-//! `docs/reference/scenario/every-key.toml` to a value that cannot be right and reads what the check says is needed. The examples
-//! are the values of that file. Tests fail if the committed files are not the ones that this program writes.
+//! The tables, keys, types and descriptions come from the JSON Schema of the scenario file, and so
+//! from the doc comments of the configuration structs. The allowed ranges come from the checks
+//! themselves: `probe` sets each key of `docs/reference/scenario/every-key.toml` to a wrong value,
+//! and reads the allowed values from the message of the check. The examples are the values of that
+//! file. Tests fail if the committed files differ from the files that this program writes.
 
 mod digests;
 mod files;

@@ -11,8 +11,8 @@ use super::probe::Probe;
 use super::schema::{Key, Kind, Step, Table, Way, tables};
 use super::text::Described;
 
-/// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear object-level sensor. A
-/// sensor without a default does not have the property.
+/// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear
+/// object-level sensor. A sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
     ("range-m", [Some(150.0), Some(14.0), Some(133.9)]),
     ("half-angle-deg", [Some(45.0), None, Some(66.5)]),
@@ -98,7 +98,7 @@ fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe
     let is_number = !table.is_choice && matches!(key.kind, Kind::Number { .. } | Kind::Either(_));
     let described = Described::new(&key.name, &key.description, is_number);
     let inner: Vec<Way> = table.ways.iter().map(|way| with(way, Step::Key(key.name.clone()))).collect();
-    let found = inner.iter().flat_map(|way| probe.values(way)).next();
+    let given = inner.iter().flat_map(|way| probe.values(way)).next();
     let value = value(key, &inner, all, probe);
     let meaning = described.meaning.replace('|', "\\|");
     if table.is_choice {
@@ -106,7 +106,7 @@ fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe
         return Ok(());
     }
     let unit = described.unit.as_deref().unwrap_or("");
-    let example = match found {
+    let example = match given {
         Some((_, example)) if is_short(&key.kind) => format!("`{example}`"),
         _ => String::new(),
     };
@@ -119,13 +119,13 @@ fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe
     Ok(())
 }
 
-/// What a key holds, and what is allowed there. `ways` are all of its places.
+/// The kind of a key's value, and the allowed values. `ways` are all of its places.
 fn value(key: &Key, ways: &[Way], all: &[Table], probe: &Probe) -> String {
     let way = &ways[0];
     let range = |is_whole| {
         let mut values = ways.iter().flat_map(|way| probe.values(way));
-        let found = values.find(|(_, value)| !value.is_array() && !value.is_table());
-        found.and_then(|(at, _)| probe.allowed(&at, is_whole))
+        let leaf = values.find(|(_, value)| !value.is_array() && !value.is_table());
+        leaf.and_then(|(at, _)| probe.allowed(&at, is_whole))
     };
     let ranged = |name: String, range: Option<String>| range.map_or(name.clone(), |range| format!("{name}, {range}"));
     match &key.kind {
@@ -178,7 +178,7 @@ fn plural(kind: &Kind) -> String {
     }
 }
 
-/// The default of a key: what its doc comment says, or what the schema says.
+/// The default of a key, from its doc comment or from the schema.
 fn default(key: &Key, stated: Option<String>) -> String {
     if key.required {
         return "required".to_owned();
@@ -199,7 +199,8 @@ fn default(key: &Key, stated: Option<String>) -> String {
     }
 }
 
-/// True if `key` is the key `name` of an object-level sensor: only there such keys have no default in the schema.
+/// True if `key` is the key `name` of an object-level sensor: only there such keys have no default
+/// in the schema.
 fn is_sensor_key(key: &Key, name: &str) -> bool {
     key.name == name && key.default.is_none()
 }
@@ -224,11 +225,11 @@ fn words(page: &mut String, table: &Table) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The anchor of the table at `way`, or of the first one below it.
+/// The anchor of the table at `way`, or of the first table below it.
 fn link(way: &Way, all: &[Table]) -> Option<String> {
-    let depth = |table: &&Table| table.ways.iter().filter(|known| known.starts_with(way)).map(Vec::len).min();
-    let found = all.iter().filter(|table| depth(table).is_some()).min_by_key(depth)?;
-    Some(format!("#{}", anchor(&found.ways[0])))
+    let depth = |table: &&Table| table.ways.iter().filter(|way_in| way_in.starts_with(way)).map(Vec::len).min();
+    let nearest = all.iter().filter(|table| depth(table).is_some()).min_by_key(depth)?;
+    Some(format!("#{}", anchor(&nearest.ways[0])))
 }
 
 fn with(way: &Way, step: Step) -> Way {

@@ -1,7 +1,7 @@
-//! What the checks of a scenario allow, asked of the checks themselves.
+//! The values that the checks of a scenario allow, read from the messages of the checks.
 //!
-//! The scenario that uses every key is changed in one place and checked again. A number far beyond any range is refused
-//! with the range that is allowed.
+//! The scenario that uses every key is changed in one place and checked again. The message about a
+//! number far beyond any range states the allowed range.
 
 use std::error::Error;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -16,7 +16,8 @@ use super::schema::Step;
 
 /// Larger than every number that a scenario allows.
 const HUGE: f64 = 1e300;
-/// The largest number of a distribution: a bound that only excludes what no quantity of a scenario can be.
+/// The largest number of a distribution: a bound that only excludes what no quantity of a scenario
+/// can be.
 const LIMIT: &str = "1000000000000";
 /// The largest number below 1: a bound that excludes 1.
 const BELOW_ONE: &str = "0.9999999999999999";
@@ -59,14 +60,14 @@ impl Probe {
 
     /// Returns the values at `way`, each with its path.
     pub(crate) fn values(&self, way: &[Step]) -> Vec<(KeyPath, Value)> {
-        let mut found = vec![(Vec::new(), Value::Table(self.table.clone()))];
+        let mut values = vec![(Vec::new(), Value::Table(self.table.clone()))];
         for step in way {
-            found = found.into_iter().flat_map(|(path, value)| step_into(step, path, value)).collect();
+            values = values.into_iter().flat_map(|(path, value)| step_into(step, path, value)).collect();
         }
-        found.into_iter().map(|(path, value)| (KeyPath(path), value)).collect()
+        values.into_iter().map(|(path, value)| (KeyPath(path), value)).collect()
     }
 
-    /// Returns what is allowed at `at`, or `None` if the check allows any number there.
+    /// Returns the allowed values at `at`, or `None` if the check allows any number there.
     pub(crate) fn allowed(&self, at: &KeyPath, is_whole: bool) -> Option<String> {
         let wrong =
             if is_whole { [Value::Integer(255), Value::Integer(0)] } else { [Value::Float(-HUGE), Value::Float(HUGE)] };
@@ -91,7 +92,8 @@ impl Probe {
         Ok(file)
     }
 
-    /// Returns the scenario with another value at `at`, or with none; `None` if there is no such place.
+    /// Returns the scenario with another value at `at`, or with none; `None` if there is no such
+    /// place.
     pub(crate) fn with(&self, at: &KeyPath, value: Option<Value>) -> Option<Table> {
         let mut root = Value::Table(self.table.clone());
         let (last, way) = at.0.split_last()?;

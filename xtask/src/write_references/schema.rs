@@ -16,12 +16,12 @@ pub(crate) enum Step {
 /// A path from the root of the file.
 pub(crate) type Way = Vec<Step>;
 
-/// What a key holds.
+/// The kind of a key's value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Kind {
-    /// A number; `sampled` if `"$name"` may stand for it.
+    /// A number; `sampled` if a parameter `"$name"` may give it.
     Number {
-        /// True if a parameter may stand for it.
+        /// True if a parameter may give it.
         sampled: bool,
     },
     /// A whole number.
@@ -30,11 +30,12 @@ pub(crate) enum Kind {
     Flag,
     /// Text.
     Text,
-    /// One of several words, each with its description; `sampled` if `"$name"` may stand for it.
+    /// One of several words, each with its description; `sampled` if a parameter `"$name"` may give
+    /// it.
     Word {
         /// The words, each with its description.
         words: Vec<(String, String)>,
-        /// True if a parameter may stand for it.
+        /// True if a parameter may give it.
         sampled: bool,
     },
     /// A list.
@@ -60,7 +61,7 @@ pub(crate) struct Key {
     pub(crate) required: bool,
     /// The schema's default, if it has one.
     pub(crate) default: Option<Value>,
-    /// What it holds.
+    /// The kind of its value.
     pub(crate) kind: Kind,
 }
 
@@ -79,7 +80,8 @@ pub(crate) struct Table {
     pub(crate) keys: Vec<Key>,
 }
 
-/// Returns all tables, each before those in it. `order` gives the position of a key among its neighbours.
+/// Returns all tables, each before its inner tables. `order` gives the position of a key among its
+/// neighbours.
 pub(crate) fn tables(schema: &Value, order: &dyn Fn(&str) -> usize) -> Vec<Table> {
     let mut reader = Reader { definitions: &schema["$defs"], order, tables: Vec::new() };
     reader.visit(schema, String::new(), Vec::new());
@@ -93,17 +95,17 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Adds the table that `schema` defines, and those in it.
+    /// Adds the table that `schema` defines, and its inner tables.
     fn visit(&mut self, schema: &'a Value, definition: String, way: Way) {
-        if let Some(known) =
+        if let Some(table) =
             self.tables.iter_mut().find(|table| !definition.is_empty() && table.definition == definition)
         {
-            known.ways.push(way);
+            table.ways.push(way);
             return;
         }
         let (mut properties, is_choice) = properties(schema);
         properties.sort_by_key(|property| (self.order)(property.name));
-        // A choice of one is no choice: what it holds stands in a section of its own.
+        // A choice of one kind is no choice: its content gets its own section.
         if !is_choice || properties.len() > 1 {
             let keys = properties.iter().map(|property| self.key(property)).collect();
             let (ways, description) = (vec![way.clone()], description(schema));
@@ -164,13 +166,15 @@ impl<'a> Reader<'a> {
             return Kind::Table;
         }
         let words: Vec<_> = alternatives(schema)
-            .filter_map(|one| Some((one["const"].as_str()?.to_owned(), description(one))))
+            .filter_map(|alternative| Some((alternative["const"].as_str()?.to_owned(), description(alternative))))
             .collect();
         if !words.is_empty() {
             return Kind::Word { words, sampled: false };
         }
-        let kinds: Vec<Kind> =
-            alternatives(schema).filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
+        let kinds: Vec<Kind> = alternatives(schema)
+            .filter(|alternative| alternative["type"] != "null")
+            .map(|alternative| self.kind(alternative))
+            .collect();
         match &kinds[..] {
             [] => self.plain_kind(schema),
             [only] => only.clone(),
@@ -182,8 +186,8 @@ impl<'a> Reader<'a> {
 
     fn plain_kind(&self, schema: &'a Value) -> Kind {
         let is = |name: &str| match &schema["type"] {
-            Value::Array(types) => types.iter().any(|one| one == name),
-            one => one == name,
+            Value::Array(types) => types.iter().any(|kind| kind == name),
+            kind => kind == name,
         };
         if is("array") {
             let element = Box::new(self.kind(&schema["items"]));
@@ -214,15 +218,16 @@ struct Property<'a> {
     name: &'a str,
     schema: &'a Value,
     required: bool,
-    /// The variant that the key stands for, in a tagged enumeration.
+    /// The variant that the key names, in a tagged enumeration.
     variant: Option<&'a Value>,
 }
 
-/// The keys of an object, or of the single-key objects of a tagged enumeration; and whether it is an enumeration.
+/// The keys of an object, or of the single-key objects of a tagged enumeration; and whether it is
+/// an enumeration.
 fn properties(schema: &Value) -> (Vec<Property<'_>>, bool) {
     if let Some(properties) = schema["properties"].as_object() {
         let is_required =
-            |name: &str| schema["required"].as_array().is_some_and(|all| all.iter().any(|one| one == name));
+            |name: &str| schema["required"].as_array().is_some_and(|all| all.iter().any(|required| required == name));
         let property = |(name, schema)| Property { name, schema, required: is_required(name), variant: None };
         return (properties.iter().map(|(name, schema)| property((name.as_str(), schema))).collect(), false);
     }

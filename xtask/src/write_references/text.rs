@@ -1,10 +1,10 @@
-//! What a doc comment says beside the meaning of a key: its unit and its default.
+//! The unit and the default of a key, which a doc comment states beside the meaning.
 
 /// The units that doc comments put into brackets.
 const UNITS: [&str; 15] =
     ["m/s³", "m/s²", "m/s", "rad/s", "10⁻⁴ rad/s", "1/m", "mm/h", "mm", "m", "s", "rad", "deg", "kg", "EV", "0 to 1"];
 
-/// The ends of keys, longer ones first where one ends in another, and their units.
+/// The ends of keys with their units. If one end is the end of another, the longer stands first.
 const ENDS: [(&str, &str); 12] = [
     ("-mm-per-h", "mm/h"),
     ("-per-m", "1/m"),
@@ -20,7 +20,7 @@ const ENDS: [(&str, &str); 12] = [
     ("-s", "s"),
 ];
 
-/// What the page itself says of everything on it.
+/// Phrases that the page itself says about all of its keys.
 const SELF_EVIDENT: [&str; 6] = [
     ", as a scenario file describes them",
     ", as a scenario file describes it",
@@ -33,7 +33,7 @@ const SELF_EVIDENT: [&str; 6] = [
 /// A doc comment, taken apart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Described {
-    /// What the key means.
+    /// The meaning of the key.
     pub(crate) meaning: String,
     /// Its unit.
     pub(crate) unit: Option<String>,
@@ -42,14 +42,15 @@ pub(crate) struct Described {
 }
 
 impl Described {
-    /// Takes a doc comment of the key `name` apart. `is_number` says whether the key has a unit of its own.
+    /// Takes a doc comment of the key `name` apart. `is_number` says whether the key has a unit of
+    /// its own.
     pub(crate) fn new(name: &str, description: &str, is_number: bool) -> Self {
         let mut plain = description.replace("[`", "`").replace("`]", "`");
         for phrase in SELF_EVIDENT {
             plain = plain.replace(phrase, "");
         }
         let (meaning, default) = match default_in(&plain) {
-            Some(found) => (found.rest, Some(found.value)),
+            Some(split) => (split.rest, Some(split.value)),
             None => (plain, None),
         };
         let by_name = ENDS.iter().find(|(end, _)| is_number && name.ends_with(end)).map(|(_, unit)| (*unit).to_owned());
@@ -65,7 +66,7 @@ impl Described {
 
 /// A default that a doc comment states, and the comment without it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Found {
+pub(crate) struct StatedDefault {
     /// The default.
     pub(crate) value: String,
     /// The rest of the comment.
@@ -73,18 +74,18 @@ pub(crate) struct Found {
 }
 
 /// Finds the default in a doc comment, which says `; 3 if absent.` or `Default: 3.`
-pub(crate) fn default_in(text: &str) -> Option<Found> {
+pub(crate) fn default_in(text: &str) -> Option<StatedDefault> {
     if let Some((before, after)) = text.split_once("Default: ") {
         let end = after.find(". ").unwrap_or(after.len());
         let value = after[..end].trim_end_matches('.').to_owned();
         let rest = format!("{} {}", before.trim_end(), after[end..].trim_start_matches('.').trim_start());
-        return Some(Found { value, rest: rest.trim_end().to_owned() });
+        return Some(StatedDefault { value, rest: rest.trim_end().to_owned() });
     }
     for end in [" if absent", " where absent", " by default"] {
         if let Some((before, after)) = text.split_once(end)
             && let Some((meaning, value)) = before.rsplit_once("; ")
         {
-            return Some(Found { value: value.to_owned(), rest: format!("{meaning}{after}") });
+            return Some(StatedDefault { value: value.to_owned(), rest: format!("{meaning}{after}") });
         }
     }
     None

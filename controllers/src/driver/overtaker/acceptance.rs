@@ -2,20 +2,22 @@
 
 use crate::driver::perception::{PerceivedLane, PerceivedVehicle};
 
-/// Smallest gap to a follower that a driver accepts, whatever its speed (m): an assumption; 0.5 (the default of Vissim) to
-/// 5 are plausible.
+/// Smallest gap to a follower that a driver accepts, whatever its speed (m): an assumption; 0.5
+/// (the default of Vissim) to 5 are plausible.
 const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 
 /// Time headway left to a follower in the passing lane (s): an assumption; 0 to 1 are plausible.
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// Least gain of speed for which a driver overtakes: by which the own desired speed, and the speed of a lead vehicle in the
-/// passing lane, must exceed the speed of the vehicle to overtake (m/s): an assumption; 0.5 to 2.8 are plausible. German law
-/// asks for a speed that is *substantially higher* (StVO § 5 (2)); courts take 10 km/h for trucks (OLG Hamm, 4 Ss OWi 629/08).
+/// Least gain of speed for which a driver overtakes (m/s). The own desired speed and the speed of a
+/// lead vehicle in the passing lane must both exceed the speed of the vehicle to overtake by this
+/// amount. An assumption; 0.5 to 2.8 are plausible. German law asks for a speed that is
+/// *substantially higher* (StVO § 5 (2)); courts take 10 km/h for trucks (OLG Hamm, 4 Ss OWi
+/// 629/08).
 pub(super) const MIN_GAIN_MPS: f64 = 1.0;
 
-/// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far ahead to matter: an
-/// assumption; 0.1 to 0.5 are plausible.
+/// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far
+/// ahead to matter: an assumption; 0.1 to 0.5 are plausible.
 const IRRELEVANT_LEAD_BRAKING_SHARE: f64 = 0.25;
 
 /// Braking that an overtaking driver accepts, of itself and of the follower in the adjacent lane.
@@ -30,12 +32,14 @@ pub(super) struct Tolerance {
 }
 
 impl Tolerance {
-    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s²: half of the limit of MOBIL's safety
-    /// criterion, 4 m/s² (Kesting, Treiber and Helbing, Transportation Research Record 1999 (2007) 86–94). The half is an
-    /// assumption, as is the own braking; Vissim's defaults are 1 to 4 m/s².
+    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s²: half of the limit
+    /// of MOBIL's safety criterion, 4 m/s² (Kesting, Treiber and Helbing, Transportation Research
+    /// Record 1999 (2007) 86–94). The half is an assumption, as is the own braking; Vissim's
+    /// defaults are 1 to 4 m/s².
     pub(super) const TO_START: Self =
         Self { own_mps2: 1.0, follower_mps2: 2.0, follower_headway_s: FOLLOWER_HEADWAY_S };
-    /// Tolerance for continuing after pulling out: MOBIL's limit itself. The own braking is an assumption.
+    /// Tolerance for continuing after pulling out: MOBIL's limit itself. The own braking is an
+    /// assumption.
     pub(super) const TO_CONTINUE: Self =
         Self { own_mps2: 3.0, follower_mps2: 4.0, follower_headway_s: FOLLOWER_HEADWAY_S };
 }
@@ -76,8 +80,8 @@ impl GapAcceptance {
         room_m > 0.0 && closing_mps * closing_mps <= 2.0 * room_m * self.tolerance.own_mps2
     }
 
-    /// Returns true if the change gains speed: the lead vehicle in the lane is faster than the vehicle to overtake, or
-    /// so far ahead that it does not matter.
+    /// Returns true if the change gains speed: the lead vehicle in the lane is faster than the
+    /// vehicle to overtake, or so far ahead that it does not matter.
     fn gains_speed(&self, vehicle: &PerceivedVehicle) -> bool {
         let (room_m, closing_mps) = self.room_and_closing(vehicle);
         vehicle.lead.speed_mps >= self.overtaken_mps + MIN_GAIN_MPS

@@ -13,17 +13,19 @@ use crate::driver::pedals::check_brake_build_up;
 use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
 use crate::driver::reaction::{Reaction, ReactionChange, ReactionConfig};
 
-/// Default duration of a whole lane change (s): the mean of 7,192 single lane changes of commuters, with a standard
-/// deviation of 2.0 s (Lee, Olsen and Wierwille, *A Comprehensive Examination of Naturalistic Lane-Changes*, DOT HS 809
-/// 702, 2004). Range for an ensemble: 3 to 10.
+/// Default duration of a whole lane change (s): the mean of 7,192 single lane changes of commuters,
+/// with a standard deviation of 2.0 s (Lee, Olsen and Wierwille, *A Comprehensive Examination of
+/// Naturalistic Lane-Changes*, DOT HS 809 702, 2004). Range for an ensemble: 3 to 10.
 const DEFAULT_DURATION_S: f64 = 6.3;
 
-/// Default lateral acceleration that a driver accepts in evasive steering, to be clear earlier (m/s²).
+/// Default lateral acceleration that a driver accepts in evasive steering, to be clear earlier
+/// (m/s²).
 ///
-/// The mean of 61 drivers who steered around an obstacle that appeared without warning at 80 km/h, with a standard
-/// deviation of 1.4 m/s² (Weir and McRuer 1976, SAE 766060, as quoted at mfes.com/avoidance.html). Range for an ensemble:
-/// 1 to 4.5, and 0 for drivers who only brake. In an emergency, drivers brake more often than they steer (Adams, *Review
-/// of the literature on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994); no source for the
+/// The mean of 61 drivers who steered around an obstacle that appeared without warning at 80 km/h,
+/// with a standard deviation of 1.4 m/s² (Weir and McRuer 1976, SAE 766060, as quoted at
+/// mfes.com/avoidance.html). Range for an ensemble: 1 to 4.5, and 0 for drivers who only brake. In
+/// an emergency, drivers brake more often than they steer (Adams, *Review of the literature on
+/// obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994); no source for the
 /// share was found. The plant limits the steering to half of the friction, 4.4 m/s² on a dry road.
 const DEFAULT_EVASIVE_LATERAL_MPS2: f64 = 4.3;
 
@@ -31,19 +33,19 @@ const DEFAULT_EVASIVE_LATERAL_MPS2: f64 = 4.3;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct OvertakerConfig {
-    /// Time headway to the vehicle ahead when the centre of the driver's vehicle crosses the lane marking (s): 0 to 5. A
-    /// driver whose safe gap cc0 + cc1·v is larger pulls out earlier, so as to keep that gap. With 0, the safe gap alone
-    /// decides.
+    /// Time headway to the vehicle ahead when the centre of the driver's vehicle crosses the lane
+    /// marking (s): 0 to 5. A driver whose safe gap cc0 + cc1·v is larger pulls out earlier, so as
+    /// to keep that gap. With 0, the safe gap alone decides.
     pub cut_out_thw_s: Num,
-    /// Car-following model while the driver cannot overtake. Its safe gap is also the smallest gap that the driver
-    /// accepts while pulling out.
+    /// Car-following model while the driver cannot overtake. Its safe gap is also the smallest gap
+    /// that the driver accepts while pulling out.
     pub follow: FollowConfig,
     /// Reaction time (s).
     pub reaction_s: ReactionConfig,
     /// Duration of the whole lane change (s). Default: 6.3.
     pub lane_change_duration_s: Option<Num>,
-    /// Lateral acceleration accepted in evasive steering, to be clear earlier than planned (m/s²): 0 to 8.
-    /// Default: 4.3. With 0, the driver only brakes.
+    /// Lateral acceleration accepted in evasive steering, to be clear earlier than planned (m/s²):
+    /// 0 to 8. Default: 4.3. With 0, the driver only brakes.
     pub evasive_lateral_mps2: Option<Num>,
     /// Lapses of attention. Default: none.
     pub lapse: Option<LapseConfig>,

@@ -1,10 +1,11 @@
-//! Conflict with the vehicle ahead: whether the present course hits it before the two are laterally clear, and which
-//! deceleration prevents that.
+//! Conflict with the vehicle ahead: whether the present course hits it before the two are laterally
+//! clear, and which deceleration prevents that.
 //!
-//! A lane change is a path along the road, so that braking does not shorten the distance D that the driver covers until
-//! the two are laterally clear. In the same time, the vehicle ahead, at speed v_l and deceleration a_l, must cover
-//! X = D − gap + minimum gap. It needs the time t = (v_l − √(v_l² − 2·a_l·X))/a_l. In order not to arrive earlier, the
-//! driver at speed v must brake with b = 2·(v·t − D)/t². If the vehicle ahead stops short of X, or the gap has its
+//! A lane change is a path along the road. Braking therefore does not shorten the distance D that
+//! the driver covers until the two vehicles are laterally clear. In the same time, the vehicle
+//! ahead, at speed v_l and deceleration a_l, must cover X = D − gap + minimum gap. It needs the
+//! time t = (v_l − √(v_l² − 2·a_l·X))/a_l. In order not to arrive earlier, the driver at speed v
+//! must brake with b = 2·(v·t − D)/t². If the vehicle ahead stops short of X, or the gap has its
 //! minimum before the driver is clear, the driver must brake so as to stay behind.
 
 use crate::braking::Behind;
@@ -40,7 +41,8 @@ impl Course {
         }
     }
 
-    /// Returns the time headway after the distance `distance_m` at the constant deceleration `slowing_mps2` ≥ 0 (s).
+    /// Returns the time headway after the distance `distance_m` at the constant deceleration
+    /// `slowing_mps2` ≥ 0 (s).
     pub(super) fn thw_after_s(&self, distance_m: f64, slowing_mps2: f64) -> f64 {
         let square = self.speed_mps * self.speed_mps - 2.0 * slowing_mps2 * distance_m;
         let then_mps = square.max(STANDING_MPS * STANDING_MPS).sqrt();
@@ -54,14 +56,16 @@ impl Course {
         self.lead.gap_m + self.lead_distance_m(time_s) - distance_m
     }
 
-    /// Returns true if the driver may accelerate at `acceleration_mps2` until it is clear, without having to brake then.
+    /// Returns true if the driver may accelerate at `acceleration_mps2` until it is clear, without
+    /// having to brake then.
     pub(super) fn allows(&self, acceleration_mps2: f64) -> bool {
         let time_s = self.distance_to_clear_m.max(0.0) / self.speed_mps.max(STANDING_MPS);
         let faster = Self { speed_mps: self.speed_mps + acceleration_mps2.max(0.0) * time_s, ..*self };
         faster.required_braking_mps2() <= 0.0
     }
 
-    /// Returns the deceleration that keeps the minimum gap until the driver is clear (m/s²), 0 if none is required.
+    /// Returns the deceleration that keeps the minimum gap until the driver is clear (m/s²), 0 if
+    /// none is required.
     pub(super) fn required_braking_mps2(&self) -> f64 {
         let lead_distance_m = self.distance_to_clear_m - self.lead.gap_m + self.min_gap_m;
         if !(self.distance_to_clear_m > 0.0) || lead_distance_m <= 0.0 {
@@ -128,14 +132,15 @@ mod tests {
     fn slowing_down_increases_the_time_headway_after_a_distance() {
         let course = course(20.0, 40.0, 30.0, 0.0, 40.0);
         assert!((course.thw_after_s(40.0, 0.0) - 10.0 / 40.0).abs() < 1e-12);
-        // 40 m from 40 m/s at 3.75 m/s² end at √1300 = 36.056 m/s after 1.0518 s, in which the lead vehicle drives
-        // 31.55 m.
+        // 40 m from 40 m/s at 3.75 m/s² end at √1300 = 36.056 m/s after 1.0518 s, in which the lead
+        // vehicle drives 31.55 m.
         let expected_s = (20.0 + 30.0 * 80.0 / (40.0 + 1300.0_f64.sqrt()) - 40.0) / 1300.0_f64.sqrt();
         assert!((course.thw_after_s(40.0, 3.75) - expected_s).abs() < 1e-12);
     }
 
     proptest! {
-        /// The required braking keeps the minimum gap until the driver is clear; checked by stepping both vehicles.
+        /// The required braking keeps the minimum gap until the driver is clear; checked by
+        /// stepping both vehicles.
         #[test]
         fn the_required_braking_suffices(
             gap in 3.0..60.0, speed in 20.0..45.0, slower in 0.0..15.0_f64, braking in 0.0..8.0_f64, distance in 1.0..150.0,
@@ -143,12 +148,12 @@ mod tests {
             let course = course(gap, speed, speed - slower, -braking, distance);
             let required_mps2 = course.required_braking_mps2();
             prop_assume!(required_mps2 <= 30.0);
-            let (step, mut own, mut lead) = (1e-3, (0.0, speed), (gap, speed - slower));
+            let (step, mut follower, mut lead) = (1e-3, (0.0, speed), (gap, speed - slower));
             let mut least = gap;
-            while own.0 < distance && own.1 > 0.0 {
-                own = (own.0 + own.1 * step, (own.1 - required_mps2 * step).max(0.0));
+            while follower.0 < distance && follower.1 > 0.0 {
+                follower = (follower.0 + follower.1 * step, (follower.1 - required_mps2 * step).max(0.0));
                 lead = (lead.0 + lead.1 * step, f64::max(lead.1 - braking * step, 0.0));
-                least = f64::min(least, lead.0 - own.0);
+                least = f64::min(least, lead.0 - follower.0);
             }
             prop_assert!(least > 1.5 - 0.2, "{least} with {required_mps2}");
         }

@@ -15,22 +15,26 @@ use crate::driver::{
     BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Looks, check_finite, finite,
 };
 
-/// Required braking below which an overtaking driver does not brake (m/s²): an assumption; 0 to 0.5 are plausible.
+/// Required braking below which an overtaking driver does not brake (m/s²): an assumption; 0 to 0.5
+/// are plausible.
 const TOLERATED_BRAKING_MPS2: f64 = 0.1;
 
-/// Lateral distance between two boxes from which they count as clear (m): an assumption; 0 to 0.5 are plausible.
+/// Lateral distance between two boxes from which they count as clear (m): an assumption; 0 to 0.5
+/// are plausible.
 const LATERAL_CLEARANCE_M: f64 = 0.1;
 
-/// Time before pulling out from which a driver signals (s): an assumption. Drivers signal in 64 % of lane changes, some
-/// only after the change has begun (Lee, Olsen and Wierwille, *A Comprehensive Examination of Naturalistic Lane-Changes*,
-/// DOT HS 809 702, 2004).
+/// Time before pulling out from which a driver signals (s): an assumption. Drivers signal in 64 %
+/// of lane changes, some only after the change has begun (Lee, Olsen and Wierwille, *A
+/// Comprehensive Examination of Naturalistic Lane-Changes*, DOT HS 809 702, 2004).
 const SIGNALLING_TIME_S: f64 = 2.0;
 
-/// Duration of the change back to the original lane after an abort (s): an assumption; 2 to 5 are plausible.
+/// Duration of the change back to the original lane after an abort (s): an assumption; 2 to 5 are
+/// plausible.
 const ABORT_DURATION_S: f64 = 3.0;
 
-/// Required braking above which a driver steers more sharply than planned, to be clear earlier (m/s²): an assumption; 2
-/// to 5 are plausible. Drivers who steer begin later than drivers who brake: 1.5 s after the event (Summala 1981).
+/// Required braking above which a driver steers more sharply than planned, to be clear earlier
+/// (m/s²): an assumption; 2 to 5 are plausible. Drivers who steer begin later than drivers who
+/// brake: 1.5 s after the event (Summala 1981).
 const EVASIVE_STEERING_FROM_MPS2: f64 = 3.0;
 
 /// Phase of the overtaking manoeuvre.
@@ -159,17 +163,18 @@ impl Step<'_> {
         Indicator::towards(self.side)
     }
 
-    /// Returns the perceived vehicle ahead, unless it is the overtaken one beside the driver's path: a vehicle observed
-    /// ahead one reaction time ago, in the original lane, may have been passed since. The next vehicle in the path then
-    /// takes its place. An overtaken vehicle that comes into the driver's path is an ordinary lead vehicle.
+    /// Returns the perceived vehicle ahead, unless it is the overtaken vehicle beside the driver's
+    /// path: the driver may have passed a vehicle that was ahead in the original lane one reaction
+    /// time ago. The next vehicle in the path then takes its place. An overtaken vehicle that comes
+    /// into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
         let is_meant = |ahead: &&PerceivedVehicle| Some(ahead.actor) != overtaken || ahead.is_in_path(self.input);
         let beyond = self.scene.beyond.as_ref().filter(|beyond| beyond.is_in_path(self.input));
         self.scene.ahead.as_ref().filter(is_meant).or(beyond)
     }
 
-    /// Returns the perceived lead vehicle in the passing lane, in which the driver is by now. One reaction time ago that lane may
-    /// have been the adjacent one.
+    /// Returns the perceived lead vehicle in the passing lane, in which the driver is by now. One
+    /// reaction time ago that lane may have been the adjacent lane.
     fn lead_in_passing_lane(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
         let lane = self.input.road.lane_at(self.input.own.d_m);
         if self.input.road.beside(self.scene.lane, self.side) == Some(lane) {
@@ -179,8 +184,8 @@ impl Step<'_> {
         }
     }
 
-    /// Returns the vehicle that is being overtaken: the nearest one ahead in the original lane `origin`. If the first one leaves
-    /// that lane as well, it is the next one.
+    /// Returns the overtaken vehicle: the nearest vehicle ahead in the original lane `origin`. If
+    /// the first vehicle leaves that lane as well, it is the next vehicle.
     fn overtaken_in(&self, origin: Lane) -> Option<&PerceivedVehicle> {
         let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
         leaders.find(|leader| self.input.road.lane_at(leader.d_m) == origin)
@@ -220,15 +225,16 @@ impl Step<'_> {
         path::longitudinal_share((apart_m + self.lateral_from_start_m(change, ahead.d_m)) / change.lateral_distance_m)
     }
 
-    /// Returns the share of the length at which the centre of the driver's vehicle crosses the lane marking.
+    /// Returns the share of the length at which the centre of the driver's vehicle crosses the lane
+    /// marking.
     fn crossing_at(&self, change: &Change) -> f64 {
         let road = self.input.road;
         let marking_m = 0.5 * (road.lane_centre_m(change.origin) + road.lane_centre_m(change.target));
         path::longitudinal_share(self.lateral_from_start_m(change, marking_m) / change.lateral_distance_m)
     }
 
-    /// Returns the lateral distance from the start of a change to `d_m`, positive towards its target (m), for a driver
-    /// who keeps the present deviation from the intended path.
+    /// Returns the lateral distance from the start of a change to `d_m`, positive towards its
+    /// target (m), for a driver who keeps the present deviation from the intended path.
     fn lateral_from_start_m(&self, change: &Change, d_m: f64) -> f64 {
         let to_the_left_m = d_m - change.start_d_m - self.input.lateral_deviation_m;
         match self.side {
@@ -239,7 +245,8 @@ impl Step<'_> {
 }
 
 impl OvertakerDriver {
-    /// Keeps the speed and pulls out in time, if the passing lane is free; follows the vehicle ahead otherwise.
+    /// Keeps the speed and pulls out in time, if the passing lane is free; follows the vehicle
+    /// ahead otherwise.
     fn approach(&mut self, step: &Step<'_>) -> DriverAction {
         let origin = step.input.road.lane_at(step.input.own.d_m);
         let target = step.input.road.beside(origin, step.side);
@@ -278,14 +285,14 @@ impl OvertakerDriver {
 
     /// Continues the lane change to the passing lane, or aborts it.
     fn continue_change(&mut self, step: &Step<'_>, mut change: Change) -> DriverAction {
-        let own = step.input.own;
-        let in_target_lane = step.input.road.lane_at(own.d_m) == change.target;
+        let ego = step.input.own;
+        let in_target_lane = step.input.road.lane_at(ego.d_m) == change.target;
         let overtaken = step.overtaken_in(change.origin);
         if let Some(ahead) = overtaken {
             change.overtaken = Some(ahead.actor);
             change.clear_at = step.clear_at(&change, ahead);
         }
-        let distance_to_clear_m = change.distance_to_clear_m(own.s_m);
+        let distance_to_clear_m = change.distance_to_clear_m(ego.s_m);
         if in_target_lane && distance_to_clear_m <= 0.0 {
             self.phase = Phase::Overtaking { overtaken: change.overtaken };
             return self.overtake(step, change.overtaken);
@@ -307,7 +314,7 @@ impl OvertakerDriver {
             if !change.evasive && course.required_braking_mps2() > EVASIVE_STEERING_FROM_MPS2 {
                 action.lane_change = evade(step, &mut change, ahead, &self.settings);
             }
-            let course = self.course(step, ahead, change.distance_to_clear_m(own.s_m));
+            let course = self.course(step, ahead, change.distance_to_clear_m(ego.s_m));
             let kept_mps2 = if course.allows(requested_mps2) { requested_mps2 } else { requested_mps2.min(0.0) };
             action.acceleration_mps2 = self.limited_by_course_mps2(kept_mps2, &course);
         }
@@ -315,8 +322,9 @@ impl OvertakerDriver {
         action
     }
 
-    /// Follows the nearer of the vehicles ahead, in the driver's lane and in the original one, until the driver is back there: its
-    /// centre may swing into the passing lane before it turns back.
+    /// Follows the nearer of the vehicles ahead, in the driver's lane and in the original one,
+    /// until the driver is back there: its centre may swing into the passing lane before it turns
+    /// back.
     fn abort(&mut self, step: &Step<'_>, origin: Lane) -> DriverAction {
         if step.input.lane_change_target != Some(origin) {
             self.phase = Phase::Approaching;
@@ -372,9 +380,10 @@ impl OvertakerDriver {
         self.model.acceleration_mps2(step.speed_mps, step.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
     }
 
-    /// Returns true if the driver turns back: if the change asks for more braking than it tolerates, and the gap to the vehicle that
-    /// it overtakes still allows it. A gap in the passing lane that is shorter than the preferred headway is no reason, nor is a
-    /// gain of speed that turns out small.
+    /// Returns true if the driver turns back: if the change asks for more braking than it
+    /// tolerates, and the gap to the vehicle that it overtakes still allows it. A gap in the
+    /// passing lane that is shorter than the preferred headway is no reason, nor is a gain of speed
+    /// that turns out small.
     fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
         let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
         let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE);
@@ -400,7 +409,8 @@ impl OvertakerDriver {
         Course { speed_mps: step.speed_mps, lead: ahead.lead, distance_to_clear_m, min_gap_m }
     }
 
-    /// Returns `requested_mps2`, lowered to the braking that the course requires (with a margin) if it exceeds that.
+    /// Returns `requested_mps2`, lowered to the braking that the course requires (with a margin) if
+    /// it exceeds that.
     fn limited_by_course_mps2(&self, requested_mps2: f64, course: &Course) -> f64 {
         let required_mps2 = course.required_braking_mps2();
         if required_mps2 > TOLERATED_BRAKING_MPS2 {
@@ -412,11 +422,13 @@ impl OvertakerDriver {
     }
 }
 
-/// Replaces `change` by one with evasive steering and returns its command, or `None` if it is not sharper than planned.
+/// Replaces `change` by one with evasive steering and returns its command, or `None` if it is not
+/// sharper than planned.
 fn evade(step: &Step<'_>, change: &mut Change, ahead: &PerceivedVehicle, settings: &Overtaker) -> Option<LaneChange> {
     let duration_s =
         (MINIMUM_JERK_PEAK * step.lateral_distance_m(change.target) / settings.evasive_lateral_mps2).sqrt();
-    // Written so that a lateral acceleration of zero, for which the duration is infinite, means no sharper steering.
+    // Written so that a lateral acceleration of zero, for which the duration is infinite, means no
+    // sharper steering.
     if !(duration_s < settings.duration_s) {
         return None;
     }
@@ -445,8 +457,9 @@ mod tests {
     use crate::driver::testing::{car_ahead, overtaker_config, with_input};
     use crate::driver::{LaneNeighbours, Lead, Neighbour, Neighbours};
 
-    /// Returns the actions of a driver at 30 m/s in its first seconds, 14 m behind a vehicle at `lead_mps` and with a free
-    /// passing lane. The vehicle shows its brake light, though it keeps its speed, once the driver has pulled out.
+    /// Returns the actions of a driver at 30 m/s in its first seconds, 14 m behind a vehicle at
+    /// `lead_mps` and with a free passing lane. The vehicle shows its brake light, though it keeps
+    /// its speed, once the driver has pulled out.
     fn actions(lead_mps: f64) -> Vec<DriverAction> {
         let mut driver = overtaker_config(0.5, 0.05).check(&Parameters::default()).unwrap().driver();
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
@@ -469,7 +482,8 @@ mod tests {
 
     #[test]
     fn a_driver_does_not_turn_back_because_the_gap_in_the_passing_lane_falls_below_its_headway() {
-        // The safe gap is 1.5 m + 0.8 s · 30 m/s = 25.5 m. The driver pulls out with 26 m, which shrink to 23 m.
+        // The safe gap is 1.5 m + 0.8 s · 30 m/s = 25.5 m. The driver pulls out with 26 m, which
+        // shrink to 23 m.
         let mut driver = overtaker_config(0.5, 0.8).check(&Parameters::default()).unwrap().driver();
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
         let mut notes = Vec::new();

@@ -110,7 +110,8 @@ pub(super) enum FollowModel {
 }
 
 impl FollowModel {
-    /// Returns the acceleration at `speed_mps` behind `lead`, with the desired speed `desired_mps` (m/s²).
+    /// Returns the acceleration at `speed_mps` behind `lead`, with the desired speed `desired_mps`
+    /// (m/s²).
     pub(super) fn acceleration_mps2(&mut self, speed_mps: f64, desired_mps: f64, lead: Option<&Lead>) -> f64 {
         match self {
             Self::Wiedemann99(model) => model.acceleration_mps2(speed_mps, desired_mps, lead),

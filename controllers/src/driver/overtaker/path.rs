@@ -1,4 +1,5 @@
-//! Shape of a lane change: the minimum-jerk path, whose lateral speed and acceleration are zero at both ends.
+//! Shape of a lane change: the minimum-jerk path, whose lateral speed and acceleration are zero at
+//! both ends.
 
 use closecall_traffic::minimum_jerk;
 
@@ -10,12 +11,12 @@ const CELLS: f64 = (1_u32 << BISECTIONS) as f64;
 const NEWTON_STEPS: u32 = 6;
 /// Step after which the share is exact to rounding, as each step squares the error.
 const LAST_STEP: f64 = 1e-7;
-/// Lateral shares between which the shape is steep enough for Newton's method, and rises from cell to cell by far more than
-/// rounding.
+/// Lateral shares between which the shape is steep enough for Newton's method, and rises from cell
+/// to cell by far more than rounding.
 const STEEP: std::ops::Range<f64> = 0.02..0.98;
 
-/// Returns the longitudinal share at which the lateral share `lateral` is reached, 0 for NaN: the middle of the cell in which
-/// bisection ends.
+/// Returns the longitudinal share at which the lateral share `lateral` is reached, 0 for NaN: the
+/// middle of the cell in which bisection ends.
 pub(super) fn longitudinal_share(lateral: f64) -> f64 {
     if !(lateral > 0.0) {
         return 0.0;
@@ -28,9 +29,11 @@ pub(super) fn longitudinal_share(lateral: f64) -> f64 {
     by_bisection(lateral)
 }
 
-/// Returns the middle of the cell that Newton's method finds, if its two ends enclose the lateral share.
+/// Returns the middle of the cell that Newton's method finds, if its two ends enclose the lateral
+/// share.
 fn by_newton(lateral: f64) -> Option<f64> {
-    // The straight line with the shape's slope in the middle, and the shape's derivative 30·u²·(1 − u)².
+    // The straight line with the shape's slope in the middle, and the shape's derivative 30·u²·(1 −
+    // u)².
     let mut share = (0.5 + (lateral - 0.5) / 1.875).clamp(0.1, 0.9);
     for _ in 0..NEWTON_STEPS {
         let slope = share * (1.0 - share);

@@ -45,7 +45,8 @@ impl Check for ReturnConfig {
 }
 
 impl OvertakerDriver {
-    /// Drives on in the passing lane, and begins to change back once the scenario and the traffic allow it.
+    /// Drives on in the passing lane, and begins to change back once the scenario and the traffic
+    /// allow it.
     pub(super) fn drive_on(&mut self, step: &Step<'_>, passing: CompletedPassing) -> DriverAction {
         let mut action = self.cruise(step, step.ahead_except(passing.overtaken));
         let origin_side = step.side.opposite();

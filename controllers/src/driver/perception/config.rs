@@ -1,5 +1,5 @@
-//! How a driver perceives the vehicles ahead, as a scenario file describes it: how far ahead the driver looks, and
-//! whether it accumulates evidence.
+//! How a driver perceives the vehicles ahead, as a scenario file describes it: how far ahead the
+//! driver looks, and whether it accumulates evidence.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
@@ -8,22 +8,25 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{Evidence, EvidenceConfig};
 use crate::driver::reaction::ReactionChange;
 
-/// Sensitivity to the second leader if the scenario gives none, as a share of the sensitivity to the vehicle ahead (-): the
-/// mean of drivers on a motorway, seen from a helicopter (Hoogendoorn and Ossen, *Empirical analysis of two-leader
-/// car-following behavior*, European Journal of Transport and Infrastructure Research 6 (2006), abstract). Range for an
-/// ensemble: 0 to 1; the drivers differed much, and some were more sensitive to the second leader than to the first.
+/// Sensitivity to the second leader if the scenario gives none, as a share of the sensitivity to
+/// the vehicle ahead (-): the mean of drivers on a motorway, seen from a helicopter (Hoogendoorn
+/// and Ossen, *Empirical analysis of two-leader car-following behavior*, European Journal of
+/// Transport and Infrastructure Research 6 (2006), abstract). Range for an ensemble: 0 to 1; the
+/// drivers differed much, and some were more sensitive to the second leader than to the first.
 const DEFAULT_ANTICIPATION: f64 = 0.5;
 
 /// How a driver perceives the vehicles ahead, as a scenario file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct PerceptionConfig {
-    /// Anticipation: the sensitivity to the second leader, the next vehicle beyond the one ahead, as a share of the
-    /// sensitivity to the vehicle directly ahead: 0 (the driver watches only that one) to 1. Where the driver sees the
-    /// second leader, it brakes with this share of the deceleration with which it would follow it directly, and at its brake
-    /// light it expects the vehicle ahead to brake with this share of its deceleration. Default: 0.5.
+    /// Anticipation: the sensitivity to the second leader, the next vehicle beyond the one ahead,
+    /// as a share of the sensitivity to the vehicle directly ahead: 0 (the driver watches only that
+    /// one) to 1. Where the driver sees the second leader, it brakes with this share of the
+    /// deceleration with which it would follow it directly, and at its brake light it expects the
+    /// vehicle ahead to brake with this share of its deceleration. Default: 0.5.
     pub anticipation: Option<Num>,
-    /// Accumulation of looming evidence, in place of the fixed looming threshold and of the brake light. Default: none.
+    /// Accumulation of looming evidence, in place of the fixed looming threshold and of the brake
+    /// light. Default: none.
     pub evidence: Option<EvidenceConfig>,
 }
 
@@ -43,16 +46,17 @@ impl Default for PerceptionSettings {
 }
 
 impl PerceptionSettings {
-    /// Returns the settings of a driver whose reaction changes: one who reacts at once accumulates no evidence.
+    /// Returns the settings of a driver whose reaction changes: one who reacts at once accumulates
+    /// no evidence.
     #[must_use]
     pub(crate) fn changed(self, change: ReactionChange) -> Self {
         let evidence = self.evidence.filter(|_| change != ReactionChange::AtOnce);
         Self { evidence, ..self }
     }
 
-    /// Returns `nearest_mps2`, the response to the vehicle ahead, or the braking with which the driver responds to the second
-    /// leader if that is the stronger one (m/s²). `beyond_mps2` is the acceleration with which the driver would follow the second
-    /// leader directly.
+    /// Returns `nearest_mps2`, the response to the vehicle ahead, or the braking with which the
+    /// driver responds to the second leader if that is the stronger one (m/s²). `beyond_mps2` is
+    /// the acceleration with which the driver would follow the second leader directly.
     pub(crate) fn respond_mps2(&self, nearest_mps2: f64, beyond_mps2: Option<f64>) -> f64 {
         match beyond_mps2 {
             Some(beyond_mps2) if beyond_mps2 < 0.0 => nearest_mps2.min(self.anticipation * beyond_mps2),
@@ -77,8 +81,8 @@ impl Check for PerceptionConfig {
     }
 }
 
-/// Checks how a driver perceives. The settings need a driver with a reaction time (`perceives`): a driver without one
-/// uses the true state of traffic at each step.
+/// Checks how a driver perceives. The settings need a driver with a reaction time (`perceives`): a
+/// driver without one uses the true state of traffic at each step.
 pub(crate) fn check_perception(
     perception: Option<&PerceptionConfig>,
     perceives: bool,

@@ -1,5 +1,5 @@
-//! Accumulation of looming evidence: a driver notices a change once the looming has differed from the expected one for
-//! long enough.
+//! Accumulation of looming evidence: a driver notices a change once the looming has differed from
+//! the expected looming for long enough.
 //!
 //! ```text
 //!  1/τ ▲        ╱ observed        A ▲      threshold
@@ -8,17 +8,19 @@
 //!      └───────────▶ time           └─────╱───┴──▶ time
 //! ```
 //!
-//! Markkula, *Modeling driver control behavior in both routine and near-accident driving*, Proceedings of the Human Factors
-//! and Ergonomics Society 58 (2014) 879–883, with the author's code (`gmarkkula/HFES2014ModelsAndFigs`): the activation A of an
-//! accumulator grows with the deviation of 1/τ = θ̇/θ from the predicted value, minus a gating, and is never negative. At a
-//! threshold the driver reacts, and A falls to 0.6 of the threshold. Gating and threshold are those fitted there to the brake
-//! onsets that Kiefer et al. (2003) measured on a test track.
+//! Markkula, *Modeling driver control behavior in both routine and near-accident driving*,
+//! Proceedings of the Human Factors and Ergonomics Society 58 (2014) 879–883, with the author's
+//! code (`gmarkkula/HFES2014ModelsAndFigs`): the activation A of an accumulator grows with the
+//! deviation of 1/τ = θ̇/θ from the predicted value, minus a gating, and is never negative. At a
+//! threshold the driver reacts, and A falls to 0.6 of the threshold. Gating and threshold come from
+//! the fit in that paper to the brake onsets that Kiefer et al. (2003) measured on a test track.
 //!
-//! What deviates: the prediction is the motion of the vehicle ahead that the driver noticed last (its speed, and the
-//! deceleration perceived from the change of speed), not the fixed decay over 9 s of the author's braking model. This keeps
-//! the decision how hard to brake with the car-following model. A second accumulator notices in the same way that the
-//! vehicle ahead is faster than expected; the source has only the closing one. No noise is added: drivers
-//! differ by their thresholds.
+//! This model deviates in its prediction: it is the motion of the vehicle ahead that the driver
+//! noticed last (its speed, and the deceleration perceived from the change of speed), not the fixed
+//! decay over 9 s of the author's braking model. The car-following model thus still decides how
+//! hard the driver brakes. A second accumulator notices in the same way that the vehicle ahead is
+//! faster than expected; the source has only the accumulator for closing. No noise is added:
+//! drivers differ by their thresholds.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
@@ -32,14 +34,16 @@ const DEFAULT_THRESHOLD: f64 = 0.0888;
 /// Deviation of 1/τ below which no evidence accumulates (1/s) (Markkula 2014).
 const DEFAULT_GATING_PER_S: f64 = 0.0155;
 
-/// Share of the threshold to which the activation falls when the driver notices a change (-) (Markkula 2014).
+/// Share of the threshold to which the activation falls when the driver notices a change (-)
+/// (Markkula 2014).
 const RESET_SHARE: f64 = 0.6;
 
 /// Accumulation of looming evidence as a scenario file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct EvidenceConfig {
-    /// Accumulated deviation of 1/τ at which the driver notices a change (-): above 0, at most 2. Default: 0.0888.
+    /// Accumulated deviation of 1/τ at which the driver notices a change (-): above 0, at most 2.
+    /// Default: 0.0888.
     pub threshold: Option<Num>,
     /// Deviation of 1/τ below which no evidence accumulates (1/s): 0 to 0.5. Default: 0.0155.
     pub gating_per_s: Option<Num>,
@@ -80,7 +84,7 @@ pub(super) struct Looming {
     pub(super) step_s: f64,
 }
 
-/// What the driver expects of the vehicle ahead, and the evidence against it.
+/// The driver's expectation about the vehicle ahead, and the evidence against it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Belief {
     actor: u32,
@@ -93,9 +97,10 @@ pub(super) struct Belief {
 }
 
 impl Belief {
-    /// Returns the belief after an observation. A vehicle seen for the first time is believed to drive at the own speed.
-    pub(super) fn updated(known: Option<Self>, evidence: Evidence, seen: Looming, own_mps: f64) -> Self {
-        let same = known.filter(|belief| belief.actor == seen.actor);
+    /// Returns the belief after an observation. A vehicle seen for the first time is believed to
+    /// drive at the own speed.
+    pub(super) fn updated(belief: Option<Self>, evidence: Evidence, seen: Looming, own_mps: f64) -> Self {
+        let same = belief.filter(|belief| belief.actor == seen.actor);
         let mut belief = same.unwrap_or(Self {
             actor: seen.actor,
             speed_mps: own_mps,
@@ -126,8 +131,8 @@ impl Belief {
 mod tests {
     use super::*;
 
-    /// Returns the time after which a driver notices that a vehicle ahead, at a gap that stays at 20 m, is slower by
-    /// `closing_mps` (s), or `None` if it does not within 20 s.
+    /// Returns the time after which a driver notices that a vehicle ahead, at a gap that stays at
+    /// 20 m, is slower by `closing_mps` (s), or `None` if it does not within 20 s.
     fn noticed_after_s(closing_mps: f64, config: &EvidenceConfig) -> Option<f64> {
         let evidence = config.check(&Parameters::default()).unwrap();
         let seen =
@@ -143,7 +148,8 @@ mod tests {
     #[test]
     fn slow_looming_is_noticed_later_than_fast_looming() {
         let default = EvidenceConfig::default();
-        // A constant deviation of ε is noticed after 0.0888/(ε − 0.0155): 0.19 s at 10 m/s, 1.05 s at 2 m/s.
+        // A constant deviation of ε is noticed after 0.0888/(ε − 0.0155): 0.19 s at 10 m/s, 1.05 s
+        // at 2 m/s.
         let [fast_s, slow_s] = [10.0, 2.0].map(|closing_mps| noticed_after_s(closing_mps, &default).unwrap());
         assert!((fast_s - 0.0888 / (0.5 - 0.0155)).abs() < 0.011, "{fast_s}");
         assert!((slow_s - 0.0888 / (0.1 - 0.0155)).abs() < 0.011, "{slow_s}");

@@ -1,4 +1,4 @@
-//! What a driver observes at one time: the true state of the vehicles around it.
+//! A driver's observation at one time: the true state of the vehicles around it.
 
 use closecall_traffic::{Lane, Side, Time, VehicleClass};
 
@@ -65,8 +65,8 @@ impl Observation {
     }
 }
 
-/// Returns true if a driver sees the vehicle `beyond` the one `ahead`: through the windows of a car, past a motorcycle, and
-/// behind a truck only where part of its rear reaches past the truck.
+/// Returns true if a driver sees the vehicle `beyond` the vehicle `ahead`: through the windows of a
+/// car, past a motorcycle, and behind a truck only where part of its rear reaches past the truck.
 fn shows(ahead: &Neighbour, beyond: &Neighbour) -> bool {
     let ends = |vehicle: &Neighbour| {
         let distance_m = vehicle.gap_m.max(0.0) + EYES_TO_BUMPER_M;
@@ -91,8 +91,8 @@ impl ObservedVehicle {
         }
     }
 
-    /// Rate at which the vehicle's visual angle grows or shrinks, observed from a vehicle at `own_mps` (rad/s).
-    /// Infinite at a gap of zero.
+    /// Rate at which the vehicle's visual angle grows or shrinks, observed from a vehicle at
+    /// `own_mps` (rad/s). Infinite at a gap of zero.
     pub(super) fn visual_angle_rate_radps(&self, own_mps: f64) -> f64 {
         self.width_m * (self.speed_mps - own_mps).abs() / (self.gap_m * self.gap_m)
     }

@@ -5,7 +5,8 @@ use super::*;
 use crate::driver::testing::{car_ahead, with_input};
 use crate::driver::{LaneNeighbours, LapseConfig, Lead, Neighbour, Neighbours};
 
-/// Observes a lead vehicle with this motion and brake light from a vehicle at 30 m/s, and returns it as perceived.
+/// Observes a lead vehicle with this motion and brake light from a vehicle at 30 m/s, and returns
+/// it as perceived.
 fn observe(perception: &mut Perception, time: Time, lead: Lead, brake_light: bool) -> PerceivedVehicle {
     let own = LaneNeighbours { lead: Some(car_ahead(lead, brake_light)), ..LaneNeighbours::default() };
     let neighbours = Neighbours { own, ..Neighbours::default() };
@@ -49,15 +50,16 @@ fn a_brake_light_is_perceived_after_the_reaction_time_and_implies_an_ordinary_br
 
 #[test]
 fn a_small_speed_difference_at_a_large_gap_is_not_noticed() {
-    // 1.85 m · 5 m/s / g² falls below 0.003 rad/s beyond 55.5 m, and below 0.0006 rad/s beyond 124 m.
+    // 1.85 m · 5 m/s / g² falls below 0.003 rad/s beyond 55.5 m, and below 0.0006 rad/s beyond 124
+    // m.
     let mut perception = Perception::new(0.0, None);
     let mut time = Time::ZERO;
     for (gap_m, speed_mps, perceived_mps) in [
         (60.0, 25.0, 30.0),
         (50.0, 25.0, 25.0),
         (60.0, 26.0, 26.0),
-        // Below the attended threshold, the perceived speed stays at 26 m/s until the observed one differs enough from
-        // it.
+        // Below the attended threshold, the perceived speed stays at 26 m/s until the observed one
+        // differs enough from it.
         (130.0, 25.5, 26.0),
         (60.0, 27.0, 26.0),
         (60.0, 29.9, 26.0),
@@ -71,7 +73,8 @@ fn a_small_speed_difference_at_a_large_gap_is_not_noticed() {
 
 #[test]
 fn a_vehicle_that_stops_is_not_extrapolated_backwards() {
-    // From 6 m/s at 6 m/s² it stands after one second and 3 m: 3 m less than at constant speed. Later it stays there.
+    // From 6 m/s at 6 m/s² it stands after one second and 3 m: 3 m less than at constant speed.
+    // Later it stays there.
     assert_eq!(accelerated_displacement_m(6.0, -6.0, 1.0), -3.0);
     assert_eq!(6.0 * 2.5 + accelerated_displacement_m(6.0, -6.0, 2.5), 3.0);
     assert_eq!(accelerated_displacement_m(0.0, -6.0, 1.0), 0.0);
@@ -113,7 +116,8 @@ fn anticipating(anticipation: f64) -> Perception {
     Perception::new(0.9, None).with_settings(config.check(&Parameters::default()).unwrap())
 }
 
-/// Returns what a driver perceives at `time` of a steady vehicle ahead if the one beyond brakes at 6 m/s² from 2 s on.
+/// Returns a driver's perception, at `time`, of a steady vehicle ahead if the vehicle beyond it
+/// brakes at 6 m/s² from 2 s on.
 fn seen_before_a_braking_one(perception: &mut Perception, time: Time) -> PerceivedVehicle {
     let on = time >= Time::from_s(2.0);
     let acceleration_mps2 = if on { -6.0 } else { 0.0 };
@@ -145,8 +149,8 @@ fn a_driver_who_anticipates_expects_braking_one_reaction_time_after_the_brake_li
     assert!(!seen.brake_light && seen.lead.acceleration_mps2 == 0.0, "{seen:?}");
 }
 
-/// Returns the time from the start of braking at `braking_mps2`, 15 m ahead and with its brake light on, until a driver who
-/// accumulates evidence perceives it (s).
+/// Returns the time from the start of braking at `braking_mps2`, 15 m ahead and with its brake
+/// light on, until a driver who accumulates evidence perceives it (s).
 fn noticed_after_s(braking_mps2: f64) -> f64 {
     let config = PerceptionConfig { anticipation: None, evidence: Some(EvidenceConfig::default()) };
     let mut perception = Perception::new(0.1, None).with_settings(config.check(&Parameters::default()).unwrap());
@@ -169,7 +173,8 @@ fn noticed_after_s(braking_mps2: f64) -> f64 {
 #[test]
 fn accumulated_evidence_is_noticed_later_behind_a_vehicle_that_brakes_gently() {
     let [hard_s, gentle_s] = [8.0, 1.0].map(noticed_after_s);
-    // ∫(b·t/15 − 0.0155)dt = 0.0888 gives 0.61 s for 8 m/s² and 1.9 s for 1 m/s², plus the delay of 0.1 s.
+    // ∫(b·t/15 − 0.0155)dt = 0.0888 gives 0.61 s for 8 m/s² and 1.9 s for 1 m/s², plus the delay of
+    // 0.1 s.
     assert!((0.6..0.85).contains(&hard_s) && (1.6..2.1).contains(&gentle_s), "{hard_s} {gentle_s}");
 }
 
@@ -188,8 +193,9 @@ fn a_driver_without_a_reaction_time_has_no_perception_to_set() {
     assert_eq!(error.path.to_string(), "perception.evidence.gating-per-s");
 }
 
-/// Returns what a driver at 30 m/s perceives whose nearest vehicle is 15 m ahead at the same speed until it has left the lane
-/// at 3 s, and whose next one, of the same kind as it, drives 17 m/s slower.
+/// Returns the perception of a driver at 30 m/s. The nearest vehicle is 15 m ahead at the same
+/// speed until it has left the lane at 3 s. The next vehicle, of the same kind, drives 17 m/s
+/// slower.
 fn seen_behind_a_leader_that_leaves(perception: &mut Perception, time: Time, class: VehicleClass) -> PerceivedScene {
     let near = Neighbour { class, ..car_ahead(steady(15.0, 30.0), false) };
     let next = Neighbour { actor: 2, ..car_ahead(steady(110.0 - 17.0 * time.s(), 13.0), false) };
@@ -200,8 +206,8 @@ fn seen_behind_a_leader_that_leaves(perception: &mut Perception, time: Time, cla
     with_input(time, &neighbours, |input| perception.observe(input, &mut rng))
 }
 
-/// Returns the time after which a driver with a reaction time of 0.9 s perceives the next vehicle as the one ahead (s), and the
-/// perceived speed (m/s).
+/// Returns the time after which a driver with a reaction time of 0.9 s perceives the next vehicle
+/// as the vehicle ahead (s), and the perceived speed (m/s).
 fn next_vehicle_perceived_after_s(class: VehicleClass) -> (f64, f64) {
     let mut perception = Perception::new(0.9, None);
     let mut time = Time::ZERO;
@@ -217,7 +223,7 @@ fn next_vehicle_perceived_after_s(class: VehicleClass) -> (f64, f64) {
 #[test]
 fn a_driver_whose_leader_pulls_out_brakes_for_the_next_vehicle_without_a_new_reaction_time() {
     assert_eq!(next_vehicle_perceived_after_s(VehicleClass::Car), (0.0, 13.0));
-    // What a truck hides is new, and costs the full reaction time.
+    // A vehicle that a truck has hidden is new, and costs the full reaction time.
     assert!((next_vehicle_perceived_after_s(VehicleClass::Truck).0 - 0.9).abs() < 1e-9);
 }
 
@@ -239,8 +245,8 @@ fn a_driver_sees_position_and_speed_of_the_second_leader_through_a_car_but_not_t
     assert_eq!(seen(VehicleClass::Truck), None);
 }
 
-/// Returns the time after which a driver with a reaction time of 1.25 s perceives a brake light that goes on at 3 s (s), 30 m
-/// behind a vehicle that is slower by `closing_mps` at that moment.
+/// Returns the time after which a driver with a reaction time of 1.25 s perceives a brake light
+/// that goes on at 3 s (s), 30 m behind a vehicle that is slower by `closing_mps` at that moment.
 fn light_perceived_after_s(closing_mps: f64) -> f64 {
     let mut perception = Perception::new(1.25, None);
     let mut time = Time::ZERO;

@@ -14,17 +14,18 @@ pub(super) const MAX_TIME_S: f64 = 1e6;
 /// Highest speed in a profile (m/s).
 const MAX_SPEED_MPS: f64 = 100.0;
 
-/// A prescribed driver as a scenario file describes it: exactly one of the first three keys, and optional lane changes.
+/// A prescribed driver as a scenario file describes it: exactly one of the first three keys, and
+/// optional lane changes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct PrescribedConfig {
-    /// Pairs of time (s) and speed (m/s), with increasing times. The speed is linear in between, constant before and
-    /// after.
+    /// Pairs of time (s) and speed (m/s), with increasing times. The speed is linear in between,
+    /// constant before and after.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Vec<[Num; 2]>>,
-    /// Pairs of time (s) and acceleration (m/s²), with increasing times. Each acceleration holds until the next; before
-    /// the first it is zero. The driver starts at the initial speed; braking ends at standstill, accelerating at
-    /// 100 m/s.
+    /// Pairs of time (s) and acceleration (m/s²), with increasing times. Each acceleration holds
+    /// until the next; before the first it is zero. The driver starts at the initial speed; braking
+    /// ends at standstill, accelerating at 100 m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_profile: Option<Vec<[Num; 2]>>,
     /// The speeds of a vehicle in recorded traffic.
@@ -48,7 +49,8 @@ pub struct RecordedConfig {
     pub from_s: Option<f64>,
 }
 
-/// A checked prescribed driver: a profile with at least one point and increasing times, and lane changes.
+/// A checked prescribed driver: a profile with at least one point and increasing times, and lane
+/// changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prescribed {
     points: Points,
@@ -167,7 +169,8 @@ impl Prescribed {
         }
     }
 
-    /// Checks that a target lane exists for each lane change of a vehicle that starts in lane `start` of `lanes` lanes.
+    /// Checks that a target lane exists for each lane change of a vehicle that starts in lane
+    /// `start` of `lanes` lanes.
     ///
     /// # Errors
     /// Returns a [`ConfigError`] that names the first lane change that would leave the road.

@@ -6,7 +6,8 @@ use super::Prescribed;
 use super::profile::SpeedProfile;
 use crate::driver::{Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Looks, finite};
 
-/// Gain with which a deviation from the prescribed speed is removed (1/s); well below the actuators' 1/0.15 s.
+/// Gain with which a deviation from the prescribed speed is removed (1/s); well below the
+/// actuators' 1/0.15 s.
 const SPEED_GAIN_PER_S: f64 = 2.0;
 
 /// Hardest braking commanded to follow a profile (m/s²): dry friction.

@@ -36,7 +36,7 @@ impl PrescribedLaneChange {
     }
 }
 
-/// Checks the lane changes in their order. Each must begin after the end of the one before.
+/// Checks the lane changes in their order. Each must begin after the end of the previous change.
 pub(super) fn check_lane_changes(
     configs: &[PrescribedLaneChangeConfig],
     parameters: &Parameters,

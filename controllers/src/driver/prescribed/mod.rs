@@ -7,7 +7,8 @@
 //!                                                         with the scenario file
 //! ```
 //!
-//! The driver changes lanes at the times in `lane-changes`, on the same smooth path as all vehicles.
+//! The driver changes lanes at the times in `lane-changes`, on the same smooth path as all
+//! vehicles.
 
 mod config;
 mod driver;

@@ -1,4 +1,5 @@
-//! Speed as a function of time: linear between points, constant before the first and after the last.
+//! Speed as a function of time: linear between points, constant before the first and after the
+//! last.
 
 /// An acceleration that holds from a given time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +22,8 @@ impl SpeedProfile {
         Self { points }
     }
 
-    /// Integrates the accelerations `steps` from the speed `start_mps`, limited to speeds from 0 to `max_mps`.
+    /// Integrates the accelerations `steps` from the speed `start_mps`, limited to speeds from 0 to
+    /// `max_mps`.
     pub(super) fn integrated(start_mps: f64, steps: &[AccelerationStep], max_mps: f64) -> Self {
         let mut points = vec![(0.0, start_mps)];
         for (index, step) in steps.iter().enumerate() {

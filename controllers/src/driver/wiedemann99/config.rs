@@ -10,7 +10,8 @@ use crate::driver::pedals::check_brake_build_up;
 use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
 use crate::driver::reaction::{Reaction, ReactionChange, ReactionConfig};
 
-/// The Wiedemann 99 model as a scenario file describes it. The defaults of cc0 to cc9 are those published for Vissim.
+/// The Wiedemann 99 model as a scenario file describes it. The defaults of cc0 to cc9 are those
+/// published for Vissim.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Wiedemann99Config {
@@ -18,9 +19,11 @@ pub struct Wiedemann99Config {
     pub cc0_m: Option<Num>,
     /// Time headway kept in addition to cc0 (s). Default: 0.9.
     pub cc1_s: Option<Num>,
-    /// Distance by which the gap may exceed the safe gap before the driver closes up (m). Default: 4.
+    /// Distance by which the gap may exceed the safe gap before the driver closes up (m). Default:
+    /// 4.
     pub cc2_m: Option<Num>,
-    /// Time before reaching the safe gap at which the driver begins to slow down, negative (s). Default: −8.
+    /// Time before reaching the safe gap at which the driver begins to slow down, negative (s).
+    /// Default: −8.
     pub cc3_s: Option<Num>,
     /// Closing speed tolerated while following, negative (m/s). Default: −0.35.
     pub cc4_mps: Option<Num>,
@@ -36,18 +39,19 @@ pub struct Wiedemann99Config {
     pub cc9_mps2: Option<Num>,
     /// Hardest braking (m/s²): 4 to 9. Default: 6.7.
     pub hardest_braking_mps2: Option<Num>,
-    /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial speed; for an
-    /// overtaking driver, its initial speed.
+    /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial
+    /// speed; for an overtaking driver, its initial speed.
     pub desired_speed_mps: Option<Num>,
-    /// Reaction time (s). With it, the driver perceives with a delay, notices speed differences only above the looming
-    /// threshold, and reacts to brake lights. Without it, the driver uses the true state of traffic, and only the
-    /// model's own perception thresholds apply.
+    /// Reaction time (s). With it, the driver perceives with a delay, notices speed differences
+    /// only above the looming threshold, and reacts to brake lights. Without it, the driver uses
+    /// the true state of traffic, and only the model's own perception thresholds apply.
     pub reaction_s: Option<ReactionConfig>,
     /// Lapses of attention. Default: none. They need a reaction time.
     pub lapse: Option<LapseConfig>,
     /// How the driver perceives the vehicles ahead. It needs a reaction time.
     pub perception: Option<PerceptionConfig>,
-    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a reaction time.
+    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a
+    /// reaction time.
     pub brake_build_up_mps3: Option<Num>,
 }
 
@@ -108,7 +112,8 @@ impl Wiedemann99 {
         self.parameters.cc0_m + self.parameters.cc1_s * speed_mps
     }
 
-    /// Returns the gap in the middle of those that the driver keeps behind a vehicle at `speed_mps`, cc0 + cc1·v + cc2/2 (m).
+    /// Returns the middle of the gaps that the driver keeps behind a vehicle at `speed_mps`, cc0 +
+    /// cc1·v + cc2/2 (m).
     pub(crate) fn settled_gap_m(&self, speed_mps: f64) -> f64 {
         self.safe_gap_m(speed_mps) + 0.5 * self.parameters.cc2_m
     }

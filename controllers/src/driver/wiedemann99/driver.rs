@@ -10,25 +10,27 @@ use crate::driver::{
     finite,
 };
 
-/// Share of the hardest braking above which braking counts as emergency braking: an assumption; it marks the log only.
+/// Share of the hardest braking above which braking counts as emergency braking: an assumption; it
+/// marks the log only.
 const EMERGENCY_BRAKING_SHARE: f64 = 0.75;
 
-/// Time headway below which a driver releases the accelerator because of a brake light ahead (s): an assumption, the
-/// longest headway that drivers keep in car-following (Fancher et al. 1996: 0.6 to 3 s).
+/// Time headway below which a driver releases the accelerator because of a brake light ahead (s):
+/// an assumption, the longest headway that drivers keep in car-following (Fancher et al. 1996: 0.6
+/// to 3 s).
 const COASTING_FOR_LIGHT_THW_S: f64 = 3.0;
 
-/// Time headway below which a driver brakes because of a brake light ahead, instead of only releasing the accelerator
-/// (s): an assumption; 1 to 3 are plausible.
+/// Time headway below which a driver brakes because of a brake light ahead, instead of only
+/// releasing the accelerator (s): an assumption; 1 to 3 are plausible.
 const BRAKING_FOR_LIGHT_THW_S: f64 = 2.0;
 
-/// 1/TTC from which a driver who is about to overtake brakes for a brake light ahead (1/s). Drivers begin ordinary
-/// braking at 0.100 behind a vehicle that brakes at 0.15 g, at 0.132 behind one that brakes at 0.39 g, and at 0.192
-/// behind a standing one, all at 60 mph (Kiefer et al. 2003, as quoted in Markkula's code for HFES 2014). Range: 0.10 to
-/// 0.25.
+/// 1/TTC from which a driver who is about to overtake brakes for a brake light ahead (1/s). Drivers
+/// begin ordinary braking at 0.100 behind a vehicle that brakes at 0.15 g, at 0.132 behind one that
+/// brakes at 0.39 g, and at 0.192 behind a standing one, all at 60 mph (Kiefer et al. 2003, as
+/// quoted in Markkula's code for HFES 2014). Range: 0.10 to 0.25.
 const BRAKE_ONSET_PER_S: f64 = 0.10;
 
-/// Speed difference above which the vehicle ahead pulls away, so that its brake light does not matter (m/s): an
-/// assumption; 1 to 4 are plausible.
+/// Speed difference above which the vehicle ahead pulls away, so that its brake light does not
+/// matter (m/s): an assumption; 1 to 4 are plausible.
 const PULLING_AWAY_MPS: f64 = 2.0;
 
 /// A human driver who follows the lead vehicle by the Wiedemann 99 model and stays in the lane.
@@ -58,7 +60,8 @@ impl Wiedemann99Driver {
         }
     }
 
-    /// Observes the surroundings and returns them as perceived, or `None` if the driver knows the truth at once.
+    /// Observes the surroundings and returns them as perceived, or `None` if the driver knows the
+    /// truth at once.
     fn observe(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<PerceivedScene> {
         let reaction = self.settings.reaction?;
         let settings = &self.settings;
@@ -111,14 +114,14 @@ pub(crate) fn nearest_lead(input: &DriverInput<'_>) -> Option<Lead> {
     })
 }
 
-/// Returns the desired speed of a driver whose scenario gives none (m/s): the larger of the road's speed limit and the
-/// vehicle's own speed. It is called at the first step.
+/// Returns the desired speed of a driver whose scenario gives none (m/s): the larger of the road's
+/// speed limit and the vehicle's own speed. It is called at the first step.
 pub(crate) fn default_desired_mps(input: &DriverInput<'_>) -> f64 {
     input.own.speed_mps.max(input.road.speed_limit_mps())
 }
 
-/// Returns `requested_mps2`, or at most the acceleration with released accelerator if a near vehicle ahead shows its
-/// brake light.
+/// Returns `requested_mps2`, or at most the acceleration with released accelerator if a near
+/// vehicle ahead shows its brake light.
 pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
         Some(vehicle)
@@ -132,9 +135,9 @@ pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
-/// Limits the acceleration as [`coast_for_brake_light`] does. If the vehicle ahead is near enough to be followed, the
-/// driver also brakes at least as strongly as that vehicle: humans brake first, and assess afterwards how hard they need
-/// to.
+/// Limits the acceleration as [`coast_for_brake_light`] does. If the vehicle ahead is near enough
+/// to be followed, the driver also brakes at least as strongly as that vehicle: humans brake first,
+/// and assess afterwards how hard they must brake.
 pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
     match ahead {
@@ -146,16 +149,17 @@ pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
-/// Limits the acceleration as [`coast_for_brake_light`] and [`brake_while_overtaking`] do, for a driver who is about to
-/// overtake the vehicle ahead.
+/// Limits the acceleration as [`coast_for_brake_light`] and [`brake_while_overtaking`] do, for a
+/// driver who is about to overtake the vehicle ahead.
 pub(crate) fn brake_before_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     brake_while_overtaking(coast_for_brake_light(requested_mps2, speed_mps, ahead), speed_mps, ahead)
 }
 
-/// Returns `requested_mps2`, or at most the acceleration of the vehicle that is being overtaken if that one shows its brake
-/// light and the gap closes as fast as drivers brake at. The driver then brakes even if steering alone would avoid a collision:
-/// the brake light says that the prediction may be wrong. The light alone does not make a driver who is already pulling out
-/// release the accelerator: it leaves the lane of that vehicle.
+/// Returns `requested_mps2`. If the overtaken vehicle shows its brake light and the gap closes so
+/// fast that drivers brake, returns at most the acceleration of that vehicle. The driver then
+/// brakes even if steering alone would avoid a collision: the brake light says that the prediction
+/// may be wrong. The light alone does not make a driver who is already pulling out release the
+/// accelerator: it leaves the lane of that vehicle.
 pub(crate) fn brake_while_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
         Some(vehicle)
@@ -180,7 +184,8 @@ impl EmergencyBrakingDetector {
         Self { hardest_braking_mps2, brakes: false }
     }
 
-    /// Returns [`DriverNote::EmergencyBraking`] at the first step at which `acceleration_mps2` is emergency braking.
+    /// Returns [`DriverNote::EmergencyBraking`] at the first step at which `acceleration_mps2` is
+    /// emergency braking.
     pub(crate) fn detect(&mut self, acceleration_mps2: f64) -> Option<DriverNote> {
         let before = self.brakes;
         self.brakes = acceleration_mps2 <= -EMERGENCY_BRAKING_SHARE * self.hardest_braking_mps2;

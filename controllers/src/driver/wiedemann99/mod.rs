@@ -1,8 +1,9 @@
 //! The car-following model of Wiedemann (1999): a human driver who stays in the lane.
 //!
-//! The parameters and their meaning are those published for PTV Vissim (User Manual, "Defining the Wiedemann 99
-//! model"). The regimes are the psycho-physical ones of Wiedemann, *Simulation des Straßenverkehrsflusses* (1974).
-//! [`Wiedemann99Model`] is the pure model; [`Wiedemann99Driver`] adapts it to the simulation loop.
+//! The parameters and their meaning follow the publication for PTV Vissim (User Manual, "Defining
+//! the Wiedemann 99 model"). The regimes are the psycho-physical regimes of Wiedemann, *Simulation
+//! des Straßenverkehrsflusses* (1974). [`Wiedemann99Model`] is the pure model;
+//! [`Wiedemann99Driver`] adapts it to the simulation loop.
 
 mod config;
 mod driver;

@@ -12,7 +12,8 @@
 //!                      cc4 − c·g²  0   cc5 + c·g²          c = cc6 · 10⁻⁴
 //! ```
 //!
-//! Here g is the gap, v the own speed, v_l the speed of the lead vehicle, and Δv = v_l − v (negative while closing):
+//! Here g is the gap, v the own speed, v_l the speed of the lead vehicle, and Δv = v_l − v
+//! (negative while closing):
 //!
 //! | threshold | value | meaning |
 //! |---|---|---|
@@ -29,10 +30,11 @@
 //! | following | g ≤ follow and Δv ≤ opening |
 //! | free | otherwise |
 //!
-//! Sources: PTV Vissim user manual, "Defining the Wiedemann 99 model" (the parameters and their meaning); Wiedemann,
-//! *Simulation des Straßenverkehrsflusses*, Karlsruhe 1974 (the plane and its thresholds); Aghabayk, Sarvi, Young and
-//! Kautzsch, *A novel methodology for evolutionary calibration of Vissim by multi-threading*, Australasian Transport
-//! Research Forum 2013 (the formulas of the thresholds). `docs/reference/wiedemann99-regimes.svg` shows the plane.
+//! Sources: PTV Vissim user manual, "Defining the Wiedemann 99 model" (the parameters and their
+//! meaning); Wiedemann, *Simulation des Straßenverkehrsflusses*, Karlsruhe 1974 (the plane and its
+//! thresholds); Aghabayk, Sarvi, Young and Kautzsch, *A novel methodology for evolutionary
+//! calibration of Vissim by multi-threading*, Australasian Transport Research Forum 2013 (the
+//! formulas of the thresholds). `docs/reference/wiedemann99-regimes.svg` shows the plane.
 
 use super::Parameters99;
 use crate::driver::Lead;
@@ -77,7 +79,8 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
-    /// Computes the thresholds at `speed_mps` behind `lead`. `before` is the regime at the previous step.
+    /// Computes the thresholds at `speed_mps` behind `lead`. `before` is the regime at the previous
+    /// step.
     pub(super) fn new(p: &Parameters99, speed_mps: f64, lead: &Lead, before: Regime) -> Self {
         let safe_m = p.cc0_m + p.cc1_s * speed_mps.min(lead.speed_mps).max(0.0);
         let follow_m = safe_m + p.cc2_m;
@@ -91,7 +94,8 @@ impl Thresholds {
         }
     }
 
-    /// Returns the regime at a gap and a speed difference, lead minus own. `cc0_m` is the gap at standstill.
+    /// Returns the regime at a gap and a speed difference, lead minus own. `cc0_m` is the gap at
+    /// standstill.
     pub(super) fn regime(&self, gap_m: f64, opening_mps: f64, cc0_m: f64) -> Regime {
         let closing = opening_mps < self.closing_mps;
         if (gap_m <= self.safe_m && closing) || (gap_m < cc0_m && opening_mps < 0.0) {

@@ -21,25 +21,30 @@ pub struct MisConfig {
     pub short_thw_s: Option<Num>,
     /// Largest rear gap at which the system engages (m); 100 if absent.
     pub engage_gap_m: Option<Num>,
-    /// Smallest closing speed of the rear vehicle at which the system engages (m/s); 10 km/h if absent.
+    /// Smallest closing speed of the rear vehicle at which the system engages (m/s); 10 km/h if
+    /// absent.
     pub engage_closing_mps: Option<Num>,
-    /// Longest time for which the ego does not brake for the lead vehicle, from the moment at which the rear vehicle
-    /// crosses the marking or is at the critical gap (s): 0 to 10; 2 if absent. With 0, it always may.
+    /// Longest time for which the ego does not brake for the lead vehicle, from the moment at which
+    /// the rear vehicle crosses the marking or is at the critical gap (s): 0 to 10; 2 if absent.
+    /// With 0, it always may.
     pub hold_s: Option<Num>,
-    /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²); 8 if absent.
+    /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²); 8 if
+    /// absent.
     pub worst_front_braking_mps2: Option<Num>,
-    /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with which that lane counts
-    /// as free (s); 0 if absent. A vehicle within 15 m is in the way in any case.
+    /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with
+    /// which that lane counts as free (s); 0 if absent. A vehicle within 15 m is in the way in any
+    /// case.
     pub follower_headway_s: Option<Num>,
 }
 
 /// The time for which the braking is planned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Horizon {
-    /// Until the rear vehicle is at the critical gap, with the ego braking as planned: what the paper's figure shows.
+    /// Until the rear vehicle is at the critical gap while the ego brakes as planned, as in the
+    /// paper's figure.
     #[default]
     CriticalGap,
-    /// The time to closest encounter at present speeds: what the paper's text says.
+    /// The time to closest encounter at present speeds, as in the paper's text.
     Ttce,
 }
 
@@ -60,18 +65,19 @@ pub struct MisSettings {
     pub engage_gap_m: f64,
     /// Smallest closing speed of the rear vehicle at which the system engages (m/s).
     pub engage_closing_mps: f64,
-    /// Longest time for which the ego does not brake for the lead vehicle in the critical phase (s).
+    /// Longest time for which the ego does not brake for the lead vehicle in the critical phase
+    /// (s).
     pub hold_s: f64,
     /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²).
     pub worst_front_braking_mps2: f64,
-    /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with which that lane counts
-    /// as free (s).
+    /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with
+    /// which that lane counts as free (s).
     pub follower_headway_s: f64,
     /// The time for which the braking is planned.
     #[serde(skip)]
     pub horizon: Horizon,
-    /// Whether the ego does not accelerate towards a braking lead vehicle, and the system stays off if another vehicle
-    /// follows the rear vehicle closely in the lane of the ego.
+    /// Whether the ego does not accelerate towards a braking lead vehicle, and the system stays off
+    /// if another vehicle follows the rear vehicle closely in the lane of the ego.
     #[serde(skip)]
     pub is_cautious: bool,
     /// Speed deficit to the lead vehicle from which on the ego takes no more speed (m/s).
@@ -80,8 +86,9 @@ pub struct MisSettings {
 }
 
 impl MisSettings {
-    /// The paper's values. Of them, `max_jerk_mps3`, `short_thw_s` and `worst_front_braking_mps2` are assumptions that the
-    /// paper does not state; 1 to 5 m/s³, 1 to 2 s and 6 to 9 m/s² are plausible.
+    /// The paper's values. Of them, `max_jerk_mps3`, `short_thw_s` and `worst_front_braking_mps2`
+    /// are assumptions that the paper does not state; 1 to 5 m/s³, 1 to 2 s and 6 to 9 m/s² are
+    /// plausible.
     pub const PAPER: Self = Self {
         max_deceleration_mps2: 1.0,
         max_jerk_mps3: 2.0,
@@ -98,31 +105,35 @@ impl MisSettings {
         max_deficit_mps: f64::INFINITY,
     };
 
-    /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors to the rear confirm and
-    /// classify a car (the data sheet of the simulated LiDAR states 200 m on good targets); 120 to 200 are plausible.
+    /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors
+    /// to the rear confirm and classify a car (the data sheet of the simulated LiDAR states 200 m
+    /// on good targets); 120 to 200 are plausible.
     pub const EXTENDED_ENGAGE_GAP_M: f64 = 150.0;
 
-    /// Strongest braking of the extended system (m/s²): an assumption. ISO 15622 allows an adaptive cruise control 3.5 m/s²
-    /// at highway speeds; the system uses little more than half of it, since the rear vehicle must follow it; 1 to 3.5 are
-    /// plausible.
+    /// Strongest braking of the extended system (m/s²): an assumption. ISO 15622 allows an adaptive
+    /// cruise control 3.5 m/s² at highway speeds; the system uses little more than half of it,
+    /// since the rear vehicle must follow it; 1 to 3.5 are plausible.
     pub const EXTENDED_MAX_DECELERATION_MPS2: f64 = 2.0;
 
-    /// Smallest time headway of a vehicle behind the rear vehicle in the passing lane with which the extended system takes
-    /// that lane for free (s): an assumption, the distance that automated lane changes must leave to the vehicle behind in
-    /// UN Regulation No. 79 (1 s, once speeds are equal); 0.5 to 2 are plausible. A rear vehicle that cannot pull out stays
-    /// behind an ego that has become slower.
+    /// Smallest time headway of a vehicle behind the rear vehicle in the passing lane with which
+    /// the extended system takes that lane for free (s): an assumption, the distance that automated
+    /// lane changes must leave to the vehicle behind in UN Regulation No. 79 (1 s, once speeds are
+    /// equal); 0.5 to 2 are plausible. A rear vehicle that cannot pull out stays behind an ego that
+    /// has become slower.
     pub const EXTENDED_FOLLOWER_HEADWAY_S: f64 = 1.0;
 
-    /// Largest speed deficit of the extended system to the lead vehicle (m/s): an assumption, what requirement MIS-6 allows; 7 to
-    /// 12 are plausible. A limit of 6 m/s misses the gain of 2 s, which needs about 8 m/s.
+    /// Largest speed deficit of the extended system to the lead vehicle (m/s): an assumption, what
+    /// requirement MIS-6 allows; 7 to 12 are plausible. A limit of 6 m/s misses the gain of 2 s,
+    /// which needs about 8 m/s.
     pub const EXTENDED_MAX_DEFICIT_MPS: f64 = 10.0;
 
-    /// Returns the settings of the extended system: it engages earlier, may brake harder, does not act if another vehicle
-    /// closes the way of the rear vehicle or follows it closely, and brakes for a braking lead vehicle at once. Every other
-    /// value stays as it is.
+    /// Returns the settings of the extended system: it engages earlier, may brake harder, does not
+    /// act if another vehicle closes the way of the rear vehicle or follows it closely, and brakes
+    /// for a braking lead vehicle at once. Every other value stays as it is.
     ///
-    /// Engagement distance and braking limit are the values that determine most how much margin the system gains until the
-    /// rear vehicle arrives. A system with larger values already keeps its own.
+    /// Engagement distance and braking limit are the values that determine most how much margin the
+    /// system gains until the rear vehicle arrives. A system with larger values already keeps its
+    /// own.
     #[must_use]
     pub const fn extended(self) -> Self {
         Self {

@@ -9,22 +9,24 @@ use super::{ArrivalPrediction, BrakingResponse, Encounter, Horizon, MisPlan, Mis
 use crate::ego::surroundings::{Front, PassingLane, RearVehicle, is_followed, nearest_rear_vehicle, passing_lane};
 use crate::ego::{EgoInput, EgoState, Reason};
 
-/// Multiple of the engaging gap beyond which the rear vehicle has fallen back: an assumption; 1.1 to 1.5 are plausible.
+/// Multiple of the engaging gap beyond which the rear vehicle has fallen back: an assumption; 1.1
+/// to 1.5 are plausible.
 const FELL_BACK_GAP_RATIO: f64 = 1.2;
 
-/// Number of standard deviations by which the measured closing speed must exceed the one for engaging: 95 %, one-sided.
-/// A track whose speed has not settled yet does not engage; a track without error engages at once.
+/// Number of standard deviations by which the measured closing speed must exceed the closing speed
+/// for engaging: 95 %, one-sided. A track whose speed has not settled yet does not engage; a track
+/// without error engages at once.
 const CONFIDENCE_SD: f64 = 1.645;
-/// Share of the engaging closing speed below which the rear vehicle counts as following: an assumption; 0.2 to 0.8 are
-/// plausible.
+/// Share of the engaging closing speed below which the rear vehicle counts as following: an
+/// assumption; 0.2 to 0.8 are plausible.
 const FOLLOWING_SPEED_SHARE: f64 = 0.5;
 
-/// Time for which the rear vehicle must follow before the system releases: shorter intervals may be disturbances. An
-/// assumption; 0.5 to 2 s are plausible.
+/// Time for which the rear vehicle must follow before the system releases: shorter intervals may be
+/// disturbances. An assumption; 0.5 to 2 s are plausible.
 const FOLLOWING_DELAY: Time = Time::from_ms(1_000);
 
-/// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated: an assumption;
-/// 0.2 to 1 s are plausible.
+/// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated:
+/// an assumption; 0.2 to 1 s are plausible.
 const LOSS_TIMEOUT: Time = Time::from_ms(500);
 
 /// Speed below which the time headway of the ego is meaningless (m/s).
@@ -33,15 +35,17 @@ const MIN_THW_SPEED_MPS: f64 = 1.0;
 /// Jerk with which braking is released (m/s³): an assumption; 2 to 5 are plausible.
 pub const BRAKE_RELEASE_JERK_MPS3: f64 = 3.0;
 
-/// Time constant of the actuators, as the ego knows it (s): that of the simulated car; published responses of car brakes
-/// are 0.1 to 0.3 s.
+/// Time constant of the actuators, as the ego knows it (s): the value of the simulated car;
+/// published responses of car brakes are 0.1 to 0.3 s.
 pub const ACTUATOR_LAG_S: f64 = 0.15;
 
-/// Largest shortfall at which the goal still counts as in reach (s). A margin that falls short by 0.1 s is still called
-/// reached; the difference covers effects that the prediction does not model, such as the control steps.
+/// Largest shortfall at which the goal still counts as in reach (s). A margin that falls short by
+/// 0.1 s is still called reached; the difference covers effects that the prediction does not model,
+/// such as the control steps.
 pub const GOAL_TOLERANCE_S: f64 = 0.08;
 
-/// Multiple of the gap of the ACC within which the margin counts as returned: an assumption; 1.05 to 1.5 are plausible.
+/// Multiple of the gap of the ACC within which the margin counts as returned: an assumption; 1.05
+/// to 1.5 are plausible.
 const RETURNED_GAP_RATIO: f64 = 1.2;
 
 /// The request of the system to the arbitration.
@@ -180,7 +184,8 @@ impl Mis {
         self.reason = if in_reach { Reason::Engaged } else { Reason::EngagedGoalOutOfReach };
     }
 
-    /// Checks all conditions for engaging, in the documented order. Returns the target, or the first missing condition.
+    /// Checks all conditions for engaging, in the documented order. Returns the target, or the
+    /// first missing condition.
     fn check_conditions(&self, situation: &Situation<'_>) -> Result<Target, Reason> {
         let settings = &self.settings;
         if !situation.automated {
@@ -286,8 +291,8 @@ impl Mis {
         Some((State::Releasing, reason))
     }
 
-    /// Returns why holding begins now: the rear vehicle crosses the marking or is at the critical gap, and there is room.
-    /// Returns `None` if it does not begin.
+    /// Returns why holding begins now: the rear vehicle crosses the marking or is at the critical
+    /// gap, and there is room. Returns `None` if it does not begin.
     fn reason_to_hold(&self, situation: &Situation<'_>, rear: &RearVehicle) -> Option<Reason> {
         let reason = if rear.gap_m <= self.settings.critical_gap_m {
             Reason::CriticalDistance

@@ -1,8 +1,9 @@
 //! The margin increase system (MIS).
 //!
-//! A rear vehicle approaches the ego fast, closes to a very short time headway, and overtakes only then. If the lead
-//! vehicle brakes at that moment, the ego must brake, and the rear vehicle hits it. The MIS detects the rear vehicle
-//! early and slows the ego down gently beforehand, so that the ego need not brake during the two critical seconds.
+//! A rear vehicle approaches the ego fast, closes to a very short time headway, and overtakes only
+//! then. If the lead vehicle brakes at that moment, the ego must brake, and the rear vehicle hits
+//! it. The MIS detects the rear vehicle early and slows the ego down gently beforehand, so that the
+//! ego need not brake during the two critical seconds.
 //!
 //! ```text
 //!            every condition holds           rear vehicle crosses, or at critical gap
@@ -14,10 +15,11 @@
 //! ```
 //!
 //! # Conditions for engaging
-//! The system engages at the first control step at which all of the following conditions hold. While following, the
-//! reason of the command is the first condition that is missing, in this order. The conditions rest on tracks only:
-//! what perception does not report is not assumed. In the tables d_R is the rear gap, Δv the closing speed of the rear
-//! vehicle, σ the standard deviation of its speed, and THW_F the front time headway.
+//! The system engages at the first control step at which all of the following conditions hold.
+//! While following, the reason of the command is the first condition that is missing, in this
+//! order. The conditions use tracks only: the system assumes nothing that perception does not
+//! report. In the tables d_R is the rear gap, Δv the closing speed of the rear vehicle, σ the
+//! standard deviation of its speed, and THW_F the front time headway.
 //!
 //! | condition | holds if | reason otherwise |
 //! |---|---|---|
@@ -58,15 +60,16 @@
 //! | releasing | following | the front gap is within 1.2 × the gap of the ACC, or the lead vehicle is lost | `MarginReturned` |
 //! | any | emergency braking | only emergency braking avoids a collision with the lead vehicle; it overrides the command, and the states continue beneath it | `BrakingRequired` |
 //!
-//! There is *room* if the ego can stop 2 m behind the lead vehicle in the following case: the lead vehicle brakes at
-//! `worst-front-braking-mps2` from now on to a standstill, and the ego brakes at 5.9 m/s² (what a wet road allows) from
-//! 0.3 s later on.
+//! There is *room* if the ego can stop 2 m behind the lead vehicle in the following case: the lead
+//! vehicle brakes at `worst-front-braking-mps2` from now on to a standstill, and the ego brakes at
+//! 5.9 m/s² (what a wet road allows) from 0.3 s later on.
 //!
-//! Hysteresis: the system engages at a rear gap of 100 m, and the rear vehicle has fallen back at 120 m. It engages at
-//! a closing speed of 10 km/h, and the rear vehicle follows below 5 km/h for a second. The margin must be short, below
-//! 1.5 s, only when engaging, because it is meant to grow. Of two rear vehicles the nearer is the target. The target
-//! stays the same until it is past; the next vehicle is then judged afresh. A truck or a motorcycle is treated like a
-//! car, with its own length.
+//! Hysteresis: the system engages at a rear gap of 100 m, and the rear vehicle has fallen back at
+//! 120 m. It engages at a closing speed of 10 km/h, and the rear vehicle follows below 5 km/h for a
+//! second. The margin must be short, below 1.5 s, only when engaging, because it is meant to grow.
+//! Of two rear vehicles the nearer is the target. The target stays the same until it is past; the
+//! system then judges the next vehicle afresh. A truck or a motorcycle is treated like a car, with
+//! its own length.
 //!
 //! # Commands
 //!
@@ -77,11 +80,12 @@
 //! | holding | the brake is released; the ACC is ignored | 0 | the same |
 //! | releasing | ACC, limited | ≤ 0.8 m/s² | rises by 3 m/s³ |
 //!
-//! Braking by the ACC, up to 3.5 m/s², passes in all states but holding; emergency braking always passes. The jerk limits
-//! hold for the comfort command, beneath emergency braking.
+//! Braking by the ACC, up to 3.5 m/s², passes in all states but holding; emergency braking always
+//! passes. The jerk limits hold for the comfort command, beneath emergency braking.
 //!
-//! *Holding* is the paper's critical time: for `hold-s` the ego uses up its margin instead of braking for the lead vehicle.
-//! It begins when the centre of the rear vehicle crosses the marking, or at the critical gap if that comes first.
+//! *Holding* is the paper's critical time: for `hold-s` the ego uses up its margin instead of
+//! braking for the lead vehicle. It begins when the centre of the rear vehicle crosses the marking,
+//! or at the critical gap if that comes first.
 //!
 //! | limit | default | key |
 //! |---|---|---|
@@ -97,26 +101,31 @@
 //! | time headway of a vehicle behind the rear vehicle in a free passing lane | 0 s: 15 m | `follower-headway-s` |
 //!
 //! # The plan
-//! a* is the smallest braking with which THW_F, when the rear vehicle reaches d_c, equals the time headway at engaging
-//! plus `thw-gain-s`. If no braking within the bound suffices, a* is the bound. The goal is out of reach if the bound
-//! misses it by more than 0.08 s. [`Encounter`] has the kinematics of the method and their closed-form solution for
-//! braking that takes effect at once. [`BrakingResponse`] models how the ego's braking builds up instead, and
-//! [`ArrivalPrediction`] solves the same problem with it by a bracketed search. All assume that the lead vehicle and
-//! the rear vehicle keep their speeds; the plan is computed afresh at every step.
+//! a* is the smallest braking with which THW_F, when the rear vehicle reaches d_c, equals the time
+//! headway at engaging plus `thw-gain-s`. If no braking within the bound suffices, a* is the bound.
+//! The goal is out of reach if the bound misses it by more than 0.08 s. [`Encounter`] has the
+//! kinematics of the method and their closed-form solution for braking that takes effect at once.
+//! [`BrakingResponse`] models how the ego's braking builds up instead, and [`ArrivalPrediction`]
+//! solves the same problem with it by a bracketed search. All assume that the lead vehicle and the
+//! rear vehicle keep their speeds; the plan is computed afresh at every step.
 //!
-//! With [`Horizon::Ttce`] a* is instead the braking that gains the headway within the time to closest encounter at present
-//! speeds, as the paper's text has it. The ego's own braking brings the rear vehicle earlier than that, so that this plan brakes
-//! at 0.39 m/s² at the reference point and misses the goal, which the paper's figure reaches at 1 m/s².
+//! With [`Horizon::Ttce`] a* is instead the braking that gains the headway within the time to
+//! closest encounter at present speeds, as in the paper's text. The ego's own braking makes the
+//! rear vehicle arrive earlier. This plan therefore brakes at 0.39 m/s² at the reference point and
+//! misses the goal, which the paper's figure reaches at 1 m/s².
 //!
-//! The rear vehicle crosses the marking at a time headway of 0.15 to 0.4 s, mostly before it reaches d_c. If there is room,
-//! the ego stops braking there, although the plan aims at a time headway at d_c: from the marking on, the paper's ego does
-//! not brake in front of the rear vehicle. Without room it continues its plan until d_c. A rear vehicle that leaves the lane
-//! at a time headway of 0.9 s or more needs no margin.
+//! The rear vehicle crosses the marking at a time headway of 0.15 to 0.4 s, mostly before it
+//! reaches d_c. If there is room, the ego stops braking there, although the plan aims at a time
+//! headway at d_c: from the marking on, the paper's ego does not brake in front of the rear
+//! vehicle. Without room it continues its plan until d_c. A rear vehicle that leaves the lane at a
+//! time headway of 0.9 s or more needs no margin.
 //!
 //! # Why 1 m/s², and d_c = 5 m
-//! Both are the values of the paper. `cargo run --release -p closecall-xtask -- validate-margin-increase 1000 1` measures what
-//! other values would change: scenario `low-thw-overtake`, closing speed 10 to 50 km/h, true tracks, 1000 samples of
-//! tuning seed 1. Without the system, 233 samples end in a collision (23.3 %, 95 % interval 20.7 to 26.0 %). With it:
+//! Both are the values of the paper.
+//! `cargo run --release -p closecall-xtask -- validate-margin-increase 1000 1` measures what other
+//! values would change: scenario `low-thw-overtake`, closing speed 10 to 50 km/h, true tracks, 1000
+//! samples of tuning seed 1. Without the system, 233 samples end in a collision (23.3 %, 95 %
+//! interval 20.7 to 26.0 %). With it:
 //!
 //! | bound | d_c | collisions | share | 95 % interval | prevented | induced | speed deficit |
 //! |---|---|---|---|---|---|---|---|
@@ -127,18 +136,22 @@
 //! | 2 m/s² | 10 m | 32 | 3.2 % | 2.2 to 4.5 % | 206 | 5 | 11.0 m/s |
 //! | 3 m/s² | 10 m | 34 | 3.4 % | 2.4 to 4.7 % | 205 | 6 | 11.1 m/s |
 //!
-//! The speed deficit is the largest amount by which the ego is slower than the lead vehicle in a run; 95 % of the samples
-//! stay below the value of the table. If the rear driver needs 2 s to react, 462 samples end in a collision without the
-//! system, and 207, 129 and 117 with bounds of 1, 2 and 3 m/s² (d_c = 5 m; 33, 18 and 12 of them induced). The same slow
-//! driver collides in none of 1000 samples of `overtake-without-brake` with bounds of up to 2 m/s², and in two with 3 m/s².
+//! The speed deficit is the largest amount by which the ego is slower than the lead vehicle in a
+//! run; 95 % of the samples stay below the value of the table. If the rear driver needs 2 s to
+//! react, 462 samples end in a collision without the system, and 207, 129 and 117 with bounds of 1,
+//! 2 and 3 m/s² (d_c = 5 m; 33, 18 and 12 of them induced). The same slow driver collides in none
+//! of 1000 samples of `overtake-without-brake` with bounds of up to 2 m/s², and in two with 3 m/s².
 //!
-//! * d_c makes no difference that 1000 samples show.
-//! * A bound of 2 m/s² prevents more collisions than the paper's comfort limit of 1 m/s², and induces fewer. The price is a
-//!   stronger and longer intervention: the ego becomes 10 m/s slower than the lead vehicle instead of 8 m/s.
-//! * A bound of 3 m/s² shows no further gain over 2 m/s², and lets a slow rear driver collide without any event ahead.
+//! * d_c makes no difference that 1000 samples can show.
+//! * A bound of 2 m/s² prevents more collisions than the paper's comfort limit of 1 m/s², and
+//!   induces fewer. The price is a stronger and longer intervention: the ego becomes 10 m/s slower
+//!   than the lead vehicle instead of 8 m/s.
+//! * A bound of 3 m/s² shows no further gain over 2 m/s², and lets a slow rear driver collide
+//!   without any event ahead.
 //!
-//! The default remains the comfort limit. A scenario that accepts stronger braking sets `max-deceleration-mps2`. If the
-//! goal is out of reach, the bound is used in full: each tenth of a second gained counts.
+//! The default remains the comfort limit. A scenario that accepts stronger braking sets
+//! `max-deceleration-mps2`. If the goal is out of reach, the bound is used in full: each tenth of a
+//! second gained counts.
 //!
 //! The module `machine` has the states and transitions; `plan` has the plan that is reported.
 

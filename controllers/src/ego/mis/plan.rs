@@ -13,10 +13,11 @@ pub struct MisPlan {
     pub closing_mps: f64,
     /// Present front time headway (s).
     pub thw_front_s: Measured,
-    /// Time to closest encounter: time until the rear vehicle reaches the rear of the ego, both at their present speeds
-    /// (s).
+    /// Time to closest encounter: time until the rear vehicle reaches the rear of the ego, both at
+    /// their present speeds (s).
     pub ttce_s: Measured,
-    /// t_c(a): time until the rear vehicle reaches the critical gap while the ego brakes as planned (s).
+    /// t_c(a): time until the rear vehicle reaches the critical gap while the ego brakes as planned
+    /// (s).
     pub time_to_critical_s: Measured,
     /// a*: planned braking (m/s²); 0 if none is needed.
     pub deceleration_mps2: f64,

@@ -1,19 +1,24 @@
-//! The smallest braking that reaches the goal, taking into account that braking builds up over time.
+//! The smallest braking that reaches the goal, taking into account that braking builds up over
+//! time.
 //!
-//! [`Encounter`] has the closed-form solution for braking that takes effect at once. With a [`BrakingResponse`], the
-//! arrival time solves D = Δv·t + W(t), where D is the distance to the critical gap, Δv the closing speed and W the
-//! ego's loss of distance. Newton's method finds the root of this convex function within a few steps, starting from the
-//! closed-form arrival. The braking is then bisected between a value that misses the goal and one that reaches it.
+//! [`Encounter`] has the closed-form solution for braking that takes effect at once. With a
+//! [`BrakingResponse`], the arrival time solves D = Δv·t + W(t), where D is the distance to the
+//! critical gap, Δv the closing speed and W the ego's loss of distance. Newton's method finds the
+//! root of this convex function within a few steps, starting from the closed-form arrival.
+//! Bisection then narrows the braking between a value that misses the goal and a value that reaches
+//! it.
 //!
-//! If the rear vehicle is at least as fast as the lead vehicle, which is the case that the system is built for, the
-//! headway at arrival grows with the braking, without limit until the ego stops. Evaluating the bound alone then tells
-//! whether any braking reaches the goal. If the lead vehicle is faster still, the headway may fall with the braking.
-//! The range is then scanned from its lower end, and the first braking that reaches the goal is bracketed.
+//! If the rear vehicle is at least as fast as the lead vehicle, which is the case that the system
+//! is built for, the headway at arrival grows with the braking, without limit until the ego stops.
+//! Evaluating the bound alone then tells whether any braking reaches the goal. If the lead vehicle
+//! is faster still, the headway may fall with the braking. The range is then scanned from its lower
+//! end, and the first braking that reaches the goal is bracketed.
 
 use super::response::{BrakingResponse, BuildUp};
 use super::{Encounter, Solution};
 
-/// Number of parts in which the range is scanned if the headway at arrival may fall with the braking.
+/// Number of parts in which the range is scanned if the headway at arrival may fall with the
+/// braking.
 const SCAN_PARTS: u32 = 64;
 
 /// Bisection steps: to 10⁻⁹ of the bound.
@@ -31,7 +36,8 @@ const NEWTON_STEPS: u32 = 12;
 /// Change of the arrival time below which it counts as found (s).
 const ARRIVAL_TOLERANCE_S: f64 = 1e-10;
 
-/// Prediction of the rear vehicle's arrival: an encounter, and the build-up of the ego's braking in it.
+/// Prediction of the rear vehicle's arrival: an encounter, and the build-up of the ego's braking in
+/// it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrivalPrediction {
     /// The present encounter.
@@ -41,8 +47,8 @@ pub struct ArrivalPrediction {
 }
 
 impl ArrivalPrediction {
-    /// Returns the time until the rear vehicle reaches the critical gap, with the ego braking up to `deceleration_mps2`
-    /// (s).
+    /// Returns the time until the rear vehicle reaches the critical gap, with the ego braking up to
+    /// `deceleration_mps2` (s).
     ///
     /// Returns `None` if the rear vehicle never arrives.
     pub fn arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
@@ -70,8 +76,8 @@ impl ArrivalPrediction {
         None
     }
 
-    /// Returns the front time headway when the rear vehicle arrives, with the ego braking up to `deceleration_mps2`
-    /// (s).
+    /// Returns the front time headway when the rear vehicle arrives, with the ego braking up to
+    /// `deceleration_mps2` (s).
     ///
     /// Returns `None` if the rear vehicle never arrives, or if the ego stops before.
     pub fn headway_at_arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
@@ -79,8 +85,8 @@ impl ArrivalPrediction {
         (speed_mps > 0.0).then(|| gap_m / speed_mps)
     }
 
-    /// Returns the front gap (m) and the speed of the ego (m/s) when the rear vehicle arrives; a speed of 0 or less
-    /// means that the ego stops before.
+    /// Returns the front gap (m) and the speed of the ego (m/s) when the rear vehicle arrives; a
+    /// speed of 0 or less means that the ego stops before.
     fn at_arrival(&self, deceleration_mps2: f64) -> Option<(f64, f64)> {
         let Encounter { ego_mps, front_gap_m, lead_mps, .. } = self.encounter;
         let mut build_up = self.response.towards(deceleration_mps2);
@@ -89,10 +95,11 @@ impl ArrivalPrediction {
         Some((front_gap_m + (lead_mps - ego_mps) * time_s + loss.distance_m, ego_mps - loss.speed_mps))
     }
 
-    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is at least `goal_s` when the
-    /// rear vehicle arrives.
+    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is at
+    /// least `goal_s` when the rear vehicle arrives.
     ///
-    /// Returns `None` if the rear vehicle does not approach: there is then no encounter to prepare for.
+    /// Returns `None` if the rear vehicle does not approach: there is then no encounter to prepare
+    /// for.
     pub fn solve(&self, goal_s: f64, bound_mps2: f64) -> Option<Solution> {
         if !(self.encounter.closing_mps > 0.0) {
             return None;
@@ -115,18 +122,20 @@ impl ArrivalPrediction {
         })
     }
 
-    /// Returns true if this braking reaches or exceeds the goal. If the ego stops before the arrival, it does: the
-    /// headway passes every value on the way to a standstill.
+    /// Returns true if this braking reaches or exceeds the goal. If the ego stops before the
+    /// arrival, it does: the headway passes every value on the way to a standstill.
     fn reaches_goal(&self, goal_s: f64, deceleration_mps2: f64) -> bool {
         let enough = |(gap_m, speed_mps)| speed_mps <= 0.0 || gap_m / speed_mps >= goal_s;
         self.at_arrival(deceleration_mps2).is_some_and(enough)
     }
 
-    /// Returns what [`Self::bisect`] returns for the range from 0 to `enough`, in a third of its steps.
+    /// Returns what [`Self::bisect`] returns for the range from 0 to `enough`, in a third of its
+    /// steps.
     ///
-    /// The secant method (the Illinois algorithm) estimates the braking. The cell of bisection that contains the estimate is the
-    /// result if its lower end misses the goal and its upper end reaches it, since the headway grows with the braking. Returns
-    /// `None` if that is not so, or if the ego stops before the arrival at the bound.
+    /// The secant method (the Illinois algorithm) estimates the braking. The cell of bisection that
+    /// contains the estimate is the result if its lower end misses the goal and its upper end
+    /// reaches it, since the headway grows with the braking. Returns `None` if that is not so, or
+    /// if the ego stops before the arrival at the bound.
     fn by_secant(&self, goal_s: f64, enough: f64) -> Option<f64> {
         let surplus_s = |braking: f64| self.headway_at_arrival_s(braking).map(|headway_s| headway_s - goal_s);
         let (mut low, mut high) = ((0.0, surplus_s(0.0)?), (enough, surplus_s(enough)?));
@@ -140,7 +149,8 @@ impl ArrivalPrediction {
             }
             let surplus_s = surplus_s(estimate)?;
             let misses = surplus_s < 0.0;
-            // An end that stays twice is given half of its weight, so that both ends approach the root.
+            // An end that stays twice is given half of its weight, so that both ends approach the
+            // root.
             let stays = last_missed == Some(misses);
             let (moved, kept) = if misses { (&mut low, &mut high) } else { (&mut high, &mut low) };
             *moved = (estimate, surplus_s);
@@ -164,7 +174,8 @@ impl ArrivalPrediction {
         (!self.reaches_goal(goal_s, too_little) && self.reaches_goal(goal_s, reaching)).then_some(reaching)
     }
 
-    /// Returns the smallest braking that reaches the goal, between one that does not and one that does.
+    /// Returns the smallest braking that reaches the goal. It lies between a braking that does not
+    /// reach the goal and a braking that does.
     fn bisect(&self, goal_s: f64, mut too_little: f64, mut enough: f64) -> f64 {
         for _ in 0..BISECTION_STEPS {
             let middle = 0.5 * (too_little + enough);
@@ -192,8 +203,8 @@ mod tests {
         }
     }
 
-    /// Computes the front time headway when the rear vehicle arrives by time-stepping all three vehicles, a hundred
-    /// times a second.
+    /// Computes the front time headway when the rear vehicle arrives by time-stepping all three
+    /// vehicles, a hundred times a second.
     fn stepped(prediction: &ArrivalPrediction, aim: f64) -> Option<f64> {
         let ArrivalPrediction { encounter, response } = prediction;
         let step_s = 0.01;
@@ -227,8 +238,8 @@ mod tests {
         None
     }
 
-    /// The result of a scan over the braking. A scan is inconclusive if the headway is within its own error of the
-    /// goal.
+    /// The result of a scan over the braking. A scan is inconclusive if the headway is within its
+    /// own error of the goal.
     #[derive(Debug, PartialEq)]
     enum Scanned {
         Reached,
@@ -266,10 +277,10 @@ mod tests {
             }
         }
 
-        /// Holds if the rear vehicle is at least as fast as the lead vehicle, as in every state in which the system
-        /// engages.
+        /// Holds if the rear vehicle is at least as fast as the lead vehicle, as in every state in
+        /// which the system engages.
         #[test]
-        fn the_reachable_set_equals_that_of_a_scan(
+        fn the_goal_is_in_reach_exactly_if_a_scan_reaches_it(
             encounter in encounters(), response in responses(), gain in 0.1..3.0, bound in 0.5..3.0,
         ) {
             prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);

@@ -7,11 +7,13 @@
 //!  β  ───────╱
 //! ```
 //!
-//! Integrating τ·ẋ = c − x once and twice gives V = ∫c − τ·(x − β) and W = ∬c − τ·(V − β·t), where τ is the lag.
-//! Everything is in closed form: c is a line and then a constant, and x approaches it exponentially.
+//! Integrating τ·ẋ = c − x once and twice gives V = ∫c − τ·(x − β) and W = ∬c − τ·(V − β·t), where
+//! τ is the lag. Everything is in closed form: c is a line and then a constant, and x approaches it
+//! exponentially.
 //!
-//! Without this model, the plan would assume that braking takes effect at once. The half second of ramp and lag costs
-//! 0.3 s of the 2 s of headway gain at the closing speed of the reference point, and more at higher closing speeds.
+//! Without this model, the plan would assume that braking takes effect at once. The half second of
+//! ramp and lag costs 0.3 s of the 2 s of headway gain at the closing speed of the reference point,
+//! and more at higher closing speeds.
 
 use closecall_traffic::maths;
 
@@ -47,7 +49,8 @@ pub(super) struct BuildUp<'a> {
     jerk_mps3: f64,
     /// Duration of the whole ramp (s).
     ramp_s: f64,
-    /// The whole ramp, once a loss after its end was asked for: it does not depend on the time of the loss.
+    /// The whole ramp, once a loss after its end was asked for: it does not depend on the time of
+    /// the loss.
     whole_ramp: Option<Segment>,
 }
 
@@ -71,7 +74,8 @@ impl BuildUp<'_> {
     }
 }
 
-/// A time segment in which the command changes linearly: the integrals of the command, and the braking at its end.
+/// A time segment in which the command changes linearly: the integrals of the command, and the
+/// braking at its end.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
     /// ∫c and ∬c (m/s, m).
@@ -147,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn without_ramp_and_lag_the_loss_is_that_of_constant_braking() {
+    fn without_ramp_and_lag_the_loss_equals_constant_braking() {
         let loss = BrakingResponse::IMMEDIATE.towards(1.5).loss(4.0);
         assert_eq!(loss, Loss { speed_mps: 6.0, distance_m: 12.0 });
     }

@@ -1,22 +1,25 @@
-//! The braking with which the ego's front time headway has grown enough when the rear vehicle arrives.
+//! The braking with which the ego's front time headway has grown enough when the rear vehicle
+//! arrives.
 //!
-//! Notation: E is the ego, F the lead vehicle, R the rear vehicle; v are speeds, g_F and g_R the gaps to F and R, and
-//! THW is the front time headway. R covers the distance D = g_R − d_c to the critical gap d_c at the closing speed Δv >
-//! 0, while E brakes at a. R arrives after
+//! Notation: E is the ego, F the lead vehicle, R the rear vehicle; v are speeds, g_F and g_R the
+//! gaps to F and R, and THW is the front time headway. R covers the distance D = g_R − d_c to the
+//! critical gap d_c at the closing speed Δv > 0, while E brakes at a. R arrives after
 //!
 //! t(a) = (−Δv + √(Δv² + 2·a·D))/a, which solves D = Δv·t + ½·a·t², with the limit D/Δv for a → 0.
 //!
-//! The front time headway is then THW(t) = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t). With ½·a·t² = D − Δv·t it
-//! depends only on t:
+//! The front time headway is then THW(t) = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t). With ½·a·t²
+//! = D − Δv·t it depends only on t:
 //!
-//! THW(t) = (G − w·t)/(v_E + 2·Δv − 2·D/t), with G = g_F + D and w = v_E + Δv − v_F, the speed by which R exceeds F.
+//! THW(t) = (G − w·t)/(v_E + 2·Δv − 2·D/t), with G = g_F + D and w = v_E + Δv − v_F, the speed by
+//! which R exceeds F.
 //!
-//! THW(t) = H is a quadratic equation, w·t² + B·t − 2·H·D = 0 with B = H·(v_E + 2·Δv) − G. No braking means t = D/Δv,
-//! and harder braking means an earlier arrival. Towards earlier times the first solution is t* = 4·H·D/(B + √(B² +
-//! 8·w·H·D)), whatever the sign of w. The braking is a* = 2·(D − Δv·t*)/t*².
+//! THW(t) = H is a quadratic equation, w·t² + B·t − 2·H·D = 0 with B = H·(v_E + 2·Δv) − G. No
+//! braking means t = D/Δv, and harder braking means an earlier arrival. Towards earlier times the
+//! first solution is t* = 4·H·D/(B + √(B² + 8·w·H·D)), whatever the sign of w. The braking is a* =
+//! 2·(D − Δv·t*)/t*².
 //!
-//! For w ≥ 0, which is the case that the system is built for, the headway at arrival grows with the braking. Then t* is
-//! the only solution, and a* is the smallest braking that reaches H.
+//! For w ≥ 0, which is the case that the system is built for, the headway at arrival grows with the
+//! braking. Then t* is the only solution, and a* is the smallest braking that reaches H.
 
 /// Braking below which the ego counts as keeping its speed (m/s²).
 const NO_BRAKING_MPS2: f64 = 1e-9;
@@ -53,10 +56,11 @@ impl Encounter {
         (self.rear_gap_m - self.critical_gap_m).max(0.0)
     }
 
-    /// Returns t_c(a), the time until the rear vehicle reaches the critical gap while the ego brakes at
-    /// `deceleration_mps2` (s).
+    /// Returns t_c(a), the time until the rear vehicle reaches the critical gap while the ego
+    /// brakes at `deceleration_mps2` (s).
     ///
-    /// Returns `None` if the rear vehicle never arrives: it does not approach, and the ego does not brake.
+    /// Returns `None` if the rear vehicle never arrives: it does not approach, and the ego does not
+    /// brake.
     pub fn arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
         let (distance_m, closing_mps) = (self.distance_to_critical_m(), self.closing_mps);
         if deceleration_mps2 > NO_BRAKING_MPS2 {
@@ -71,7 +75,8 @@ impl Encounter {
         (closing_mps > 0.0).then(|| distance_m / closing_mps)
     }
 
-    /// Returns the front time headway when the rear vehicle arrives, with the ego braking at `deceleration_mps2` (s).
+    /// Returns the front time headway when the rear vehicle arrives, with the ego braking at
+    /// `deceleration_mps2` (s).
     ///
     /// Returns `None` if the rear vehicle never arrives, or if the ego stops before.
     pub fn headway_at_arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
@@ -84,25 +89,27 @@ impl Encounter {
         Some((self.front_gap_m + opening_m) / speed_mps)
     }
 
-    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is `goal_s` at the time to closest
-    /// encounter, which both vehicles' present speeds determine: the time until the rear vehicle touches the ego if neither
-    /// brakes.
+    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is
+    /// `goal_s` at the time to closest encounter, which both vehicles' present speeds determine:
+    /// the time until the rear vehicle touches the ego if neither brakes.
     ///
-    /// With the time t, THW = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t) = H gives a = (H·v_E − g_F − (v_F − v_E)·t)/(½·t² + H·t).
-    /// Returns `None` if the rear vehicle does not approach.
+    /// With the time t, THW = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t) = H gives a = (H·v_E − g_F
+    /// − (v_F − v_E)·t)/(½·t² + H·t). Returns `None` if the rear vehicle does not approach.
     pub fn solve_by_ttce(&self, goal_s: f64, bound_mps2: f64) -> Option<Solution> {
         let time_s = Self { critical_gap_m: 0.0, ..*self }.arrival_s(0.0)?;
         let missing_m = goal_s * self.ego_mps - self.front_gap_m - (self.lead_mps - self.ego_mps) * time_s;
         let needed = missing_m / (0.5 * time_s * time_s + goal_s * time_s);
-        // NaN and infinity occur if the rear vehicle touches the ego. NaN is written to be out of reach.
+        // NaN and infinity occur if the rear vehicle touches the ego. NaN is written to be out of
+        // reach.
         let in_reach = needed <= bound_mps2;
         Some(Solution { deceleration_mps2: if in_reach { needed.max(0.0) } else { bound_mps2 }, in_reach })
     }
 
-    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is `goal_s` when the rear
-    /// vehicle arrives.
+    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is
+    /// `goal_s` when the rear vehicle arrives.
     ///
-    /// Returns `None` if the rear vehicle does not approach: there is then no encounter to prepare for.
+    /// Returns `None` if the rear vehicle does not approach: there is then no encounter to prepare
+    /// for.
     pub fn solve(&self, goal_s: f64, bound_mps2: f64) -> Option<Solution> {
         if self.headway_at_arrival_s(0.0)? >= goal_s {
             return Some(Solution { deceleration_mps2: 0.0, in_reach: true });
@@ -115,8 +122,8 @@ impl Encounter {
         // For b < 0 the sum b + √… suffers from cancellation; the conjugate form does not.
         let time_s = if b >= 0.0 { 4.0 * goal_s * distance_m / (b + root) } else { (root - b) / (2.0 * w) };
         let needed = 2.0 * (distance_m - self.closing_mps * time_s) / (time_s * time_s);
-        // NaN occurs if the rear vehicle is at the critical gap or no solution exists. The comparison is written so
-        // that NaN is out of reach.
+        // NaN occurs if the rear vehicle is at the critical gap or no solution exists. The
+        // comparison is written so that NaN is out of reach.
         if needed <= bound_mps2 {
             Some(Solution { deceleration_mps2: needed.max(0.0), in_reach: true })
         } else {

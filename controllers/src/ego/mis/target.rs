@@ -5,8 +5,8 @@ use closecall_traffic::{Time, TrackId};
 use super::machine::Situation;
 use crate::ego::surroundings::{Front, RearVehicle, rear_vehicle_from};
 
-/// Largest distance between a new track and the expected position of the lost one to be taken for it (m): an
-/// assumption; 3 to 8 are plausible.
+/// Largest distance between a new track and the expected position of a lost track at which both are
+/// the same vehicle (m): an assumption; 3 to 8 are plausible.
 const REASSOCIATION_DISTANCE_M: f64 = 5.0;
 
 /// Largest difference of their speeds (m/s): an assumption; 2 to 5 are plausible.
@@ -29,10 +29,11 @@ pub(super) struct Target {
 impl Target {
     /// Returns true if the ego may slow down for the margin.
     ///
-    /// Emergency braking is the hazard that the margin was meant for: the rear vehicle has lost the distance that the ego
-    /// needed, its driver brakes or evades, and the plan's assumption that it drives on as before no longer holds. From then
-    /// on the ego slows down in front of it only while the gap ahead closes. While it does not, the margin does not shrink,
-    /// and every further m/s is taken from the driver behind for nothing.
+    /// Emergency braking is the hazard that the margin was meant for: the rear vehicle has lost the
+    /// distance that the ego needed, its driver brakes or evades, and the plan's assumption that it
+    /// drives on as before no longer holds. From then on the ego slows down in front of it only
+    /// while the gap ahead closes. While it does not, the margin does not shrink, and every further
+    /// m/s is taken from the driver behind for nothing.
     pub(super) fn may_cost_speed(&self, lead: &Front, ego_mps: f64) -> bool {
         !self.has_braked_hard || lead.speed_mps < ego_mps
     }
@@ -43,7 +44,7 @@ impl Target {
         let own_mps = situation.speed_mps();
         let expected_m = self.rear.x_m + (self.rear.speed_mps - own_mps) * step_s;
         let by_id = |id: TrackId| situation.input.tracks.iter().find(|track| track.id == id);
-        let found = by_id(self.rear.track).or_else(|| {
+        let target = by_id(self.rear.track).or_else(|| {
             situation.input.tracks.iter().find(|track| {
                 (track.x_m() - expected_m).abs() < REASSOCIATION_DISTANCE_M
                     && (track.vx_mps() - self.rear.speed_mps).abs() < REASSOCIATION_SPEED_MPS
@@ -52,7 +53,7 @@ impl Target {
                         >= 0.5
             })
         });
-        match found {
+        match target {
             Some(track) => {
                 self.rear = rear_vehicle_from(track, situation.input);
                 self.last_seen = situation.input.time;

@@ -41,8 +41,8 @@ prop_compose! {
     }
 }
 
-/// A test bench in which every condition for engaging holds: the ego drives at 30 m/s, the lead vehicle is at 21 m, and
-/// the rear vehicle is at 90 m and 8 m/s faster.
+/// A test bench in which every condition for engaging holds: the ego drives at 30 m/s, the lead
+/// vehicle is at 21 m, and the rear vehicle is at 90 m and 8 m/s faster.
 struct Bench {
     stack: EgoStack,
     time: Time,

@@ -37,12 +37,14 @@ impl Unpacked {
     }
 }
 
-/// The beginning of the names of the folders, and the ends of the names of a folder and of its lock.
+/// The beginning of the names of the folders, and the ends of the names of a folder and of its
+/// lock.
 const PREFIX: &str = "closecall-fmu-";
 const FOLDER_END: &str = "unpacked";
 const LOCK_END: &str = "lock";
 
-/// A temporary folder. A process that crashes leaves its folder behind, without the lock beside it: the next process removes it.
+/// A temporary folder. A process that crashes leaves its folder behind, without the lock beside it:
+/// the next process removes it.
 #[derive(Debug)]
 struct Folder {
     path: PathBuf,
@@ -64,7 +66,8 @@ impl Folder {
         loop {
             let lock = tempfile::Builder::new().prefix(PREFIX).suffix(&format!(".{LOCK_END}")).tempfile_in(folder)?;
             lock.as_file().lock()?;
-            // Before it was locked, another process may have taken it for an abandoned one, and removed it.
+            // Before it was locked, another process may have taken it for an abandoned one, and
+            // removed it.
             if lock.path().exists() {
                 return Ok(lock);
             }
@@ -98,35 +101,39 @@ fn remove_abandoned(folder: &Path) {
     }
 }
 
-/// Largest size of an FMU that is unpacked (bytes), its largest number of files, and the longest time that unpacking takes:
-/// limits of this program, 20 times the largest FMU of the FMI cross-check repository.
+/// Largest size of an FMU that is unpacked (bytes), its largest number of files, and the longest
+/// time that unpacking takes: limits of this program, 20 times the largest FMU of the FMI
+/// cross-check repository.
 const MOST_BYTES: u64 = 2 << 30;
 const MOST_FILES: usize = 100_000;
 const LONGEST: Duration = Duration::from_secs(60);
-/// Largest description that is read (bytes): a limit of this program, 100 times a description with 10,000 variables.
+/// Largest description that is read (bytes): a limit of this program, 100 times a description with
+/// 10,000 variables.
 const MOST_DESCRIPTION_BYTES: u64 = 256 << 20;
 
-/// The folder into which the process that started this one has unpacked its FMU.
+/// The folder into which the parent process has unpacked its FMU.
 static BY_PARENT: OnceLock<PathBuf> = OnceLock::new();
 
-/// What this process has unpacked for the processes that it starts, by the path of the FMU, and what was seen of the file then.
+/// The folders that this process has unpacked for its child processes, by the path of the FMU, with
+/// the time and size of the file.
 static UNPACKED: Mutex<BTreeMap<PathBuf, (Seen, Folder)>> = Mutex::new(BTreeMap::new());
 
 /// The time of change and the length of a file.
 type Seen = (SystemTime, u64);
 
-/// Uses the folder into which the process that started this one has unpacked the FMU.
+/// Uses the folder into which the parent process has unpacked the FMU.
 pub(crate) fn use_unpacked(folder: PathBuf) {
     BY_PARENT.get_or_init(|| folder);
 }
 
-/// Unpacks an FMU once for all processes that this one starts, and returns the folder. Returns `None` if it cannot be unpacked: a process
-/// that tries it again says why. No code of the FMU runs.
+/// Unpacks an FMU once for all processes that this process starts, and returns the folder. Returns
+/// `None` if it cannot be unpacked: a process that tries it again says why. No code of the FMU
+/// runs.
 pub(crate) fn unpacked_for_children(path: &Path) -> Option<PathBuf> {
     let metadata = path.metadata().ok()?;
     let seen = (metadata.modified().ok()?, metadata.len());
     let mut unpacked = UNPACKED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, folder)) = unpacked.get(path).filter(|(there, _)| *there == seen) {
+    if let Some((_, folder)) = unpacked.get(path).filter(|(unpacked_as, _)| *unpacked_as == seen) {
         return Some(folder.path.clone());
     }
     let Unpacked { folder: Some(folder), .. } = unpack_into_new(path).ok()? else { return None };
@@ -141,7 +148,7 @@ pub(crate) fn remove_unpacked() {
     drop(unpacked);
 }
 
-/// Returns the unpacked FMU: what the process that started this one has unpacked, or a folder of its own.
+/// Returns the unpacked FMU: the folder that the parent process has unpacked, or a new folder.
 pub(super) fn unpack(path: &Path) -> Result<Unpacked, LoadError> {
     let Some(place) = BY_PARENT.get() else { return unpack_into_new(path) };
     let shown = path.display().to_string();
@@ -260,8 +267,8 @@ fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mu
     }
 }
 
-/// Returns the name of a file in the notation of the standard: with slashes, and without `./`. Some tools write backslashes. Returns `None`
-/// for a folder.
+/// Returns the name of a file in the notation of the standard: with slashes, and without `./`. Some
+/// tools write backslashes. Returns `None` for a folder.
 fn normal_name(raw: &str) -> Result<Option<String>, String> {
     let slashed = raw.replace('\\', "/");
     let parts: Vec<&str> = slashed.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
@@ -271,7 +278,8 @@ fn normal_name(raw: &str) -> Result<Option<String>, String> {
     Ok((!slashed.ends_with('/') && !parts.is_empty()).then(|| parts.join("/")))
 }
 
-/// Returns the text of a description in the encoding that it declares: UTF-8, which the standard prescribes, or ISO-8859-1.
+/// Returns the text of a description in the encoding that it declares: UTF-8, which the standard
+/// prescribes, or ISO-8859-1.
 fn decoded(bytes: Vec<u8>) -> Result<String, String> {
     let is_utf_16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).into_owned();
@@ -293,23 +301,23 @@ fn decoded(bytes: Vec<u8>) -> Result<String, String> {
     }
 }
 
-/// Returns the name of the binary for this platform among those of the archive, or why there is none.
+/// Returns the name of the archive's binary for this platform, or the reason why there is none.
 fn binary(names: &[String], description: &Description) -> Result<String, String> {
-    let own = own_platforms(description.version);
+    let expected = own_platforms(description.version);
     let name = |platform: &str| format!("binaries/{platform}/{}{DLL_SUFFIX}", description.identifier);
-    if let Some(found) = own.iter().map(|platform| name(platform)).find(|name| names.contains(name)) {
-        return Ok(found);
+    if let Some(file) = expected.iter().map(|platform| name(platform)).find(|name| names.contains(name)) {
+        return Ok(file);
     }
     let mut platforms: Vec<&str> =
         names.iter().filter_map(|name| Some(name.strip_prefix("binaries/")?.split_once('/')?.0)).collect();
     platforms.sort_unstable();
     platforms.dedup();
-    let found = match platforms.iter().any(|platform| own.contains(&(*platform).to_owned())) {
-        true => format!("its binaries lack {}", name(&own[0])),
+    let problem = match platforms.iter().any(|platform| expected.contains(&(*platform).to_owned())) {
+        true => format!("its binaries lack {}", name(&expected[0])),
         false if platforms.is_empty() => "it has no binaries".to_owned(),
         false => format!("it has binaries for {}", platforms.join(", ")),
     };
-    Err(format!("{found}; expected one for {}", own.join(" or ")))
+    Err(format!("{problem}; expected one for {}", expected.join(" or ")))
 }
 
 /// Returns the names of this platform in the folder `binaries`.
@@ -349,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unpacked_is_bounded() {
+    fn the_unpacked_size_is_bounded() {
         let (mut left, mut written) = (10, Vec::new());
         let error = copy_bounded(&mut [0; 11].as_slice(), &mut written, (&mut left, Instant::now())).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
@@ -358,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn a_live_folder_is_not_taken_for_an_abandoned_one() {
+    fn a_live_folder_does_not_count_as_abandoned() {
         let place = tempfile::tempdir().unwrap();
         let is_over = AtomicBool::new(false);
         std::thread::scope(|scope| {

@@ -12,7 +12,7 @@ pub(crate) enum Version {
     Fmi3,
 }
 
-/// The causality of a variable, as far as it matters here.
+/// The causality of a variable, with the kinds that matter here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Causality {
     Input,
@@ -21,7 +21,8 @@ pub(crate) enum Causality {
     Other,
 }
 
-/// The type of a variable. The names are those of FMI 3.0; FMI 2.0 has `Real`, `Integer`, `Boolean`, `String` and `Enumeration`.
+/// The type of a variable. The names come from FMI 3.0; FMI 2.0 has `Real`, `Integer`, `Boolean`,
+/// `String` and `Enumeration`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Type {
     Float64,
@@ -76,7 +77,7 @@ pub(crate) struct Variable {
     pub(crate) is_array: bool,
 }
 
-/// What the description says.
+/// The content of the description.
 #[derive(Clone, Debug)]
 pub(crate) struct Description {
     pub(crate) version: Version,
@@ -95,8 +96,8 @@ pub(crate) struct Description {
 
 /// Returns an attribute of an element.
 fn attribute(element: &BytesStart<'_>, name: &str) -> Option<String> {
-    let found = element.attributes().flatten().find(|attribute| attribute.key.as_ref() == name.as_bytes())?;
-    let value = String::from_utf8(found.value.into_owned()).ok()?;
+    let attribute = element.attributes().flatten().find(|attribute| attribute.key.as_ref() == name.as_bytes())?;
+    let value = String::from_utf8(attribute.value.into_owned()).ok()?;
     quick_xml::escape::unescape(&value).ok().map(|value| value.into_owned())
 }
 
@@ -122,7 +123,7 @@ struct Draft {
 }
 
 impl Description {
-    /// Reads a description, and returns what is wrong otherwise.
+    /// Reads a description, or returns its fault.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         let mut reader = Reader::from_str(text);
         let mut draft = Draft::default();
@@ -147,11 +148,11 @@ impl Draft {
         let number = |key: &str| attribute(element, key).and_then(|text| text.parse::<f64>().ok());
         match name.as_str() {
             "fmiModelDescription" => {
-                let found = attribute(element, "fmiVersion").unwrap_or_default();
-                self.version = match found.as_str() {
+                let version = attribute(element, "fmiVersion").unwrap_or_default();
+                self.version = match version.as_str() {
                     "2.0" => Some(Version::Fmi2),
                     three if three == "3.0" || three.starts_with("3.0.") => Some(Version::Fmi3),
-                    _ => return Err(format!("it is an FMU of FMI version `{found}`; expected 2.0 or 3.0")),
+                    _ => return Err(format!("it is an FMU of FMI version `{version}`; expected 2.0 or 3.0")),
                 };
                 self.model = attribute(element, "modelName").unwrap_or_default();
                 self.model_version = attribute(element, "version");
@@ -218,7 +219,7 @@ impl Draft {
                 return Err("its description has no element CoSimulation with a modelIdentifier".to_owned());
             }
         };
-        // A step that may not vary is the one that the FMU proposes.
+        // A step that may not vary is the step that the FMU proposes.
         let proposed_s = self.default_step_s.filter(|_| !self.can_vary_step);
         Ok(Description {
             version,

@@ -18,7 +18,8 @@ type Status = c_int;
 /// The functions of the environment: `fmi2CallbackFunctions`.
 #[repr(C)]
 struct Callbacks {
-    /// The function of the standard has further arguments, to which the placeholders of the message refer. They are ignored.
+    /// The function of the standard has further arguments, to which the placeholders of the message
+    /// refer. They are ignored.
     logger: unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char),
     allocate: unsafe extern "C" fn(usize, usize) -> *mut c_void,
     free: unsafe extern "C" fn(*mut c_void),
@@ -166,14 +167,14 @@ impl Instance2 {
         Ok(Self { functions, component, _callbacks: callbacks, is_initialized: false, is_dead: false })
     }
 
-    fn check(&mut self, status: Status, what: &str) -> Result<(), String> {
+    fn check(&mut self, status: Status, call: &str) -> Result<(), String> {
         if status <= WARNING {
             return Ok(());
         }
         self.is_dead = status == FATAL;
         let names = ["OK", "Warning", "Discard", "Error", "Fatal", "Pending"];
         let name = usize::try_from(status).ok().and_then(|index| names.get(index)).unwrap_or(&"of no name");
-        Err(format!("{what} answered fmi2{name}{}", logged()))
+        Err(format!("{call} answered fmi2{name}{}", logged()))
     }
 }
 

@@ -171,14 +171,14 @@ impl Instance3 {
         Ok(Self { functions, component, is_initialized: false, is_dead: false })
     }
 
-    fn check(&mut self, status: Status, what: &str) -> Result<(), String> {
+    fn check(&mut self, status: Status, call: &str) -> Result<(), String> {
         if status <= WARNING {
             return Ok(());
         }
         self.is_dead = status == FATAL;
         let names = ["OK", "Warning", "Discard", "Error", "Fatal"];
         let name = usize::try_from(status).ok().and_then(|index| names.get(index)).unwrap_or(&"of no name");
-        Err(format!("{what} answered fmi3{name}{}", logged()))
+        Err(format!("{call} answered fmi3{name}{}", logged()))
     }
 
     /// Sets one variable with a function that the FMU may lack.

@@ -1,4 +1,4 @@
-//! Which variable of an FMU gets which quantity.
+//! The assignment of quantities to the variables of an FMU.
 
 use std::collections::BTreeMap;
 
@@ -9,11 +9,12 @@ use super::description::{Causality, Description, Type, Variable};
 use super::quantity::{Number, Quantity};
 use crate::external::exchange::Setup;
 
-/// The names of the variables of an FMU, if they are not those of the quantities.
+/// The names of the variables of an FMU, if they differ from the names of the quantities.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct VariableTable {
-    /// What an input or parameter of the FMU gets, by its name: the name of a quantity, or a number.
+    /// The source of an input or parameter of the FMU, by its name: the name of a quantity, or a
+    /// number.
     #[serde(default)]
     pub inputs: BTreeMap<String, Given>,
     /// The outputs of the FMU that are `acceleration` and, if it has one, `state`.
@@ -21,7 +22,7 @@ pub struct VariableTable {
     pub outputs: BTreeMap<String, String>,
 }
 
-/// What a variable gets.
+/// The value that a variable receives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Given {
@@ -59,13 +60,15 @@ pub(super) struct Mapping {
 const OUTPUTS: [&str; 2] = ["acceleration", "state"];
 
 impl Mapping {
-    /// Returns the mapping of an FMU, or what is wrong.
+    /// Returns the mapping of an FMU, or its fault.
     pub(super) fn new(description: &Description, table: &VariableTable, setup: &Setup) -> Result<Self, String> {
-        let of = |causality| description.variables.iter().filter(move |variable| variable.causality == causality);
-        let names = |causality| match of(causality).map(|variable| variable.name.as_str()).collect::<Vec<_>>() {
-            names if names.is_empty() => "none".to_owned(),
-            names => names.join(", "),
-        };
+        let with_causality =
+            |causality| description.variables.iter().filter(move |variable| variable.causality == causality);
+        let names =
+            |causality| match with_causality(causality).map(|variable| variable.name.as_str()).collect::<Vec<_>>() {
+                names if names.is_empty() => "none".to_owned(),
+                names => names.join(", "),
+            };
         let settable = |variable: &&Variable| matches!(variable.causality, Causality::Input | Causality::Parameter);
         for name in table.inputs.keys() {
             if !description.variables.iter().filter(settable).any(|variable| variable.name == *name) {
@@ -128,9 +131,9 @@ impl Mapping {
         }
         for output in OUTPUTS {
             let name = table.outputs.get(output).map_or(output, String::as_str);
-            let found = of(Causality::Output).find(|variable| variable.name == name);
+            let variable = with_causality(Causality::Output).find(|variable| variable.name == name);
             let is_named = table.outputs.contains_key(output);
-            match found {
+            match variable {
                 Some(variable) => {
                     let is_real = variable.of_type.is_real();
                     let is_whole = !matches!(variable.of_type, Type::Boolean | Type::Other) && !is_real;
@@ -181,7 +184,8 @@ fn check(variable: &Variable, quantity: &Quantity) -> Result<(), String> {
     check_unit(variable, quantity.unit())
 }
 
-/// Refuses a variable that states another unit. One that states none is taken to have the right one.
+/// Refuses a variable that states another unit. A variable without a unit counts as having the
+/// right unit.
 fn check_unit(variable: &Variable, expected: &str) -> Result<(), String> {
     let plain = |unit: &str| {
         unit.replace(['^', ' ', '(', ')', '*'], "").replace('²', "2").replace("s-1", "/s").replace("s-2", "/s2")

@@ -1,4 +1,4 @@
-//! The quantities that an FMU can get, by their names.
+//! The quantities that an FMU can receive, by their names.
 
 use crate::external::exchange::{Input, Setup};
 
@@ -94,13 +94,13 @@ const TRACK: &[TrackField] = track_fields![
 
 /// Returns the quantities of the setup: name, unit, number, value.
 fn fixed(setup: &Setup) -> Vec<(String, &'static str, Number, f64)> {
-    let own = |name: &str, unit, number, value| (name.to_owned(), unit, number, value);
+    let quantity = |name: &str, unit, number, value| (name.to_owned(), unit, number, value);
     let mut all = vec![
-        own("control_step", "s", Number::Real, setup.control_step_s),
-        own("road_lanes", "", Number::Whole, setup.lanes.into()),
-        own("road_lane_width", "m", Number::Real, setup.lane_width_m),
-        own("road_curvature", "1/m", Number::Real, setup.curvature_per_m),
-        own("road_speed_limit", "m/s", Number::Real, setup.speed_limit_mps),
+        quantity("control_step", "s", Number::Real, setup.control_step_s),
+        quantity("road_lanes", "", Number::Whole, setup.lanes.into()),
+        quantity("road_lane_width", "m", Number::Real, setup.lane_width_m),
+        quantity("road_curvature", "1/m", Number::Real, setup.curvature_per_m),
+        quantity("road_speed_limit", "m/s", Number::Real, setup.speed_limit_mps),
     ];
     // The unit of a setting is the end of its name.
     all.extend(setup.settings().map(|(name, value)| (name.replace('.', "_"), "", Number::Real, value)));
@@ -110,15 +110,15 @@ fn fixed(setup: &Setup) -> Vec<(String, &'static str, Number, f64)> {
 impl Quantity {
     /// Returns the quantity of a name; `None` if there is none. `setup` has the settings.
     pub(super) fn of(name: &str, setup: &Setup) -> Option<Self> {
-        if let Some(found) = STEP.iter().find(|field| field.name == name) {
-            return Some(Self::Step(found));
+        if let Some(entry) = STEP.iter().find(|field| field.name == name) {
+            return Some(Self::Step(entry));
         }
         if let Some((number, field)) = name.strip_prefix("track_").and_then(|rest| rest.split_once('_')) {
-            let found = TRACK.iter().find(|known| known.name == field)?;
-            return number.parse::<usize>().ok()?.checked_sub(1).map(|index| Self::Track(index, found));
+            let entry = TRACK.iter().find(|listed| listed.name == field)?;
+            return number.parse::<usize>().ok()?.checked_sub(1).map(|index| Self::Track(index, entry));
         }
-        let found = fixed(setup).into_iter().find(|known| known.0 == name);
-        found.map(|(_, unit, number, value)| Self::Fixed { value, unit, number })
+        let entry = fixed(setup).into_iter().find(|listed| listed.0 == name);
+        entry.map(|(_, unit, number, value)| Self::Fixed { value, unit, number })
     }
 
     /// Returns the names, for messages.
@@ -131,7 +131,8 @@ impl Quantity {
         all.collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns the value in a control step. `nearest` are the indices of the tracks, the nearest first.
+    /// Returns the value in a control step. `nearest` are the indices of the tracks, the nearest
+    /// first.
     pub(super) fn value(&self, input: &Input, nearest: &[usize]) -> f64 {
         match self {
             Self::Step(field) => (field.get)(input),

@@ -17,7 +17,7 @@ use crate::external::identity::{Identity, Run};
 use crate::external::library::open;
 use crate::external::platform;
 
-/// An instance of an FMU, of either version. The messages name the function and what the FMU says.
+/// An instance of an FMU, of either version. The messages name the function and quote the FMU.
 pub(super) trait Instance: Send {
     /// Goes to the initialisation at a time (s).
     fn enter(&mut self, start_s: f64) -> Result<(), String>;
@@ -33,7 +33,8 @@ pub(super) trait Instance: Send {
     fn reset(&mut self) -> Result<(), String>;
 }
 
-/// An instance after whose calls the floating-point environment is restored. It is `None` while it is dropped.
+/// An instance after whose calls the floating-point environment is restored. It is `None` while it
+/// is dropped.
 struct Restoring<I: Instance>(Option<I>);
 
 impl<I: Instance> Restoring<I> {
@@ -92,7 +93,7 @@ pub(crate) struct Fmu {
     unpacked: Unpacked,
     /// Number of steps of the FMU in a control step.
     steps: u32,
-    /// The instance of an FMU that can have only one, between two runs.
+    /// The instance, between two runs, of an FMU that can have only one instance.
     kept: Mutex<Option<Box<dyn Instance>>>,
     _module: Module,
 }
@@ -160,10 +161,12 @@ impl Fmu {
     }
 }
 
-/// Largest deviation of a control step from a whole number of steps of an FMU (-): the rounding of a description.
+/// Largest deviation of a control step from a whole number of steps of an FMU (-): the rounding of
+/// a description.
 const STEP_TOLERANCE: f64 = 1e-9;
 
-/// Returns the number of steps of an FMU in a control step. `fixed_s` is the step that it prescribes (s), if it does.
+/// Returns the number of steps of an FMU in a control step. `fixed_s` is the step that it
+/// prescribes (s), if it does.
 fn steps(fixed_s: Option<f64>) -> Result<u32, String> {
     let Some(fixed_s) = fixed_s else { return Ok(1) };
     let control_s = CONTROL_STEP.s();
@@ -197,7 +200,7 @@ impl Run for FmuRun {
         self.nearest.clear();
         self.nearest.extend(0..tracks.len());
         let distance_m = |index: &usize| maths::hypot(tracks[*index].x_m, tracks[*index].y_m);
-        self.nearest.sort_by(|one, other| distance_m(one).total_cmp(&distance_m(other)));
+        self.nearest.sort_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
         let start_s = input.values().time_s;
         if !self.has_started {
             for set in &self.mapping.parameters {

@@ -1,4 +1,5 @@
-//! Pixels whose moments are computed at once have the bits of moments that are computed one by one.
+//! Tests that the moments of a pixel have the same bits whether they are computed at once or one by
+//! one.
 
 use crate::camera::effects::Effects;
 use closecall_traffic::{
@@ -18,7 +19,8 @@ fn vehicle(class: VehicleClass, [s_m, d_m]: [f64; 2]) -> SceneVehicle {
     SceneVehicle { actor: 1, vehicle: Vehicle::typical(class), state, pitch_rad: 0.002 }
 }
 
-/// Returns the number of pixels of one kind, that of those that show a body, and that of all, after a comparison of both ways.
+/// Compares both ways. Returns the number of pixels of one kind, the number of pixels that show a
+/// body, and the number of all pixels.
 fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize; 3] {
     let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
     let mut ego = vehicle(VehicleClass::Car, [731.3, -5.4]);

@@ -1,4 +1,5 @@
-//! The ground at the four moments of a pixel at once: the steps of [`Ground::radiance`], with the same bits.
+//! The ground at the four moments of a pixel at once: the steps of [`Ground::radiance`], with the
+//! same bits.
 
 use wide::f32x4;
 
@@ -10,7 +11,7 @@ use super::{
 use crate::camera::lanes::{PlaneNoise, Radiance, none, split};
 use crate::camera::light::Illumination;
 
-/// What the pixels of one row share, by moment.
+/// Values that the pixels of one row share, by moment.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GroundRow {
     /// Position along the axis of the lens (m), and distance that the ego has moved along s (m).
@@ -47,7 +48,8 @@ fn splat(value: f32) -> f32x4 {
 }
 
 impl GroundRow {
-    /// Prepares a row whose samples lie at `x` (m), by moment, after the ego has moved by `travelled_m`.
+    /// Prepares a row whose samples lie at `x` (m), by moment, after the ego has moved by
+    /// `travelled_m`.
     pub(crate) fn new(x: [f32; 4], travelled_m: [f32; 4], light: &Illumination) -> Self {
         let run_m = -f32x4::from(x);
         let merging_m = DASHES_MERGE_M[1] - DASHES_MERGE_M[0];
@@ -63,8 +65,8 @@ impl GroundRow {
 }
 
 impl Ground {
-    /// Returns the radiance of the ground at the points (x, y) of a row, by moment. Returns `None` if some of them are on the road and
-    /// others beside it.
+    /// Returns the radiance of the ground at the points (x, y) of a row, by moment. Returns `None`
+    /// if some of them are on the road and others beside it.
     #[inline]
     pub(crate) fn radiances(
         &self,

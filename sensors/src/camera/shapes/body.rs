@@ -42,7 +42,8 @@ impl Body {
     }
 }
 
-/// Converts an sRGB value to linear reflectance by a square, the inverse of the camera's square-root encoding.
+/// Converts an sRGB value to linear reflectance by a square, the inverse of the camera's
+/// square-root encoding.
 fn linear(value: u8) -> f32 {
     let share = f32::from(value) / 255.0;
     share * share

@@ -1,4 +1,5 @@
-//! Passenger cars: a lower body, a greenhouse with windows on top of it, and the details of the front.
+//! Passenger cars: a lower body, a greenhouse with windows on top of it, and the details of the
+//! front.
 
 use super::Body;
 use crate::camera::mesh::{Emission, Mesh, Rib, Surface};
@@ -18,7 +19,8 @@ pub(super) fn append(mesh: &mut Mesh, body: &Body, shape: &CarProportions) {
     }
 }
 
-/// Returns the four ribs of the greenhouse: bottom and top of the windscreen, top and bottom of the rear window.
+/// Returns the four ribs of the greenhouse: bottom and top of the windscreen, top and bottom of the
+/// rear window.
 fn greenhouse(body: &Body, shape: &CarProportions) -> [Rib; 4] {
     let [length, width, height] = body.extents();
     let x = |share: f32| length * (0.5 - share);

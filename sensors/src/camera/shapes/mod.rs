@@ -1,7 +1,8 @@
 //! Body shapes: the geometry of vehicles of each class and of roadside furniture.
 //!
-//! The LiDAR builds its bodies from the same [`Proportions`], so that both see the same extents. The shapes in
-//! [`HELD_OUT_SHAPES`] never appear in training: the model card evaluates the classifier on them.
+//! The LiDAR builds its bodies from the same [`Proportions`], so both sensors see the same extents.
+//! The shapes in [`HELD_OUT_SHAPES`] never appear in training: the model card evaluates the
+//! classifier on them.
 
 mod body;
 mod car;

@@ -1,7 +1,7 @@
 //! Roadside furniture: guard rails with their posts, delineator posts, signs, gantries, and trees.
 //!
-//! The positions depend only on the road (multiples of a spacing along s), so that the furniture passes by as the ego
-//! drives. Delineators stand every 50 m, as is German practice.
+//! The positions depend only on the road (multiples of a spacing along s), so the furniture passes
+//! by as the ego drives. Delineators are 50 m apart, as is German practice.
 
 use closecall_traffic::Road;
 
@@ -10,7 +10,8 @@ use crate::camera::mesh::{Mesh, Surface, Vec3};
 use closecall_traffic::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
 use closecall_traffic::roadside::{BESIDE_M, GANTRY_M, LEG_HALF_M, SHEET_M, SIGN_M, TREE_M, outer_edge, positions_m};
 
-/// Lateral distance of the middle of the guard rails beyond the left and the right edge of the road (m).
+/// Lateral distance of the middle of the guard rails beyond the left and the right edge of the road
+/// (m).
 const RAIL_OFFSET_M: [f64; 2] = [LEFT_OFFSET_M + 0.5 * BEAM_DEPTH_M, RIGHT_OFFSET_M + 0.5 * BEAM_DEPTH_M];
 /// Distance between delineator posts (m).
 const DELINEATOR_SPACING_M: f64 = 50.0;
@@ -18,9 +19,11 @@ const DELINEATOR_SPACING_M: f64 = 50.0;
 const GANTRY_SPACING_M: f64 = 400.0;
 /// Distance behind the lens up to which roadside furniture is rendered (m).
 const MAX_DISTANCE_M: f64 = 240.0;
-/// Distance up to which the posts of rails are rendered (m). Beyond it they are thinner than a pixel.
+/// Distance up to which the posts of rails are rendered (m). Beyond it they are thinner than a
+/// pixel.
 const MAX_POST_DISTANCE_M: f64 = 90.0;
-/// Height of the lower end of a tree's crown, half of its width, and height of its upper end (m) (assumption).
+/// Height of the lower end of a tree's crown, half of its width, and height of its upper end (m)
+/// (assumption).
 const CROWN_M: [f64; 3] = [4.5, 2.0, 9.0];
 /// Key of the random positions and sizes of gantries and their signs.
 const PLACEMENT_KEY: u64 = 0x706c_6163_6573;
@@ -48,7 +51,8 @@ enum Kind {
 }
 
 impl Roadside {
-    /// Replaces `mesh` by that of the body: x along the road, y left, z up. It is built only for bodies that are in view.
+    /// Replaces `mesh` by the mesh of the body: x along the road, y left, z up. It is built only
+    /// for bodies that are in view.
     pub(crate) fn build(&self, mesh: &mut Mesh) {
         mesh.clear();
         match self.kind {
@@ -102,7 +106,8 @@ fn spacing_indices(s_m: f64, spacing_m: f64, distance_m: f64) -> std::ops::Range
 }
 
 fn rail(bodies: &mut Vec<Roadside>, s_m: f64, d_m: f64) {
-    // The beam consists of straight pieces, so that it follows a bend. Their length grows with the distance.
+    // The beam consists of straight pieces, so that it follows a bend. Their length grows with the
+    // distance.
     const PIECES_M: [f64; 10] = [0.0, 8.0, 16.0, 28.0, 44.0, 64.0, 92.0, 128.0, 180.0, MAX_DISTANCE_M];
     for piece in PIECES_M.windows(2) {
         let half_m = ((piece[1] - piece[0]) / 2.0) as f32;
@@ -115,7 +120,8 @@ fn rail(bodies: &mut Vec<Roadside>, s_m: f64, d_m: f64) {
     }
 }
 
-/// Appends what a scenario places along the road, where the LiDARs see it as well.
+/// Appends the objects that a scenario places along the road. The LiDARs see them at the same
+/// places.
 fn configured(bodies: &mut Vec<Roadside>, road: &Road, s_m: f64) {
     let (edge_m, outward) = outer_edge(road);
     let roadside = road.roadside();

@@ -1,4 +1,5 @@
-//! The background above the ground at the four moments of a pixel at once: the steps of [`super::radiance`], with the same bits.
+//! The background above the ground at the four moments of a pixel at once: the steps of
+//! [`super::radiance`], with the same bits.
 
 use wide::f32x4;
 
@@ -19,7 +20,8 @@ fn splat(value: f32) -> f32x4 {
     f32x4::splat(value)
 }
 
-/// Returns the radiance of the background, by moment. Returns `None` if some of the moments see woods and others the sky.
+/// Returns the radiance of the background, by moment. Returns `None` if some of the moments see
+/// woods and others the sky.
 #[inline]
 pub(crate) fn radiances(slope: f32x4, bearing: f32x4, light: &Illumination, noise: &mut SkyNoise) -> Option<Radiance> {
     let is_low = slope.simd_lt(splat(WOODS_SLOPE));

@@ -14,9 +14,11 @@ const STRENGTHS: [f64; 7] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
 const GAPS_M: [f64; 3] = [25.0, 40.0, 60.0];
 /// Number of exposures at each gap.
 const EXPOSURES: u64 = 10;
-/// Value from which a pixel counts as saturated: the noise of a saturated one at night has a standard deviation of 8.
+/// Value from which a pixel counts as saturated: the noise of a saturated one at night has a
+/// standard deviation of 8.
 const SATURATED: u8 = 235;
-/// Share of the exposures by which noise may raise the result (-): three of thirty. A network that sees nothing but noise says anything.
+/// Share of the exposures by which noise may raise the result (-): three of thirty. A network that
+/// sees nothing but noise says anything.
 const BY_CHANCE: f64 = 0.1;
 
 fn vehicle(s_m: f64) -> SceneVehicle {
@@ -56,7 +58,8 @@ fn exposures(light: Light, camera: &Camera, fault: &CameraFault, mut see: impl F
     }
 }
 
-/// Returns the share of the exposures in which the network takes the car for one, and the share of the samples that are saturated.
+/// Returns the share of the exposures in which the network takes the car for one, and the share of
+/// the samples that are saturated.
 fn seen(light: Light, camera: &Camera, fault: &CameraFault) -> [f64; 2] {
     let mut network = Classifier::shipped(&Backend::Tract).unwrap();
     let mut crop = Crop::default();
@@ -73,7 +76,7 @@ fn seen(light: Light, camera: &Camera, fault: &CameraFault) -> [f64; 2] {
 }
 
 #[test]
-fn the_veil_falls_with_the_square_of_the_angle_and_is_that_of_stiles_and_holladay() {
+fn the_veil_falls_with_the_square_of_the_angle_as_stiles_and_holladay_state() {
     let veil = Veil { towards: [-1.0, 0.0, 0.0], irradiance: [1.0; 3] };
     let at_deg = |angle_deg: f32| {
         let (sin, cos) = maths::sin_cos(angle_deg.to_radians());
@@ -103,24 +106,24 @@ fn a_source_behind_the_lens_or_one_that_does_not_shine_lays_no_veil() {
 }
 
 #[test]
-fn the_classifier_loses_a_car_the_more_the_stronger_the_glare_and_sees_none_where_it_saturates() {
+fn stronger_glare_hides_a_car_more_and_saturation_hides_it_entirely() {
     let sun = |strength| CameraFault { sun_glare: strength, ..CameraFault::default() };
     let beam = |strength| CameraFault { main_beam_glare: strength, ..CameraFault::default() };
-    for (name, found) in [
+    for (name, scores) in [
         ("sun", STRENGTHS.map(|strength| seen(Light::Day, &camera(0.1), &sun(strength)))),
         ("main beam", STRENGTHS.map(|strength| seen(Light::Night, &camera(0.1), &beam(strength)))),
     ] {
         let falls = |pair: &[[f64; 2]]| pair[1][0] <= pair[0][0] + BY_CHANCE && pair[1][1] >= pair[0][1];
-        assert!(found.windows(2).all(falls), "{name}: {found:?}");
-        assert!(found[0][0] > 0.9, "{name}: {found:?}");
-        assert!(found.iter().any(|[_, saturated]| *saturated > 0.9), "{name}: {found:?}");
+        assert!(scores.windows(2).all(falls), "{name}: {scores:?}");
+        assert!(scores[0][0] > 0.9, "{name}: {scores:?}");
+        assert!(scores.iter().any(|[_, saturated]| *saturated > 0.9), "{name}: {scores:?}");
         let lost = |[right, saturated]: &[f64; 2]| *saturated < 0.9 || *right <= BY_CHANCE;
-        assert!(found.iter().all(lost), "{name}: {found:?}");
+        assert!(scores.iter().all(lost), "{name}: {scores:?}");
     }
 }
 
 #[test]
-fn a_sun_far_from_the_car_takes_less_than_one_near_it() {
+fn a_sun_far_from_the_car_hides_less_than_a_sun_near_it() {
     let fault = CameraFault { sun_glare: 1.0, ..CameraFault::default() };
     let saturated = [0.05, 0.2, 0.5].map(|elevation_rad| seen(Light::Day, &camera(elevation_rad), &fault)[1]);
     assert!(saturated[0] > 2.0 * saturated[2] && saturated[0] > saturated[1], "{saturated:?}");

@@ -44,8 +44,8 @@ fn a_blocked_sector_hides_the_side_that_it_names() {
     assert_eq!(tracks(&with("dropout = 0.0", beside())).len(), 2);
     // The lane to the left lies 6 to 9 degrees to the left.
     let left = with("blocked-from-deg = 4.0\nblocked-to-deg = 20.0", beside());
-    let [own] = tracks(&left)[..] else { panic!("{} tracks", tracks(&left).len()) };
-    assert!(own.lane[1] > 0.9, "{:?}", own.lane);
+    let [track] = tracks(&left)[..] else { panic!("{} tracks", tracks(&left).len()) };
+    assert!(track.lane[1] > 0.9, "{:?}", track.lane);
     let right = with("blocked-from-deg = -20.0\nblocked-to-deg = -4.0", beside());
     assert_eq!(tracks(&right).len(), 2);
 }
@@ -69,7 +69,8 @@ fn a_mounting_turned_to_the_left_moves_the_vehicle_to_the_right() {
 fn dirt_dropout_latency_and_a_wrong_clock_act_on_the_front_lidar() {
     let range = |fault: &str| tracks(&with(fault, vec![ahead(95.0, OWN_LANE_M)])).len();
     assert_eq!((range("dropout = 0.0"), range("window-transmission = 0.2"), range("dropout = 0.98")), (1, 0, 0));
-    // The lead vehicle brakes at no time, so that only a clock that is wrong moves it: the ego drives 30 m/s.
+    // The lead vehicle brakes at no time, so that only a clock that is wrong moves it: the ego
+    // drives 30 m/s.
     let x_m = |fault: &str| tracks(&with(fault, vec![ahead(40.0, OWN_LANE_M)]))[0].x_m();
     assert!((x_m("delay-s = 0.2") - x_m("delay-s = 0.0")).abs() < 0.3);
     let first = |fault: &str| {
@@ -81,14 +82,14 @@ fn dirt_dropout_latency_and_a_wrong_clock_act_on_the_front_lidar() {
     assert_eq!(first("delay-s = 0.2") - first("delay-s = 0.0"), 5);
 }
 
-/// What the confirmed front track of a vehicle `gap_m` ahead shows in each step: its position and its status.
+/// Position and status, in each step, of the confirmed front track of a vehicle `gap_m` ahead.
 fn followed(fault: &str, lead: SceneVehicle) -> Vec<Option<(f64, TrackStatus)>> {
     let is_front = |track: &&Track| track.source == Source::Front && track.status != TrackStatus::Tentative;
     let shown = |step: &Step| step.tracks.iter().find(is_front).map(|track| (track.x_m(), track.status));
     with(fault, vec![lead]).iter().map(shown).collect()
 }
 
-/// Returns what the rear sensors show in each step, with a car behind and one ahead.
+/// Returns the output of the rear sensors in each step, with a car behind and a car ahead.
 fn behind_with(fault: &str) -> Vec<Vec<Track>> {
     let others = vec![behind(40.0, OWN_LANE_M, 31.0), with_actor(2, ahead(40.0, OWN_LANE_M))];
     let of_rear = |step: Step| step.tracks.into_iter().filter(|track| track.source == Source::Rear).collect();
@@ -97,7 +98,8 @@ fn behind_with(fault: &str) -> Vec<Vec<Track>> {
 
 #[test]
 fn a_wrong_clock_of_the_front_lidar_moves_a_lead_vehicle_by_its_closing_speed() {
-    // The ego closes by 5 m/s: a scan that is dated 0.2 s too late puts the vehicle 1 m too far away by the time it counts for.
+    // The ego closes by 5 m/s: a scan that is dated 0.2 s too late puts the vehicle 1 m too far
+    // away by the time it counts for.
     let x_m = |offset: &str| {
         let lead = with_speed(ahead(60.0, OWN_LANE_M), 25.0);
         followed(&format!("clock-offset-s = {offset}"), lead)[95].unwrap().0
@@ -134,7 +136,7 @@ fn jitter_of_the_front_lidar_makes_tracks_old_by_turns_and_loses_none() {
 }
 
 #[test]
-fn a_wrong_pitch_or_height_of_the_front_lidar_raises_or_lowers_what_it_sees() {
+fn a_wrong_pitch_or_height_of_the_front_lidar_raises_or_lowers_its_points() {
     let height_m = |fault: &str| {
         let text = format!("[[front-lidar]]\n{fault}\n");
         let drive =
@@ -142,7 +144,8 @@ fn a_wrong_pitch_or_height_of_the_front_lidar_raises_or_lowers_what_it_sees() {
         mean(drive.run().iter().flat_map(|step| step.front_points_z_m.iter().copied()))
     };
     let right_m = height_m("dropout = 0.0");
-    // The axis points upward, and the ego believes it to be level: what it sees lies higher than it believes.
+    // The axis points upward, and the ego believes it to be level: an object lies higher than the
+    // ego believes.
     assert!(height_m("pitch-deg = 1.0") < right_m - 0.3, "{} {right_m}", height_m("pitch-deg = 1.0"));
     assert!(height_m("pitch-deg = -1.0") > right_m + 0.3, "{} {right_m}", height_m("pitch-deg = -1.0"));
     assert!(height_m("height-m = -0.2") > right_m + 0.05 && height_m("height-m = 0.4") < right_m - 0.05);

@@ -53,8 +53,8 @@ fn a_sensor_that_loses_every_measurement_is_noticed_after_a_second_and_one_that_
     for (dropout, noticed) in [("1.0", Some(50 + NOTICED_AFTER_SCANS - 1)), ("0.6", None)] {
         let fault = format!("dropout = {dropout}\nfrom-s = 2.0");
         let steps = object("rear-object", &fault, vec![behind(40.0, OWN_LANE_M, 30.0)]);
-        let found = steps.iter().position(|step| step.health == Health::Failed);
-        assert_eq!(found.map(|step| step as u32), noticed, "{dropout}");
+        let failed_at = steps.iter().position(|step| step.health == Health::Failed);
+        assert_eq!(failed_at.map(|step| step as u32), noticed, "{dropout}");
     }
     let alone = object("rear-object", "dropout = 1.0", vec![]);
     assert!(alone.iter().all(|step| step.health == Health::Ok), "nothing is there to be lost");

@@ -1,4 +1,5 @@
-//! The same faults of each kind of object-level sensor: the front radar, the surround sensors and the one behind.
+//! Tests the same faults of each kind of object-level sensor: the front radar, the surround sensors
+//! and the rear sensor.
 
 use super::*;
 use closecall_traffic::maths;
@@ -66,8 +67,8 @@ fn dropout_and_lost_frames_let_tracks_coast_and_the_loss_of_all_is_noticed() {
         };
         let usual = coasting("dropout = 0.0");
         for fault in ["dropout = 0.5", "lost-frames = 0.5"] {
-            let found = coasting(fault);
-            assert!(usual < 10 && (30..70).contains(&found), "{} {fault}: {usual} {found}", kind.key);
+            let coasted = coasting(fault);
+            assert!(usual < 10 && (30..70).contains(&coasted), "{} {fault}: {usual} {coasted}", kind.key);
         }
         for fault in ["lost-frames = 1.0", "dropout = 1.0", "dead = true"] {
             let steps = kind.drive(&format!("{fault}\nfrom-s = 2.0"), kind.steady(), 100);
@@ -97,13 +98,13 @@ fn a_lost_frame_loses_all_vehicles_at_once_and_dropout_each_for_itself() {
             let of_rear = step.tracks.iter().filter(|track| track.source == Source::Rear);
             of_rear.filter(|track| track.status == TrackStatus::Coasting).count()
         });
-        counts.fold([0; 3], |mut of, count| {
-            of[count] += 1;
-            of
+        counts.fold([0; 3], |mut histogram, count| {
+            histogram[count] += 1;
+            histogram
         })
     };
-    let ([_, one, both], [_, alone, _]) = (coasting("lost-frames = 0.5"), coasting("dropout = 0.5"));
-    assert!(both > 25 && one < 12 && alone > 25, "{both} {one} {alone}");
+    let ([_, single, both], [_, alone, _]) = (coasting("lost-frames = 0.5"), coasting("dropout = 0.5"));
+    assert!(both > 25 && single < 12 && alone > 25, "{both} {single} {alone}");
 }
 
 #[test]
@@ -185,7 +186,8 @@ fn a_wrong_clock_moves_an_approaching_vehicle_by_its_closing_speed() {
             kind.mean(&fault, kind.car(kind.gap_m, 0.0, closing_mps), |track| track.x_m())
         };
         let right_m = x_m("0.0");
-        // Dated too early, a vehicle counts as having come nearer since. Ahead, nearer is less; behind, it is more.
+        // Dated too early, a vehicle counts as having come nearer since. Ahead, nearer is less;
+        // behind, it is more.
         let nearer = if kind.looks_ahead() { -1.0 } else { 1.0 };
         for offset_s in [-0.2, -0.1, 0.1, 0.2] {
             let shift_m = x_m(&format!("{offset_s:?}")) - right_m;
@@ -200,7 +202,8 @@ fn a_mounting_turned_to_the_left_moves_vehicles_to_the_right() {
     for kind in &KINDS {
         let y_m = |yaw: &str| kind.mean(&format!("yaw-deg = {yaw}"), kind.steady(), |track| track.y_m());
         let right_m = y_m("0.0");
-        // Seen from the sensor, the vehicle turns to the right: ahead that is the ego's right, behind it is the ego's left.
+        // Seen from the sensor, the vehicle turns to the right: ahead that is the ego's right,
+        // behind it is the ego's left.
         let mount_m = if kind.source == Source::Surround { 2.3 } else { 0.0 };
         let to_left = if kind.looks_ahead() { -1.0 } else { 1.0 };
         for yaw_deg in [-2.0_f64, 1.0, 2.0] {
@@ -212,18 +215,19 @@ fn a_mounting_turned_to_the_left_moves_vehicles_to_the_right() {
 }
 
 #[test]
-fn added_noise_scatters_what_it_names_and_nothing_else() {
+fn added_noise_scatters_only_the_quantity_that_it_names() {
     for kind in &KINDS {
         let scatter = |fault: &str| {
             let tracks = kind.tracks(fault, kind.steady(), 400);
-            let of = |value: fn(&Track) -> f64| {
+            let deviation = |value: fn(&Track) -> f64| {
                 let values: Vec<f64> = tracks.iter().skip(100).flatten().map(value).collect();
                 let centre = mean(values.iter().copied());
-                mean(values.iter().map(|it| (it - centre).powi(2))).sqrt()
+                mean(values.iter().map(|value| (value - centre).powi(2))).sqrt()
             };
-            [of(Track::x_m), of(Track::y_m), of(Track::vx_mps)]
+            [deviation(Track::x_m), deviation(Track::y_m), deviation(Track::vx_mps)]
         };
-        // The filters of the rear sensor switch between modes of motion by the situation along the road, and so does the one across.
+        // The filters of the rear sensor switch between modes of motion by the situation along the
+        // road, and so does the filter across the road.
         let (noise_m, slack) = if kind.source == Source::Rear { (0.3, 0.1) } else { (2.0, 1e-6) };
         let [usual_x, usual_y, _] = scatter("range-noise-m = 0.0");
         let [noisy_x, same_y, _] = scatter(&format!("range-noise-m = {noise_m:?}"));
@@ -259,7 +263,7 @@ fn a_ghost_is_ahead_of_the_ego_for_the_front_radar_and_behind_it_for_the_others(
 }
 
 #[test]
-fn a_fault_holds_from_its_start_to_its_end_and_leaves_the_rest_as_it_is() {
+fn a_fault_holds_from_its_start_to_its_end_and_changes_nothing_else() {
     for kind in &KINDS {
         for fault in [
             "yaw-deg = 2.0",

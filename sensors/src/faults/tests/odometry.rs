@@ -26,9 +26,10 @@ fn wrong_odometry_changes_the_speeds_and_the_lanes_of_others_and_nothing_else() 
 }
 
 #[test]
-fn a_wrong_heading_moves_a_vehicle_behind_to_another_lane_and_not_from_where_it_is_seen() {
-    // The vehicle is 72 m behind the ego's middle. To an ego that believes itself to be turned to the left, what lies straight
-    // behind it lies to the right on the map: by 2.5 m for 2 degrees, which is the lane to the right.
+fn a_wrong_heading_moves_a_vehicle_behind_to_another_lane_but_not_relative_to_the_ego() {
+    // The vehicle is 72 m behind the ego's middle. To an ego that believes itself to be turned to
+    // the left, what lies straight behind it lies to the right on the map: by 2.5 m for 2 degrees,
+    // which is the lane to the right.
     for sensors in MODES {
         let car = || behind(67.5, OWN_LANE_M, 30.0);
         let usual = seen(sensors, "", car());
@@ -44,7 +45,8 @@ fn a_wrong_heading_moves_a_vehicle_behind_to_another_lane_and_not_from_where_it_
 
 #[test]
 fn a_map_that_bends_too_far_to_the_left_puts_a_vehicle_behind_too_far_to_the_right() {
-    // The own lane on such a map lies to the left of a straight line behind the ego, too: by 72² / 2 · 0.001 = 2.6 m.
+    // The own lane on such a map lies to the left of a straight line behind the ego, too: by 72² /
+    // 2 · 0.001 = 2.6 m.
     for sensors in MODES {
         let car = || behind(67.5, OWN_LANE_M, 30.0);
         let usual = seen(sensors, "", car());
@@ -58,7 +60,8 @@ fn a_map_that_bends_too_far_to_the_left_puts_a_vehicle_behind_too_far_to_the_rig
 
 #[test]
 fn lanes_that_are_too_wide_on_the_map_take_a_vehicle_near_the_marking_into_the_own_lane() {
-    // The car is 2.1 m to the left of the ego. The own lane ends at 1.9 m, on the map with lanes of 4.75 m at 2.4 m.
+    // The car is 2.1 m to the left of the ego. The own lane ends at 1.9 m, on the map with lanes of
+    // 4.75 m at 2.4 m.
     for sensors in MODES {
         let car = || behind(40.0, OWN_LANE_M + 2.1, 30.0);
         let (usual, wide) = (seen(sensors, "", car()), seen(sensors, "lane-width-m = 1.0", car()));
@@ -104,7 +107,8 @@ fn a_speed_that_was_wrong_for_a_while_leaves_no_jump_behind() {
 fn a_map_without_the_rails_lets_their_mirror_images_become_vehicles_beside_the_road() {
     let run = |errors: &str| {
         let faults = format!("[[rear-lidar]]\nrail-ghosts = 0.5\n[odometry]\n{errors}\n");
-        // A car with its middle 4.2 m to the left of the ego. The rail is at 6.4 m, its image at 8.6 m.
+        // A car with its middle 4.2 m to the left of the ego. The rail is at 6.4 m, its image at
+        // 8.6 m.
         let others = vec![behind(25.0, LEFT_LANE_M + 0.45, 30.0)];
         Drive { sensors: MODES[0], faults: &faults, others, has_rails: true, ..Drive::default() }.run()
     };
@@ -119,6 +123,6 @@ fn a_map_without_the_rails_lets_their_mirror_images_become_vehicles_beside_the_r
     let ghosts = beside(&run("rails-missing = true"));
     assert!(ghosts.len() > 30, "{} of 100 steps", ghosts.len());
     assert!(ghosts.iter().any(|track| (track.x_m() + 29.6).abs() < 2.0), "abreast of the car");
-    // They stand in no lane, which is what keeps a function from acting on them.
+    // They are in no lane, so no function acts on them.
     assert!(ghosts.iter().all(|track| track.lane.iter().all(|probability| *probability < 0.1)), "{:?}", ghosts[0].lane);
 }

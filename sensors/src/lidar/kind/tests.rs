@@ -35,7 +35,8 @@ fn a_rate_of_10_hz_gives_10_scans_in_a_second() {
     let kind = LidarModel::Os1With64.kind();
     let due = (-25..0).filter(|step| kind.is_due(Time::from_ns(step * CONTROL_STEP.ns()))).count();
     assert_eq!(due, 10);
-    // 40 m at 10 % with probability 0.9: P = 1 + 1.2816/5, so that the nominal range is 40·√(1.2563·5) m.
+    // 40 m at 10 % with probability 0.9: P = 1 + 1.2816/5, so that the nominal range is
+    // 40·√(1.2563·5) m.
     assert!((kind.nominal_range_m - 100.25).abs() < 0.01, "{}", kind.nominal_range_m);
 }
 
@@ -74,22 +75,22 @@ fn the_processing_knows_points_beams_and_ground_of_a_kind() {
     use super::super::ground::ground_reach_m;
     use super::super::rail_returns::narrow_to_m;
     let lidar = |kind: &'static LidarKind| Lidar { kind, nominal_range_m: kind.nominal_range_m, ..Lidar::default() };
-    let known = |kind: &'static LidarKind| {
+    let derived = |kind: &'static LidarKind| {
         (kind.resolution.point_sd_m, narrow_to_m(kind.beam_height_deg), ground_reach_m(&lidar(kind)))
     };
-    let (point_sd_m, narrow_m, ground_m) = known(LidarModel::Scala2.kind());
+    let (point_sd_m, narrow_m, ground_m) = derived(LidarModel::Scala2.kind());
     assert_eq!(
         (point_sd_m.to_bits(), narrow_m.to_bits(), ground_m.to_bits()),
         (0.05_f64.to_bits(), 30.0_f32.to_bits(), 40.0_f32.to_bits())
     );
     assert_eq!(Resolution::default().ground_reach_m, ground_m, "also for a scan about which nothing else is said");
     // √(0.015² + (0.237/2.25)²) m; 0.44 m over the tangent of 4/3 of 0.13°, down to tens of metres.
-    assert_eq!(known(LidarModel::Os1With64.kind()), (0.1064, 140.0, 40.0));
-    assert_eq!(known(LidarModel::PandarXt16.kind()), (0.0167, 100.0, 40.0));
+    assert_eq!(derived(LidarModel::Os1With64.kind()), (0.1064, 140.0, 40.0));
+    assert_eq!(derived(LidarModel::PandarXt16.kind()), (0.0167, 100.0, 40.0));
     // A beam of 3° is as high as a rail's lower edge at 6 m: no distance is safe.
     assert_eq!(narrow_to_m(3.0), 0.0);
     let strong = checked(|config| (config.range_m, config.range_reflectivity) = (450.0, 0.5)).unwrap();
-    let (_, _, strong_m) = known(strong);
+    let (_, _, strong_m) = derived(strong);
     assert!((45.0..60.0).contains(&strong_m), "{strong_m}");
     let high_m = ground_reach_m(&Lidar { mount_height_m: 2.5, ..lidar(strong) });
     assert!((70.0..95.0).contains(&high_m), "{high_m}");

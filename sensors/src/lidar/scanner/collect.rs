@@ -13,7 +13,8 @@ use super::super::{Material, MirrorSide, PointSource};
 use super::Scanner;
 use crate::{Scene, SceneVehicle};
 
-/// Distance of a vehicle's centre beyond which the vehicle is ignored (m). From there only a plate could give a return.
+/// Distance of a vehicle's centre beyond which the vehicle is ignored (m). From there only a plate
+/// could give a return.
 const MAX_CENTRE_DISTANCE_M: f64 = 300.0;
 
 impl Scanner {
@@ -81,14 +82,16 @@ impl Scanner {
         }
     }
 
-    fn collect_plume(&mut self, of: &SceneVehicle, scene: &Scene<'_>, view: &Viewpoint) {
-        let Some((solid, extinction_per_m)) = soft::spray_plume(&of.vehicle, of.state.speed_mps, scene.environment)
+    fn collect_plume(&mut self, vehicle: &SceneVehicle, scene: &Scene<'_>, view: &Viewpoint) {
+        let Some((solid, extinction_per_m)) =
+            soft::spray_plume(&vehicle.vehicle, vehicle.state.speed_mps, scene.environment)
         else {
             return;
         };
-        let pose = scene.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
+        let pose = scene.road.plane_pose(vehicle.state.s_m, vehicle.state.d_m, vehicle.state.heading_rad);
         let placed = view.sensor_from_plane(0.0) * plane_from_body(pose, 0.0);
-        // No beam points forward. A plume that lies entirely ahead would only cost each beam a test.
+        // No beam points forward. A plume that lies entirely ahead would only cost each beam a
+        // test.
         if !solid.corners().any(|corner| (placed * corner).x > 0.0) {
             return;
         }
@@ -106,7 +109,8 @@ impl Scanner {
     }
 }
 
-/// Returns the pose of a vehicle `before_end_s` earlier, extrapolated at its current speed and heading.
+/// Returns the pose of a vehicle `before_end_s` earlier, extrapolated at its current speed and
+/// heading.
 fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_end_s: f64) -> PlanePose {
     let distance_m = vehicle.state.speed_mps * before_end_s;
     let (sin, cos) = maths::sin_cos(pose.yaw_rad);

@@ -18,39 +18,40 @@ fn levels() -> Vec<Level> {
 }
 
 impl Scanner {
-    /// Returns the scan of this scene, with its ground truth, in each kind of vector registers that this processor has. All of them draw
-    /// the same number from the stream.
+    /// Returns the scan of this scene, with its ground truth, in each kind of vector registers that
+    /// this processor has. All of them draw the same number from the stream.
     pub(crate) fn scans_in_all_registers(&mut self, scene: &Scene<'_>, rng: &Stream) -> Vec<(LidarScan, ScanTruth)> {
-        let of = |level: Level| {
+        let scan_with = |level: Level| {
             self.level = level;
             self.scan(scene, &mut rng.clone());
             (self.scan.clone(), self.truth.clone())
         };
-        levels().into_iter().map(of).collect()
+        levels().into_iter().map(scan_with).collect()
     }
 
-    /// Asserts that all columns of a block whose road counts as ground also count as ground one by one, in this scene. Returns the
-    /// number of columns of these blocks, and of all columns that count as ground.
+    /// Asserts that all columns of a block whose road counts as ground also count as ground one by
+    /// one, in this scene. Returns the number of columns of these blocks, and of all columns that
+    /// count as ground.
     pub(crate) fn columns_of_bare_road(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> [usize; 2] {
         self.scan(scene, rng);
-        let of = self.latest.unwrap();
-        let limits_m = [of.viewpoint.max_shift_m(self.sweep_s()) as f32, self.ground_reach_m];
-        let Some(bare_road) = BareRoad::new(&self.targets, &of.link, of.pose, limits_m) else { return [0; 2] };
-        let road = Road::new(&self.targets, &of.link);
+        let sweep = self.latest.unwrap();
+        let limits_m = [sweep.viewpoint.max_shift_m(self.sweep_s()) as f32, self.ground_reach_m];
+        let Some(bare_road) = BareRoad::new(&self.targets, &sweep.link, sweep.pose, limits_m) else { return [0; 2] };
+        let road = Road::new(&self.targets, &sweep.link);
         let mut counts = [0; 2];
         for index in 0..self.pattern.columns.len() {
-            let bounds = self.pattern.line_bounds(of.mirror_side, index / BLOCK_COLUMNS);
+            let bounds = self.pattern.line_bounds(sweep.mirror_side, index / BLOCK_COLUMNS);
             let is_block_covered = bare_road.covers_block(bounds, &road);
-            let is_covered = bare_road.covers(self.pattern.centre_lines(of.mirror_side, index), &road);
+            let is_covered = bare_road.covers(self.pattern.centre_lines(sweep.mirror_side, index), &road);
             assert!(is_covered || !is_block_covered, "column {index}");
             counts = [counts[0] + usize::from(is_block_covered), counts[1] + usize::from(is_covered)];
         }
         counts
     }
 
-    /// Asserts that three ray casts of a scene agree: the fast one, the one by brute force, and one in double
-    /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
-    /// differ at edges.
+    /// Asserts that three ray casts of a scene agree: the fast cast, the cast by brute force, and a
+    /// cast in double precision that clips a ray at one plane after the other. The first two agree
+    /// to the bit. The third may differ at edges.
     pub(crate) fn assert_cast_agrees_with_brute_force(&mut self, scene: &Scene<'_>) {
         let mirror_side = self.lidar.kind.mirror_side_at(scene.time);
         self.collect_targets(scene, mirror_side, &Viewpoint::new(scene, &self.lidar));
@@ -77,15 +78,16 @@ impl Scanner {
         assert!(differ <= 2 + hits / 200, "{differ} of {hits}");
     }
 
-    /// Asserts that no return from droplets is missed for not being looked at, in the scan of this scene with the next random key.
-    /// Returns the number of these returns, and of beams that are looked at.
+    /// Asserts that no return from droplets is missed for not being looked at, in the scan of this
+    /// scene with the next random key. Returns the number of these returns, and of beams that are
+    /// looked at.
     pub(crate) fn droplet_returns(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> [usize; 2] {
         self.scan(scene, rng);
-        let of = self.latest.unwrap();
+        let sweep = self.latest.unwrap();
         let mut counts = [0; 2];
         for (index, column) in self.pattern.columns.iter().enumerate() {
             let layers = self.pattern.kind().layers();
-            soft::bound_clumps(index, layers, of.noise, &mut self.clumps);
+            soft::bound_clumps(index, layers, sweep.noise, &mut self.clumps);
             let air = AirColumn {
                 first_beam: index * layers,
                 layers,
@@ -97,22 +99,22 @@ impl Scanner {
                 column_index: index,
                 beams: self.pattern.kind().beams(),
                 column,
-                elevations: self.pattern.elevations(of.mirror_side, index),
-                pose: of.pose,
+                elevations: self.pattern.elevations(sweep.mirror_side, index),
+                pose: sweep.pose,
                 targets: &self.targets,
                 plumes: &self.plumes,
-                link: &of.link,
-                noise: of.noise,
+                link: &sweep.link,
+                noise: sweep.noise,
                 dropout: 0.0,
             };
-            let [returns, looked_at] = receiver.droplet_returns(air.layers_with_returns(&of.link, of.noise));
+            let [returns, looked_at] = receiver.droplet_returns(air.layers_with_returns(&sweep.link, sweep.noise));
             counts = [counts[0] + returns, counts[1] + looked_at];
         }
         counts
     }
 
-    /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in double
-    /// precision.
+    /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in
+    /// double precision.
     fn compare_exactly(&self, column: &Column, elevations: &[Elevation], layer: usize) -> [usize; 2] {
         let group = elevations[layer].group;
         let hits = &self.hits.beams[layer];
@@ -133,8 +135,8 @@ impl Scanner {
         counts
     }
 
-    /// Returns the distance at which a ray first enters a solid (m), found by clipping it at one plane after the
-    /// other.
+    /// Returns the distance at which a ray first enters a solid (m), found by clipping it at one
+    /// plane after the other.
     fn nearest_m(&self, direction: [f64; 3]) -> Option<f64> {
         let mut nearest: Option<f64> = None;
         for part in &self.targets.parts {

@@ -16,10 +16,11 @@ pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
     }
 }
 
-/// Height of the middle of the rear plate (m): between 0.30 m for its lower and 1.20 m for its upper edge, which Commission Regulation
-/// (EU) No 1003/2010 allows (assumption).
+/// Height of the middle of the rear plate (m): between 0.30 m for its lower and 1.20 m for its
+/// upper edge, which Commission Regulation (EU) No 1003/2010 allows (assumption).
 const REAR_PLATE_M: f64 = 0.75;
-/// Half extents of the rear plate of a motorcycle, and of other vehicles (m): 180 × 200 mm and 520 × 110 mm.
+/// Half extents of the rear plate of a motorcycle, and of other vehicles (m): 180 × 200 mm and 520
+/// × 110 mm.
 const REAR_PLATES_M: [[f64; 2]; 2] = [[0.09, 0.10], [0.26, 0.055]];
 /// Distance by which the rear plate stands out from the rear end (m).
 const REAR_PLATE_OUT_M: f64 = 0.01;

@@ -1,4 +1,5 @@
-//! The shapes of passenger cars: a hull, a cabin with windows on top of it, and the details of the front.
+//! The shapes of passenger cars: a hull, a cabin with windows on top of it, and the details of the
+//! front.
 
 use closecall_traffic::Dimensions;
 
@@ -21,7 +22,8 @@ pub(super) fn append(size: &Dimensions, shape: &CarProportions, solids: &mut Vec
     let (front, half, top) = (0.5 * size.length_m, 0.5 * size.width_m, size.height_m);
     let [nose, belt, floor] = [shape.nose, shape.belt, shape.clearance].map(|share| f64::from(share) * top);
     let from_front = |share: f32| front - f64::from(share) * size.length_m;
-    // The plate ends exactly at the front end of the bounding box, so the painted body begins behind it.
+    // The plate ends exactly at the front end of the bounding box, so the painted body begins
+    // behind it.
     let skin = front - PROTRUSION_M;
     let hull = [
         corner(skin - 0.04, floor, Paint),

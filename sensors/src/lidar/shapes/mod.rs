@@ -7,8 +7,8 @@
 //!       (o)      (o)    wheels           o      o o     ooo            O  O  wheels
 //! ```
 //!
-//! The camera builds its bodies from the same [`Proportions`], so that both see the same extents. All coordinates are in
-//! the vehicle's frame: x forward, z = 0 on the ground.
+//! The camera builds its bodies from the same [`Proportions`], so both sensors see the same
+//! extents. All coordinates are in the vehicle's frame: x forward, z = 0 on the ground.
 
 mod append;
 mod car;

@@ -15,8 +15,8 @@ const CAB_FLOOR_M: f64 = 0.35;
 const CHASSIS_M: [f64; 2] = [0.6, 1.1];
 const WHEEL_DIAMETER_M: f64 = 1.0;
 const TYRE_WIDTH_M: f64 = 0.3;
-/// Heights of the lower and upper edge of the lateral guards between the axles (m). UN Regulation 73 requires the
-/// guards.
+/// Heights of the lower and upper edge of the lateral guards between the axles (m). UN Regulation
+/// 73 requires the guards.
 const GUARD_M: [f64; 2] = [0.5, 0.95];
 
 /// The measures of one truck (m), in its own frame.
@@ -174,7 +174,8 @@ fn append_running_gear(truck: &Measures, solids: &mut Vec<Solid>) {
     let (front, half, load_front) = (truck.front, truck.half, truck.load_front);
     let rear = -front;
     let length = 2.0 * front;
-    // One block for each axle group: steered axle, driven axle, and the three axles at the rear of a long vehicle.
+    // One block for each axle group: steered axle, driven axle, and the three axles at the rear of
+    // a long vehicle.
     let rear_group_m = if length > 10.0 { 3.0 * WHEEL_DIAMETER_M + 0.6 } else { WHEEL_DIAMETER_M };
     let rear_from = rear + 0.1 * length;
     let groups = [

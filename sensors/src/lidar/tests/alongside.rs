@@ -12,16 +12,17 @@ fn road(text: &str) -> Road {
     config.check(&Parameters::default()).unwrap()
 }
 
-/// Returns the number of points of `source`, of boxes, and of boxes that are taken for vehicles, over 20 complete scans.
+/// Returns the number of points of `source`, of boxes, and of boxes that are classified as
+/// vehicles, over 20 complete scans.
 fn counts(setup: &mut TestScene, lidar: &mut RearLidar, source: PointSource) -> [usize; 3] {
     let mut counts = [0; 3];
     for scan_index in 0..20 {
         // The ego passes the things along the road.
         setup.ego.state.s_m += 1.2;
-        let found = setup.detect(lidar, scan_index);
+        let detections = setup.detect(lidar, scan_index);
         counts[0] += count(lidar.completed().unwrap().truth(), source);
-        counts[1] += found.len();
-        counts[2] += found.iter().filter(|detection| detection.class.vehicle() > 0.5).count();
+        counts[1] += detections.len();
+        counts[2] += detections.iter().filter(|detection| detection.class.vehicle() > 0.5).count();
     }
     counts
 }
@@ -40,7 +41,8 @@ fn false_alarms_come_at_their_rate_and_single_ones_make_no_box() {
         // Three of them would have to fall within the radius of the clustering.
         assert!(boxes <= points / 50, "{boxes} boxes of {points} points");
     }
-    // Boxes come only at a rate far above that of any receiver, and most of them are no vehicles.
+    // Boxes come only at a rate far above the rate of any receiver, and most of them are no
+    // vehicles.
     let [_, boxes, vehicles] = with_rate(0.1);
     assert!(boxes > 0 && vehicles < boxes, "{boxes} {vehicles}");
 }
@@ -70,7 +72,7 @@ fn signs_gantries_and_trees_give_points_and_boxes_that_an_empty_road_does_not() 
     let along = |text: &str| {
         let mut setup = TestScene::new();
         setup.road = road(text);
-        // In the right lane, next to what stands beside the road.
+        // In the right lane, next to the objects beside the road.
         setup.ego.state.d_m = -9.4;
         counts(&mut setup, &mut RearLidar::new(Lidar::default()), PointSource::Roadside)
     };
@@ -91,11 +93,12 @@ fn a_sensor_sees_the_retro_reflective_face_only_from_the_side_of_the_traffic() {
         setup.road = road;
         let mut lidar = RearLidar::new(Lidar::default());
         setup.detect(&mut lidar, 0);
-        let of = |material| lidar.truth().points.iter().filter(|point| point.material == material).count();
-        [of(Material::Sign), of(Material::Steel)]
+        let returns_from = |material| lidar.truth().points.iter().filter(|point| point.material == material).count();
+        [returns_from(Material::Sign), returns_from(Material::Steel)]
     };
     let signs = road("roadside.sign-spacing-m = 25");
-    // The rear sensor looks at the backs of the signs that the ego has passed; the front sensor, whose road is turned, at the faces.
+    // The rear sensor looks at the backs of the signs that the ego has passed; the front sensor,
+    // whose road is turned, at the faces.
     let [rear, front] = [materials(signs), materials(signs.reversed())];
     assert!(rear[0] < rear[1] && front[0] > 5 * rear[0].max(1), "{rear:?} {front:?}");
 }

@@ -1,4 +1,4 @@
-//! What a scan without the bare road has in common with the complete one.
+//! Compares a scan without the bare road with the complete scan.
 
 use closecall_traffic::{BodyShape, VehicleClass};
 use proptest::prelude::*;
@@ -14,7 +14,8 @@ fn setup() -> impl Strategy<Value = (TestScene, Lidar)> {
     });
     let ego = (-0.04..0.04_f64, 0.0..45.0_f64, -0.3..0.3_f64, -0.03..0.03_f64);
     let air = prop::sample::select(vec![(1e4, 0.0), (1e4, 1.0), (150.0, 0.0)]);
-    // A strong sensor and a large error of the pitch, so that some of the road's points pass for something else.
+    // A strong sensor and a large error of the pitch, so that some of the road's points pass for
+    // something else.
     let lidar = (
         0.2..2.5_f64,
         -0.1..0.1_f64,
@@ -56,11 +57,11 @@ proptest! {
     #[test]
     fn a_scan_leaves_out_only_points_that_the_detector_discards((mut setup, model) in setup(), index in 0..1_000_i64) {
         let mut lidar = RearLidar::new(model);
-        let found = setup.detect(&mut lidar, index);
+        let detections = setup.detect(&mut lidar, index);
         let complete = lidar.completed().unwrap();
-        prop_assert_eq!(complete.detections(), &found[..]);
+        prop_assert_eq!(complete.detections(), &detections[..]);
         let members = |lidar: &RearLidar| -> Vec<_> {
-            (0..found.len()).map(|at| points(lidar, |point| lidar.point_indices_of(at).contains(&(point as u32)))).collect()
+            (0..detections.len()).map(|at| points(lidar, |point| lidar.point_indices_of(at).contains(&(point as u32)))).collect()
         };
         prop_assert_eq!(members(&lidar), members(&complete));
         let solid = |lidar: &RearLidar| points(lidar, |at| matches!(lidar.truth().points[at].source, PointSource::Actor(_)));

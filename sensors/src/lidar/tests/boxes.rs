@@ -14,8 +14,8 @@ fn reported_standard_deviations_match_the_errors_of_the_front_face() {
             let left = [0.0, 3.75, -3.75, 0.7][step as usize % 4];
             let mut setup = TestScene::new().with(class, gap, left);
             let mut lidar = RearLidar::new(Lidar::default());
-            let found = setup.detect(&mut lidar, step.into());
-            let Some((detection, dx, dy)) = first_vehicle_error(&setup, &found) else { continue };
+            let detections = setup.detect(&mut lidar, step.into());
+            let Some((detection, dx, dy)) = first_vehicle_error(&setup, &detections) else { continue };
             along += (dx / detection.range_sd_m).powi(2);
             across += (dy / detection.lateral_sd_m).powi(2);
             n += 1.0;
@@ -34,8 +34,8 @@ fn class_and_width_follow_from_the_shape() {
             for gap in [4.0, 10.0, 25.0, 50.0] {
                 let mut setup = TestScene::new().with(class, gap, 0.0);
                 setup.others[0].vehicle.appearance.body_shape = body_shape;
-                let found = setup.detect(&mut RearLidar::new(Lidar::default()), 1);
-                let (detection, ..) = first_vehicle_error(&setup, &found).unwrap();
+                let detections = setup.detect(&mut RearLidar::new(Lidar::default()), 1);
+                let (detection, ..) = first_vehicle_error(&setup, &detections).unwrap();
                 assert_eq!(detection.class.best_vehicle_class(), class, "{body_shape} at {gap} m: {detection:?}");
                 assert!(detection.class.vehicle() > 0.6, "{body_shape} at {gap} m: {detection:?}");
                 assert_eq!(detection.width, Extent::Seen);

@@ -50,7 +50,7 @@ proptest! {
         let rng = stream(3, sample, &ActorId::new("ego").unwrap(), "lidar");
         let scans = Scanner::new(Lidar::default()).scans_in_all_registers(&setup.scene(), &rng);
         let bits = |scan: &LidarScan| {
-            [&scan.x_m, &scan.y_m, &scan.z_m, &scan.intensity].map(|of| of.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+            [&scan.x_m, &scan.y_m, &scan.z_m, &scan.intensity].map(|values| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
         };
         for (scan, truth) in &scans[1..] {
             prop_assert_eq!(bits(scan), bits(&scans[0].0));

@@ -9,13 +9,13 @@ fn boxes_follow_the_curvature_of_the_road() {
     let mut setup = TestScene::new().with(VehicleClass::Car, 60.0, 0.0);
     setup.road = Road::straight(3).with_curvature(0.0025);
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = setup.detect(&mut lidar, 0);
-    assert_eq!(found.len(), 1);
+    let detections = setup.detect(&mut lidar, 0);
+    assert_eq!(detections.len(), 1);
     // The ego's path is a circle of curvature κ = 0.0025/(1 + 0.0025·5.625) per metre: y = κ·x²/2.
     let kappa = 0.0025 / (1.0 + 0.0025 * 5.625);
-    let expected = 0.5 * kappa * found[0].face_x_m.powi(2);
-    assert!((found[0].face_y_m - expected).abs() < 0.2, "{} for {expected}", found[0].face_y_m);
-    assert!((found[0].heading_rad - kappa * found[0].face_x_m).abs() < 0.02, "{}", found[0].heading_rad);
+    let expected = 0.5 * kappa * detections[0].face_x_m.powi(2);
+    assert!((detections[0].face_y_m - expected).abs() < 0.2, "{} for {expected}", detections[0].face_y_m);
+    assert!((detections[0].heading_rad - kappa * detections[0].face_x_m).abs() < 0.02, "{}", detections[0].heading_rad);
 }
 
 #[test]
@@ -23,15 +23,15 @@ fn a_static_target_is_measured_at_its_position_at_the_end_of_the_scan() {
     let mut setup = TestScene::new().with(VehicleClass::Truck, 30.0, 0.0);
     setup.others[0].state.speed_mps = 0.0;
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = setup.detect(&mut lidar, 5);
-    assert!((found[0].face_x_m + REAR_BUMPER_M + 30.0).abs() < 0.1, "{}", found[0].face_x_m);
+    let detections = setup.detect(&mut lidar, 5);
+    assert!((detections[0].face_x_m + REAR_BUMPER_M + 30.0).abs() < 0.1, "{}", detections[0].face_x_m);
     // A moving target is detected at its position at the time of measurement.
     setup.others[0].state.speed_mps = SPEED_MPS;
-    let found = setup.detect(&mut lidar, 5);
-    let since_s = (setup.time - found[0].time).s();
+    let detections = setup.detect(&mut lidar, 5);
+    let since_s = (setup.time - detections[0].time).s();
     assert!((0.006..0.009).contains(&since_s), "{since_s}");
     let expected = -REAR_BUMPER_M - 30.0 - SPEED_MPS * since_s;
-    assert!((found[0].face_x_m - expected).abs() < 0.1, "{} for {expected}", found[0].face_x_m);
+    assert!((detections[0].face_x_m - expected).abs() < 0.1, "{} for {expected}", detections[0].face_x_m);
 }
 
 #[test]

@@ -13,8 +13,8 @@ fn no_class_counts_as_background_at_any_height_of_the_field_of_view() {
         for class in VehicleClass::ALL {
             for gap_m in [4.0, 6.0, 10.0] {
                 let mut setup = TestScene::new().with(class, gap_m, 0.0);
-                let found = setup.detect(&mut lidar, 0);
-                let (detection, ..) = first_vehicle_error(&setup, &found).unwrap();
+                let detections = setup.detect(&mut lidar, 0);
+                let (detection, ..) = first_vehicle_error(&setup, &detections).unwrap();
                 let background = detection.class.0[ClassScores::BACKGROUND];
                 assert!(background < 0.5, "{model:?}, {class:?} at {gap_m} m: {background}");
             }
@@ -82,11 +82,11 @@ fn there_is_spray_behind_the_ego_on_wet_roads_only() {
     let mut spray = |film_mm: f64, speed_mps: f64| {
         setup.environment.water_film_mm = film_mm;
         setup.ego.state.speed_mps = speed_mps;
-        let found = setup.detect(&mut lidar, 0);
+        let detections = setup.detect(&mut lidar, 0);
         let points: Vec<_> = lidar.truth().points.iter().filter(|at| at.source == PointSource::Spray).collect();
         assert!(points.iter().all(|point| point.range_m < 15.0));
         // Spray neither occludes the vehicle nor is detected as one.
-        assert_eq!(found.iter().filter(|detection| detection.class.vehicle() > 0.5).count(), 1, "{found:?}");
+        assert_eq!(detections.iter().filter(|detection| detection.class.vehicle() > 0.5).count(), 1, "{detections:?}");
         points.len()
     };
     assert_eq!(spray(0.0, 30.0), 0);
@@ -120,9 +120,9 @@ fn fog_gives_false_returns_that_are_not_classified_as_vehicles() {
     let mut setup = TestScene::new();
     setup.environment.visibility_m = 60.0;
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = setup.detect(&mut lidar, 0);
+    let detections = setup.detect(&mut lidar, 0);
     assert!(count(lidar.truth(), PointSource::Fog) > 20);
-    assert!(found.iter().all(|detection| detection.class.vehicle() < 0.5), "{found:?}");
+    assert!(detections.iter().all(|detection| detection.class.vehicle() < 0.5), "{detections:?}");
 }
 
 #[test]
@@ -132,10 +132,10 @@ fn guard_rails_give_returns_but_no_vehicle_detections() {
         setup.road = road_with_guard_rails(curvature);
         let mut lidar = RearLidar::new(Lidar::default());
         for scan_index in 0..2 {
-            let found = setup.detect(&mut lidar, scan_index);
+            let detections = setup.detect(&mut lidar, scan_index);
             let complete = lidar.completed().unwrap();
             assert!(count(complete.truth(), PointSource::GuardRail) > 50, "{curvature}");
-            let vehicles: Vec<_> = found.iter().filter(|detection| detection.class.vehicle() > 0.5).collect();
+            let vehicles: Vec<_> = detections.iter().filter(|detection| detection.class.vehicle() > 0.5).collect();
             assert_eq!(vehicles.len(), 2, "{curvature}: {vehicles:?}");
         }
     }

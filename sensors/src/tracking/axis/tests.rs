@@ -15,7 +15,8 @@ fn normal(rng: &mut Stream) -> f64 {
     rng.sample(StandardNormal)
 }
 
-/// A simulated vehicle, whose modes, motion and measurements follow the filter's model, with its filter.
+/// A simulated vehicle, whose modes, motion and measurements follow the filter's model, with its
+/// filter.
 struct SimulatedVehicle {
     rng: Stream,
     truth: Vector4<f64>,
@@ -94,7 +95,8 @@ fn a_single_mode_is_consistent_despite_the_slow_error() {
 
 #[test]
 fn switching_modes_are_nearly_consistent() {
-    // Mixing the modes is an approximation, and a mixture has heavier tails than a normal distribution.
+    // Mixing the modes is an approximation, and a mixture has heavier tails than a normal
+    // distribution.
     for modes in [ALONG_MODES, ACROSS_MODES] {
         let mean = mean_nees(modes, 600);
         assert!((1.6..2.6).contains(&mean), "{mean}");
@@ -130,8 +132,8 @@ fn predicting_over_a_horizon_equals_predicting_step_by_step() {
             "{predicted:?} {stepped:?}"
         );
     }
-    let here = AxisFilter::prior(ALONG_MODES, Gaussian::new(0.0, 0.1), Gaussian::new(0.0, 0.1));
-    assert_eq!(here.predicted(0.0), here.estimate());
+    let prior = AxisFilter::prior(ALONG_MODES, Gaussian::new(0.0, 0.1), Gaussian::new(0.0, 0.1));
+    assert_eq!(prior.predicted(0.0), prior.estimate());
 }
 
 #[test]
@@ -150,7 +152,7 @@ fn a_measurement_that_is_not_a_number_leaves_the_mode_probabilities_unchanged() 
 }
 
 #[test]
-fn the_mean_of_position_and_speed_is_that_of_the_whole_mixture() {
+fn the_mean_of_position_and_speed_is_the_mean_of_the_whole_mixture() {
     let mut vehicle = SimulatedVehicle::new(ALONG_MODES, 3);
     vehicle.measure();
     for _ in 0..50 {

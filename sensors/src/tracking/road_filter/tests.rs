@@ -5,7 +5,7 @@ use super::*;
 const EGO: EgoRear = EgoRear { s_m: 80.0, d_m: 0.0, speed_mps: 30.0, half_lane_m: 1.875 };
 const SCAN_S: f64 = 0.04;
 
-/// Returns a measured place across the road: that of the middle, known to 4 cm, or that of a part.
+/// Returns a measured place across the road: the middle, known to 4 cm, or a part.
 fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
     let axis = |position_m, sd_m: f64| AxisMeasurement {
         position_m,
@@ -46,23 +46,23 @@ fn across(all: impl IntoIterator<Item = Measurement>) -> AxisEstimate {
 #[test]
 fn a_lamp_between_plates_does_not_move_the_track() {
     for lamp_m in [-0.7, 0.7] {
-        let found = across((0..400).map(|step| {
+        let estimate = across((0..400).map(|step| {
             let is_part = step % 2 == 1;
             seen(step, if is_part { lamp_m } else { 0.0 }, is_part)
         }));
-        assert!(found.position_m.abs() < 0.01, "{found:?}");
+        assert!(estimate.position_m.abs() < 0.01, "{estimate:?}");
         // Nor does one that came first.
-        let found = across((0..400).map(|step| {
+        let estimate = across((0..400).map(|step| {
             let is_part = step % 2 == 0;
             seen(step, if is_part { lamp_m } else { 0.0 }, is_part)
         }));
-        assert!(found.position_m.abs() < 0.02, "{found:?}");
-        assert!(found.position_variance_m2.sqrt() < 0.05, "{found:?}");
+        assert!(estimate.position_m.abs() < 0.02, "{estimate:?}");
+        assert!(estimate.position_variance_m2.sqrt() < 0.05, "{estimate:?}");
     }
 }
 
-/// Returns the estimate across the road after 16 s in which sensor 0 measures every `first` and sensor 1 every `second` scan, the
-/// latter `off_m` to the side, and sensor 0 nothing in every 25th.
+/// Returns the estimate across the road after 16 s. Sensor 0 measures in every `first` scan, except
+/// every 25th scan. Sensor 1 measures in every `second` scan, `off_m` to the side.
 fn across_of_two([first, second]: [u32; 2], off_m: f64) -> AxisEstimate {
     let mut filter = RoadFilter::new(&seen(0, 0.0, false), 30.0, Some(0));
     for step in 1..400 {
@@ -78,17 +78,17 @@ fn across_of_two([first, second]: [u32; 2], off_m: f64) -> AxisEstimate {
 }
 
 #[test]
-fn a_sensor_that_contradicts_the_one_that_is_followed_does_not_pull_the_track_apart() {
+fn a_sensor_that_contradicts_the_followed_sensor_does_not_pull_the_track_apart() {
     for scans in [[1, 1], [3, 1], [1, 3], [2, 3]] {
         for off_m in [0.0, 0.02, 0.3, 0.6, 1.5] {
-            let found = across_of_two(scans, off_m);
+            let estimate = across_of_two(scans, off_m);
             // Within their errors of 0.04 m, both count.
             let bounds_m = if off_m <= 0.02 { [0.0, off_m] } else { [0.0; 2] };
             assert!(
-                (bounds_m[0] - 0.005..bounds_m[1] + 0.005).contains(&found.position_m),
-                "{scans:?} {off_m}: {found:?}"
+                (bounds_m[0] - 0.005..bounds_m[1] + 0.005).contains(&estimate.position_m),
+                "{scans:?} {off_m}: {estimate:?}"
             );
-            assert!(found.speed_mps.abs() < 0.05, "{scans:?} {off_m}: {found:?}");
+            assert!(estimate.speed_mps.abs() < 0.05, "{scans:?} {off_m}: {estimate:?}");
         }
     }
 }
@@ -118,14 +118,14 @@ fn a_lamp_counts_once_the_middle_has_not_been_seen_for_a_second() {
         let until = 100 + (seconds / SCAN_S) as u32;
         (across((0..until).map(|step| seen(step, d_m(step), step >= 100))), d_m(until - 1))
     };
-    let (found, _) = after(0.9);
-    assert!(found.position_m.abs() < 0.05, "{found:?}");
+    let (estimate, _) = after(0.9);
+    assert!(estimate.position_m.abs() < 0.05, "{estimate:?}");
     for seconds in [2.5, 5.0, 8.0] {
-        let (found, d_m) = after(seconds);
-        let sd_m = found.position_variance_m2.sqrt();
-        assert!((found.position_m - d_m).abs() < 3.0 * sd_m, "{found:?} instead of {d_m} m after {seconds} s");
+        let (estimate, d_m) = after(seconds);
+        let sd_m = estimate.position_variance_m2.sqrt();
+        assert!((estimate.position_m - d_m).abs() < 3.0 * sd_m, "{estimate:?} instead of {d_m} m after {seconds} s");
         // Where the lamp is on the vehicle remains unknown.
-        assert!((0.1..0.6).contains(&sd_m), "{found:?}");
+        assert!((0.1..0.6).contains(&sd_m), "{estimate:?}");
     }
 }
 
@@ -135,6 +135,6 @@ fn a_camera_that_does_not_know_the_middle_does_not_silence_a_lamp() {
         let across = AxisMeasurement { white_sd_m: 0.7, slow_sd_m: 0.7, ..seen(step, 0.0, false).across };
         Measurement { across, knows_middle: false, ..seen(step, 0.0, false) }
     };
-    let found = across((0..200).map(|step| if step % 2 == 0 { poor(step) } else { seen(step, 0.7, true) }));
-    assert!(found.position_m > 0.2, "{found:?}");
+    let estimate = across((0..200).map(|step| if step % 2 == 0 { poor(step) } else { seen(step, 0.7, true) }));
+    assert!(estimate.position_m > 0.2, "{estimate:?}");
 }

@@ -1,7 +1,9 @@
-//! The inverse of the complementary error function, accurate to 11 digits, with the same bits on every processor.
+//! The inverse of the complementary error function, accurate to 11 digits, with the same bits on
+//! every processor.
 //!
-//! The fits are those of the crate `statrs` 0.19 (from Math.NET and Boost), which a test compares. That crate calls the logarithm of the C library,
-//! whose last digit depends on the processor; here it is that of [`crate::maths`].
+//! The fits come from the crate `statrs` 0.19 (from Math.NET and Boost); a test compares both. That
+//! crate calls the logarithm of the C library, whose last digit depends on the processor. Here the
+//! logarithm comes from [`crate::maths`].
 
 use crate::maths::ln;
 
@@ -104,7 +106,8 @@ const SHOULDER: Fit = Fit {
     ],
 };
 
-/// For smaller probabilities: the end of each interval of √(-ln q), the origin of its polynomials, and the fit.
+/// For smaller probabilities: the end of each interval of √(-ln q), the origin of its polynomials,
+/// and the fit.
 const TAIL: [(f64, f64, Fit); 5] = [
     (
         3.0,
@@ -249,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_those_of_statrs() {
+    fn values_equal_statrs() {
         let inner = (1..40_000).map(|step| f64::from(step) / 20_000.0);
         // Powers of 10, down to the smallest number.
         let outer = (0..3_200).map(|step| crate::maths::powf(10.0, -0.1 * f64::from(step)));

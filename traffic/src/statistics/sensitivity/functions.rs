@@ -3,8 +3,8 @@
 use crate::maths;
 use std::f64::consts::PI;
 
-/// T. Ishigami and T. Homma, *An importance quantification technique in uncertainty analysis for computer models*, ISUMA 1990,
-/// with a = 7 and b = 0.1.
+/// T. Ishigami and T. Homma, *An importance quantification technique in uncertainty analysis for
+/// computer models*, ISUMA 1990, with a = 7 and b = 0.1.
 pub(super) fn ishigami(u: &[f64]) -> f64 {
     let x: Vec<f64> = u.iter().map(|u| PI * (2.0 * u - 1.0)).collect();
     maths::sin(x[0]) + A * maths::sin(x[1]).powi(2) + B * x[2].powi(4) * maths::sin(x[0])
@@ -25,7 +25,8 @@ pub(super) fn ishigami_indices() -> Vec<[f64; 2]> {
 /// Coefficients of Sobol's g-function: the smaller, the more a factor matters.
 const G: [f64; 5] = [0.0, 0.5, 3.0, 9.0, 99.0];
 
-/// Sobol's g-function (A. Saltelli and I. M. Sobol', Reliability Engineering & System Safety 50 (1995) 225–239).
+/// Sobol's g-function (A. Saltelli and I. M. Sobol', Reliability Engineering & System Safety 50
+/// (1995) 225–239).
 pub(super) fn g_function(u: &[f64]) -> f64 {
     u.iter().zip(G).map(|(u, a)| ((4.0 * u - 2.0).abs() + a) / (1.0 + a)).product()
 }
@@ -49,6 +50,6 @@ pub(super) fn event(u: &[f64]) -> f64 {
 pub(super) fn event_indices() -> Vec<[f64; 2]> {
     let p: f64 = EDGES.iter().product();
     let v = p * (1.0 - p);
-    let of = |edge: &f64| [p * p * (1.0 / edge - 1.0) / v, p / edge * edge * (1.0 - edge) / v];
-    EDGES.iter().map(of).chain([[0.0, 0.0]]).collect()
+    let indices = |edge: &f64| [p * p * (1.0 / edge - 1.0) / v, p / edge * edge * (1.0 - edge) / v];
+    EDGES.iter().map(indices).chain([[0.0, 0.0]]).collect()
 }

@@ -1,14 +1,17 @@
-//! The first-order index of a parameter for an event, from samples that were drawn for another purpose.
+//! The first-order index of a parameter for an event, from samples that were drawn for another
+//! purpose.
 //!
 //! ```text
 //!   parameter ─▶ class: one of 8 equally probable parts of its distribution, or one of its labels
 //!   index = share of the event's variance between the classes, corrected for what chance puts there
 //! ```
 //!
-//! The share between classes is the correlation ratio, the estimator of Plischke, Borgonovo and Smith (2013). Of a parameter
-//! without influence it would show (classes − 1)/(samples − 1); the correction is that of T. L. Kelley, *An unbiased correlation
-//! ratio measure*, PNAS 21 (1935) 554–559. Classes hide what happens within them: the index is a lower bound of the first-order
-//! Sobol' index. If the event depends linearly on the parameter, eight classes hide 1/64 of it.
+//! The share between classes is the correlation ratio, the estimator of Plischke, Borgonovo and
+//! Smith (2013). For a parameter without influence, the uncorrected index would be (classes −
+//! 1)/(samples − 1). The correction follows T. L. Kelley, *An unbiased correlation ratio measure*,
+//! PNAS 21 (1935) 554–559. Classes hide what happens within them: the index is a lower bound of the
+//! first-order Sobol' index. If the event depends linearly on the parameter, eight classes hide
+//! 1/64 of it.
 
 use super::jackknife::{Estimate, REPLICATES, jackknife};
 use crate::statistics::interval::{COVERAGE, clopper_pearson};
@@ -17,8 +20,9 @@ use crate::statistics::interval::{COVERAGE, clopper_pearson};
 pub const CLASSES: usize = 8;
 /// Number of classes if there are few events.
 const FEW_CLASSES: usize = 4;
-/// Least mean number of events, and of samples without the event, in a class: the usual rule for tables of counts (W. G. Cochran,
-/// *Some methods for strengthening the common χ² tests*, Biometrics 10 (1954) 417–451).
+/// Least mean number of events, and of samples without the event, in a class: the usual rule for
+/// tables of counts (W. G. Cochran, *Some methods for strengthening the common χ² tests*,
+/// Biometrics 10 (1954) 417–451).
 const MIN_PER_CLASS: u64 = 5;
 
 /// Counts of an event over the classes of one parameter.
@@ -26,11 +30,11 @@ const MIN_PER_CLASS: u64 = 5;
 pub struct ClassCounts {
     /// The number of samples and of events, by class and replicate.
     counts: Vec<[[u64; 2]; REPLICATES]>,
-    /// Whether adjacent classes may be merged: those of a continuous parameter.
+    /// Whether adjacent classes may be merged, as for a continuous parameter.
     is_continuous: bool,
 }
 
-/// What a parameter says about an event.
+/// The influence of a parameter on an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Influence {
     /// The first-order index.
@@ -50,8 +54,8 @@ impl ClassCounts {
         Self { counts: vec![[[0; 2]; REPLICATES]; labels], is_continuous: false }
     }
 
-    /// Adds a sample. `number` assigns it to a replicate, and must not depend on the parameters. A class that does not exist is
-    /// ignored.
+    /// Adds a sample. `number` assigns it to a replicate, and must not depend on the parameters. A
+    /// class that does not exist is ignored.
     pub fn push(&mut self, class: usize, number: u64, is_event: bool) {
         if let Some(of_class) = self.counts.get_mut(class) {
             let [samples, events] = &mut of_class[(number % REPLICATES as u64) as usize];
@@ -65,7 +69,8 @@ impl ClassCounts {
         self.counts.iter().flatten().fold([0; 2], |[samples, events], [more, hits]| [samples + more, events + hits])
     }
 
-    /// Returns what the parameter says about the event; `None` if there are too few events, or too few samples without it.
+    /// Returns the influence of the parameter on the event; `None` if there are too few events, or
+    /// too few samples without it.
     pub fn influence(&self) -> Option<Influence> {
         let [samples, events] = self.total();
         let per_class = |classes: usize| events.min(samples - events) / classes.max(1) as u64;
@@ -102,7 +107,7 @@ fn merged(classes: &[[[u64; 2]; REPLICATES]]) -> [[u64; 2]; REPLICATES] {
 
 /// Returns Kelley's ε² of the counts by class and replicate.
 fn index(counts: &[[[u64; 2]; REPLICATES]]) -> Option<Estimate> {
-    // Sums of up to 8 classes stand in one array; more labels than that share the last place.
+    // One array holds the sums of up to 8 classes; further labels share the last place.
     let mut replicates = [[0.0; 2 * CLASSES]; REPLICATES];
     for (class, of_class) in counts.iter().enumerate() {
         let place = 2 * class.min(CLASSES - 1);

@@ -1,20 +1,25 @@
 //! Estimates from independent replicates, with intervals.
 //!
-//! A smooth function of sums, such as a ratio of variances, is evaluated on the sums of all replicates, and again without each
-//! of them. The pseudo-values have the estimate, freed of its bias of the order of one over the number of replicates, as their
-//! mean, and their spread gives its standard error (J. W. Tukey, Annals of Mathematical Statistics 29 (1958) 614; B. Efron and
-//! C. Stein, Annals of Statistics 9 (1981) 586–596). The interval is Student's.
+//! A smooth function of sums, such as a ratio of variances, is evaluated on the sums of all
+//! replicates, and again without each of them. The mean of the pseudo-values is the estimate
+//! without its bias of the order of one over the number of replicates. The spread of the
+//! pseudo-values gives the standard error of the estimate (J. W. Tukey, Annals of Mathematical
+//! Statistics 29 (1958) 614; B. Efron and C. Stein, Annals of Statistics 9 (1981) 586–596). The
+//! interval is Student's.
 //!
-//! The points of one scrambled low-discrepancy sequence depend on each other, so that resampling them, as a bootstrap does,
-//! overstates the error. Independent scramblings do not depend on each other. For their mean, Student's interval keeps its
-//! coverage best of the usual intervals, the bootstrap's among them (P. L'Ecuyer, M. K. Nakayama, A. B. Owen and B. Tuffin,
-//! *Confidence intervals for randomized quasi-Monte Carlo estimators*, Winter Simulation Conference 2023).
+//! The points of one scrambled low-discrepancy sequence depend on each other. A bootstrap, which
+//! resamples them, therefore overstates the error. Independent scramblings do not depend on each
+//! other. For their mean, Student's interval keeps its coverage better than the other usual
+//! intervals, the bootstrap included (P. L'Ecuyer, M. K. Nakayama, A. B. Owen and B. Tuffin,
+//! *Confidence intervals for randomized quasi-Monte Carlo estimators*, Winter Simulation Conference
+//! 2023).
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::statistics::interval::COVERAGE;
 
-/// Number of replicates into which samples are divided. Student's factor is then 4 % above that of infinitely many.
+/// Number of replicates into which samples are divided. Student's factor is then 4 % above its
+/// value for infinitely many replicates.
 pub const REPLICATES: usize = 32;
 
 /// An estimate with its interval.
@@ -22,13 +27,14 @@ pub const REPLICATES: usize = 32;
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// The 95 % interval. Unless it is [bounded](Self::within), it may reach beyond the range of the quantity, such as below 0 for a
-    /// share.
+    /// The 95 % interval. Unless it is [bounded](Self::within), it may reach beyond the range of
+    /// the quantity, such as below 0 for a share.
     pub interval_95: [f64; 2],
 }
 
 impl Estimate {
-    /// Returns the estimate in `interval_95`, which is found in another way: the value is moved to its nearer end if it lies outside.
+    /// Returns the estimate in `interval_95`, which is found in another way: the value is moved to
+    /// its nearer end if it lies outside.
     #[must_use]
     pub fn with_interval(self, interval_95: [f64; 2]) -> Self {
         let [low, high] = interval_95;
@@ -47,8 +53,8 @@ impl Estimate {
     }
 }
 
-/// Estimates `function` of the sums over all replicates. `None` if the function has no value for the sums of all replicates or
-/// of all but one, or if there are fewer than two replicates.
+/// Estimates `function` of the sums over all replicates. `None` if the function has no value for
+/// the sums of all replicates or of all but one, or if there are fewer than two replicates.
 pub fn jackknife<const K: usize>(
     replicates: &[[f64; K]],
     function: impl Fn(&[f64; K]) -> Option<f64>,
@@ -71,7 +77,8 @@ pub fn jackknife<const K: usize>(
     student(&replicates.iter().map(pseudo_value).collect::<Option<Vec<f64>>>()?)
 }
 
-/// Estimates the mean of independent values, with Student's interval; `None` of fewer than two values.
+/// Estimates the mean of independent values, with Student's interval; `None` of fewer than two
+/// values.
 pub fn student(values: &[f64]) -> Option<Estimate> {
     if values.len() < 2 {
         return None;
@@ -126,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_value_without_one_replicate_has_no_estimate() {
+    fn a_function_without_a_value_for_all_but_one_replicate_has_no_estimate() {
         let replicates = [[1.0, 0.0], [1.0, 2.0]];
         let ratio = |[above, below]: &[f64; 2]| (*below > 0.0).then(|| above / below);
         assert_eq!(jackknife(&replicates, ratio), None);

@@ -6,9 +6,10 @@
 //!   μ = mean of d     μ* = mean of |d|     σ = standard deviation of d (interactions, curvature)
 //! ```
 //!
-//! Morris's grid has p levels for each factor and steps of p/(2(p − 1)), half of the levels. Here a level is one of p equally
-//! probable parts of the factor, and each trajectory lies at a random place within its parts. On Morris's own grid a value that
-//! only occurs beyond the outermost level, such as a label with a probability of a tenth, would never be seen.
+//! Morris's grid has p levels for each factor and steps of p/(2(p − 1)), half of the levels. Here a
+//! level is one of p equally probable parts of the factor, and each trajectory lies at a random
+//! place within its parts. On Morris's own grid, a value that occurs only beyond the outermost
+//! level would never be seen: for example a label with a probability of a tenth.
 
 use rand::{Rng, RngExt};
 
@@ -42,7 +43,8 @@ struct Trajectory {
 pub struct Effects {
     /// μ: mean of the effects; `None` of no effects.
     pub mu: Option<f64>,
-    /// μ*: mean of the magnitudes of the effects, with its interval; `None` of fewer than two effects.
+    /// μ*: mean of the magnitudes of the effects, with its interval; `None` of fewer than two
+    /// effects.
     pub mu_star: Option<Estimate>,
     /// σ: standard deviation of the effects; `None` of fewer than two effects.
     pub sigma: Option<f64>,
@@ -92,16 +94,17 @@ impl Trajectories {
         trajectory.low.iter().zip(is_high).map(value).collect()
     }
 
-    /// Returns the effects of every factor. `outputs` are those of the points, `None` where a run has no output.
+    /// Returns the effects of every factor. `outputs` are the outputs of the points, `None` where a
+    /// run has no output.
     ///
     /// # Panics
     /// Panics if there are fewer outputs than points.
     pub fn effects(&self, outputs: &[Option<f64>]) -> Vec<Effects> {
-        let mut found: Vec<(Vec<f64>, usize)> = vec![(Vec::new(), 0); self.factors];
+        let mut by_factor: Vec<(Vec<f64>, usize)> = vec![(Vec::new(), 0); self.factors];
         for (number, trajectory) in self.trajectories.iter().enumerate() {
             let first = number * (self.factors + 1);
             for (step, &factor) in trajectory.order.iter().enumerate() {
-                let (effects, missing) = &mut found[factor];
+                let (effects, missing) = &mut by_factor[factor];
                 match (outputs[first + step], outputs[first + step + 1]) {
                     (Some(before), Some(after)) => {
                         let [low, high] =
@@ -112,7 +115,7 @@ impl Trajectories {
                 }
             }
         }
-        found.into_iter().map(|(effects, missing)| Effects::of(&effects, missing)).collect()
+        by_factor.into_iter().map(|(effects, missing)| Effects::of(&effects, missing)).collect()
     }
 }
 

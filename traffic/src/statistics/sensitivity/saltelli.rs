@@ -1,4 +1,5 @@
-//! Sobol' indices: the shares of the output's variance that a factor, or a group of factors, explains.
+//! Sobol' indices: the shares of the output's variance that a factor, or a group of factors,
+//! explains.
 //!
 //! ```text
 //!   A, B     two independent points in each row
@@ -8,28 +9,32 @@
 //!   total        ST_i = E[V(y | all but x_i)] / V[y]  ≈ ½ mean (f(A) − f(AB_i))² / V             (Jansen 1999)
 //! ```
 //!
-//! The constant c, the mean of the outputs, changes no expectation and lowers the variance of the first-order index (I. M. Sobol'
-//! and E. E. Myshetskaya, Monte Carlo Methods and Applications 13 (2007) 455–465): its standard error is about √(2 ST_i / n).
+//! The constant c, the mean of the outputs, changes no expectation and lowers the variance of the
+//! first-order index (I. M. Sobol' and E. E. Myshetskaya, Monte Carlo Methods and Applications 13
+//! (2007) 455–465): its standard error is about √(2 ST_i / n).
 //!
-//! A and B are the two halves of one scrambled Sobol' sequence (B. Burley, JCGT 9(4), 2020, crate `sobol_burley`). There are
-//! [`REPLICATES`] independent scramblings, from which the intervals follow: see [`super::jackknife`].
+//! A and B are the two halves of one scrambled Sobol' sequence (B. Burley, JCGT 9(4), 2020, crate
+//! `sobol_burley`). There are [`REPLICATES`] independent scramblings, from which the intervals
+//! follow: see [`super::jackknife`].
 
 use rand::Rng;
 
 use super::jackknife::{Estimate, REPLICATES, jackknife};
 use crate::statistics::interval::{COVERAGE, clopper_pearson};
 
-/// Half the spacing of the numbers in the sequence, which have 23 bits: it keeps each number above 0 and below 1.
+/// Half the spacing of the numbers in the sequence, which have 23 bits: it keeps each number above
+/// 0 and below 1.
 const HALF_CELL: f64 = 1.0 / (1_u32 << 24) as f64;
 /// Largest number of factors: the sequence has two dimensions for each.
 pub const MAX_FACTORS: usize = sobol_burley::NUM_DIMENSIONS as usize / 2;
 /// Largest number of rows in a replicate: the length of the sequence.
 const MAX_ROWS: usize = 1 << 16;
-/// Number of rows that must inform an index for Student's interval. With fewer, the distribution of the estimate is far from
-/// normal.
+/// Number of rows that must inform an index for Student's interval. With fewer, the distribution of
+/// the estimate is far from normal.
 const MIN_CHANGES: u64 = 10;
-/// The same for the first-order index of an event: of the rows with a change, as many must have the event at B, and as many must
-/// not. The event of the tests needs about twenty, since the products of two rare events are skewed.
+/// The same for the first-order index of an event: of the rows with a change, as many must have the
+/// event at B, and as many must not. The event of the tests needs about twenty, since the products
+/// of two rare events are skewed.
 const MIN_ON_EACH_SIDE: u64 = 20;
 /// Number of parts of a factor's range for which the output's mean is estimated.
 pub const QUARTERS: usize = 4;
@@ -48,7 +53,8 @@ pub struct Design {
 /// The indices of one group of factors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Indices {
-    /// The first-order index; `None` if the output does not vary, or changes in too few rows to say.
+    /// The first-order index; `None` if the output does not vary, or changes in too few rows to
+    /// say.
     pub first: Option<Estimate>,
     /// The total index; `None` if the output does not vary, or changes in too few rows to say.
     pub total: Option<Estimate>,
@@ -58,11 +64,12 @@ pub struct Indices {
     pub rows: u64,
 }
 
-/// How one factor moves the mean of the output, whatever the others do.
+/// The effect of one factor on the mean of the output, whatever the values of the other factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MainEffect {
-    /// Share of the output's variance between the quarters of the factor's distribution. It is a lower bound of the first-order
-    /// index, and has a smaller error, since all points of the design count.
+    /// Share of the output's variance between the quarters of the factor's distribution. It is a
+    /// lower bound of the first-order index, and has a smaller error, since all points of the
+    /// design count.
     pub index: Estimate,
     /// The mean of the output while the factor lies in the first, second, third and last quarter.
     pub means: [Estimate; QUARTERS],
@@ -79,8 +86,8 @@ impl MainEffect {
 }
 
 impl Design {
-    /// Returns a design with about `rows` rows, for groups of the factors `0..factors`. The number of rows is raised to a
-    /// multiple of [`REPLICATES`].
+    /// Returns a design with about `rows` rows, for groups of the factors `0..factors`. The number
+    /// of rows is raised to a multiple of [`REPLICATES`].
     ///
     /// # Panics
     /// Panics if there are more than [`MAX_FACTORS`] factors.
@@ -131,15 +138,15 @@ impl Design {
         f64::from(sobol_burley::sample(number, dimension as u32, scramble)) + HALF_CELL
     }
 
-    /// Returns the indices of every group. `outputs` are those of the points, `None` if a run has no output: its row is then
-    /// left out for the groups that need it.
+    /// Returns the indices of every group. `outputs` are the outputs of the points, `None` if a run
+    /// has no output: its row is then left out for the groups that need it.
     ///
     /// # Panics
     /// Panics if there are fewer outputs than points.
     pub fn indices(&self, outputs: &[Option<f64>]) -> Vec<Indices> {
-        let known: Vec<f64> = outputs.iter().flatten().copied().collect();
-        let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
-        let is_event = known.iter().all(|output| *output == 0.0 || (output - 1.0).abs() <= f64::EPSILON);
+        let complete: Vec<f64> = outputs.iter().flatten().copied().collect();
+        let mean = complete.iter().sum::<f64>() / complete.len().max(1) as f64;
+        let is_event = complete.iter().all(|output| *output == 0.0 || (output - 1.0).abs() <= f64::EPSILON);
         (0..self.groups.len()).map(|group| self.of_group(group, outputs, mean, is_event)).collect()
     }
 
@@ -154,13 +161,15 @@ impl Design {
         sums.indices(is_event)
     }
 
-    /// Returns how a factor moves the mean of the output; `None` if a quarter of its distribution has no outputs, or they do not
-    /// vary. All points count: each coordinate is uniformly distributed in each of them.
+    /// Returns how a factor moves the mean of the output; `None` if a quarter of its distribution
+    /// has no outputs, or they do not vary. All points count: each coordinate is uniformly
+    /// distributed in each of them.
     ///
     /// # Panics
     /// Panics if there are fewer outputs than points.
     pub fn main_effect(&self, factor: usize, outputs: &[Option<f64>]) -> Option<MainEffect> {
-        // For each replicate and quarter: the number of outputs, their sum, and the sum of their squares.
+        // For each replicate and quarter: the number of outputs, their sum, and the sum of their
+        // squares.
         let mut replicates = [[0.0; 3 * QUARTERS]; REPLICATES];
         for (index, output) in outputs.iter().enumerate() {
             let Some(output) = output else { continue };
@@ -188,8 +197,8 @@ impl Design {
 /// The sums of one group.
 #[derive(Clone, Debug, Default)]
 struct GroupSums {
-    /// For each replicate: the number of rows; the sums of the outputs of A and B, and of their squares; the sums of the terms of
-    /// both indices.
+    /// For each replicate: the number of rows; the sums of the outputs of A and B, and of their
+    /// squares; the sums of the terms of both indices.
     replicates: [[f64; 5]; REPLICATES],
     /// Number of rows.
     rows: u64,
@@ -224,8 +233,9 @@ impl GroupSums {
         Indices { first, total, changes, rows: self.rows }
     }
 
-    /// Returns the bounds of the total index of an event. Jansen's index is then the probability of a change over twice the
-    /// variance. For other outputs, nothing is known about the size of changes that were not seen.
+    /// Returns the bounds of the total index of an event. Jansen's index is then the probability of
+    /// a change over twice the variance. For other outputs, nothing is known about the size of
+    /// changes that were not seen.
     fn bounds(&self, is_event: bool) -> Option<[f64; 2]> {
         let mut all = [0.0; 5];
         for replicate in &self.replicates {
@@ -247,8 +257,8 @@ fn variance([count, sum, squares, ..]: &[f64; 5]) -> Option<f64> {
     (variance > 0.0).then_some(variance)
 }
 
-/// Returns the share of the variance between the quarters; `None` if there is none. The sums are the count, the sum and the sum of
-/// the squares of each quarter.
+/// Returns the share of the variance between the quarters; `None` if there is none. The sums are
+/// the count, the sum and the sum of the squares of each quarter.
 fn share_between(sums: &[f64; 3 * QUARTERS]) -> Option<f64> {
     let quarters = || sums.chunks_exact(3).filter(|quarter| quarter[0] > 0.0);
     let total = |part: usize| quarters().map(|quarter| quarter[part]).sum::<f64>();

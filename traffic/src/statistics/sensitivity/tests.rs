@@ -16,7 +16,8 @@ fn one_by_one(factors: usize) -> Vec<Vec<usize>> {
     (0..factors).map(|factor| vec![factor]).collect()
 }
 
-/// The share of repetitions in which the interval of each index contains the truth: first order, and total.
+/// The share of repetitions in which the interval of each index contains the truth: first order,
+/// and total.
 fn coverage(
     function: fn(&[f64]) -> f64,
     truth: &[[f64; 2]],
@@ -28,9 +29,9 @@ fn coverage(
     for seed in seeds {
         let design = Design::new(truth.len(), one_by_one(truth.len()), rows, &mut StdRng::seed_from_u64(seed));
         let indices = design.indices(&evaluated(&design, function));
-        for ((covered, [first, total]), found) in covered.iter_mut().zip(truth).zip(indices) {
-            covered[0] += u32::from(found.first.unwrap().covers(*first));
-            covered[1] += u32::from(found.total.unwrap().covers(*total));
+        for ((covered, [first, total]), index) in covered.iter_mut().zip(truth).zip(indices) {
+            covered[0] += u32::from(index.first.unwrap().covers(*first));
+            covered[1] += u32::from(index.total.unwrap().covers(*total));
         }
     }
     covered.into_iter().map(|hits| hits.map(|hits| f64::from(hits) / repetitions as f64)).collect()
@@ -41,9 +42,10 @@ const RANGE: std::ops::RangeInclusive<f64> = 0.93..=0.97;
 
 #[test]
 fn intervals_of_ishigami_s_function_contain_the_truth_as_often_as_they_say() {
-    // Of 200 repetitions, the share of a single index scatters by 1.5 % around its expectation, so that one of six indices is
-    // likely to leave the range even if the intervals are exact. 200 repetitions are judged together for all indices, and each
-    // index by 2000 repetitions, which scatter by 0.5 %.
+    // Over 200 repetitions, the share of a single index scatters by 1.5 % around its expectation.
+    // One of six indices is then likely to leave the range even if the intervals are exact. 200
+    // repetitions are judged together for all indices, and each index by 2000 repetitions, which
+    // scatter by 0.5 %.
     let of_200 = coverage(ishigami, &ishigami_indices(), 1_024, 10_000..10_200);
     println!("Ishigami's function, 200 repetitions, first order and total: {of_200:?}");
     let mean = of_200.iter().flatten().sum::<f64>() / 6.0;
@@ -67,7 +69,8 @@ fn intervals_of_an_event_contain_the_truth_at_least_as_often_as_they_say() {
     for share in shares.iter().flatten().chain(coverage(event, &event_indices(), 256, 0..1_000).iter().flatten()) {
         assert!(*share >= *RANGE.start(), "{shares:?}");
     }
-    // The first factor, and the total indices that rest on enough changes, have intervals that are not wider than needed.
+    // The first factor, and the total indices that rest on enough changes, have intervals that are
+    // not wider than needed.
     for share in [shares[0][0], shares[0][1], shares[1][1], shares[2][1]] {
         assert!(RANGE.contains(&share), "{shares:?}");
     }
@@ -80,7 +83,7 @@ fn design(function: fn(&[f64]) -> f64, factors: usize, groups: Vec<Vec<usize>>) 
 }
 
 #[test]
-fn the_total_index_of_a_group_is_that_of_all_its_factors() {
+fn the_total_index_of_a_group_covers_all_its_factors() {
     let (design, outputs) = design(ishigami, 3, vec![vec![0, 2], vec![1]]);
     let indices = design.indices(&outputs);
     let of_second = ishigami_indices()[1][0];
@@ -105,16 +108,16 @@ fn a_missing_output_leaves_out_its_row_and_a_constant_output_has_no_index() {
     // Row 0: the mixed point of the first factor. Row 1: point A, which all need.
     outputs[2] = None;
     outputs[5] = None;
-    let rows: Vec<u64> = design.indices(&outputs).iter().map(|found| found.rows).collect();
+    let rows: Vec<u64> = design.indices(&outputs).iter().map(|index| index.rows).collect();
     assert_eq!(rows, [4_094, 4_095, 4_095]);
     let constant = vec![Some(1.0); outputs.len()];
-    assert!(design.indices(&constant).iter().all(|found| found.first.is_none() && found.total.is_none()));
+    assert!(design.indices(&constant).iter().all(|index| index.first.is_none() && index.total.is_none()));
     let none = vec![None; outputs.len()];
-    assert!(design.indices(&none).iter().all(|found| found.rows == 0 && found.total.is_none()));
+    assert!(design.indices(&none).iter().all(|index| index.rows == 0 && index.total.is_none()));
 }
 
 #[test]
-fn the_main_effect_of_a_factor_is_the_true_one() {
+fn the_main_effect_of_a_factor_equals_the_true_effect() {
     // The event needs the first factor below 0.3, the others below 0.6 and 0.9.
     let truth = [0.54, 0.2 * 0.54, 0.0, 0.0];
     let p = 0.3 * 0.54;
@@ -171,10 +174,10 @@ fn the_effects_of_a_linear_function_are_its_coefficients() {
 fn screening_finds_the_factors_of_the_g_function_in_their_order() {
     let design = Trajectories::new(5, 100, &mut StdRng::seed_from_u64(4));
     let outputs: Vec<Option<f64>> = (0..design.len()).map(|index| Some(g_function(&design.point(index)))).collect();
-    let found: Vec<f64> = design.effects(&outputs).iter().map(|effects| effects.mu_star.unwrap().value).collect();
-    assert!(found.windows(2).all(|pair| pair[0] > pair[1]), "{found:?}");
+    let mu_stars: Vec<f64> = design.effects(&outputs).iter().map(|effects| effects.mu_star.unwrap().value).collect();
+    assert!(mu_stars.windows(2).all(|pair| pair[0] > pair[1]), "{mu_stars:?}");
     // Every factor interacts with the others: σ is of the size of μ*.
-    assert!(design.effects(&outputs)[0].sigma.unwrap() > 0.5 * found[0]);
+    assert!(design.effects(&outputs)[0].sigma.unwrap() > 0.5 * mu_stars[0]);
 }
 
 #[test]
@@ -219,15 +222,16 @@ fn given(samples: u64, seed: u64, probability: fn(f64) -> f64) -> [ClassCounts; 
 
 #[test]
 fn the_index_from_given_data_is_unbiased_and_its_interval_is_honest() {
-    // Two levels of probability, one per half of the range: the index is exact for any number of even classes.
+    // Two levels of probability, one per half of the range: the index is exact for any number of
+    // even classes.
     let probability = |u: f64| if u < 0.5 { 0.1 } else { 0.3 };
     let truth = [0.01 / (0.2 * 0.8), 0.0];
     let (mut covered, mut sum) = ([0_u32; 2], [0.0; 2]);
     for seed in 0..2_000 {
         for (index, counts) in given(1_000, seed, probability).iter().enumerate() {
-            let found = counts.influence().unwrap().index;
-            covered[index] += u32::from(found.covers(truth[index]));
-            sum[index] += found.value;
+            let estimate = counts.influence().unwrap().index;
+            covered[index] += u32::from(estimate.covers(truth[index]));
+            sum[index] += estimate.value;
         }
     }
     let shares = covered.map(|hits| f64::from(hits) / 2_000.0);
@@ -239,7 +243,7 @@ fn the_index_from_given_data_is_unbiased_and_its_interval_is_honest() {
 }
 
 #[test]
-fn with_few_events_nothing_is_said() {
+fn with_few_events_there_is_no_influence() {
     let [few, _] = given(1_000, 1, |_| 0.005);
     assert_eq!(few.influence(), None);
     let [some, _] = given(1_000, 1, |_| 0.03);

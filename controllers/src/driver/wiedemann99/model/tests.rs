@@ -13,7 +13,8 @@ fn settings(cc1_s: f64) -> Wiedemann99 {
     Wiedemann99 { parameters, hardest_braking_mps2: HARDEST_MPS2, ..default }
 }
 
-/// A driver behind a lead vehicle. The actual acceleration follows the desired one with the actuator lag of 0.15 s.
+/// A driver behind a lead vehicle. The actual acceleration follows the desired one with the
+/// actuator lag of 0.15 s.
 #[derive(Clone, Copy)]
 struct Pair {
     gap_m: f64,
@@ -21,7 +22,8 @@ struct Pair {
     actual_mps2: f64,
 }
 
-/// Simulates 120 s behind a lead vehicle with the given acceleration over time, and returns the gap at each step.
+/// Simulates 120 s behind a lead vehicle with the given acceleration over time, and returns the gap
+/// at each step.
 fn drive(cc1_s: f64, mut pair: Pair, mut lead_mps: f64, step_s: f64, lead_mps2: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut model = Wiedemann99Model::new(&settings(cc1_s));
     let steps = (120.0 / step_s).round() as usize;
@@ -52,8 +54,8 @@ fn behind_a_lead_vehicle_at_constant_speed_the_gap_settles_into_its_band() {
                 let settled = &gaps[gaps.len() / 2..];
                 let least = settled.iter().copied().fold(f64::INFINITY, f64::min);
                 let most = settled.iter().copied().fold(0.0, f64::max);
-                // The coarsest step allows an overshoot of 0.25 m. At steps up to 0.04 s, only the actuator lag causes
-                // overshoot.
+                // The coarsest step allows an overshoot of 0.25 m. At steps up to 0.04 s, only the
+                // actuator lag causes overshoot.
                 let overshoot_m = if step_s > 0.05 { 0.25 } else { 0.1 };
                 assert!(
                     least > safe_m - overshoot_m && most < safe_m + 4.0 + overshoot_m,

@@ -50,9 +50,10 @@ fn hard_braking() -> Vec<[f64; 2]> {
     [&far[..], &near, &[[60.0, 30.0]; 30], &near, &[[30.0, 31.0]; 40]].concat()
 }
 
-/// The comfort command goes on beneath emergency braking. A stack that has emergency braking therefore commands, in every step
-/// in which it does not act, what a stack without it commands. If the ramp that releases the brake started from the command of
-/// emergency braking, the ego would still brake after it.
+/// The comfort command goes on beneath emergency braking. In every step without emergency braking,
+/// a stack with the function therefore gives the same command as a stack without it. If the ramp
+/// that releases the brake started from the command of emergency braking, the ego would still brake
+/// after it.
 #[test]
 fn the_ramp_that_releases_the_brake_starts_from_the_comfort_command() {
     for mis in [Some(MisSettings::PAPER), None] {
@@ -62,7 +63,7 @@ fn the_ramp_that_releases_the_brake_starts_from_the_comfort_command() {
         with.time = without.time;
         let (mut braked, mut compared_after) = (0, 0);
         for [gap_m, lead_mps] in hard_braking() {
-            let [one, other] = [&mut with, &mut without].map(|bench| {
+            let [with_braking, without_braking] = [&mut with, &mut without].map(|bench| {
                 // The rear vehicle has passed: nothing but the lead vehicle matters.
                 bench.rear().state[0] = 1.1 * CAR_M;
                 bench.rear().lane = [1.0, 0.0, 0.0];
@@ -70,11 +71,18 @@ fn the_ramp_that_releases_the_brake_starts_from_the_comfort_command() {
                 bench.lead().state[2] = lead_mps;
                 bench.step()
             });
-            if one.state == EgoState::EmergencyBraking {
-                assert!(one.acceleration_mps2 <= other.acceleration_mps2, "{one:?} {other:?}");
+            if with_braking.state == EgoState::EmergencyBraking {
+                assert!(
+                    with_braking.acceleration_mps2 <= without_braking.acceleration_mps2,
+                    "{with_braking:?} {without_braking:?}"
+                );
                 braked += 1;
             } else {
-                assert_eq!(one.acceleration_mps2.to_bits(), other.acceleration_mps2.to_bits(), "{one:?} {other:?}");
+                assert_eq!(
+                    with_braking.acceleration_mps2.to_bits(),
+                    without_braking.acceleration_mps2.to_bits(),
+                    "{with_braking:?} {without_braking:?}"
+                );
                 compared_after += u32::from(braked > 0);
             }
         }
@@ -89,7 +97,8 @@ fn after_emergency_braking_the_system_takes_no_more_speed_while_the_front_gap_do
     bench.lead().state[0] = 14.0 + CAR_M;
     bench.lead().state[2] = 22.0;
     assert_eq!(bench.step_for(0.5).state, EgoState::EmergencyBraking);
-    // The lead vehicle is as fast as the ego again, at a gap that the cruise control need not extend.
+    // The lead vehicle is as fast as the ego again, at a gap that the cruise control need not
+    // extend.
     bench.lead().state[0] = 30.0 + CAR_M;
     bench.lead().state[2] = 30.5;
     let command = bench.step_for(2.0);

@@ -105,7 +105,8 @@ fn a_fast_vehicle_ahead_in_the_passing_lane_does_not_matter() {
 
 #[test]
 fn a_close_follower_of_the_rear_vehicle_in_its_lane_matters_to_the_extended_system_alone() {
-    // The rear vehicle drives at 38 m/s, its centre 94.6 m behind: 30 m are a headway of 0.67 s, and 50 m one of 1.2 s.
+    // The rear vehicle drives at 38 m/s, its centre 94.6 m behind: 30 m are a headway of 0.67 s,
+    // and 50 m one of 1.2 s.
     for (behind_m, engages) in [(30.0, false), (50.0, true)] {
         for (mis, expected) in [(MisSettings::PAPER, true), (MisSettings::PAPER.extended(), engages)] {
             let mut bench = Bench::with_mis(mis);
@@ -121,8 +122,8 @@ fn a_close_follower_of_the_rear_vehicle_in_its_lane_matters_to_the_extended_syst
 
 #[test]
 fn a_close_follower_of_the_rear_vehicle_in_the_passing_lane_matters_to_the_extended_system_alone() {
-    // The rear vehicle drives at 38 m/s, its centre 94.6 m behind. At the same speed, 30 m are a headway of 0.67 s between
-    // the bumpers, and 50 m one of 1.2 s.
+    // The rear vehicle drives at 38 m/s, its centre 94.6 m behind. At the same speed, 30 m are a
+    // headway of 0.67 s between the bumpers, and 50 m one of 1.2 s.
     for (behind_m, engages) in [(30.0, false), (50.0, true)] {
         for (mis, expected) in [(MisSettings::PAPER, true), (MisSettings::PAPER.extended(), engages)] {
             let mut bench = Bench::with_mis(mis);

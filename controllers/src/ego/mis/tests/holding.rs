@@ -40,8 +40,8 @@ fn holding_needs_room_for_the_worst_braking_of_the_lead_vehicle() {
     assert_eq!(command.acceleration_mps2, -3.5);
 }
 
-/// Finds the gaps at which the ego may just hold by time-stepping the worst case: the lead vehicle brakes at 8 m/s² at
-/// once, the ego 0.3 s later at 0.6·g, and 2 m are left.
+/// Finds the gaps at which the ego may just hold by time-stepping the worst case: the lead vehicle
+/// brakes at 8 m/s² at once, the ego 0.3 s later at 0.6·g, and 2 m are left.
 #[test]
 fn it_holds_exactly_if_the_worst_case_leaves_room() {
     let left_m = |gap_m: f64, lead_mps: f64| {
@@ -198,8 +198,8 @@ fn commands_stay_within_the_comfort_limits() {
     assert!(last_mps2 > 0.0, "the margin is returned");
 }
 
-/// Returns how long the ego does not brake for a slower lead vehicle far ahead, once the rear vehicle crosses the marking
-/// (s), at most 12 s.
+/// Returns how long the ego does not brake for a slower lead vehicle far ahead, once the rear
+/// vehicle crosses the marking (s), at most 12 s.
 fn without_braking_s(hold_s: f64) -> f64 {
     let mut bench = Bench::with_mis(MisSettings { hold_s, ..MisSettings::PAPER });
     assert_eq!(bench.step().state, EgoState::Increasing);

@@ -68,7 +68,8 @@ fn the_extended_system_does_not_accelerate_towards_a_braking_lead_vehicle() {
         for step in 0..25 {
             bench.lead().state[2] = 30.0 - 6.0 * 0.04 * f64::from(step);
             let command = bench.step();
-            // The acceleration of the lead vehicle is smoothed over 0.2 s, and the command changes within its jerk limit.
+            // The acceleration of the lead vehicle is smoothed over 0.2 s, and the command changes
+            // within its jerk limit.
             if step > 15 {
                 most = most.max(command.acceleration_mps2);
             }

@@ -1,4 +1,4 @@
-//! What a driver knows about the motion of one vehicle ahead, from one observation to the next.
+//! A driver's knowledge of the motion of one vehicle ahead, from one observation to the next.
 
 use closecall_traffic::Time;
 
@@ -7,7 +7,7 @@ use super::evidence::{Belief, Evidence, Looming};
 use super::observation::{Observation, ObservedVehicle};
 use super::{ATTENDED_THRESHOLD_RADPS, LOOMING_THRESHOLD_RADPS};
 
-/// What a driver knows about the motion of one vehicle ahead.
+/// A driver's knowledge of the motion of one vehicle ahead.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KnownVehicle {
     /// Index of the vehicle.
@@ -17,7 +17,8 @@ pub(super) struct KnownVehicle {
     /// True while the driver has noticed the difference to the own speed and attends to it.
     attended: bool,
     acceleration: AccelerationEstimate,
-    /// What a driver who accumulates evidence expects, and the time of the observation that was last accumulated.
+    /// The expectation of a driver who accumulates evidence, and the time of the last accumulated
+    /// observation.
     belief: Option<(Belief, Time)>,
 }
 
@@ -46,7 +47,7 @@ impl KnownVehicle {
         }
     }
 
-    /// Updates what the driver knows, and returns the perceived motion.
+    /// Updates the driver's knowledge, and returns the perceived motion.
     pub(super) fn perceive(
         &mut self,
         observed: &ObservedVehicle,
@@ -66,8 +67,8 @@ impl KnownVehicle {
         }
     }
 
-    /// Returns the motion as a driver perceives it who accumulates evidence. The brake light counts once the driver has noticed
-    /// that the vehicle slows down.
+    /// Returns the motion as a driver perceives it who accumulates evidence. The brake light counts
+    /// once the driver has noticed that the vehicle slows down.
     fn accumulate(
         &mut self,
         observed: &ObservedVehicle,
@@ -92,11 +93,12 @@ impl KnownVehicle {
         }
     }
 
-    /// Updates and returns the speed of a driver who notices differences above the looming threshold (m/s).
+    /// Updates and returns the speed of a driver who notices differences above the looming
+    /// threshold (m/s).
     fn notice_speed_mps(&mut self, observed: &ObservedVehicle, own_mps: f64) -> f64 {
         let threshold = if self.attended { ATTENDED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS };
         self.attended = observed.visual_angle_rate_radps(own_mps) >= threshold;
-        // A driver also notices that the observed speed differs from the one assumed so far.
+        // A driver also notices that the observed speed differs from the assumed speed.
         let notices = self.attended || observed.visual_angle_rate_radps(self.speed_mps) >= LOOMING_THRESHOLD_RADPS;
         if notices {
             self.speed_mps = observed.speed_mps;
