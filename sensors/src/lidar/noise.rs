@@ -29,6 +29,8 @@ pub(crate) enum Purpose {
     FogClump = 7,
 }
 
+/// Least number that [`Noise::uniform`] returns.
+pub(crate) const LEAST_UNIFORM: f32 = 0.5 / 8_388_608.0;
 /// Number of purposes.
 const PURPOSES: u64 = 8;
 /// 2⁶⁴ divided by the golden ratio, the increment of SplitMix64.
@@ -85,7 +87,7 @@ impl Noise {
         z ^ (z >> 31)
     }
 
-    /// Returns a number that is uniform in the open interval from 0 to 1.
+    /// Returns a number that is uniform in the open interval from 0 to 1, at least [`LEAST_UNIFORM`].
     #[inline(always)]
     pub(crate) fn uniform(self, beam: usize, purpose: Purpose) -> f32 {
         ((self.bits(beam, purpose) >> 41) as u32 as f32 + 0.5) * (1.0 / 8_388_608.0)

@@ -11,8 +11,8 @@ use super::echo::{Echo, Echoes};
 use super::kind::THRESHOLD_OVER_NOISE;
 use super::noise::{Noise, Purpose};
 use super::pattern::{Column, Elevation};
-use super::power::{LinkBudget, MIN_POWER};
-use super::soft::{self, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
+use super::power::MIN_POWER;
+use super::soft::{self, Air, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
@@ -158,8 +158,7 @@ pub(crate) struct Receiver<'a> {
     pub(crate) pose: SensorPoseEstimate,
     pub(crate) targets: &'a Targets,
     pub(crate) plumes: &'a [Plume],
-    pub(crate) link: &'a LinkBudget,
-    pub(crate) noise: Noise,
+    pub(crate) air: Air<'a>,
     /// Share of returns that are lost regardless of their power.
     pub(crate) dropout: f32,
 }
@@ -174,7 +173,7 @@ impl Receiver<'_> {
         (hits, droplets, layers): (&ColumnHits, &ColumnDroplets, u64),
         (scan, truth): (&mut LidarScan, &mut ScanTruth),
     ) {
-        let in_air = !self.plumes.is_empty() || self.link.has_fog();
+        let in_air = !self.plumes.is_empty() || self.air.link.has_fog();
         let mut echoes = Echoes::NONE;
         let mut left = layers;
         while left != 0 {
@@ -183,10 +182,10 @@ impl Receiver<'_> {
             let elevation = &self.elevations[layer];
             let droplets = in_air.then(|| droplets.computed(layer).unwrap_or_else(|| self.droplet_effect(layer)));
             if hits.is_tested(layer) {
-                echoes.set(simd, (&hits.beams[layer], elevation), &self.targets.faces, self.link);
+                echoes.set(simd, (&hits.beams[layer], elevation), &self.targets.faces, self.air.link);
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[elevation.group];
-                echoes.set_ground(centre, elevation, &self.targets.faces[0], self.link);
+                echoes.set_ground(centre, elevation, &self.targets.faces[0], self.air.link);
             } else {
                 echoes.clear();
             }
@@ -206,7 +205,7 @@ impl Receiver<'_> {
         let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let centre = [cos, sin, self.elevations[layer].centre[0]];
         let at = BeamIndex { column: self.column_index, layer, layers: self.elevations.len() };
-        soft::droplet_effect(at, centre, self.plumes, (self.targets, self.link, self.noise))
+        soft::droplet_effect(at, centre, self.plumes, (self.targets, &self.air))
     }
 
     /// Returns two numbers of beams, of the layers in a bit mask: the beams on which droplets may
@@ -248,7 +247,7 @@ impl Receiver<'_> {
             // exponential.
             let is_strong = echo.power > MIN_POWER;
             let through =
-                if is_strong { self.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
+                if is_strong { self.air.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
             let power = echo.power * through;
             PotentialReturn { range_m: echo.range_m, power, source: face.source, material: face.material }
         });
@@ -271,15 +270,16 @@ impl Receiver<'_> {
     /// dropped.
     #[inline(always)]
     fn detect_one(&self, address: usize, potential: PotentialReturn) -> Option<DetectedReturn> {
-        if !(potential.power > MIN_POWER) || potential.range_m > self.link.max_range_m {
+        if !(potential.power > MIN_POWER) || potential.range_m > self.air.link.max_range_m {
             return None;
         }
-        let measured_power = potential.power + self.noise.normal(address, Purpose::Detection) / THRESHOLD_OVER_NOISE;
-        let is_dropped = || self.dropout > 0.0 && self.noise.uniform(address, Purpose::Dropout) < self.dropout;
+        let measured_power =
+            potential.power + self.air.noise.normal(address, Purpose::Detection) / THRESHOLD_OVER_NOISE;
+        let is_dropped = || self.dropout > 0.0 && self.air.noise.uniform(address, Purpose::Dropout) < self.dropout;
         if !(measured_power > 1.0) || is_dropped() {
             return None;
         }
-        let error = self.link.range_sd_m(measured_power) * self.noise.normal(address, Purpose::Range);
+        let error = self.air.link.range_sd_m(measured_power) * self.air.noise.normal(address, Purpose::Range);
         Some(DetectedReturn { potential, measured_m: potential.range_m + error, measured_power })
     }
 
@@ -294,7 +294,7 @@ impl Receiver<'_> {
         scan.y_m.push(y);
         scan.z_m.push(z);
         let square = detected.measured_m * detected.measured_m;
-        scan.intensity.push((detected.measured_power * square / self.link.gain_m2).min(MAX_INTENSITY));
+        scan.intensity.push((detected.measured_power * square / self.air.link.gain_m2).min(MAX_INTENSITY));
         scan.offset_ns.push(self.column.offset_ns);
         #[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 65,535 beams")]
         scan.beam.push((self.column_index * self.elevations.len() + layer) as u16);

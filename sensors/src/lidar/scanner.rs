@@ -18,7 +18,7 @@ use super::power::LinkBudget;
 use super::rail_returns::RailReturns;
 use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::PlacedSolid;
-use super::soft::{self, AirColumn, ColumnDroplets, Plume};
+use super::soft::{self, Air, AirColumn, ColumnDroplets, Plume};
 use super::solid::Solid;
 use super::spoil::{Added, Spoiler};
 use super::targets::Targets;
@@ -248,6 +248,7 @@ impl Scanner {
         let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBackground);
         let road = Road::new(&self.targets, &sweep.link);
         let in_air = !self.plumes.is_empty() || sweep.link.has_fog();
+        let air = Air::new(&sweep.link, sweep.noise);
         self.active.start(&self.targets);
         let columns = self.pattern.columns.len();
         let mut is_block_covered = false;
@@ -287,14 +288,14 @@ impl Scanner {
                 if !self.plumes.is_empty() {
                     soft::bound_clumps(index, elevations.len(), sweep.noise, &mut self.clumps);
                 }
-                let air = AirColumn {
+                let column_air = AirColumn {
                     first_beam: index * elevations.len(),
                     layers: elevations.len(),
                     greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
                     least_cosine: self.pattern.least_cosine,
                     clumps: &self.clumps,
                 };
-                air.layers_with_returns(&sweep.link, sweep.noise)
+                column_air.layers_with_returns(&air)
             } else {
                 0
             };
@@ -309,8 +310,7 @@ impl Scanner {
                 pose: pose(),
                 targets: &self.targets,
                 plumes: &self.plumes,
-                link: &sweep.link,
-                noise: sweep.noise,
+                air,
                 dropout: self.lidar.dropout as f32,
             };
             self.droplets.compute(with_droplets, |layer| receiver.droplet_effect(layer));

@@ -25,7 +25,7 @@ use closecall_traffic::{Environment, Vehicle, VehicleClass, maths};
 use nalgebra::Isometry3;
 
 use super::echo::PULSE_M;
-use super::noise::{Noise, Purpose};
+use super::noise::{LEAST_UNIFORM, Noise, Purpose};
 use super::power::{LinkBudget, MIN_POWER};
 use super::solid::Solid;
 use super::targets::{FaceRange, Targets, layers_below};
@@ -102,7 +102,8 @@ pub(crate) struct SoftEcho {
 /// The effect of droplets on a beam.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DropletEffect {
-    /// The nearest false return, which may be too weak to be detected.
+    /// The nearest false return, which may be too weak to be detected. `None` only if there surely is none
+    /// that can be detected.
     pub(crate) echo: Option<SoftEcho>,
     /// Distance at which the beam enters the first plume (m).
     near_m: f32,
@@ -171,15 +172,13 @@ pub(crate) fn droplet_effect(
     at: BeamIndex,
     centre: [f32; 3],
     plumes: &[Plume],
-    setting: (&Targets, &LinkBudget, Noise),
+    (targets, air): (&Targets, &Air<'_>),
 ) -> DropletEffect {
-    let (targets, link, noise) = setting;
+    let Air { link, noise, .. } = *air;
     let beam = at.beam();
-    let mut effect = DropletEffect { echo: fog(beam, link, noise), near_m: f32::INFINITY, optical_depth: 0.0 };
+    let mut effect = DropletEffect { echo: None, near_m: f32::INFINITY, optical_depth: 0.0 };
     // Logarithms are computed only if needed: not for a beam that crosses no plume, ...
-    let mut clump = None;
-    let depth = noise.uniform(beam, Purpose::Depth);
-    let mut has_echo = false;
+    let (mut clump, mut depth) = (None, None);
     for plume in plumes.iter().filter(|plume| plume.columns.contains(&at.column)) {
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
         let clump = *clump.get_or_insert_with(|| -maths::ln(noise.uniform(at.clump(), Purpose::Plume)));
@@ -187,18 +186,23 @@ pub(crate) fn droplet_effect(
         let before = effect.optical_depth;
         effect.near_m = effect.near_m.min(from);
         effect.optical_depth += extinction * (to - from);
+        let depth = *depth.get_or_insert_with(|| noise.uniform(beam, Purpose::Depth));
         // ... nor for one that surely returns no light from this plume, since −ln u ≥ 1 − u.
-        if has_echo || 0.5 * (1.0 - depth) >= effect.optical_depth {
+        if effect.echo.is_some() || 0.5 * (1.0 - depth) >= effect.optical_depth {
             continue;
         }
         let ends_at = -0.5 * maths::ln(depth);
         if ends_at < effect.optical_depth {
-            has_echo = true;
             let range_m = from + (ends_at - before) / extinction;
-            let echo = SoftEcho { range_m, power: soft_power(extinction, range_m, link), source: PointSource::Spray };
-            if effect.echo.is_none_or(|other| range_m < other.range_m) {
-                effect.echo = Some(echo);
-            }
+            let power = soft_power(extinction, range_m, link);
+            effect.echo = Some(SoftEcho { range_m, power, source: PointSource::Spray });
+        }
+    }
+    // Fog that is too weak to be detected matters only before spray, whose light it takes for its own.
+    if link.has_fog() && (effect.echo.is_some() || air.may_return_from_fog(beam)) {
+        let fog = fog(beam, air);
+        if effect.echo.is_none_or(|spray| spray.range_m >= fog.range_m) {
+            effect.echo = Some(fog);
         }
     }
     effect
@@ -254,6 +258,56 @@ impl ColumnDroplets {
 /// Number of layers that are tested side by side.
 const LANES: usize = 8;
 
+/// Fog and rain in the air of a scan, and the random numbers of its beams.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Air<'a> {
+    pub(crate) link: &'a LinkBudget,
+    pub(crate) noise: Noise,
+    /// Least random number of the depth with which fog or rain may give a return that can be
+    /// detected: the densest clump that occurs is too far away with any smaller number.
+    least_depth: f32,
+}
+
+impl<'a> Air<'a> {
+    /// Returns the air of a scan.
+    pub(crate) fn new(link: &'a LinkBudget, noise: Noise) -> Self {
+        // A return is detected from at most the range at which the densest clump, without any loss of
+        // light before it, has the least power: see `power_in_clear_air`.
+        let densest = most_logarithm(LEAST_UNIFORM) * ROUNDING;
+        let at_a_metre = power_in_clear_air(link.extinction_per_m * FOG_CLUMPINESS * densest, 1.0, link);
+        let overlap = OVERLAP_M * OVERLAP_M;
+        let square = at_a_metre * (1.0 + overlap) / MIN_POWER - overlap;
+        let farthest_m = square.max(0.0).sqrt() * ROUNDING;
+        // The nearest place that the light may come from, (1 − u)/((1 + u)·α), is beyond it.
+        let optical = link.extinction_per_m * (farthest_m - NEAREST_M);
+        Self { link, noise, least_depth: (1.0 - optical) / (1.0 + optical) / ROUNDING }
+    }
+
+    /// Returns the random number of the depth from which fog or rain returns light on a beam.
+    #[inline(always)]
+    fn fog_depth(&self, beam: usize) -> f32 {
+        self.noise.uniform(beam, Purpose::FogDepth)
+    }
+
+    /// Returns false if the return from fog or rain on the beam is surely too weak to be detected.
+    #[inline(always)]
+    fn may_return_from_fog(&self, beam: usize) -> bool {
+        let depth = self.fog_depth(beam);
+        depth > self.least_depth && self.may_return_from(beam, depth)
+    }
+
+    /// Does what [`Air::may_return_from_fog`] does, for a depth that is not too great.
+    #[inline(always)]
+    fn may_return_from(&self, beam: usize, depth: f32) -> bool {
+        let link = self.link;
+        let from_m = NEAREST_M + (1.0 - depth) / ((1.0 + depth) * link.extinction_per_m);
+        let clump = most_logarithm(self.noise.uniform(beam, Purpose::FogClump)) * ROUNDING;
+        // The light is at most that from the nearest place that it may come from: exp(−x) ≤ 1/(1 + x).
+        let unattenuated = power_in_clear_air(link.extinction_per_m * FOG_CLUMPINESS * clump, from_m, link);
+        unattenuated > MIN_POWER * (1.0 + 2.0 * link.extinction_per_m * from_m)
+    }
+}
+
 /// What bounds the returns from droplets on the beams of a column.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AirColumn<'a> {
@@ -275,8 +329,8 @@ impl AirColumn<'_> {
     ///
     /// Written without branches, so that the layers are tested side by side in vector registers.
     #[inline(always)]
-    pub(crate) fn layers_with_returns(&self, link: &LinkBudget, noise: Noise) -> u64 {
-        let (has_spray, has_fog) = (self.greatest_depth > 0.0, link.has_fog());
+    pub(crate) fn layers_with_returns(&self, air: &Air<'_>) -> u64 {
+        let (has_spray, has_fog) = (self.greatest_depth > 0.0, air.link.has_fog());
         if !has_spray && !has_fog {
             return 0;
         }
@@ -286,12 +340,16 @@ impl AirColumn<'_> {
             if has_spray && let Some(clumps) = self.clumps[first..].first_chunk::<LANES>() {
                 for (lane, may) in may.iter_mut().enumerate() {
                     let bounds = [self.greatest_depth, self.least_cosine, clumps[lane]];
-                    *may = may_return_from_spray(self.first_beam + first + lane, bounds, noise);
+                    *may = may_return_from_spray(self.first_beam + first + lane, bounds, air.noise);
                 }
             }
             if has_fog {
-                for (lane, may) in may.iter_mut().enumerate() {
-                    *may |= may_return_from_fog(self.first_beam + first + lane, link, noise);
+                let beam = |lane| self.first_beam + first + lane;
+                let depths: [f32; LANES] = std::array::from_fn(|lane| air.fog_depth(beam(lane)));
+                if depths.iter().any(|depth| *depth > air.least_depth) {
+                    for (lane, may) in may.iter_mut().enumerate() {
+                        *may |= air.may_return_from(beam(lane), depths[lane]);
+                    }
                 }
             }
             for (lane, may) in may.into_iter().enumerate() {
@@ -332,17 +390,6 @@ fn may_return_from_spray(beam: usize, [greatest_depth, cosine, clump]: [f32; 3],
     // −ln u ≥ 2·(1 − u)/(1 + u)
     let depth = noise.uniform(beam, Purpose::Depth);
     (1.0 - depth) * cosine < greatest_depth * clump * (1.0 + depth)
-}
-
-/// Returns false if the return from fog on the beam is surely too weak to be detected.
-#[inline(always)]
-fn may_return_from_fog(beam: usize, link: &LinkBudget, noise: Noise) -> bool {
-    let depth = noise.uniform(beam, Purpose::FogDepth);
-    let from_m = NEAREST_M + (1.0 - depth) / ((1.0 + depth) * link.extinction_per_m);
-    let clump = most_logarithm(noise.uniform(beam, Purpose::FogClump)) * ROUNDING;
-    // The light is at most that from the nearest place that it may come from: exp(−x) ≤ 1/(1 + x).
-    let unattenuated = power_in_clear_air(link.extinction_per_m * FOG_CLUMPINESS * clump, from_m, link);
-    unattenuated > MIN_POWER * (1.0 + 2.0 * link.extinction_per_m * from_m)
 }
 
 /// Factor that covers the rounding errors of bounds in single precision.
@@ -389,19 +436,16 @@ fn power_in_clear_air(extinction_per_m: f32, range_m: f32, link: &LinkBudget) ->
     link.gain_m2 * reflectivity * overlap / square
 }
 
-/// Returns the return from the first clump of fog or rain that the beam hits, or `None` if the air
-/// is clear.
-fn fog(beam: usize, link: &LinkBudget, noise: Noise) -> Option<SoftEcho> {
-    if !link.has_fog() {
-        return None;
-    }
-    let depth = -0.5 * maths::ln(noise.uniform(beam, Purpose::FogDepth));
+/// Returns the return from the first clump of fog or rain that the beam hits.
+fn fog(beam: usize, air: &Air<'_>) -> SoftEcho {
+    let link = air.link;
+    let depth = -0.5 * maths::ln(air.fog_depth(beam));
     let range_m = NEAREST_M + depth / link.extinction_per_m;
     // The power of a return that surely is too weak needs no logarithm.
     let power = || {
-        let clump = -maths::ln(noise.uniform(beam, Purpose::FogClump));
+        let clump = -maths::ln(air.noise.uniform(beam, Purpose::FogClump));
         soft_power(link.extinction_per_m * FOG_CLUMPINESS * clump, range_m, link)
     };
-    let power = if may_return_from_fog(beam, link, noise) { power() } else { 0.0 };
-    Some(SoftEcho { range_m, power, source: PointSource::Fog })
+    let power = if air.may_return_from_fog(beam) { power() } else { 0.0 };
+    SoftEcho { range_m, power, source: PointSource::Fog }
 }

@@ -84,11 +84,12 @@ impl Scanner {
     pub(crate) fn droplet_returns(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> [usize; 2] {
         self.scan(scene, rng);
         let sweep = self.latest.unwrap();
+        let air = Air::new(&sweep.link, sweep.noise);
         let mut counts = [0; 2];
         for (index, column) in self.pattern.columns.iter().enumerate() {
             let layers = self.pattern.kind().layers();
             soft::bound_clumps(index, layers, sweep.noise, &mut self.clumps);
-            let air = AirColumn {
+            let column_air = AirColumn {
                 first_beam: index * layers,
                 layers,
                 greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
@@ -103,11 +104,10 @@ impl Scanner {
                 pose: sweep.pose,
                 targets: &self.targets,
                 plumes: &self.plumes,
-                link: &sweep.link,
-                noise: sweep.noise,
+                air,
                 dropout: 0.0,
             };
-            let [returns, looked_at] = receiver.droplet_returns(air.layers_with_returns(&sweep.link, sweep.noise));
+            let [returns, looked_at] = receiver.droplet_returns(column_air.layers_with_returns(&air));
             counts = [counts[0] + returns, counts[1] + looked_at];
         }
         counts
