@@ -343,7 +343,7 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
     for (name, counts) in &summary.scenarios {
         let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
         let sentence = format!(
-            "{name}: the margin increase system was not available, because sensors had failed, in {} of {}",
+            "{name}: the system under test was not available, because sensors had failed, in {} of {}",
             tested.unavailable,
             samples(tested.outcomes)
         );
@@ -360,11 +360,11 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
     }
 }
 
-/// A system that never slowed the ego for a vehicle behind was not tested by a scenario that asks what it prevents.
+/// A system that never acted was not tested by a scenario that asks what it prevents.
 fn judge_action(judge: &Judge, findings: &mut Findings) {
-    for (name, count) in judge.without_action() {
+    for (name, missing, count) in judge.without_action() {
         let reason = format!(
-            "{name}: the system under test never slowed the ego for a vehicle behind in {}, so that they do not decide what it does",
+            "{name}: the system under test never {missing} in {}, so that they do not decide what it does",
             samples(count)
         );
         findings.add(Decision::NotJudged, reason);
