@@ -220,6 +220,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let expectations = judge_expectations(judge, &mut findings);
     judge_samples(summary, judge, &mut findings);
     judge_action(judge, &mut findings);
+    judge_extrapolation(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
         let what = weakened.join("; ");
         findings.add(
@@ -335,6 +336,13 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
         }
     }
     expectations
+}
+
+/// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on assumptions.
+fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
+    for (name, parameters) in judge.extrapolations() {
+        findings.note(format!("{name}: extrapolates beyond recorded traffic: {}", parameters.join("; ")));
+    }
 }
 
 /// Says in how many samples the system under test was not available for some time. If those are more than

@@ -44,6 +44,9 @@ const LIBRARY: [(&str, &str); 17] = embedded![
 const TRAFFIC: [(&str, &str); 4] =
     embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic", "trucks-alongside"];
 
+/// The scenarios of the folder `as-recorded`: the headline with the distributions of the recordings, uncut.
+const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtake-as-recorded"];
+
 /// The scenarios of the folders `aeb` and `acc` of the library: those that judge emergency braking and adaptive cruise control.
 const AEB: [(&str, &str); 2] = embedded!["aeb": "aeb-lead-brakes", "aeb-lead-brakes-gently"];
 const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehicle-ahead"];
@@ -149,7 +152,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Returns all scenarios that have no base.
 fn plain() -> impl Iterator<Item = (&'static str, &'static str)> {
-    LIBRARY.into_iter().chain(TRAFFIC).chain(AEB).chain(ACC)
+    LIBRARY.into_iter().chain(TRAFFIC).chain(AS_RECORDED).chain(AEB).chain(ACC)
 }
 
 /// Returns the names of the scenarios that can be a base.

@@ -11,6 +11,10 @@ use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
 use crate::ledger::Inference;
 use crate::record::{ArmRecord, Record};
+use closecall_scenarios::parameters::SpaceEntry;
+use closecall_traffic::ParameterName;
+use closecall_traffic::statistics::format::percent;
+
 use crate::repeats::{Repeats, is_varied};
 use crate::runner::Work;
 
@@ -46,6 +50,8 @@ struct Judged {
     asks_for_action: bool,
     /// The function that the scenario judges.
     function: Function,
+    /// The parameters that are sampled beyond what trajectory data show, in words.
+    extrapolations: Vec<String>,
     /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or moved it otherwise than the baseline.
     acted: u64,
 }
@@ -84,6 +90,7 @@ impl Judge {
                 overridden: config.overridden.clone(),
                 asks_for_action: config.checks.values().flatten().any(of_prevented),
                 function: config.function,
+                extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
                 acted: 0,
             }
         };
@@ -139,6 +146,12 @@ impl Judge {
             .iter()
             .filter(idle)
             .map(move |judged| (judged.scenario.as_str(), missing(judged), judged.samples))
+    }
+
+    /// Returns what each scenario samples beyond trajectory data, in words.
+    pub fn extrapolations(&self) -> impl Iterator<Item = (&str, &[String])> {
+        let judged = self.scenarios.iter().filter(|judged| !judged.extrapolations.is_empty());
+        judged.map(|judged| (judged.scenario.as_str(), judged.extrapolations.as_slice()))
     }
 
     /// Returns true if some parameter of the scenario varies.
@@ -199,6 +212,20 @@ impl Judge {
         };
         self.scenarios.iter().filter(|judged| !judged.expects.is_empty()).map(result).collect()
     }
+}
+
+/// Returns how far a parameter is sampled beyond what trajectory data show; `None` if it is not.
+fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String> {
+    let (observed, beyond) = entry.beyond_observed()?;
+    let [low, high] = entry.distribution.bounds()?;
+    let range = if entry.distribution.is_fixed() { format!("{low}") } else { format!("{low:.3} to {high:.3}") };
+    Some(format!(
+        "{name} {range}, observed {} to {} ({} observations), {} of the samples beyond",
+        observed.min,
+        observed.max,
+        observed.n,
+        percent(beyond)
+    ))
 }
 
 impl Judged {

@@ -485,6 +485,7 @@ mod tests {
     #[test]
     fn a_vehicle_that_pushes_touches_once_and_does_not_overlap() {
         let mut world = close(0.3);
+        drive(&mut world, 1.0, &[0.0, 0.0]);
         let least_m = drive(&mut world, 3.0, &[-6.0, 1.0]);
         assert!(world.collisions().is_empty() && world.touches().len() == 1, "{:?}", world.collisions());
         assert!(least_m >= 0.0, "the boxes overlap by {least_m} m");
