@@ -220,7 +220,6 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let expectations = judge_expectations(judge, &mut findings);
     judge_samples(summary, judge, &mut findings);
     judge_action(judge, &mut findings);
-    judge_extrapolation(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
         let what = weakened.join("; ");
         findings.add(
@@ -260,6 +259,8 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         }
         Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)
     };
+    // Last: it decides nothing, and the first reason that is no gate is the sentence of the verdict.
+    judge_extrapolation(judge, &mut findings);
     Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, flaky }
 }
 
