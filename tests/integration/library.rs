@@ -156,7 +156,7 @@ fn emergency_braking_and_cruise_control_are_judged_in_arms_of_their_own() {
         let path = library(family).with_extension("");
         let args = ["campaign", path.to_str().unwrap(), "--paired", "-n", SAMPLES_OF_FAMILY, "--format", "json"];
         let report = json(&closecall(args), 0);
-        assert_eq!(report["verdict"], "pass", "{family}: {}", report["reasons"]);
+        assert_eq!(report["verdict"], "PASS", "{family}: {}", report["reasons"]);
         for arm in arms {
             assert_eq!(report["controllers"][arm]["errors"], 0, "{family}: {arm}");
         }
