@@ -190,7 +190,7 @@ fn arms_and_settings_that_change_nothing_are_refused() {
         ("aeb/aeb-lead-brakes", &["--arms", "acc,acc+aeb"][..], "are the same stack in this scenario"),
         ("aeb/aeb-lead-brakes", &["--arms", "acc-aeb,acc+aeb", "--set", "acc-aeb:aeb.trigger-mps2=6"], "change nothing"),
         ("aeb/aeb-lead-brakes", &["--arms", "acc-aeb,acc+aeb", "--set", "mis:aeb.trigger-mps2=6"], "no arm is `mis`"),
-        ("aeb/aeb-lead-brakes", &["--set", "acc+aeb:aeb.triger-mps2=6"], "trigger-mps2"),
+        ("aeb/aeb-lead-brakes", &["--set", "acc+aeb:aeb.onset-mps2=6"], "trigger-mps2"),
         ("aeb/aeb-lead-brakes", &["--controller", "mis"], "needs a margin increase system"),
         ("low-thw-overtake", &["--arms", "acc+abs,mis"], "a list of functions has"),
     ] {

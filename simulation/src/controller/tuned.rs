@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn what_is_no_setting_of_the_stack_is_refused_with_what_is_allowed() {
         let refusal = |text: &str| Tuned::new(BuiltIn::Acc).with(text).unwrap_err().to_string();
-        assert!(refusal("aeb.triger-mps2=5").contains("trigger-mps2"), "{}", refusal("aeb.triger-mps2=5"));
+        assert!(refusal("aeb.onset-mps2=5").contains("trigger-mps2"), "{}", refusal("aeb.onset-mps2=5"));
         assert!(refusal("brakes.trigger-mps2=5").contains("aeb"), "{}", refusal("brakes.trigger-mps2=5"));
         assert!(refusal("aeb.trigger-mps2=50").contains("9"), "{}", refusal("aeb.trigger-mps2=50"));
         assert!(refusal("aeb.trigger-mps2=hard").contains("hard"), "{}", refusal("aeb.trigger-mps2=hard"));
