@@ -55,7 +55,7 @@ impl ControllerWatch {
             let named: Vec<PathBuf> = match arm {
                 ControllerChoice::Exec(exec) => named_files(exec, folder).into_iter().map(|(_, path)| path).collect(),
                 ControllerChoice::Native(native) => vec![in_folder(folder, Path::new(&native.path))],
-                ControllerChoice::BuiltIn(_) | ControllerChoice::Hosted(_) => continue,
+                ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => continue,
             };
             paths.extend(imports(&named));
             paths.extend(named);

@@ -73,7 +73,7 @@ impl Fingerprint {
         match choice {
             ControllerChoice::Exec(exec) => Some(Self::of(exec, folder, scenario)),
             ControllerChoice::Native(native) => Some(Self::of_native(native, folder)),
-            ControllerChoice::BuiltIn(_) | ControllerChoice::Hosted(_) => None,
+            ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => None,
         }
     }
 

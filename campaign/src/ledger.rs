@@ -73,6 +73,10 @@ pub struct ArmCounts {
     /// Samples in which the ego collides, as judged: if the validity checks flip a verdict, the one that speaks worse for
     /// the system under test.
     pub collisions: u64,
+    /// Samples in which two bumpers meet too slowly for a collision. No such contact is among the collisions.
+    pub touches: u64,
+    /// Samples in which the vehicle behind brakes harder than 3 m/s² before the lead vehicle brakes.
+    pub imposed: u64,
     /// Samples that ended in an error.
     pub errors: u64,
     /// Samples with an outcome only because they were run again after their process had crashed or hung (`--retry-crashed`).
@@ -106,6 +110,10 @@ pub struct Tally {
     pub flaky: bool,
     /// Whether two vehicles other than the ego collide with each other.
     pub others_collided: bool,
+    /// Whether two bumpers meet too slowly for a collision.
+    pub touched: bool,
+    /// Whether the vehicle behind brakes harder than 3 m/s² before the lead vehicle brakes.
+    pub imposed: bool,
     /// Whether the margin increase system engages.
     pub engaged: bool,
     /// Whether its goal is in reach when it engages.
@@ -134,6 +142,8 @@ impl ArmCounts {
             }
             None => self.errors += 1,
         }
+        self.touches += u64::from(tally.touched);
+        self.imposed += u64::from(tally.imposed);
         self.flaky += u64::from(tally.flaky);
         self.engagements += u64::from(tally.engaged);
         self.goals_in_reach += u64::from(tally.engaged && tally.goal_in_reach);
@@ -152,6 +162,8 @@ impl ArmCounts {
     pub fn add(&mut self, other: &Self) {
         self.outcomes += other.outcomes;
         self.collisions += other.collisions;
+        self.touches += other.touches;
+        self.imposed += other.imposed;
         self.errors += other.errors;
         self.flaky += other.flaky;
         self.engagements += other.engagements;
@@ -172,6 +184,12 @@ impl ArmCounts {
     /// Returns the means of time lost (s), largest speed deficit (m/s) and hardest braking of the vehicle behind (m/s²); `None` of no samples.
     pub fn mean_cost(&self) -> Option<[f64; 3]> {
         (self.costed > 0).then(|| self.cost.map(|sum| sum / self.costed as f64))
+    }
+
+    /// Returns the share of the samples with a known cost in which the vehicle behind brakes harder than 3 m/s² before the lead vehicle brakes; `None` of no
+    /// samples.
+    pub fn imposed_share(&self) -> Option<f64> {
+        (self.costed > 0).then(|| self.imposed as f64 / self.costed as f64)
     }
 
     /// Returns the share of the samples with an outcome in which the ego collides; `None` of no samples.

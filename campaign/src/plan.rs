@@ -9,7 +9,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use closecall_controllers::DriverConfig;
+use closecall_controllers::{CheckedDriver, DriverConfig};
 use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
@@ -88,6 +88,7 @@ impl Plan {
         }
         for file in &scenarios {
             check_mis(file, &controllers)?;
+            check_functions(file, &controllers)?;
         }
         for (file, native) in scenarios.iter().flat_map(|file| natives.iter().map(move |native| (file, native))) {
             // A scenario without a nominal sample is an error of its samples.
@@ -239,6 +240,42 @@ pub fn check_mis(file: &ScenarioFile, controllers: &[ControllerChoice]) -> Resul
         }
         None => Ok(()),
     }
+}
+
+/// Refuses arms whose functions are the same in a scenario, and settings of an arm that change nothing: two arms would have one outcome.
+///
+/// # Errors
+/// [`PlanError::SameStack`] or [`PlanError::NoEffect`] with the first such arms.
+pub fn check_functions(file: &ScenarioFile, controllers: &[ControllerChoice]) -> Result<(), PlanError> {
+    let is_switched = |choice: &ControllerChoice| {
+        matches!(choice, ControllerChoice::Tuned(_)) || matches!(choice.built_in(), Some(BuiltIn::Stack(_)))
+    };
+    if !controllers.iter().any(is_switched) {
+        return Ok(());
+    }
+    // A scenario without a nominal sample is an error of its samples.
+    let Ok(nominal) = file.concrete(&file.space().nominal()) else { return Ok(()) };
+    let CheckedDriver::Ego(stack) = &nominal.actors[nominal.ego].driver else { return Ok(()) };
+    let scenario = || file.config().name.clone();
+    let settings = |choice: &ControllerChoice| choice.factory().settings(stack);
+    for tuned in controllers.iter().filter(|choice| matches!(choice, ControllerChoice::Tuned(_))) {
+        let base = tuned.built_in().map(ControllerChoice::from);
+        if base.is_some_and(|base| settings(&base) == settings(tuned)) {
+            return Err(PlanError::NoEffect { scenario: scenario(), controller: tuned.to_string() });
+        }
+    }
+    let stacks: Vec<&ControllerChoice> =
+        controllers.iter().filter(|choice| choice.built_in().is_some_and(BuiltIn::is_stack)).collect();
+    for (index, second) in stacks.iter().enumerate() {
+        let same = |first: &&&ControllerChoice| {
+            (is_switched(first) || is_switched(second)) && settings(first) == settings(second)
+        };
+        if let Some(first) = stacks[..index].iter().find(same) {
+            let (first, second) = (first.to_string(), second.to_string());
+            return Err(PlanError::SameStack { scenario: scenario(), first, second });
+        }
+    }
+    Ok(())
 }
 
 /// Returns the rear camera's network and the inference backend that runs it.

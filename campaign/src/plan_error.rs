@@ -35,6 +35,28 @@ pub enum PlanError {
         /// The controller.
         controller: String,
     },
+    /// Two arms have the same functions with the same settings.
+    #[error(
+        "{scenario}: `{first}` and `{second}` are the same stack in this scenario: switch a function off or on, as in `acc-aeb` and `acc+aeb`"
+    )]
+    SameStack {
+        /// The scenario.
+        scenario: String,
+        /// The first arm.
+        first: String,
+        /// The second arm.
+        second: String,
+    },
+    /// The settings of an arm change nothing.
+    #[error(
+        "{scenario}: the settings of `{controller}` change nothing: its stack lacks the function, or has these values already"
+    )]
+    NoEffect {
+        /// The scenario.
+        scenario: String,
+        /// The arm.
+        controller: String,
+    },
     /// Two arms have the same controller, so that they would have the same outcomes.
     #[error("`{controller}` is named twice: every arm needs a controller of its own")]
     SameArm {

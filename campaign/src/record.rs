@@ -1,6 +1,6 @@
 //! The record of one sample: what the journal of a campaign keeps.
 
-use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::outcome::{IMPOSED_BRAKING_MPS2, Outcome};
 use closecall_simulation::SampleError;
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +69,8 @@ impl ArmRecord {
                     collided: Some(outcome.ego_collided()),
                     flaky: self.flaky.is_some(),
                     others_collided: outcome.others_collided(),
+                    touched: !outcome.touches.is_empty(),
+                    imposed: outcome.cost.is_some_and(|cost| cost.imposed_braking_mps2 > IMPOSED_BRAKING_MPS2),
                     engaged: mis.is_some_and(|mis| mis.engaged_at_s.is_ok()),
                     goal_in_reach: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),
                     unavailable: mis.is_some_and(|mis| mis.unavailable.is_some()),

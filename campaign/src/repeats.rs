@@ -95,7 +95,7 @@ fn hash(outcome: &Outcome, hasher: &mut DefaultHasher) {
     // To the bit: a coarser comparison would leave out samples of a scenario in which one parameter varies, and shift its shares.
     let measured = |value: Measured| value.map(f64::to_bits).map_err(|absent| absent.to_string());
     outcome.duration.hash(hasher);
-    for collision in &outcome.collisions {
+    for collision in outcome.collisions.iter().chain(&outcome.touches) {
         (&collision.between[0], &collision.between[1]).hash(hasher);
         [collision.time.s(), collision.relative_speed_mps, collision.delta_v_mps[0]].map(f64::to_bits).hash(hasher);
     }

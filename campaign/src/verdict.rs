@@ -259,6 +259,8 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         }
         Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)
     };
+    // Last: it decides nothing, and the first reason that is no gate is the sentence of the verdict.
+    judge_extrapolation(judge, &mut findings);
     Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, flaky }
 }
 
@@ -337,13 +339,20 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
     expectations
 }
 
+/// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on assumptions.
+fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
+    for (name, parameters) in judge.extrapolations() {
+        findings.note(format!("{name}: extrapolates beyond recorded traffic: {}", parameters.join("; ")));
+    }
+}
+
 /// Says in how many samples the system under test was not available for some time. If those are more than
 /// [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it engages before its sensors fail.
 fn judge_availability(summary: &Summary, findings: &mut Findings) {
     for (name, counts) in &summary.scenarios {
         let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
         let sentence = format!(
-            "{name}: the margin increase system was not available, because sensors had failed, in {} of {}",
+            "{name}: the system under test was not available, because sensors had failed, in {} of {}",
             tested.unavailable,
             samples(tested.outcomes)
         );
@@ -360,11 +369,11 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
     }
 }
 
-/// A system that never slowed the ego for a vehicle behind was not tested by a scenario that asks what it prevents.
+/// A system that never acted was not tested by a scenario that asks what it prevents.
 fn judge_action(judge: &Judge, findings: &mut Findings) {
-    for (name, count) in judge.without_action() {
+    for (name, missing, count) in judge.without_action() {
         let reason = format!(
-            "{name}: the system under test never slowed the ego for a vehicle behind in {}, so that they do not decide what it does",
+            "{name}: the system under test never {missing} in {}, so that they do not decide what it does",
             samples(count)
         );
         findings.add(Decision::NotJudged, reason);

@@ -39,5 +39,5 @@ pub use ego::{
     ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter,
     Front, GOAL_TOLERANCE_S, Horizon, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry, R157Driver,
-    R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution,
+    R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution, StackPatch,
 };

@@ -229,6 +229,7 @@ mod tests {
             end: EndReason::Collision,
             duration: Time::from_ms(15_500),
             collisions,
+            touches: Vec::new(),
             moments: vec![ReachedMoment { moment: Moment::FrontBrakes, time: Time::from_ms(9_000) }],
             margins: Margins {
                 min_thw_front_s: none,
@@ -254,6 +255,7 @@ mod tests {
             }),
             cost: None,
             promise: None,
+            ahead: None,
         }
     }
 

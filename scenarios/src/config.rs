@@ -35,6 +35,10 @@ pub struct ScenarioConfig {
     /// Identifiers of the requirements that the scenario tests, such as `MIS-1`. Reports state which of them are met.
     #[serde(default)]
     pub requirements: Vec<String>,
+    /// The function of the ego stack that the scenario judges. A campaign that names no controller runs it, and with a baseline the stack without it. Default:
+    /// mis.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub function: Function,
     /// The criteria that check each requirement, by its mark: `MIS-2 = ["upper(induced) <= 0.02"]`. They are judged in every
     /// campaign, whatever its gates; a requirement without criteria is not checked.
     #[serde(default)]
@@ -84,6 +88,30 @@ pub struct ScenarioConfig {
     /// Injected faults. Default: none.
     #[serde(default, skip_serializing_if = "is_default")]
     pub fault: FaultConfig,
+}
+
+/// A function of the ego stack.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Function {
+    /// The margin increase system: `acc` and `mis`.
+    #[default]
+    Mis,
+    /// Emergency braking: `acc-aeb` and `acc+aeb`.
+    Aeb,
+    /// Adaptive cruise control: `cruise+aeb` and `acc+aeb`.
+    Acc,
+}
+
+impl Function {
+    /// Returns the name in scenario files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mis => "mis",
+            Self::Aeb => "aeb",
+            Self::Acc => "acc",
+        }
+    }
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

@@ -57,8 +57,8 @@ mod variation;
 pub use actor::Actor;
 pub use checked::Scenario;
 pub use config::{
-    AbsoluteStartConfig, ActorConfig, RandomNumbersConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig,
-    StartConfig,
+    AbsoluteStartConfig, ActorConfig, Function, RandomNumbersConfig, RelativeStartConfig, SCHEMA_VERSION,
+    ScenarioConfig, StartConfig,
 };
 pub use edit::{Setting, SettingError};
 pub use events::{

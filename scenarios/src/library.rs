@@ -44,6 +44,13 @@ const LIBRARY: [(&str, &str); 17] = embedded![
 const TRAFFIC: [(&str, &str); 4] =
     embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic", "trucks-alongside"];
 
+/// The scenarios of the folder `as-recorded`: the headline with the distributions of the recordings, uncut.
+const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtake-as-recorded"];
+
+/// The scenarios of the folders `aeb` and `acc` of the library: those that judge emergency braking and adaptive cruise control.
+const AEB: [(&str, &str); 2] = embedded!["aeb": "aeb-lead-brakes", "aeb-lead-brakes-gently"];
+const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehicle-ahead"];
+
 /// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
 /// base.
 const FAULTS: [(&str, &str); 82] = embedded![
@@ -138,14 +145,14 @@ static EXPANDED_FAULTS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     FAULTS.iter().map(|(name, text)| (*name, whole(text))).collect()
 });
 
-/// Returns all scenarios: those with surrounding traffic, and then those with faults last.
+/// Returns all scenarios: those with surrounding traffic, those of other functions, and those with faults last.
 fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
     plain().chain(EXPANDED_FAULTS.iter().map(|(name, text)| (*name, text.as_str())))
 }
 
 /// Returns all scenarios that have no base.
 fn plain() -> impl Iterator<Item = (&'static str, &'static str)> {
-    LIBRARY.into_iter().chain(TRAFFIC)
+    LIBRARY.into_iter().chain(TRAFFIC).chain(AS_RECORDED).chain(AEB).chain(ACC)
 }
 
 /// Returns the names of the scenarios that can be a base.

@@ -30,7 +30,8 @@ use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::{ActorId, Num, ParameterName, RoadConfig, VehicleClass, VehicleConfig};
 
 use super::config::{
-    AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig,
+    AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, Function, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig,
+    StartConfig,
 };
 use super::events::{BrakeConfig, EffectConfig, EventConfig, NominalEncounterConfig, TriggerConfig};
 use super::parameters::{FittedConfig, ParameterConfig, ParametersConfig, TruncatedNormalConfig};
@@ -202,6 +203,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
     let slowest_mps = slowest_mps.and_then(|(_, config)| Some(config.truncated_normal?.min)).unwrap_or(1.0);
     let (ego, rear, lead) = (&approach.ego, &approach.rear, approach.lead.as_ref());
     Ok(ScenarioConfig {
+        function: Function::Mis,
         schema_version: SCHEMA_VERSION,
         name: name.to_owned(),
         description: format!(

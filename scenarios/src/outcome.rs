@@ -38,6 +38,15 @@ pub enum Phase {
     After,
 }
 
+/// Relative speed below which two bumpers that meet touch, and do not collide (m/s): 1.5 mph. Up to it a car must withstand a pendulum of its own mass at the
+/// corners of its bumpers, with lamps, doors and brakes intact (49 CFR 581.5 and 581.7). It is an assumption that nobody calls such a contact an accident: 0.1
+/// to the 1.12 m/s of the other impacts of that standard (2.5 mph) are plausible.
+pub const TOUCH_MPS: f64 = 0.670_56;
+
+/// Deceleration above which a vehicle behind brakes unduly hard (m/s²): a lane change is critical if a vehicle that approaches from behind must brake harder
+/// (UN Regulation 79, paragraph 5.6.4.7; UN Regulation 157 has the same criterion for its lane changes).
+pub const IMPOSED_BRAKING_MPS2: f64 = 3.0;
+
 /// The first contact of two vehicles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Collision {
@@ -289,6 +298,15 @@ pub struct Promise {
     pub crossing_braking_mps2: Measured,
 }
 
+/// The ego and the vehicle ahead, until the ego collides.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ahead {
+    /// Smallest time to collision with the vehicle ahead, in the lane or in the path, from the true states (s).
+    pub min_ttc_front_s: Measured,
+    /// Time at which the controller says for the first time that it brakes in an emergency (s).
+    pub emergency_braking_at_s: Measured,
+}
+
 /// When the margin increase system was not available, because the ego knew that sensors had failed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unavailability {
@@ -322,6 +340,10 @@ pub struct Outcome {
     pub duration: Time,
     /// The first contact of every pair of vehicles that collided, in order of time.
     pub collisions: Vec<Collision>,
+    /// The first touch of every pair of vehicles whose bumpers met at less than [`TOUCH_MPS`], in order of time. No collision is among them: if the pair
+    /// meets again and faster, that is its collision.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub touches: Vec<Collision>,
     /// The moments of the encounter that were reached before the ego collided, in order of time.
     #[serde(default)]
     pub moments: Vec<ReachedMoment>,
@@ -335,6 +357,9 @@ pub struct Outcome {
     /// What became of the method's promise. `None` in a journal that was written without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub promise: Option<Promise>,
+    /// The ego and the vehicle ahead. `None` in a journal that was written without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ahead: Option<Ahead>,
 }
 
 impl Outcome {
@@ -357,6 +382,21 @@ impl Outcome {
     /// Returns the ego's largest change of velocity in a collision (m/s), or `None` if it did not collide.
     pub fn ego_delta_v_mps(&self) -> Option<f64> {
         self.ego_collisions().filter_map(|collision| collision.delta_v_of(&self.ego)).reduce(worse)
+    }
+
+    /// Returns whether the ego was part of a touch.
+    pub fn ego_touched(&self) -> bool {
+        self.touches.iter().any(|touch| touch.involves(&self.ego))
+    }
+
+    /// Returns the collisions in which the ego struck another vehicle.
+    pub fn ego_strikes(&self) -> impl Iterator<Item = &Collision> {
+        self.ego_collisions().filter(|collision| collision.between[collision.roles()[0]] == self.ego)
+    }
+
+    /// Returns the collisions in which another vehicle struck the ego.
+    pub fn ego_struck(&self) -> impl Iterator<Item = &Collision> {
+        self.ego_collisions().filter(|collision| collision.between[collision.roles()[1]] == self.ego)
     }
 
     /// Returns whether two vehicles other than the ego collided with each other.

@@ -31,7 +31,9 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, Item};
 
 use crate::criteria::GateConfig;
 
-use super::config::{AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+use super::config::{
+    AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, Function, SCHEMA_VERSION, ScenarioConfig, StartConfig,
+};
 use super::recorded_values::{MIN_SPEED_MPS, ROUNDING_STEP, max_speed_mps, rounded, to_steps};
 use super::{ScenarioError, ScenarioFile, Setting};
 
@@ -134,6 +136,7 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
         }
     }
     Ok(ScenarioConfig {
+        function: Function::Mis,
         schema_version: SCHEMA_VERSION,
         name: format!("reenacted-track-{}", rear_track.track_id),
         description: format!(

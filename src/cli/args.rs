@@ -164,12 +164,30 @@ impl ReadArgs {
 #[derive(Clone, Debug, Args)]
 pub(super) struct SetArgs {
     /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`) or by a parameter
-    /// (`brake-mps2=6`); can be given more than once
+    /// (`brake-mps2=6`); can be given more than once. In a campaign `ARM:KEY=VALUE` sets a value of the ego stack in one arm
+    /// (`acc+aeb:aeb.trigger-mps2=5`)
     #[arg(long = "set", value_name = "KEY=VALUE", help_heading = heading::SCENARIO)]
     pub(super) settings: Vec<Setting>,
 }
 
 impl SetArgs {
+    /// Returns the changes of the scenario, and those of single arms: the arm, and its setting.
+    pub(super) fn by_arm(&self) -> (Self, Vec<(String, String)>) {
+        let (mut scenario, mut arms) = (Vec::new(), Vec::new());
+        for setting in &self.settings {
+            let text = setting.to_string();
+            let of_arm = text.split_once('=').and_then(|(key, value)| {
+                let (arm, key) = key.split_once(':')?;
+                Some((arm.to_owned(), format!("{key}={value}")))
+            });
+            match of_arm {
+                Some(of_arm) => arms.push(of_arm),
+                None => scenario.push(setting.clone()),
+            }
+        }
+        (Self { settings: scenario }, arms)
+    }
+
     /// Reads a scenario, applies the changes, and checks it.
     pub(super) fn load(&self, path: &Path) -> Result<ScenarioFile, ScenarioError> {
         let file = source::load(path, &self.settings)?;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_campaign::plan::check_mis;
-use closecall_scenarios::ScenarioFile;
+use closecall_campaign::plan::{check_functions, check_mis};
+use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::{ArmList, ControllerChoice};
 
@@ -17,21 +17,30 @@ use super::saved::LimitArgs;
 /// The controller under test.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ControllerArgs {
-    /// Controller of the ego vehicle: `acc`, `mis`, `mis-ttce`, `mis-extended`, `blind` and `crawl` (slower from the start,
+    /// Controller of the ego vehicle [default: the function that the scenario judges, `mis` in most]: `acc`, `mis`, `mis-ttce`, `mis-extended`,
+    /// `acc-aeb`, `acc+aeb` and `cruise+aeb` (stacks whose functions are switched), `blind` and `crawl` (slower from the start,
     /// without looking back), `gap-SECONDS` (cruise control with a longer time gap:
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
     /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a
-    /// program of your own, which reads a line per control step and answers with a line
-    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", default_value = "mis", help_heading = heading::CONTROLLER)]
-    controller: ControllerChoice,
+    /// program of your own, which reads a line per control step and answers with a line. A built-in one takes settings of its own:
+    /// `acc+aeb:aeb.trigger-mps2=5`
+    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", help_heading = heading::CONTROLLER)]
+    controller: Option<ControllerChoice>,
     #[command(flatten)]
     pub(super) limits: LimitArgs,
 }
 
 impl ControllerArgs {
-    /// Returns the controller with its limits.
-    pub(super) fn choice(&self) -> Result<ControllerChoice, CliError> {
-        Ok(self.limited(std::slice::from_ref(&self.controller))?.swap_remove(0))
+    /// Returns the controller with its limits, for a scenario that judges this function.
+    pub(super) fn choice(&self, function: Function) -> Result<ControllerChoice, CliError> {
+        let [_, tested] = ControllerChoice::of_function(function);
+        let controller = self.controller.clone().unwrap_or(tested);
+        Ok(self.limited(&[controller])?.swap_remove(0))
+    }
+
+    /// Returns true if the command line names the controller.
+    pub(super) const fn is_named(&self) -> bool {
+        self.controller.is_some()
     }
 
     /// Returns the controllers, the processes among them with the limits of the command line. Each is tried.
@@ -64,19 +73,20 @@ pub(super) struct ArmArgs {
 impl ArmArgs {
     /// Returns the files that the command of the controller names.
     pub(super) fn files(&self) -> Vec<PathBuf> {
-        of_controller(&self.controller.controller)
+        self.controller.controller.iter().flat_map(of_controller).collect()
     }
 
-    pub(super) fn arm(&self) -> Result<Arm, CliError> {
-        Ok(arm(&self.controller.choice()?, self.sensors))
+    /// Returns the arm of a scenario that judges this function.
+    pub(super) fn arm(&self, function: Function) -> Result<Arm, CliError> {
+        Ok(arm(&self.controller.choice(function)?, self.sensors))
     }
 }
 
 /// What the controller under test is compared with.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ComparisonArgs {
-    /// Also run every sample with the baseline controller `acc`, on the same random numbers: short for
-    /// `--arms acc,CONTROLLER`
+    /// Also run every sample with the baseline controller, on the same random numbers: short for
+    /// `--arms acc,CONTROLLER` where a scenario judges the margin increase system
     #[arg(long, help_heading = heading::CONTROLLER)]
     pub(super) paired: bool,
     /// Controllers that run on the same samples and random numbers. The first is the baseline, the last is the one under
@@ -92,18 +102,19 @@ impl ComparisonArgs {
     pub(super) fn controllers(
         &self,
         tested: &ControllerArgs,
+        function: Function,
         by_default: bool,
     ) -> Result<Vec<ControllerChoice>, CliError> {
         if self.arms.is_empty() {
-            return match tested.choice()? {
-                ControllerChoice::ACC if self.paired => {
-                    Err(CliError::usage("--paired compares a controller with `acc`: name another with --controller"))
-                }
-                tested if self.paired || (by_default && tested != ControllerChoice::ACC) => {
-                    Ok(vec![ControllerChoice::ACC, tested])
-                }
-                tested => Ok(vec![tested]),
-            };
+            let [baseline, _] = ControllerChoice::of_function(function);
+            let tested = tested.choice(function)?;
+            if tested == baseline && self.paired {
+                return Err(CliError::usage(format!(
+                    "--paired compares a controller with `{baseline}`: name another with --controller"
+                )));
+            }
+            let is_paired = self.paired || (by_default && tested != baseline);
+            return Ok(if is_paired { vec![baseline, tested] } else { vec![tested] });
         }
         let arms = ArmList::joined(&self.arms)?;
         tested.limited(&arms)
@@ -111,8 +122,9 @@ impl ComparisonArgs {
 
     /// Returns the arms of a run of a scenario.
     pub(super) fn arms(&self, tested: &ArmArgs, file: &ScenarioFile) -> Result<Vec<Arm>, CliError> {
-        let controllers = self.controllers(&tested.controller, false)?;
+        let controllers = self.controllers(&tested.controller, file.config().function, false)?;
         check_mis(file, &controllers)?;
+        check_functions(file, &controllers)?;
         let controllers = ControllerChoice::factories(&controllers, None);
         let sensors = tested.sensors.map(SensorsChoice::mode);
         Ok(controllers.into_iter().map(|controller| Arm { controller, sensors }).collect())
@@ -123,6 +135,27 @@ impl ComparisonArgs {
         let arms = self.arms.iter().flat_map(|list| &list.0).flat_map(of_controller);
         tested.files().into_iter().chain(arms).collect()
     }
+}
+
+/// Returns the controllers with the settings that the command line gives to single arms.
+///
+/// # Errors
+/// No arm has the name of a setting, or an arm cannot have it.
+pub(super) fn tuned(
+    controllers: Vec<ControllerChoice>,
+    settings: &[(String, String)],
+) -> Result<Vec<ControllerChoice>, CliError> {
+    let names: Vec<String> = controllers.iter().map(ToString::to_string).collect();
+    let mut controllers = controllers;
+    for (arm, setting) in settings {
+        let Some(index) = names.iter().position(|name| name == arm) else {
+            let known = names.join("`, `");
+            return Err(CliError::usage(format!("--set {arm}:{setting}: no arm is `{arm}`, only `{known}`")));
+        };
+        let fail = |error| CliError::usage(format!("--set {arm}:{setting}: {error}"));
+        controllers[index] = controllers[index].with_setting(setting).map_err(fail)?;
+    }
+    Ok(controllers)
 }
 
 /// Returns the arm of a controller.

@@ -15,7 +15,7 @@ use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
-use closecall_campaign::plan::Plan;
+use closecall_campaign::plan::{Plan, check_mis};
 use closecall_campaign::remote::connect;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
@@ -29,6 +29,7 @@ use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::source::expand;
+use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::controller::ControllerChoice;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::Value;
@@ -37,7 +38,7 @@ use super::CliError;
 use super::actions::command_for;
 use super::advice::after_verdict;
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
-use super::arms::{ComparisonArgs, ControllerArgs};
+use super::arms::{ComparisonArgs, ControllerArgs, tuned};
 use super::backend::{check_backend, check_cameras};
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
@@ -177,12 +178,42 @@ impl CampaignArgs {
         Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs) })
     }
 
-    /// Reads and checks every scenario.
-    fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
-        let files = expand(&self.scenarios)?
-            .iter()
-            .map(|path| self.fitted.load(path, &self.set))
-            .collect::<Result<Vec<_>, _>>()?;
+    /// Reads every scenario, and returns them with the controllers of their arms. Scenarios of a folder that judge another function than the rest are left out,
+    /// and named.
+    fn scenarios(&self) -> Result<(Vec<ScenarioFile>, Vec<ControllerChoice>), CliError> {
+        let (set, of_arms) = self.set.by_arm();
+        let mut files = Vec::new();
+        for path in expand(&self.scenarios)? {
+            files.push((self.fitted.load(&path, &set)?, self.scenarios.contains(&path)));
+        }
+        let functions = || files.iter().map(|(file, _)| file.config().function);
+        let function = functions().find(|function| *function == Function::Mis).or(functions().next());
+        let function = function.unwrap_or_default();
+        let controllers = self.comparison.controllers(&self.controller, function, self.plan.wants_pairs())?;
+        let controllers = tuned(controllers, &of_arms)?;
+        let is_default = !self.controller.is_named() && self.comparison.arms.is_empty();
+        let fits = |file: &ScenarioFile| match is_default {
+            true => file.config().function == function,
+            false => check_mis(file, &controllers).is_ok(),
+        };
+        for (other, is_named) in files.iter().filter(|(file, _)| !fits(file)) {
+            let (name, judged) = (&other.config().name, other.config().function.name());
+            if is_default && *is_named {
+                return Err(CliError::usage(format!(
+                    "{name} judges `{judged}`, and other scenarios judge `{}`: run them apart, or name the arms with --arms",
+                    function.name()
+                )));
+            }
+            if !is_named {
+                print_error(format_args!("{name}: not run, because it judges `{judged}`: name it, or its folder\n"));
+            }
+        }
+        let run = files.into_iter().filter(|(file, is_named)| *is_named || fits(file)).map(|(file, _)| file);
+        Ok((run.collect(), controllers))
+    }
+
+    /// Returns the plan of what runs.
+    fn plan(&self, files: Vec<ScenarioFile>, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let ensemble = self.ensemble.apply(files)?;
         let mut plan = Plan::new(ensemble.entries, self.sampling()?, controllers)?;
         plan.without_effect = ensemble.without_effect;
@@ -279,12 +310,12 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     check_arguments(args)?;
-    let controllers = args.comparison.controllers(&args.controller, args.plan.wants_pairs())?;
+    let (files, controllers) = args.scenarios()?;
     let is_paired = controllers.len() > 1;
     let mut gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
     let planned = Planned {
-        plan: &args.plan(controllers)?,
+        plan: &args.plan(files, controllers)?,
         gates: &gates,
         results: &args.results,
         artifacts: args.artifacts,

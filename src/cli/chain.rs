@@ -34,7 +34,7 @@ use closecall_report::run::figure::still;
 use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::{is_recording_enabled, write_recording};
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::{ScenarioError, ScenarioFile, Spreads, logical};
+use closecall_scenarios::{Function, ScenarioError, ScenarioFile, Spreads, logical};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::engagement::engagements;
 use closecall_traffic::atomic::{WriteError, write_file};
@@ -128,7 +128,7 @@ struct Chain {
 pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
     let inputs = of_trajectories(&args.data.files);
     protect(&inputs, &[("--out", Some(&args.out))])?;
-    let controllers = match args.controller.choice()? {
+    let controllers = match args.controller.choice(Function::Mis)? {
         ControllerChoice::ACC => {
             return Err(CliError::usage(
                 "every sample also runs with `acc`: name another controller with --controller",

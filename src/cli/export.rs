@@ -136,7 +136,7 @@ fn of_file(args: &ExportArgs) -> Result<Chosen, CliError> {
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let drawn = (args.sample..end).map(|sample| file.space().sample(Design::Random, seed, sample, end));
-    let arm = super::arms::arm(&args.controller.choice()?, args.sensors);
+    let arm = super::arms::arm(&args.controller.choice(file.config().function)?, args.sensors);
     let inputs = of_scenario(&file);
     let key = RunKey { seed, sample: args.sample };
     Ok(Chosen { value_sets: drawn.collect(), scenario, key, arm, inputs, file })

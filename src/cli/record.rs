@@ -88,7 +88,7 @@ fn each_sample<R: Observer>(
     begin: fn(&mut R, &Scenario),
 ) -> Result<(), CliError> {
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.samples };
-    let arm = args.sim.arm.arm()?;
+    let arm = args.sim.arm.arm(file.config().function)?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(file, sampling, sample).map_err(fail)?;

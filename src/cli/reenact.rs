@@ -84,7 +84,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.sim.seed, sample: 0 };
-    let (outcome, simulated) = run_filmed(&scenario, key, &args.sim.arm.arm()?, &args.watch)?;
+    let (outcome, simulated) = run_filmed(&scenario, key, &args.sim.arm.arm(file.config().function)?, &args.watch)?;
     let recorded = film_encounter(&found, args.watch.record_level.into())?;
     let comparison = EncounterComparison::new(&found, &recorded, &simulated);
     let foreword = comparison.markdown(&found, &simulated, args.rear.into());

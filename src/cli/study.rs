@@ -114,11 +114,10 @@ impl StudyArgs {
     }
 
     /// Returns the baseline, unless the controller under test is the baseline itself, and the controller under test.
-    fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
-        Ok(match self.controller.choice()? {
-            ControllerChoice::ACC => vec![ControllerChoice::ACC],
-            tested => vec![ControllerChoice::ACC, tested],
-        })
+    fn controllers(&self, file: &ScenarioFile) -> Result<Vec<ControllerChoice>, CliError> {
+        let function = file.config().function;
+        let ([baseline, _], tested) = (ControllerChoice::of_function(function), self.controller.choice(function)?);
+        Ok(if tested == baseline { vec![baseline] } else { vec![baseline, tested] })
     }
 
     /// Runs a study of this many steps with a progress bar; `None` if a signal has ended it.
@@ -156,7 +155,7 @@ impl StudyArgs {
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
     let (study, number) = (&args.study, |count: u64| usize::try_from(count).unwrap_or(usize::MAX));
     let (file, sensors, named) = (study.file()?, study.sensors.map(SensorsChoice::mode), args.factors.clone());
-    let mut plan = SensitivityPlan::new(&file, &study.controllers()?, sensors, named, !args.no_default_factors)?;
+    let mut plan = SensitivityPlan::new(&file, &study.controllers(&file)?, sensors, named, !args.no_default_factors)?;
     plan.method = args.method;
     (plan.trajectories, plan.rows, plan.top) = (number(args.trajectories), number(args.rows), number(args.top));
     (plan.seed, plan.workers) = (study.seed, Workers::with_jobs(study.jobs));
@@ -170,7 +169,7 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let grid = if args.vary.is_empty() { FrontierPlan::default_grid(&file) } else { args.vary.clone() };
     let sampling = Sampling { seed: study.seed, design: Design::Random, samples: args.samples };
     let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), Workers::with_jobs(study.jobs));
-    let controllers = study.controllers()?;
+    let controllers = study.controllers(&file)?;
     if controllers.len() < 2 {
         return Err(CliError::usage("a frontier compares a controller with `acc`: name another with --controller"));
     }

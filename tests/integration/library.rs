@@ -5,7 +5,7 @@ use std::path::Path;
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig, Provenance};
 
-use crate::support::{all_of_library, closecall, folder, headline_with, json, library, message, stdout};
+use crate::support::{all_of_library, closecall, families_of_library, folder, headline_with, json, library, message, stdout};
 
 /// The smallest number of scenarios that the library holds.
 const LEAST_SCENARIOS: usize = 14;
@@ -40,7 +40,7 @@ fn check_does_not_call_a_scenario_valid_that_is_not() {
 
 #[test]
 fn every_parameter_is_fitted_or_assumed() {
-    for path in all_of_library() {
+    for path in all_of_library().into_iter().chain(families_of_library()) {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         for (name, entry) in file.space().iter() {
             match &entry.provenance {
@@ -55,7 +55,7 @@ fn every_parameter_is_fitted_or_assumed() {
 #[test]
 fn every_scenario_names_a_requirement_of_the_list() {
     let list = include_str!("../../docs/reference/requirements.md");
-    for path in all_of_library() {
+    for path in all_of_library().into_iter().chain(families_of_library()) {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         let requirements = &file.config().requirements;
         assert!(!requirements.is_empty(), "{}", path.display());
@@ -72,7 +72,7 @@ fn fitted_distributions_equal_those_of_the_committed_fit() {
     let tables: Vec<ParametersConfig> =
         ["parameters", "parametric"].map(|table| document[table].clone().try_into().unwrap()).into();
     let mut count = 0;
-    for path in all_of_library() {
+    for path in all_of_library().into_iter().chain(families_of_library()) {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         for (name, config) in &file.config().parameters.0 {
             if config.fitted.is_none() {
@@ -145,6 +145,87 @@ fn the_mis_does_not_engage_in_scenarios_that_give_no_reason_to() {
         let report = json(&closecall(args), 0);
         assert_eq!(report["controllers"]["mis"]["engagements"], 0, "{name}");
     }
+}
+
+/// Samples of a family of another function: enough for the bounds of its checks.
+const SAMPLES_OF_FAMILY: &str = "400";
+
+#[test]
+fn emergency_braking_and_cruise_control_are_judged_in_arms_of_their_own() {
+    for (family, arms) in [("aeb", ["acc-aeb", "acc+aeb"]), ("acc", ["cruise+aeb", "acc+aeb"])] {
+        let path = library(family).with_extension("");
+        let args = ["campaign", path.to_str().unwrap(), "--paired", "-n", SAMPLES_OF_FAMILY, "--format", "json"];
+        let report = json(&closecall(args), 0);
+        assert_eq!(report["verdict"], "PASS", "{family}: {}", report["reasons"]);
+        for arm in arms {
+            assert_eq!(report["controllers"][arm]["errors"], 0, "{family}: {arm}");
+        }
+        assert_eq!(report["controllers"]["acc+aeb"]["collisions"], 0, "{family}");
+    }
+}
+
+#[test]
+fn without_emergency_braking_its_family_fails() {
+    let path = library("aeb/aeb-lead-brakes");
+    let same = ["campaign", path.to_str().unwrap(), "-n", "40", "--format", "json", "--arms", "cruise-aeb,acc-aeb"];
+    let report = json(&closecall(same), 1);
+    assert!(report["reasons"][0].as_str().unwrap().starts_with("NOT MET: aeb-lead-brakes: AEB-1"), "{}", report["reasons"]);
+}
+
+#[test]
+fn a_setting_acts_on_the_arm_that_it_names_alone() {
+    let path = library("aeb/aeb-lead-brakes");
+    let arms = ["--arms", "acc-aeb,acc+aeb", "--set", "acc+aeb:aeb.max-deceleration-mps2=4.5"];
+    let args = ["campaign", path.to_str().unwrap(), "-n", "40", "--no-gate", "--format", "json"];
+    let weak = json(&closecall(args.iter().chain(&arms)), 0);
+    let usual = json(&closecall(args.iter().chain(&arms[..2])), 0);
+    let collisions = |report: &serde_json::Value, arm: &str| report["controllers"][arm]["collisions"].as_u64().unwrap();
+    assert_eq!(collisions(&weak, "acc-aeb"), collisions(&usual, "acc-aeb"));
+    assert!(collisions(&weak, "acc+aeb:aeb.max-deceleration-mps2=4.5") > collisions(&usual, "acc+aeb"));
+}
+
+#[test]
+fn arms_and_settings_that_change_nothing_are_refused() {
+    for (scenario, options, part) in [
+        ("aeb/aeb-lead-brakes", &["--arms", "acc,acc+aeb"][..], "are the same stack in this scenario"),
+        ("aeb/aeb-lead-brakes", &["--arms", "acc-aeb,acc+aeb", "--set", "acc-aeb:aeb.trigger-mps2=6"], "change nothing"),
+        ("aeb/aeb-lead-brakes", &["--arms", "acc-aeb,acc+aeb", "--set", "mis:aeb.trigger-mps2=6"], "no arm is `mis`"),
+        ("aeb/aeb-lead-brakes", &["--set", "acc+aeb:aeb.onset-mps2=6"], "trigger-mps2"),
+        ("aeb/aeb-lead-brakes", &["--controller", "mis"], "needs a margin increase system"),
+        ("low-thw-overtake", &["--arms", "acc+abs,mis"], "a list of functions has"),
+    ] {
+        let path = library(scenario);
+        let output = closecall(["campaign", path.to_str().unwrap(), "-n", "4"].iter().chain(options));
+        assert!(message(&output).contains(part), "{options:?}: {}", message(&output));
+        assert!(matches!(output.status.code(), Some(2 | 3)), "{options:?}: {:?}", output.status);
+    }
+}
+
+#[test]
+fn a_folder_runs_the_scenarios_of_one_function_and_names_the_others() {
+    let folder = folder();
+    for name in ["aeb/aeb-lead-brakes", "paper-figure"] {
+        let name = library(name);
+        std::fs::copy(&name, folder.path().join(name.file_name().unwrap())).unwrap();
+    }
+    let output = closecall(["campaign", folder.path().to_str().unwrap(), "-n", "2", "--no-gate", "--format", "json"]);
+    let report = json(&output, 0);
+    assert_eq!(report["controllers"].as_object().unwrap().keys().collect::<Vec<_>>(), ["mis"]);
+    assert!(message(&output).contains("aeb-lead-brakes: not run, because it judges `aeb`"), "{}", message(&output));
+    let both = ["aeb/aeb-lead-brakes", "paper-figure"].map(|name| library(name).display().to_string());
+    let refused = closecall(["campaign", &both[0], &both[1], "-n", "2"]);
+    assert!(message(&refused).contains("run them apart"), "{}", message(&refused));
+}
+
+#[test]
+fn a_verdict_names_what_its_scenario_extrapolates() {
+    let text = |name: &str| {
+        let path = library(name);
+        stdout(&closecall(["campaign", path.to_str().unwrap(), "-n", "3", "--sensors", "ground-truth", "--no-gate"]), 0)
+    };
+    let headline = text("low-thw-overtake");
+    assert!(headline.contains("extrapolates beyond recorded traffic: closing-mps 2.800 to 13.900, observed 0.001 to 4.15 (13 observations), 87.8 % of the samples beyond"), "{headline}");
+    assert!(!text("as-recorded/low-thw-overtake-as-recorded").contains("extrapolates"));
 }
 
 #[test]

@@ -24,6 +24,11 @@ pub(crate) fn traffic_of_library() -> Vec<PathBuf> {
     scenarios_in(&library_folder().join("traffic"))
 }
 
+/// Returns the scenarios of the library in folders of their own: those of other functions, and the headline as recorded.
+pub(crate) fn families_of_library() -> Vec<PathBuf> {
+    ["aeb", "acc", "as-recorded"].iter().flat_map(|name| scenarios_in(&library_folder().join(name))).collect()
+}
+
 fn scenarios_in(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).expect("the scenario library");
     let paths = entries.map(|entry| entry.expect("an entry of the scenario library").path());

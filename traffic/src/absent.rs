@@ -42,6 +42,9 @@ pub enum Absent {
     /// The margin increase system never engaged.
     #[error("the margin increase system never engaged")]
     NeverEngaged,
+    /// The controller never braked in an emergency.
+    #[error("no emergency braking")]
+    NoEmergencyBraking,
     /// The margin increase system had not released when the run ended.
     #[error("the margin increase system had not released when the run ended")]
     NotReleased,

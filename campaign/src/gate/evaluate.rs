@@ -219,6 +219,9 @@ impl Accumulator {
 
     fn value(&self, inference: Inference) -> Option<f64> {
         let (hits, samples) = (self.hits, self.samples);
+        if self.sum.is_nan() && self.expression.aggregate.is_of_flag() {
+            return Some(f64::NAN);
+        }
         match self.expression.aggregate {
             Aggregate::Count => Some(hits as f64),
             Aggregate::Share => Some(hits as f64 / samples as f64),
@@ -259,6 +262,10 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
     match quantity {
         Quantity::Tested(measure) => of(tested, measure),
         Quantity::Baseline(measure) if tested > 0 => of(0, measure),
+        Quantity::Compared(comparison) if !comparison.in_baseline => {
+            Some(comparison.of(of(tested, comparison.measure)?))
+        }
+        Quantity::Compared(comparison) if tested > 0 => Some(comparison.of(of(0, comparison.measure)?)),
         Quantity::Pair(flag) if tested > 0 => {
             let tallies = record.tallies();
             let fate = PairFate::of(tallies.first()?, tallies.get(tested)?)?;
@@ -267,7 +274,7 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
                 PairFlag::Induced => fate == PairFate::Induced,
             }))
         }
-        Quantity::Baseline(_) | Quantity::Pair(_) => None,
+        Quantity::Baseline(_) | Quantity::Pair(_) | Quantity::Compared(_) => None,
     }
 }
 

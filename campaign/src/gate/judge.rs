@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use closecall_scenarios::Function;
 use closecall_scenarios::criteria::{EGO_COLLIDED, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
 use closecall_simulation::Arm;
 
@@ -9,7 +10,11 @@ use super::evaluate::{Accumulator, Evidence, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
 use crate::ledger::Inference;
-use crate::record::Record;
+use crate::record::{ArmRecord, Record};
+use closecall_scenarios::parameters::SpaceEntry;
+use closecall_traffic::ParameterName;
+use closecall_traffic::statistics::format::percent;
+
 use crate::repeats::{Repeats, is_varied};
 use crate::runner::Work;
 
@@ -41,9 +46,13 @@ struct Judged {
     happened: u64,
     samples: u64,
     overridden: Vec<String>,
-    /// Whether the scenario asks what the system prevents.
+    /// Whether the scenario asks what the system under test prevents.
     asks_for_action: bool,
-    /// Samples in which the system under test slowed the ego for a vehicle behind.
+    /// The function that the scenario judges.
+    function: Function,
+    /// The parameters that are sampled beyond what trajectory data show, in words.
+    extrapolations: Vec<String>,
+    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or moved it otherwise than the baseline.
     acted: u64,
 }
 
@@ -80,6 +89,8 @@ impl Judge {
                 samples: 0,
                 overridden: config.overridden.clone(),
                 asks_for_action: config.checks.values().flatten().any(of_prevented),
+                function: config.function,
+                extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
                 acted: 0,
             }
         };
@@ -123,10 +134,24 @@ impl Judge {
         judged.map(|judged| (judged.scenario.as_str(), judged.overridden.as_slice()))
     }
 
-    /// Returns the scenarios that ask what the system prevents, and in which it never slowed the ego for a vehicle behind, with their numbers of samples.
-    pub fn without_action(&self) -> impl Iterator<Item = (&str, u64)> {
+    /// Returns the scenarios that ask what the system under test prevents, and in which it never acted, with the action that is missing and their numbers of
+    /// samples.
+    pub fn without_action(&self) -> impl Iterator<Item = (&str, &'static str, u64)> {
         let idle = |judged: &&Judged| judged.asks_for_action && judged.samples > 0 && judged.acted == 0;
-        self.scenarios.iter().filter(idle).map(|judged| (judged.scenario.as_str(), judged.samples))
+        let missing = |judged: &Judged| match judged.function {
+            Function::Mis => "slowed the ego for a vehicle behind",
+            Function::Aeb | Function::Acc => "moved the ego otherwise than the baseline",
+        };
+        self.scenarios
+            .iter()
+            .filter(idle)
+            .map(move |judged| (judged.scenario.as_str(), missing(judged), judged.samples))
+    }
+
+    /// Returns what each scenario samples beyond trajectory data, in words.
+    pub fn extrapolations(&self) -> impl Iterator<Item = (&str, &[String])> {
+        let judged = self.scenarios.iter().filter(|judged| !judged.extrapolations.is_empty());
+        judged.map(|judged| (judged.scenario.as_str(), judged.extrapolations.as_slice()))
     }
 
     /// Returns true if some parameter of the scenario varies.
@@ -189,6 +214,20 @@ impl Judge {
     }
 }
 
+/// Returns how far a parameter is sampled beyond what trajectory data show; `None` if it is not.
+fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String> {
+    let (observed, beyond) = entry.beyond_observed()?;
+    let [low, high] = entry.distribution.bounds()?;
+    let range = if entry.distribution.is_fixed() { format!("{low}") } else { format!("{low:.3} to {high:.3}") };
+    Some(format!(
+        "{name} {range}, observed {} to {} ({} observations), {} of the samples beyond",
+        observed.min,
+        observed.max,
+        observed.n,
+        percent(beyond)
+    ))
+}
+
 impl Judged {
     /// A run that the ego's collision ended counts as one in which everything happened: what it would have come to is not
     /// known, and it is no pass.
@@ -197,9 +236,21 @@ impl Judged {
             return;
         }
         self.samples += 1;
-        let acted = Measure::named(SLOWED_FOR_REAR).and_then(|measure| value(Quantity::Tested(measure), record));
-        // A journal without the value does not show that the system was idle.
-        self.acted += u64::from(acted != Some(0.0));
+        let acted = match self.function {
+            Function::Mis => {
+                let slowed =
+                    Measure::named(SLOWED_FOR_REAR).and_then(|measure| value(Quantity::Tested(measure), record));
+                // A journal without the value does not show that the system was idle.
+                slowed != Some(0.0)
+            }
+            Function::Aeb | Function::Acc => {
+                let margins = |arm: Option<&ArmRecord>| {
+                    arm.and_then(|arm| arm.result.as_ref().ok()).map(|outcome| outcome.margins)
+                };
+                margins(record.arms.first()) != margins(record.arms.last())
+            }
+        };
+        self.acted += u64::from(acted);
         let holds = |quantity: Quantity| value(quantity, record) == Some(1.0);
         let collided = Measure::named(EGO_COLLIDED);
         let is_paired = record.arms.len() > 1;

@@ -129,6 +129,30 @@ pub(crate) enum GapPolicy {
     R157,
     /// The gap of the fuzzy safety model of UN Regulation 157.
     FuzzySafety,
+    /// No gap: a cruise control that does not look ahead. Its time gap says only how far back the ego starts.
+    Unwatched,
+}
+
+/// Settings of the adaptive cruise control that replace those of a scenario.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub(crate) struct AccPatch {
+    time_gap_s: Option<Num>,
+    set_speed_mps: Option<Num>,
+    standstill_gap_m: Option<Num>,
+}
+
+impl AccPatch {
+    /// Returns the cruise control with these settings in place of its own.
+    pub(crate) fn over(&self, base: Acc, parameters: &Parameters) -> Result<Acc, ConfigError> {
+        let own = |value: f64| Num::Fixed(value);
+        let whole = AccConfig {
+            time_gap_s: self.time_gap_s.clone().unwrap_or_else(|| own(base.time_gap_s)),
+            set_speed_mps: self.set_speed_mps.clone().or_else(|| base.set_speed_mps.map(own)),
+            standstill_gap_m: Some(self.standstill_gap_m.clone().unwrap_or_else(|| own(base.standstill_gap_m))),
+        };
+        Ok(Acc { policy: base.policy, ..whole.check(parameters)? })
+    }
 }
 
 impl Check for AccConfig {
@@ -153,11 +177,16 @@ impl Check for AccConfig {
 }
 
 impl Acc {
+    /// Returns whether the lead vehicle matters.
+    pub(crate) fn looks_ahead(&self) -> bool {
+        self.policy != GapPolicy::Unwatched
+    }
+
     /// Returns the desired gap at `speed_mps` (m).
     pub(crate) fn desired_gap_m(&self, speed_mps: f64) -> f64 {
         match self.policy {
             GapPolicy::FuzzySafety => following_gap_m(speed_mps),
-            GapPolicy::Constant | GapPolicy::R157 => {
+            GapPolicy::Constant | GapPolicy::R157 | GapPolicy::Unwatched => {
                 (self.time_gap_at_s(speed_mps) * speed_mps).max(self.standstill_gap_m)
             }
         }
@@ -171,7 +200,7 @@ impl Acc {
     /// Returns the time gap at `speed_mps` (s).
     fn time_gap_at_s(&self, speed_mps: f64) -> f64 {
         match self.policy {
-            GapPolicy::Constant => self.time_gap_s,
+            GapPolicy::Constant | GapPolicy::Unwatched => self.time_gap_s,
             GapPolicy::R157 => r157_time_gap_s(speed_mps),
             GapPolicy::FuzzySafety => following_gap_m(speed_mps) / speed_mps.max(SLOWEST_MPS),
         }
@@ -182,7 +211,7 @@ impl Acc {
     pub(crate) fn acceleration_mps2(&self, speed_mps: f64, limit_mps: f64, lead: Option<&Front>) -> f64 {
         let set_mps = self.set_speed_mps.unwrap_or(limit_mps);
         let mut desired = (set_mps - speed_mps) / SPEED_TIME_CONSTANT_S;
-        if let Some(lead) = lead {
+        if let Some(lead) = lead.filter(|_| self.looks_ahead()) {
             let error_m = lead.gap_m - self.desired_gap_m(speed_mps);
             let opening_mps = lead.speed_mps - speed_mps;
             let allowed_mps = allowed_closing_mps(error_m);

@@ -52,21 +52,36 @@ impl Check for AebConfig {
     type Checked = Aeb;
 
     fn check(&self, parameters: &Parameters) -> Result<Aeb, ConfigError> {
+        self.over(Aeb::DEFAULT, parameters)
+    }
+}
+
+impl AebConfig {
+    /// Returns emergency braking with these settings in place of its own.
+    pub(crate) fn over(&self, base: Aeb, parameters: &Parameters) -> Result<Aeb, ConfigError> {
         let or = |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         Ok(Aeb {
-            trigger_mps2: or(&self.trigger_mps2, "trigger-mps2", Range::closed(2.0, 9.0), 4.0)?,
+            trigger_mps2: or(&self.trigger_mps2, "trigger-mps2", Range::closed(2.0, 9.0), base.trigger_mps2)?,
             max_deceleration_mps2: or(
                 &self.max_deceleration_mps2,
                 "max-deceleration-mps2",
                 Range::above(2.0, 12.0),
-                9.0,
+                base.max_deceleration_mps2,
             )?,
-            standstill_gap_m: or(&self.standstill_gap_m, "standstill-gap-m", Range::closed(0.0, 10.0), 2.0)?,
+            standstill_gap_m: or(
+                &self.standstill_gap_m,
+                "standstill-gap-m",
+                Range::closed(0.0, 10.0),
+                base.standstill_gap_m,
+            )?,
         })
     }
 }
 
 impl Aeb {
+    /// Emergency braking of a scenario that states no values.
+    pub(crate) const DEFAULT: Self = Self { trigger_mps2: 4.0, max_deceleration_mps2: 9.0, standstill_gap_m: 2.0 };
+
     /// Returns the braking that is needed from now on (m/s²); 0 if none is needed.
     pub(crate) fn required_mps2(&self, speed_mps: f64, lead: &Front) -> f64 {
         lead.required_braking_mps2(speed_mps, self.standstill_gap_m)

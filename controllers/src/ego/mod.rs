@@ -26,7 +26,7 @@ pub use mis::{
 pub use r157_driver::R157Driver;
 pub use r157_fuzzy::R157Fuzzy;
 pub use reason::Reason;
-pub use settings::{EgoSettings, EgoStackConfig};
+pub use settings::{EgoSettings, EgoStackConfig, StackPatch};
 pub use slower::{Slower, Slowing};
 pub use stack::EgoStack;
 pub use surroundings::{Front, LeadVehicleSelector};

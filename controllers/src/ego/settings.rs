@@ -4,7 +4,7 @@ use closecall_traffic::{Check, ConfigError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::acc::GapPolicy;
+use super::acc::{AccPatch, GapPolicy};
 use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoStack, Horizon, MisConfig, MisSettings};
 
 /// The ego stack as a scenario file describes it. An absent function is not part of the stack.
@@ -79,6 +79,30 @@ impl EgoSettings {
         Self { mis: self.mis.map(|mis| MisSettings { horizon: Horizon::Ttce, ..mis }), ..self }
     }
 
+    /// Returns the same stack with emergency braking: that of the scenario, or one with the default values.
+    #[must_use]
+    pub fn with_aeb(self) -> Self {
+        Self { aeb: self.aeb.or(Some(Aeb::DEFAULT)), ..self }
+    }
+
+    /// Returns the same stack without emergency braking.
+    #[must_use]
+    pub fn without_aeb(self) -> Self {
+        Self { aeb: None, ..self }
+    }
+
+    /// Returns the same stack with a cruise control that does not look ahead.
+    #[must_use]
+    pub fn without_following(self) -> Self {
+        Self { acc: Acc { policy: GapPolicy::Unwatched, ..self.acc }, ..self }
+    }
+
+    /// Returns the same stack with these settings in place of its own. A function that it lacks stays absent.
+    #[must_use]
+    pub fn patched(self, patch: &StackPatch) -> Self {
+        patch.over(self, &Parameters::default()).unwrap_or(self)
+    }
+
     /// Returns the gap that the adaptive cruise control keeps at `speed_mps` (m).
     pub fn desired_gap_m(&self, speed_mps: f64) -> f64 {
         self.acc.desired_gap_m(speed_mps)
@@ -97,6 +121,44 @@ impl EgoSettings {
     /// Builds a new controller for one run.
     pub fn build(&self) -> Box<dyn EgoController> {
         Box::new(EgoStack::new(*self))
+    }
+}
+
+/// Settings of single functions that replace those of a scenario.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct StackPatch {
+    acc: AccPatch,
+    aeb: AebConfig,
+    mis: MisConfig,
+}
+
+impl StackPatch {
+    /// Reads lines of the form `aeb.trigger-mps2=5`.
+    ///
+    /// # Errors
+    /// What is wrong, and what is allowed: an unknown key, a value that is not a number, or one that is out of range.
+    pub fn parse(lines: &str) -> Result<Self, String> {
+        let patch: Self = toml::from_str(lines).map_err(|error| error.message().to_owned())?;
+        let stack = EgoSettings {
+            acc: Acc { time_gap_s: 1.0, set_speed_mps: None, standstill_gap_m: 3.0, policy: GapPolicy::Constant },
+            aeb: Some(Aeb::DEFAULT),
+            mis: Some(MisSettings::PAPER),
+            automated: true,
+        };
+        patch.over(stack, &Parameters::default()).map_err(|error| error.to_string())?;
+        Ok(patch)
+    }
+
+    fn over(&self, stack: EgoSettings, parameters: &Parameters) -> Result<EgoSettings, ConfigError> {
+        let aeb = stack.aeb.map(|aeb| self.aeb.over(aeb, parameters).map_err(|error| error.within("aeb")));
+        let mis = stack.mis.map(|mis| self.mis.over(mis, parameters).map_err(|error| error.within("mis")));
+        Ok(EgoSettings {
+            acc: self.acc.over(stack.acc, parameters).map_err(|error| error.within("acc"))?,
+            aeb: aeb.transpose()?,
+            mis: mis.transpose()?,
+            automated: stack.automated,
+        })
     }
 }
 

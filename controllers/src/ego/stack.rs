@@ -43,6 +43,8 @@ pub struct EgoStack {
     lead: LeadVehicleSelector,
     mis: Option<Mis>,
     emergency_braking: bool,
+    /// Whether emergency braking has acted.
+    has_braked: bool,
     /// Time and value (m/s²) of the last comfort command: the command without emergency braking.
     last_comfort: Option<(Time, f64)>,
 }
@@ -51,7 +53,14 @@ impl EgoStack {
     /// Creates a stack for one run.
     pub fn new(settings: EgoSettings) -> Self {
         let mis = settings.mis.map(Mis::new);
-        Self { settings, lead: LeadVehicleSelector::default(), mis, emergency_braking: false, last_comfort: None }
+        Self {
+            settings,
+            lead: LeadVehicleSelector::default(),
+            mis,
+            emergency_braking: false,
+            has_braked: false,
+            last_comfort: None,
+        }
     }
 
     /// Creates a stack without the margin increase system for one run: the controller `acc`.
@@ -65,6 +74,9 @@ impl EgoStack {
         let (last_mps2, step_s) =
             self.last_comfort.map_or((0.0, 0.0), |(time, last_mps2)| (last_mps2, (input.time - time).s()));
         let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);
+        // Emergency braking ends a cruise control that does not look ahead: the driver takes over, and does not accelerate.
+        let is_over = self.has_braked && !self.settings.acc.looks_ahead();
+        let acc_mps2 = if is_over { acc_mps2.min(0.0) } else { acc_mps2 };
         let acc_mps2 = Acc::limit_jerk_mps2(acc_mps2, last_mps2, speed_mps, step_s);
         let Some(mis) = &mut self.mis else {
             return EgoCommand {
@@ -118,6 +130,7 @@ impl EgoController for EgoStack {
             command.reason = Reason::BrakingDone;
         }
         self.emergency_braking = braking.is_some();
+        self.has_braked |= self.emergency_braking;
         if !command.acceleration_mps2.is_finite() {
             return Err(ControllerError::NotFinite { quantity: "commanded acceleration", time: input.time });
         }

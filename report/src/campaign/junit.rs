@@ -164,6 +164,8 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
         properties.push(("samples".to_owned(), counts.samples.to_string()));
         for (controller, arm) in findings.summary.controllers.iter().zip(&counts.arms) {
             properties.push((format!("{controller}.collisions"), arm.collisions.to_string()));
+            properties.push((format!("{controller}.touches"), arm.touches.to_string()));
+            properties.push((format!("{controller}.imposed_hard"), arm.imposed.to_string()));
             properties.push((format!("{controller}.errors"), arm.errors.to_string()));
             properties.push((format!("{controller}.flaky"), arm.flaky.to_string()));
         }

@@ -6,7 +6,7 @@ use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use super::recordings::card_beside;
-use super::text::{goals, not_prevented};
+use super::text::{goals, imposed, not_prevented};
 use super::words::{reasons, sentence};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
@@ -66,18 +66,19 @@ pub fn markdown(findings: &Findings<'_>) -> String {
 }
 
 fn counts(summary: &Summary) -> String {
-    let mut text = "| scenario | controller | samples | collisions | rate | 95 % interval | errors |\n\
-                    |---|---|---:|---:|---:|---|---:|\n"
+    let mut text = "| scenario | controller | samples | collisions | touches | rate | 95 % interval | errors |\n\
+                    |---|---|---:|---:|---:|---:|---|---:|\n"
         .to_owned();
     for (name, counts) in &summary.scenarios {
         for (controller, arm) in summary.controllers.iter().zip(&counts.arms) {
             let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), percent);
             text.push_str(&format!(
-                "| {} | {} | {} | {} | {rate} | {} | {} |\n",
+                "| {} | {} | {} | {} | {} | {rate} | {} | {} |\n",
                 cell(name),
                 cell(controller),
                 arm.outcomes,
                 arm.collisions,
+                arm.touches,
                 interval(arm.interval_95(summary.inference)),
                 arm.errors,
             ));
@@ -87,7 +88,7 @@ fn counts(summary: &Summary) -> String {
     if summary.is_paired() {
         for (name, counts) in &summary.scenarios {
             text.push_str(&format!("{}: {}", cell(name), pairs(counts, summary.inference)));
-            for sentence in [not_prevented(counts), goals(counts)].into_iter().flatten() {
+            for sentence in [not_prevented(counts), goals(counts), imposed(summary, counts)].into_iter().flatten() {
                 text.push_str(&format!("{}: {sentence}.\n\n", cell(name)));
             }
         }

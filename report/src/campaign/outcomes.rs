@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array};
 use arrow::datatypes::{DataType, Field, Schema};
-use closecall_traffic::{Measured, ParameterName, Parameters, Value};
+use closecall_traffic::{Absent, Measured, ParameterName, Parameters, Value};
 use parquet::arrow::ArrowWriter;
 use parquet::file::metadata::KeyValue;
 use serde::Serialize;
@@ -23,7 +23,7 @@ use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::SampleFailure;
 use closecall_scenarios::criteria::Measure;
 use closecall_scenarios::harm::harm;
-use closecall_scenarios::outcome::{Collision, MisSummary, Outcome, ReasonSpan};
+use closecall_scenarios::outcome::{Ahead, Collision, MisSummary, Outcome, ReasonSpan, worse};
 use closecall_scenarios::promise::Goal;
 use closecall_traffic::atomic::{WriteError, write_file};
 
@@ -274,6 +274,14 @@ fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: Parameter
 
 fn collision_columns(columns: &mut Columns) {
     columns.count("collisions", |row| Some(row.outcome()?.collisions.len() as u64));
+    columns.count("touches", |row| Some(row.outcome()?.touches.len() as u64));
+    columns.number("touch_relative_speed_mps", "m/s", |row| {
+        row.outcome()?.touches.iter().map(|touch| touch.relative_speed_mps).reduce(worse)
+    });
+    for name in ["ego_strikes", "ego_is_struck", "ego_touched"] {
+        columns.flag(name, move |row| Some(Measure::named(name)?.of(row.outcome()?)? == 1.0));
+    }
+    columns.number("impact_speed_mps", "m/s", |row| Measure::named("impact_speed_mps")?.of(row.outcome()?));
     columns.flag("ego_collided", |row| Some(row.outcome()?.ego_collided()));
     columns.flag("others_collided", |row| Some(row.outcome()?.others_collided()));
     // Of no collisions, the sum is negative zero.
@@ -299,11 +307,17 @@ fn encounter_columns(columns: &mut Columns) {
     }
 }
 
+fn ahead(outcome: &Outcome, of: fn(&Ahead) -> Measured) -> Measured {
+    outcome.ahead.as_ref().map_or(Err(Absent::NotRecorded), of)
+}
+
 fn margin_columns(columns: &mut Columns) {
     columns.measured("min_thw_front_s", "s", |outcome| outcome.margins.min_thw_front_s);
     columns.measured("min_thw_rear_s", "s", |outcome| outcome.margins.min_thw_rear_s);
     columns.measured("min_gap_front_m", "m", |outcome| outcome.margins.min_gap_front_m);
     columns.measured("min_gap_rear_m", "m", |outcome| outcome.margins.min_gap_rear_m);
+    columns.measured("min_ttc_front_s", "s", |outcome| ahead(outcome, |ahead| ahead.min_ttc_front_s));
+    columns.measured("emergency_braking_at_s", "s", |outcome| ahead(outcome, |ahead| ahead.emergency_braking_at_s));
     columns.measured("min_ttc_rear_s", "s", |outcome| outcome.margins.min_ttc_rear_s);
     let margins = |row: &OutcomeRow| Some(row.outcome()?.margins);
     columns.number("max_deceleration_mps2", "m/s²", move |row| Some(margins(row)?.max_deceleration_mps2));

@@ -8,6 +8,7 @@ use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::probability::percent;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
+use closecall_scenarios::outcome::IMPOSED_BRAKING_MPS2;
 
 use super::overview::{ErrorGroup, Overview};
 use super::pareto::ParetoText;
@@ -111,7 +112,7 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
             )?;
         }
     }
-    if let Some(sentence) = goals(counts) {
+    for sentence in [goals(counts), imposed(summary, counts)].into_iter().flatten() {
         writeln!(f, "  {sentence}")?;
     }
     if summary.has_references() {
@@ -153,6 +154,26 @@ pub(super) fn goals(counts: &Counts) -> Option<String> {
     (all > 0).then(|| format!("goal (2 s of headway) in {all} encounters: {}", texts.join(", ")))
 }
 
+/// Returns in how many samples each arm makes the vehicle behind brake hard; `None` if none does.
+pub(super) fn imposed(summary: &Summary, counts: &Counts) -> Option<String> {
+    let of = |(name, arm): (&String, &ArmCounts)| {
+        let [.., mean_mps2] = arm.mean_cost()?;
+        Some(format!(
+            "{name} {} of {} ({}, mean {mean_mps2:.1} m/s²)",
+            arm.imposed,
+            arm.costed,
+            percent(arm.imposed_share()?)
+        ))
+    };
+    let texts: Vec<String> = summary.controllers.iter().zip(&counts.arms).filter_map(of).collect();
+    counts.arms.iter().any(|arm| arm.imposed > 0).then(|| {
+        format!(
+            "the vehicle behind brakes harder than {IMPOSED_BRAKING_MPS2:.0} m/s² before the lead vehicle brakes (UN Regulation 157): {}",
+            texts.join(", ")
+        )
+    })
+}
+
 /// Writes all pairs of arms.
 fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts) -> fmt::Result {
     writeln!(
@@ -181,6 +202,9 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
     }
     if arm.collisions > 0 {
         write!(f, "  delta-v up to {:.1} m/s", arm.max_delta_v_mps)?;
+    }
+    if arm.touches > 0 {
+        write!(f, "  {} touches", arm.touches)?;
     }
     if arm.engagements > 0 {
         write!(f, "  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach)?;

@@ -9,7 +9,7 @@
 
 use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
-use closecall_scenarios::criteria::{Aggregate, Operator, Quantity};
+use closecall_scenarios::criteria::{Aggregate, Comparison, Operator, Quantity, Side};
 use closecall_traffic::statistics::format::percent;
 
 use crate::units::unit_of;
@@ -169,6 +169,12 @@ fn flag_words(quantity: &Quantity) -> String {
         Quantity::Tested(measure) => measure.meaning.to_owned(),
         Quantity::Baseline(measure) => format!("{} in the baseline", measure.meaning),
         Quantity::Pair(flag) => format!("a collision is {}", flag.name()),
+        Quantity::Compared(Comparison { measure, in_baseline, side, threshold }) => {
+            let arm = if *in_baseline { " in the baseline" } else { "" };
+            let side = if *side == Side::Above { "above" } else { "below" };
+            let unit = unit_of(measure.name).map_or_else(String::new, |unit| format!(" {unit}"));
+            format!("the {}{arm} is {side} {}{unit}", measure.meaning, number(*threshold))
+        }
     }
 }
 

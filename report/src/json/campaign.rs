@@ -150,6 +150,11 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
     for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
         let mut controller = Map::new();
         controller.insert("collisions".to_owned(), json!(arm.collisions));
+        controller.insert("touches".to_owned(), json!(arm.touches));
+        controller.insert("imposed_hard".to_owned(), json!(arm.imposed));
+        controller.insert("imposed_hard_share".to_owned(), json!(arm.imposed_share()));
+        controller
+            .insert("mean_imposed_braking_mps2".to_owned(), json!(arm.mean_cost().map(|[.., mean_mps2]| mean_mps2)));
         controller.insert("collision_rate".to_owned(), json!(arm.collision_rate()));
         controller.insert("interval_95".to_owned(), json!(arm.interval_95(summary.inference)));
         if summary.inference == Inference::Design {

@@ -33,8 +33,9 @@ pub fn outcome(outcome: &Outcome) -> Value {
         "duration_s": outcome.duration.s(),
         "parameters": parameters(outcome),
         "collisions": outcome.collisions.iter().map(collision).collect::<Vec<_>>(),
+        "touches": outcome.touches.iter().map(collision).collect::<Vec<_>>(),
         "moments": outcome.moments.iter().map(moment).collect::<Vec<_>>(),
-        "margins": margins(&outcome.margins),
+        "margins": margins(outcome),
         "mis": mis(&outcome.mis),
         "promise": outcome.promise.as_ref().map(|kept| promise(kept, outcome)),
     })
@@ -77,8 +78,14 @@ fn moment(at: &ReachedMoment) -> Value {
     json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s() })
 }
 
-fn margins(margins: &Margins) -> Value {
+fn margins(outcome: &Outcome) -> Value {
+    let margins: &Margins = &outcome.margins;
     let mut object = Map::new();
+    insert(
+        &mut object,
+        "min_ttc_front_s",
+        outcome.ahead.map_or(Err(Absent::NotRecorded), |ahead| ahead.min_ttc_front_s),
+    );
     insert(&mut object, "min_thw_front_s", margins.min_thw_front_s);
     insert(&mut object, "min_thw_rear_s", margins.min_thw_rear_s);
     insert(&mut object, "min_gap_front_m", margins.min_gap_front_m);
@@ -87,6 +94,11 @@ fn margins(margins: &Margins) -> Value {
     insert(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
     insert(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
     insert(&mut object, "max_speed_deficit_mps", Ok(margins.max_speed_deficit_mps));
+    insert(
+        &mut object,
+        "emergency_braking_at_s",
+        outcome.ahead.map_or(Err(Absent::NotRecorded), |ahead| ahead.emergency_braking_at_s),
+    );
     Value::Object(object)
 }
 

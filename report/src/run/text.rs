@@ -2,8 +2,14 @@
 
 use std::fmt;
 
-use closecall_scenarios::outcome::{MisSummary, Outcome, ReasonSpan};
+use closecall_scenarios::outcome::{Collision, MisSummary, Outcome, ReasonSpan};
 use closecall_traffic::Measured;
+
+/// Returns a touch in words.
+pub(super) fn touch_text(touch: &Collision) -> String {
+    let [striking, struck] = touch.roles().map(|index| touch.between[index].as_str());
+    format!("touch: {striking} meets {struck} at {:.2} s with {:.2} m/s", touch.time.s(), touch.relative_speed_mps)
+}
 
 /// Returns an outcome in one line.
 pub fn outcome_line(outcome: &Outcome) -> String {
@@ -11,10 +17,11 @@ pub fn outcome_line(outcome: &Outcome) -> String {
     let rear = outcome.margins.min_gap_rear_m.map_or("-".to_owned(), |gap_m| format!("{gap_m:.1} m"));
     let engaged = match &outcome.mis {
         Ok(mis) => mis.engaged_at_s.map_or("not engaged".to_owned(), |time_s| format!("engaged at {time_s:.1} s")),
-        Err(_) => "no MIS".to_owned(),
+        Err(_) => String::new(),
     };
     let (sample, controller) = (outcome.sample, &outcome.controller);
-    format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}")
+    let line = format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}");
+    line.trim_end().to_owned()
 }
 
 /// Returns the reason of the system, with the time in which it could have engaged if it never did.
@@ -75,6 +82,9 @@ impl fmt::Display for OutcomeText<'_> {
                 collision.delta_v_mps[1],
             )?;
         }
+        for touch in &outcome.touches {
+            writeln!(f, "  {}", touch_text(touch))?;
+        }
         if outcome.collisions.is_empty() {
             writeln!(f, "  no collision")?;
         }
@@ -92,7 +102,7 @@ impl fmt::Display for OutcomeText<'_> {
                 f.write_str(&line("  front time headway at the critical moment", mis.thw_front_at_critical_s, "s"))?;
                 writeln!(f, "  MIS: {}", reason_text(mis))
             }
-            Err(absent) => writeln!(f, "  MIS: {absent}"),
+            Err(_) => Ok(()),
         }
     }
 }

@@ -4,14 +4,16 @@
 //!  gate      = aggregate "(" quantity [ "|" condition ] ")" operator number
 //!  aggregate = "count" | "share" | "lower" | "upper"          of a flag
 //!            | "min" | "max" | "mean" | "sum" | "p" percent   of a number
-//!  quantity  = [ "baseline." ] measure | pair flag
-//!  condition = [ "baseline." ] flag | pair flag
+//!  quantity  = [ "baseline." ] measure | pair flag | comparison
+//!  condition = [ "baseline." ] flag | pair flag | comparison
+//!  comparison = [ "baseline." ] number (">" | "<") threshold   a flag
 //!  operator  = "<=" | ">="
 //! ```
 //!
 //! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is at least 1 s.
 //! `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in which the ego collides without the system,
 //! more than half are prevented with 95 % confidence. `lower` and `upper` are the exact one-sided bounds of a share.
+//! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s² in at most 5 % of the samples.
 
 use std::fmt;
 use std::str::FromStr;
@@ -48,6 +50,39 @@ impl Aggregate {
     }
 }
 
+/// The side of a threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Larger values.
+    Above,
+    /// Smaller values.
+    Below,
+}
+
+/// A number that lies beyond a threshold: a flag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// The number.
+    pub measure: &'static Measure,
+    /// Whether it is that of the baseline, and not that of the arm under test.
+    pub in_baseline: bool,
+    /// Where the flag holds.
+    pub side: Side,
+    /// The threshold, at which the flag does not hold.
+    pub threshold: f64,
+}
+
+impl Comparison {
+    /// Returns 1 if a value lies beyond the threshold, and 0 if not. What is not a number stays so, and satisfies no gate.
+    pub fn of(&self, value: f64) -> f64 {
+        let holds = match self.side {
+            Side::Above => value > self.threshold,
+            Side::Below => value < self.threshold,
+        };
+        if value.is_nan() { value } else { f64::from(u8::from(holds)) }
+    }
+}
+
 /// The value of one sample that is aggregated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Quantity {
@@ -57,18 +92,34 @@ pub enum Quantity {
     Baseline(&'static Measure),
     /// A flag of the pair.
     Pair(PairFlag),
+    /// A number beyond a threshold.
+    Compared(Comparison),
 }
 
 impl Quantity {
     /// Returns true if the quantity exists only in a paired campaign.
     pub const fn needs_pairs(self) -> bool {
-        matches!(self, Self::Baseline(_) | Self::Pair(_))
+        match self {
+            Self::Tested(_) => false,
+            Self::Baseline(_) | Self::Pair(_) => true,
+            Self::Compared(comparison) => comparison.in_baseline,
+        }
+    }
+
+    /// Returns the measure, and whether it is that of the baseline; `None` for a flag of the pair.
+    pub const fn measure(self) -> Option<(&'static Measure, bool)> {
+        match self {
+            Self::Tested(measure) => Some((measure, false)),
+            Self::Baseline(measure) => Some((measure, true)),
+            Self::Compared(Comparison { measure, in_baseline, .. }) => Some((measure, in_baseline)),
+            Self::Pair(_) => None,
+        }
     }
 
     fn is_flag(self) -> bool {
         match self {
             Self::Tested(measure) | Self::Baseline(measure) => measure.kind == MeasureKind::Flag,
-            Self::Pair(_) => true,
+            Self::Pair(_) | Self::Compared(_) => true,
         }
     }
 }
@@ -116,8 +167,13 @@ impl Expression {
     /// Returns the arms of which the gate judges what they report of themselves: the baseline, and the arm under test.
     pub fn reported_by(&self) -> [bool; 2] {
         let quantities = || std::iter::once(self.quantity).chain(self.condition);
-        let baseline = quantities().any(|of| matches!(of, Quantity::Baseline(measure) if measure.is_reported()));
-        [baseline, quantities().any(|of| matches!(of, Quantity::Tested(measure) if measure.is_reported()))]
+        let reports = |by_baseline: bool| {
+            let reported = |of: Quantity| {
+                of.measure().is_some_and(|(measure, in_baseline)| in_baseline == by_baseline && measure.is_reported())
+            };
+            quantities().any(reported)
+        };
+        [reports(true), reports(false)]
     }
 
     /// Returns the left-hand side, which identifies what is judged.
@@ -145,7 +201,7 @@ impl FromStr for Expression {
     }
 }
 
-const FORM: &str = "it has the form `p99(min_ttc_rear_s) >= 1.0` or `count(ego_collided) <= 0`";
+const FORM: &str = "it has the form `p99(min_ttc_rear_s) >= 1.0`, `count(ego_collided) <= 0` or `share(imposed_braking_mps2 > 3) <= 0.05`";
 
 fn parse(text: &str) -> Result<Expression, String> {
     let (left, operator, right) = match (text.split_once("<="), text.split_once(">=")) {
@@ -205,6 +261,11 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
 }
 
 fn parse_quantity(name: &str) -> Result<Quantity, String> {
+    if let Some(at) = name.find(['>', '<']) {
+        let (number, threshold) = (name[..at].trim(), name[at + 1..].trim());
+        let side = if name[at..].starts_with('>') { Side::Above } else { Side::Below };
+        return parse_comparison(number, side, threshold);
+    }
     if let Some(flag) = PairFlag::named(name) {
         return Ok(Quantity::Pair(flag));
     }
@@ -216,6 +277,19 @@ fn parse_quantity(name: &str) -> Result<Quantity, String> {
         Some(measure) if in_baseline => Ok(Quantity::Baseline(measure)),
         Some(measure) => Ok(Quantity::Tested(measure)),
         None => Err(format!("`{name}` is not a measure; there are {}", measure_names())),
+    }
+}
+
+fn parse_comparison(number: &str, side: Side, threshold: &str) -> Result<Quantity, String> {
+    let quantity = parse_quantity(number)?;
+    let Some((measure, in_baseline)) = quantity.measure().filter(|_| !quantity.is_flag()) else {
+        return Err(format!("`{number}` is a flag, which has no threshold"));
+    };
+    match threshold.parse::<f64>() {
+        Ok(threshold) if threshold.is_finite() => {
+            Ok(Quantity::Compared(Comparison { measure, in_baseline, side, threshold }))
+        }
+        _ => Err(format!("the threshold `{threshold}` of `{number}` is not a finite number")),
     }
 }
 
@@ -251,6 +325,11 @@ impl fmt::Display for Quantity {
             Self::Tested(measure) => f.write_str(measure.name),
             Self::Baseline(measure) => write!(f, "baseline.{}", measure.name),
             Self::Pair(flag) => f.write_str(flag.name()),
+            Self::Compared(Comparison { measure, in_baseline, side, threshold }) => {
+                let arm = if *in_baseline { "baseline." } else { "" };
+                let sign = if *side == Side::Above { '>' } else { '<' };
+                write!(f, "{arm}{} {sign} {threshold}", measure.name)
+            }
         }
     }
 }
@@ -284,6 +363,9 @@ mod tests {
             "upper(induced) <= 0.01",
             "max(baseline.max_jerk_mps3) <= 5.5",
             "mean(thw_gain_s | goal_in_reach) >= 1.9",
+            "share(imposed_braking_mps2 > 3) <= 0.05",
+            "upper(imposed_braking_mps2 > 3 | baseline.imposed_braking_mps2 < 3) <= 0.05",
+            "count(min_ttc_rear_s < -0.5) <= 0",
         ] {
             let expression: Expression = text.parse().unwrap();
             assert_eq!(expression.to_string(), text);
@@ -291,6 +373,17 @@ mod tests {
         }
         let spaced: Expression = "  share( engaged|rear_near )>=0.9".parse().unwrap();
         assert_eq!(spaced.to_string(), "share(engaged | rear_near) >= 0.9");
+    }
+
+    #[test]
+    fn a_number_beyond_a_threshold_is_a_flag_and_what_is_not_a_number_is_neither() {
+        let expression: Expression = "share(baseline.imposed_braking_mps2 > 3) <= 0.05".parse().unwrap();
+        assert!(expression.needs_pairs());
+        let Quantity::Compared(comparison) = expression.quantity else { panic!("{:?}", expression.quantity) };
+        assert_eq!([2.9, 3.0, 3.1].map(|value| comparison.of(value)), [0.0, 0.0, 1.0]);
+        assert!(comparison.of(f64::NAN).is_nan());
+        let below = Comparison { side: Side::Below, ..comparison };
+        assert_eq!([2.9, 3.0, 3.1].map(|value| below.of(value)), [1.0, 0.0, 0.0]);
     }
 
     #[test]
@@ -308,6 +401,12 @@ mod tests {
             ("max(harm | harm) <= 1", "not a flag"),
             ("share(engaged) <= 1.5", "not from 0 to 1"),
             ("count ego_collided <= 1", "has the form"),
+            ("share(ego_collided > 0) <= 0.1", "is a flag, which has no threshold"),
+            ("share(induced > 0) <= 0.1", "is a flag, which has no threshold"),
+            ("share(imposed_braking_mps2 > hard) <= 0.1", "is not a finite number"),
+            ("share(imposed_braking_mps2 > 3 > 2) <= 0.1", "is not a finite number"),
+            ("share(imposed_braking_mps2 >= 3) <= 0.1", "one `<=` or `>="),
+            ("max(imposed_braking_mps2 > 3) <= 1", "is a flag, which has"),
         ] {
             let error = text.parse::<Expression>().unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");

@@ -4,7 +4,7 @@
 //! of `outcomes.parquet` where there is one.
 
 use crate::harm::harm;
-use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome, Promise};
+use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome, Promise, worse};
 use crate::promise::{Goal, HARD_BRAKING_MPS2, is_due};
 use closecall_traffic::Measured;
 
@@ -59,7 +59,7 @@ impl Measure {
 }
 
 /// The measures that rest on the states that a controller reports.
-const REPORTED: [&str; 3] = ["engaged", "goal_in_reach", "thw_gain_s"];
+const REPORTED: [&str; 4] = ["engaged", "goal_in_reach", "thw_gain_s", "emergency_braked"];
 
 /// The flags of a pair of arms on the same sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,8 +157,17 @@ pub const MEASURES: &[Measure] = &[
         "two vehicles other than the ego collide with each other, and the ego does not collide",
         |outcome| is(outcome.others_collided() && !outcome.ego_collided()),
     ),
+    flag("ego_strikes", "the ego strikes another vehicle", |outcome| is(outcome.ego_strikes().next().is_some())),
+    flag("ego_is_struck", "another vehicle strikes the ego", |outcome| is(outcome.ego_struck().next().is_some())),
+    flag("ego_touched", "the bumpers of the ego and of another vehicle meet at less than 0.67 m/s", |outcome| {
+        is(outcome.ego_touched())
+    }),
+    flag("touched", "two bumpers meet at less than 0.67 m/s", |outcome| is(!outcome.touches.is_empty())),
     flag("engaged", "the margin increase system engages", |outcome| {
         is(outcome.mis.as_ref().is_ok_and(|mis| mis.engaged_at_s.is_ok()))
+    }),
+    flag("emergency_braked", "the controller says that it brakes in an emergency", |outcome| {
+        is(outcome.ahead?.emergency_braking_at_s.is_ok())
     }),
     flag("goal_in_reach", "the system says, when it engages, that its goal is in reach", |outcome| {
         is(outcome.mis.as_ref().is_ok_and(|mis| mis.goal_in_reach == Some(true)))
@@ -229,6 +238,14 @@ pub const MEASURES: &[Measure] = &[
     number("min_ttc_rear_s", "smallest time to collision of the rear vehicle", |outcome| {
         margin(outcome, |margins| margins.min_ttc_rear_s)
     }),
+    number("min_ttc_front_s", "smallest time to collision with the vehicle ahead", |outcome| {
+        outcome.ahead?.min_ttc_front_s.ok()
+    }),
+    number(
+        "impact_speed_mps",
+        "largest relative speed with which the ego strikes another vehicle; 0 if it strikes none",
+        |outcome| Some(outcome.ego_strikes().map(|collision| collision.relative_speed_mps).fold(0.0, worse)),
+    ),
     number("max_deceleration_mps2", "largest deceleration of the ego before it collides", |outcome| {
         Some(outcome.margins.max_deceleration_mps2)
     }),

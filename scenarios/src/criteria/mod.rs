@@ -12,5 +12,5 @@ mod expression;
 mod measure;
 
 pub use config::{FlagName, GateConfig};
-pub use expression::{Aggregate, Expression, ExpressionError, Operator, Quantity};
+pub use expression::{Aggregate, Comparison, Expression, ExpressionError, Operator, Quantity, Side};
 pub use measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag, SLOWED_FOR_REAR};

@@ -70,6 +70,9 @@ pub struct ParameterConfig {
     /// Provenance: the distribution was assumed, for the reason given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed: Option<String>,
+    /// What trajectory data show of the quantity. A verdict says which share of the samples lies beyond it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observed: Option<ObservedConfig>,
     /// Rank correlations (Spearman) with other parameters, by their names: from -0.99 to 0.99. It suffices that one of two
     /// parameters states theirs. A pair that neither states is independent.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "finite::correlations")]
@@ -161,6 +164,39 @@ pub struct FittedConfig {
     pub cut: Option<[f64; 2]>,
 }
 
+/// What trajectory data show of a quantity, beside the distribution that a scenario samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ObservedConfig {
+    /// Number of observations.
+    pub n: u64,
+    /// Smallest observed value.
+    #[serde(deserialize_with = "finite::number")]
+    pub min: f64,
+    /// Largest observed value, not below the smallest.
+    #[serde(deserialize_with = "finite::number")]
+    pub max: f64,
+    /// The trajectory data, and the quantity.
+    pub source: String,
+}
+
+impl ObservedConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        if self.n == 0 {
+            let problem = Problem::WrongCount { value: self.n, allowed: "at least 1 observation" };
+            return Err(ConfigError::new("n", problem));
+        }
+        if !(self.min <= self.max) {
+            let rule = format!("{} is not below {}", self.min, self.max);
+            return Err(ConfigError::new("min", Problem::Contradiction { other: "max", rule }));
+        }
+        if self.source.trim().is_empty() {
+            return Err(ConfigError::new("source", Problem::Missing { needed: "where it was observed" }));
+        }
+        Ok(())
+    }
+}
+
 impl ParameterConfig {
     /// Creates a parameter with a uniform distribution between two bounds.
     pub fn uniform(min: f64, max: f64) -> Self {
@@ -198,8 +234,12 @@ impl ParameterConfig {
             let rule = "a parameter has exactly one distribution".to_owned();
             return Err(ConfigError::new(second, Problem::Contradiction { other: key, rule }));
         }
+        if let Some(observed) = &self.observed {
+            observed.check().map_err(|error| error.within("observed"))?;
+        }
         Ok(SpaceEntry {
             distribution: distribution.map_err(|error| error.within(key))?,
+            observed: self.observed.clone(),
             provenance: self.provenance()?,
             note: self.note.clone(),
         })

@@ -26,8 +26,8 @@ mod space;
 mod tests;
 
 pub use config::{
-    EmpiricalConfig, FittedConfig, LogNormalConfig, ParameterConfig, ParametersConfig, TruncatedNormalConfig,
-    UniformConfig,
+    EmpiricalConfig, FittedConfig, LogNormalConfig, ObservedConfig, ParameterConfig, ParametersConfig,
+    TruncatedNormalConfig, UniformConfig,
 };
 pub use distribution::Distribution;
 pub use space::{ParameterSpace, Provenance, SpaceEntry, Variation};

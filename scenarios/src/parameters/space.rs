@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use closecall_traffic::{ParameterName, Parameters, Value};
 
 use super::copula::Copula;
-use super::{Distribution, FittedConfig};
+use super::{Distribution, FittedConfig, ObservedConfig};
 
 /// The provenance of a distribution.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +25,21 @@ pub struct SpaceEntry {
     pub distribution: Distribution,
     /// Provenance of the distribution.
     pub provenance: Provenance,
+    /// What trajectory data show of the quantity.
+    pub observed: Option<ObservedConfig>,
     /// A remark for the reader.
     pub note: Option<String>,
+}
+
+impl SpaceEntry {
+    /// Returns the range that trajectory data show, and the probability of a value beyond it; `None` if no data are stated, or no value lies beyond.
+    pub fn beyond_observed(&self) -> Option<(&ObservedConfig, f64)> {
+        let observed = self.observed.as_ref()?;
+        let beyond = 1.0 - (self.distribution.cdf(observed.max)? - self.distribution.cdf(observed.min)?);
+        // An empirical distribution begins at the smallest observed value.
+        let [low, high] = self.distribution.bounds()?;
+        (low < observed.min || high > observed.max).then_some((observed, beyond))
+    }
 }
 
 /// The parameters of a scenario with their distributions, in the order of their names.

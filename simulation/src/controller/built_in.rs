@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver, R157Fuzzy, Slower, Slowing};
 
-use super::TimeGap;
+use super::{Functions, TimeGap};
 use crate::run::ControllerFactory;
 
 /// A built-in controller.
@@ -23,6 +23,8 @@ pub enum BuiltIn {
     Blind,
     /// As [`BuiltIn::Blind`], twice as hard and twice as far.
     Crawl,
+    /// The scenario's ego stack with the functions that the arm names.
+    Stack(Functions),
     /// As [`BuiltIn::Acc`], with another constant time gap.
     Gap(TimeGap),
     /// As [`BuiltIn::Acc`], with the minimum following distance of UN Regulation 157.
@@ -43,6 +45,7 @@ impl fmt::Display for BuiltIn {
             Self::MisExtended => f.write_str("mis-extended"),
             Self::Blind => f.write_str("blind"),
             Self::Crawl => f.write_str("crawl"),
+            Self::Stack(functions) => functions.fmt(f),
             Self::Gap(gap) => write!(f, "gap-{gap}"),
             Self::R157Gap => f.write_str("r157-gap"),
             Self::R157Driver => f.write_str("r157-driver"),
@@ -67,7 +70,41 @@ impl BuiltIn {
 
     /// Returns true if the controller is a margin increase system, so that it needs a stack that has one.
     pub const fn needs_mis(self) -> bool {
-        matches!(self, Self::Mis | Self::MisTtce | Self::MisExtended)
+        match self {
+            Self::Stack(functions) => functions.needs_mis(),
+            _ => matches!(self, Self::Mis | Self::MisTtce | Self::MisExtended),
+        }
+    }
+
+    /// Returns true if the settings of the stack are all that makes the controller.
+    pub const fn is_stack(self) -> bool {
+        !matches!(self, Self::Blind | Self::Crawl | Self::R157Driver | Self::R157Fsm)
+    }
+
+    /// Returns the settings that the controller makes of those of the scenario.
+    pub(super) fn settings(self, settings: &EgoSettings) -> EgoSettings {
+        match self {
+            Self::Acc | Self::Blind | Self::Crawl => settings.without_mis(),
+            Self::Mis => *settings,
+            Self::MisTtce => settings.with_ttce_mis(),
+            Self::MisExtended => settings.with_extended_mis(),
+            Self::Stack(functions) => functions.of(settings),
+            Self::Gap(gap) => settings.with_time_gap(gap.s()),
+            Self::R157Gap => settings.with_r157_gap(),
+            Self::R157Driver => R157Driver::settings(*settings),
+            Self::R157Fsm => settings.with_fuzzy_safety(),
+        }
+    }
+
+    /// Returns a controller for one run, with the settings that it makes of those of the scenario.
+    pub(super) fn controller(self, settings: EgoSettings) -> Box<dyn EgoController> {
+        match self {
+            Self::Blind => Box::new(Slower::new(settings, Slowing::BLIND)),
+            Self::Crawl => Box::new(Slower::new(settings, Slowing::CRAWL)),
+            Self::R157Driver => Box::new(R157Driver::new(settings)),
+            Self::R157Fsm => Box::new(R157Fuzzy::new(settings)),
+            _ => Box::new(EgoStack::new(settings)),
+        }
     }
 
     /// Returns a factory of this controller.
@@ -92,16 +129,7 @@ impl ControllerFactory for BuiltInFactory {
     }
 
     fn settings(&self, settings: &EgoSettings) -> EgoSettings {
-        match self.built_in {
-            BuiltIn::Acc | BuiltIn::Blind | BuiltIn::Crawl => settings.without_mis(),
-            BuiltIn::Mis => *settings,
-            BuiltIn::MisTtce => settings.with_ttce_mis(),
-            BuiltIn::MisExtended => settings.with_extended_mis(),
-            BuiltIn::Gap(gap) => settings.with_time_gap(gap.s()),
-            BuiltIn::R157Gap => settings.with_r157_gap(),
-            BuiltIn::R157Driver => R157Driver::settings(*settings),
-            BuiltIn::R157Fsm => settings.with_fuzzy_safety(),
-        }
+        self.built_in.settings(settings)
     }
 
     fn has_mis(&self, settings: &EgoSettings) -> bool {
@@ -114,13 +142,6 @@ impl ControllerFactory for BuiltInFactory {
     }
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
-        let settings = self.settings(settings);
-        match self.built_in {
-            BuiltIn::Blind => Box::new(Slower::new(settings, Slowing::BLIND)),
-            BuiltIn::Crawl => Box::new(Slower::new(settings, Slowing::CRAWL)),
-            BuiltIn::R157Driver => Box::new(R157Driver::new(settings)),
-            BuiltIn::R157Fsm => Box::new(R157Fuzzy::new(settings)),
-            _ => Box::new(EgoStack::new(settings)),
-        }
+        self.built_in.controller(self.settings(settings))
     }
 }

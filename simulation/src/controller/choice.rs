@@ -6,13 +6,14 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use closecall_controllers::external::Kind;
+use closecall_scenarios::Function;
 use closecall_traffic::suggest::hint;
 use serde::{Deserialize, Serialize};
 
 use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecFactory, ExecSettings, NAME as EXEC};
 use super::hosted::{self, HostedController, PREFIX as HOSTED};
 use super::native::{NativeError, NativeFactory, NativeSettings};
-use super::{BuiltIn, TimeGap};
+use super::{BuiltIn, Functions, TimeGap, Tuned, TunedError};
 use crate::run::ControllerFactory;
 
 /// A controller, as a campaign's manifest stores it.
@@ -21,6 +22,8 @@ use crate::run::ControllerFactory;
 pub enum ControllerChoice {
     /// A controller of this program.
     BuiltIn(BuiltIn),
+    /// The same with settings of its own.
+    Tuned(Tuned),
     /// A separate process for each sample.
     Exec(ExecSettings),
     /// A shared library or an FMU, in a process of its own.
@@ -30,9 +33,9 @@ pub enum ControllerChoice {
 }
 
 /// The names and forms of the controllers, as messages list them.
-const KNOWN: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `blind`, `crawl`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
+const KNOWN: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `acc-aeb`, `acc+aeb`, `cruise+aeb`, `blind`, `crawl`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
 /// The words that are suggested for a misspelt one.
-const WORDS: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `blind`, `crawl`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
+const WORDS: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `acc-aeb`, `acc+aeb`, `cruise`, `cruise+aeb`, `blind`, `crawl`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
 /// The beginning of the name of a controller with another constant time gap.
 const GAP: &str = "gap-";
 
@@ -46,6 +49,7 @@ impl ControllerChoice {
     pub fn name(&self) -> String {
         match self {
             Self::BuiltIn(built_in) => built_in.to_string(),
+            Self::Tuned(tuned) => tuned.to_string(),
             Self::Exec(_) => EXEC.to_owned(),
             Self::Native(native) => native.name(),
             Self::Hosted(hosted) => hosted.name(),
@@ -64,9 +68,43 @@ impl ControllerChoice {
         names.iter().enumerate().map(numbered).collect()
     }
 
-    /// Returns the built-in controller, or `None` if this is a process.
+    /// Returns the baseline of a scenario that judges this function, and the controller under test.
+    pub const fn of_function(function: Function) -> [Self; 2] {
+        match function {
+            Function::Mis => [Self::ACC, Self::MIS],
+            Function::Aeb => {
+                let [without, with] = [Functions::ACC_ALONE, Functions::ACC_AND_AEB];
+                [Self::BuiltIn(BuiltIn::Stack(without)), Self::BuiltIn(BuiltIn::Stack(with))]
+            }
+            Function::Acc => {
+                let [without, with] = [Functions::CRUISE_AND_AEB, Functions::ACC_AND_AEB];
+                [Self::BuiltIn(BuiltIn::Stack(without)), Self::BuiltIn(BuiltIn::Stack(with))]
+            }
+        }
+    }
+
+    /// Returns the built-in controller, with settings of its own or without; `None` if this is a process.
     pub const fn built_in(&self) -> Option<BuiltIn> {
-        if let Self::BuiltIn(built_in) = self { Some(*built_in) } else { None }
+        match self {
+            Self::BuiltIn(built_in) => Some(*built_in),
+            Self::Tuned(tuned) => Some(tuned.base),
+            _ => None,
+        }
+    }
+
+    /// Returns the same controller with a setting of its own.
+    ///
+    /// # Errors
+    /// [`TunedError`] if it is not built in, or has no such setting.
+    pub fn with_setting(&self, setting: &str) -> Result<Self, TunedError> {
+        match self {
+            Self::BuiltIn(built_in) => Ok(Self::Tuned(Tuned::new(*built_in).with(setting)?)),
+            Self::Tuned(tuned) => Ok(Self::Tuned(tuned.clone().with(setting)?)),
+            other => Err(TunedError {
+                setting: setting.to_owned(),
+                problem: format!("`{other}` is not built in, and reads its settings itself"),
+            }),
+        }
     }
 
     /// Returns the settings of the process, or `None` if this is a built-in controller.
@@ -87,7 +125,7 @@ impl ControllerChoice {
         let limits = match &mut limited {
             Self::Exec(exec) => (&mut exec.timeout_ms, &mut exec.memory_mib),
             Self::Native(native) => (&mut native.timeout_ms, &mut native.memory_mib),
-            Self::BuiltIn(_) | Self::Hosted(_) => return limited,
+            Self::BuiltIn(_) | Self::Tuned(_) | Self::Hosted(_) => return limited,
         };
         *limits.0 = timeout_ms.unwrap_or(*limits.0);
         *limits.1 = memory_mib.unwrap_or(*limits.1);
@@ -97,7 +135,7 @@ impl ControllerChoice {
     /// Returns true if the controller runs in a process that has limits.
     pub fn has_limits(&self) -> bool {
         match self {
-            Self::BuiltIn(_) => false,
+            Self::BuiltIn(_) | Self::Tuned(_) => false,
             Self::Exec(_) | Self::Native(_) => true,
             Self::Hosted(hosted) => hosted.has_processes(),
         }
@@ -113,7 +151,7 @@ impl ControllerChoice {
             Self::Exec(exec) => Child::try_start(exec, folder)
                 .map_err(|error| NativeError::Start { controller: self.to_string(), reason: error.to_string() }),
             Self::Native(native) => native.probe(folder).map(drop),
-            Self::BuiltIn(_) | Self::Hosted(_) => Ok(()),
+            Self::BuiltIn(_) | Self::Tuned(_) | Self::Hosted(_) => Ok(()),
         }
     }
 
@@ -127,6 +165,7 @@ impl ControllerChoice {
     pub fn factory_in(&self, folder: Option<&Path>, name: String) -> Arc<dyn ControllerFactory> {
         match self {
             Self::BuiltIn(built_in) => built_in.factory(),
+            Self::Tuned(tuned) => tuned.factory(),
             Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
             Self::Native(native) => Arc::new(NativeFactory::new(native, folder, name)),
             Self::Hosted(hosted) => hosted.factory(name),
@@ -150,6 +189,7 @@ impl fmt::Display for ControllerChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::BuiltIn(built_in) => built_in.fmt(f),
+            Self::Tuned(tuned) => tuned.fmt(f),
             Self::Exec(settings) => write!(f, "{EXEC}:{}", settings.command),
             Self::Native(native) => f.write_str(&native.text()),
             Self::Hosted(hosted) => hosted.fmt(f),
@@ -176,6 +216,20 @@ pub enum UnknownController {
     Gap {
         /// The text.
         text: String,
+    },
+    /// A list of functions is none.
+    #[error("`{text}` is not a controller: a list of functions has {}", Functions::ALLOWED)]
+    Functions {
+        /// The text.
+        text: String,
+    },
+    /// A controller with settings of its own has one that it cannot have.
+    #[error("`{text}` is not a controller: {source}")]
+    Setting {
+        /// The text.
+        text: String,
+        /// The reason.
+        source: TunedError,
     },
     /// There is no controller of this name in the program that has Closecall as a library.
     #[error("`{text}` is a controller of a Python program, and can be run from there only: {}", hosted::known())]
@@ -221,6 +275,16 @@ impl FromStr for ControllerChoice {
             let found = hosted.is_registered().then_some(Self::Hosted(hosted));
             return found.ok_or_else(|| UnknownController::Hosted { text: text.to_owned() });
         }
+        if let Some((controller, settings)) = text.split_once(':')
+            && let Ok(Self::BuiltIn(base)) = controller.parse()
+        {
+            let fail = |source| UnknownController::Setting { text: text.to_owned(), source };
+            return Ok(Self::Tuned(Tuned::parse(base, settings).map_err(fail)?));
+        }
+        if Functions::is_meant(text) {
+            let found = Functions::parse(text).map(|functions| BuiltIn::Stack(functions).into());
+            return found.ok_or_else(|| UnknownController::Functions { text: text.to_owned() });
+        }
         if let Some(found) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
             return Ok(found.into());
         }
@@ -258,6 +322,7 @@ impl From<ControllerChoice> for Stored {
             ControllerChoice::Exec(exec) => Self::Process(StoredProcess::Exec(exec)),
             ControllerChoice::Native(native) => Self::Process(StoredProcess::Native(native)),
             ControllerChoice::BuiltIn(built_in) => Self::BuiltIn(built_in.to_string()),
+            ControllerChoice::Tuned(tuned) => Self::BuiltIn(tuned.to_string()),
             ControllerChoice::Hosted(hosted) => Self::BuiltIn(hosted.to_string()),
         }
     }
@@ -301,6 +366,10 @@ mod tests {
             "r157-gap",
             "r157-driver",
             "r157-fsm",
+            "acc-aeb",
+            "acc+aeb",
+            "acc+aeb+mis",
+            "cruise+aeb",
         ] {
             let choice: ControllerChoice = name.parse().unwrap();
             assert_eq!((choice.to_string(), choice.name()), (name.to_owned(), name.to_owned()));
@@ -308,6 +377,12 @@ mod tests {
             let text = serde_json::to_string(&choice).unwrap();
             assert_eq!(text, format!("\"{name}\""));
             assert_eq!(serde_json::from_str::<ControllerChoice>(&text).unwrap(), choice);
+        }
+        for text in ["acc:aeb.trigger-mps2=5", "acc+aeb:aeb.trigger-mps2=5:acc.time-gap-s=1.5"] {
+            let choice: ControllerChoice = text.parse().unwrap();
+            assert_eq!((choice.to_string(), choice.name()), (text.to_owned(), text.to_owned()));
+            let stored = serde_json::to_string(&choice).unwrap();
+            assert_eq!(serde_json::from_str::<ControllerChoice>(&stored).unwrap(), choice, "{stored}");
         }
         for text in ["lib:./a.so", "fmu:/b/c.fmu"] {
             let choice = text.parse::<ControllerChoice>().unwrap().limited(Some(250), None);
@@ -330,6 +405,8 @@ mod tests {
         assert!(refusal("exce:python3 a.py").ends_with("; did you mean `exec`?"));
         assert!(refusal("r157-drivr").ends_with("; did you mean `r157-driver`?"));
         assert!(refusal("gap-3.0").contains("0.8 to 2.5 s in steps of 0.1 s"));
+        assert!(refusal("acc+abs").contains("`acc+aeb`"), "{}", refusal("acc+abs"));
+        assert!(refusal("acc:aeb.trigger-mps2=50").contains("no setting of the ego stack"));
         assert!(refusal("exec:").contains("it is empty"));
         assert!(refusal("lib:").contains("names no file"));
     }

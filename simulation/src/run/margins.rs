@@ -48,6 +48,10 @@ impl CurrentMargins {
             thw_front_s: gap_front_m.and_then(|gap_m| time_headway_s(gap_m, own.speed_mps)),
             gap_rear_m,
             thw_rear_s: behind.and_then(|behind| time_headway_s(behind.gap_m, behind.speed_mps)),
+            ttc_front_s: ahead.ok_or(Absent::NoLead).and_then(|ahead| {
+                let gap_m = ahead.gap_m.max(0.0);
+                time_to_collision_s(gap_m, own.speed_mps, ahead.speed_mps)
+            }),
             ttc_rear_s: behind.and_then(|behind| time_to_collision_s(behind.gap_m, behind.speed_mps, own.speed_mps)),
         }
     }
@@ -66,6 +70,7 @@ struct LeadDuration {
 #[derive(Debug)]
 pub(crate) struct MarginMeter {
     extremes: Margins,
+    min_ttc_front_s: Measured,
     last_acceleration_mps2: Option<f64>,
     /// Speed of the ego at the start (m/s).
     start_speed_mps: Option<f64>,
@@ -86,7 +91,14 @@ impl MarginMeter {
             max_jerk_mps3: 0.0,
             max_speed_deficit_mps: 0.0,
         };
-        Self { extremes, last_acceleration_mps2: None, start_speed_mps: None, last_lead: None, step_s }
+        Self {
+            extremes,
+            min_ttc_front_s: Err(Absent::NoLead),
+            last_acceleration_mps2: None,
+            start_speed_mps: None,
+            last_lead: None,
+            step_s,
+        }
     }
 
     /// Updates the extremes by one physics step, and returns the speed with which that of the ego is compared (m/s), if there is one now. It must not be
@@ -98,6 +110,7 @@ impl MarginMeter {
         keep_least(&mut extremes.min_gap_front_m, now.gap_front_m);
         keep_least(&mut extremes.min_gap_rear_m, now.gap_rear_m);
         keep_least(&mut extremes.min_ttc_rear_s, now.ttc_rear_s);
+        keep_least(&mut self.min_ttc_front_s, now.ttc_front_s);
         extremes.max_deceleration_mps2 = extremes.max_deceleration_mps2.max(-own.acceleration_mps2);
         // When the vehicle comes to a standstill, its deceleration ends at once. The controller did not cause that jerk.
         if let Some(last_mps2) = self.last_acceleration_mps2.filter(|_| own.speed_mps > 0.0) {
@@ -134,6 +147,11 @@ impl MarginMeter {
     pub(crate) fn note_collision(&mut self, is_ahead: bool) {
         let gap = if is_ahead { &mut self.extremes.min_gap_front_m } else { &mut self.extremes.min_gap_rear_m };
         *gap = Ok(0.0);
+    }
+
+    /// Returns the smallest time to collision with the vehicle ahead (s).
+    pub(crate) const fn min_ttc_front_s(&self) -> Measured {
+        self.min_ttc_front_s
     }
 
     /// Returns the extremes.

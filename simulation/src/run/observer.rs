@@ -34,6 +34,8 @@ pub struct CurrentMargins {
     pub thw_rear_s: Measured,
     /// Time to collision of the vehicle behind (s).
     pub ttc_rear_s: Measured,
+    /// Time to collision with the vehicle ahead, in the lane or in the path (s).
+    pub ttc_front_s: Measured,
 }
 
 /// The state of a run at one control step (25 Hz).
@@ -89,6 +91,8 @@ pub enum RunEvent {
     },
     /// Two vehicles touched for the first time. The changes of velocity are not known yet.
     Collision(Collision),
+    /// The bumpers of two vehicles met for the first time, too slowly for a collision.
+    Touch(Collision),
 }
 
 /// Observes a run.

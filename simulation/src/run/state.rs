@@ -8,7 +8,7 @@ use closecall_controllers::CheckedDriver;
 use closecall_controllers::{EgoCommand, EgoInput, EgoSettings, EgoState, Looks, MisSettings, Neighbours, Reason};
 use closecall_sensors::{Perception, Scene, SceneVehicle};
 use closecall_traffic::{
-    CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Time, Track, VehicleState,
+    Absent, CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Time, Track, VehicleState,
 };
 
 use super::cost::{CostMeter, Instant, Rear};
@@ -26,7 +26,7 @@ use super::start::start_of_ego;
 use super::{Arm, CurrentMargins, Observer, RunEvent, RunKey, SampleError, StepView};
 use crate::world::{Action, InitialVehicle, World};
 use closecall_scenarios::Scenario;
-use closecall_scenarios::outcome::{EndReason, Moment, Outcome, Phase};
+use closecall_scenarios::outcome::{Ahead, EndReason, Moment, Outcome, Phase};
 
 /// Deceleration of the ego above which it counts as braking hard (m/s²): an assumption, above the 1 m/s² of the paper's
 /// comfort limit with its overshoot; 1.2 to 3 are plausible.
@@ -69,6 +69,8 @@ pub(super) struct Run<'a> {
     mis_settings: MisSettings,
     /// The last command of the ego controller.
     command: Option<EgoCommand>,
+    /// Time of the first command of emergency braking.
+    emergency_braking_at: Option<Time>,
     /// How far the driver of each vehicle looks. The ego perceives with its sensors; its margins need the lane and the path.
     looks: Vec<Looks>,
     // Buffers that are reused in each step.
@@ -136,6 +138,7 @@ impl<'a> Run<'a> {
             moments: Moments::default(),
             mis_settings,
             command: None,
+            emergency_braking_at: None,
             neighbours: vec![Neighbours::default(); world.len()],
             // One track of each of the three object-level sensors.
             tracks: Vec::with_capacity(3 * world.len()),
@@ -295,6 +298,9 @@ impl<'a> Run<'a> {
             let changed = RunEvent::EgoStateChanged { from, to: command.state, reason: command.reason };
             observer.event(time, &changed);
         }
+        if command.state == EgoState::EmergencyBraking {
+            self.emergency_braking_at.get_or_insert(time);
+        }
         self.command = Some(command);
         let ego = self.scenario.ego;
         let rear = self.observe_rear();
@@ -431,7 +437,12 @@ impl<'a> Run<'a> {
             end,
             duration: self.world.time(),
             collisions: self.world.collisions().to_vec(),
+            touches: self.world.touches().to_vec(),
             moments: self.moments.finish(),
+            ahead: Some(Ahead {
+                min_ttc_front_s: self.meter.min_ttc_front_s(),
+                emergency_braking_at_s: self.emergency_braking_at.map(Time::s).ok_or(Absent::NoEmergencyBraking),
+            }),
             margins: self.meter.finish(),
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
             cost: Some(self.cost.finish()),

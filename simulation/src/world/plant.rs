@@ -164,6 +164,12 @@ impl Plant {
         -self.state.acceleration_mps2 * DIVE_RAD_PER_MPS2
     }
 
+    /// Puts the vehicle where its bumper meets another one: it gets this speed (m/s), and is moved along the road by `shift_m`.
+    pub(crate) fn meet(&mut self, speed_mps: f64, shift_m: f64) {
+        self.state.speed_mps = speed_mps;
+        self.state.s_m += shift_m;
+    }
+
     /// Starts a lane change, or replaces the one in progress. The path becomes longer than requested if the tyres could not
     /// provide the lateral acceleration otherwise.
     pub(crate) fn change_lane(&mut self, change: LaneChange, road: &Road) {

@@ -1,8 +1,9 @@
 //! The state of all vehicles, moved by one step at a time.
 
 use closecall_controllers::{LaneChange, Looks, Neighbours, Weave};
-use closecall_traffic::geometry::OrientedBox;
-use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleState};
+use closecall_traffic::geometry::{BoxSide, OrientedBox};
+use closecall_traffic::metrics::bumper_gap_m;
+use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleClass, VehicleState};
 use nalgebra::Vector2;
 
 use super::contact::{self, ContactSearch, StepBoxes, StruckVehicle, Touch};
@@ -10,7 +11,10 @@ use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
 use super::neighbours::{self, Around, Extent};
 use super::plant::Plant;
 use super::search::NeighbourSearch;
-use closecall_scenarios::outcome::{Collision, Phase};
+use closecall_scenarios::outcome::{Collision, Phase, TOUCH_MPS};
+
+/// Gap at which two bumpers that touch are held apart (m): numerical. Neighbours with a gap below zero would count as side by side.
+const HELD_APART_M: f64 = 1e-3;
 
 /// The commands to one vehicle for one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -82,6 +86,8 @@ pub(crate) struct World {
     wreckage: Option<Wreckage>,
     open_impacts: Vec<OpenImpact>,
     collisions: Vec<Collision>,
+    /// The first touch of each pair whose bumpers have met.
+    bumper_touches: Vec<Collision>,
 }
 
 impl World {
@@ -114,6 +120,7 @@ impl World {
             wreckage: None,
             open_impacts: Vec::new(),
             collisions: Vec::new(),
+            bumper_touches: Vec::new(),
         };
         world.refresh_shapes();
         world
@@ -199,6 +206,11 @@ impl World {
         &self.collisions
     }
 
+    /// Returns the first touch of each pair whose bumpers have met so far, in order of time.
+    pub(crate) fn touches(&self) -> &[Collision] {
+        &self.bumper_touches
+    }
+
     /// Moves all vehicles by one step. `actions` is in the order of the actors; `phase` is noted in collisions of this step.
     pub(crate) fn step(&mut self, actions: &[Action], phase: Phase) {
         std::mem::swap(&mut self.shapes, &mut self.shapes_before);
@@ -251,16 +263,69 @@ impl World {
         let mut touches = std::mem::take(&mut self.touches);
         let boxes = StepBoxes { before: &self.shapes_before, after: &self.shapes };
         self.contacts.find(boxes, &self.by_name, &self.touched_pairs, &mut touches);
+        let mut are_apart = false;
         for touch in &touches {
-            self.start_collision(touch, phase);
+            match self.bumpers(touch) {
+                Some(bumpers) => {
+                    self.hold_apart(touch, bumpers, phase);
+                    are_apart = true;
+                }
+                None => self.start_collision(touch, phase),
+            }
         }
         self.touches = touches;
+        if are_apart {
+            self.refresh_shapes();
+        }
     }
 
-    /// Adds a collision to the list and hands its two vehicles to the solver.
-    fn start_collision(&mut self, touch: &Touch, phase: Phase) {
-        let [first, second] = touch.pair;
-        let velocities_mps = [self.velocity_mps(first), self.velocity_mps(second)];
+    /// Returns the two vehicles of a contact, the one behind first, if it is a touch: the front bumper of a car or truck meets the rear bumper of another one,
+    /// slowly, and both drive. A motorcycle has no bumper, and its rider may fall.
+    fn bumpers(&self, touch: &Touch) -> Option<[usize; 2]> {
+        let [behind, ahead] = match touch.struck_side {
+            [BoxSide::Front, BoxSide::Rear] => touch.pair,
+            [BoxSide::Rear, BoxSide::Front] => [touch.pair[1], touch.pair[0]],
+            _ => return None,
+        };
+        let has_bumper =
+            |actor: usize| !self.is_wrecked(actor) && self.vehicle(actor).class != VehicleClass::Motorcycle;
+        let is_slow = (self.velocity_mps(behind) - self.velocity_mps(ahead)).norm() < TOUCH_MPS;
+        (is_slow && has_bumper(behind) && has_bumper(ahead)).then_some([behind, ahead])
+    }
+
+    /// Notes a touch, unless it is a further one of its pair. The vehicle behind pushes the one ahead: from now on both have the speed that conserves their
+    /// momentum, until one of them brakes or accelerates away.
+    fn hold_apart(&mut self, touch: &Touch, [behind, ahead]: [usize; 2], phase: Phase) {
+        let [follower_mps, lead_mps] = [behind, ahead].map(|actor| self.state(actor).speed_mps);
+        let [follower_kg, lead_kg] = [behind, ahead].map(|actor| self.vehicle(actor).mass_kg);
+        let common_mps = (follower_kg * follower_mps + lead_kg * lead_mps) / (follower_kg + lead_kg);
+        let between = touch.pair.map(|actor| self.actors[actor].id.clone());
+        if !self.bumper_touches.iter().any(|known| known.between == between) {
+            let mut collision = self.contact(touch, phase);
+            let changes_mps = |actor: usize| (common_mps - if actor == behind { follower_mps } else { lead_mps }).abs();
+            collision.delta_v_mps = touch.pair.map(changes_mps);
+            self.bumper_touches.push(collision);
+        }
+        let distance_m = self.state(ahead).s_m - self.state(behind).s_m;
+        let [follower_m, lead_m] = [behind, ahead].map(|actor| self.vehicle(actor).dimensions.length_m);
+        let overlap_m = HELD_APART_M - bumper_gap_m(distance_m, follower_m, lead_m);
+        if follower_mps > lead_mps {
+            self.meet(ahead, common_mps, 0.0);
+            self.meet(behind, common_mps, -overlap_m.max(0.0));
+        } else {
+            self.meet(behind, follower_mps, -overlap_m.max(0.0));
+        }
+    }
+
+    fn meet(&mut self, actor: usize, speed_mps: f64, shift_m: f64) {
+        if let Body::Driven(plant) = &mut self.actors[actor].body {
+            plant.meet(speed_mps, shift_m);
+        }
+    }
+
+    /// Returns a contact of two vehicles, before any change of velocity.
+    fn contact(&self, touch: &Touch, phase: Phase) -> Collision {
+        let velocities_mps = touch.pair.map(|actor| self.velocity_mps(actor));
         let struck = |index: usize| StruckVehicle {
             shape: &self.shapes[touch.pair[index]],
             side: touch.struck_side[index],
@@ -268,15 +333,21 @@ impl World {
         };
         let closed_by = contact::closed_by(struck(0), struck(1));
         let since_start = Time::from_s(touch.fraction * self.step.s());
-        self.collisions.push(Collision {
+        Collision {
             time: self.time + since_start,
-            between: [self.actors[first].id.clone(), self.actors[second].id.clone()],
+            between: touch.pair.map(|actor| self.actors[actor].id.clone()),
             struck_side: touch.struck_side,
             closed_by,
             phase,
             relative_speed_mps: (velocities_mps[0] - velocities_mps[1]).norm(),
             delta_v_mps: [0.0; 2],
-        });
+        }
+    }
+
+    /// Adds a collision to the list and hands its two vehicles to the solver.
+    fn start_collision(&mut self, touch: &Touch, phase: Phase) {
+        let velocities_mps = touch.pair.map(|actor| self.velocity_mps(actor));
+        self.collisions.push(self.contact(touch, phase));
         let collision = self.collisions.len() - 1;
         self.touched_pairs.push(touch.pair);
         self.open_impacts.push(OpenImpact { collision, pair: touch.pair, velocities_mps, left_s: IMPACT_DURATION_S });
@@ -352,5 +423,102 @@ fn road_state(motion: &Motion, road: &Road, before: &VehicleState, step_s: f64) 
         yaw_rate_radps: motion.yaw_rate_radps,
         brake_light: true,
         indicator: before.indicator,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::PHYSICS_STEP;
+
+    use super::*;
+
+    /// Vehicles in one lane, each with its class, the position of its centre (m) and its speed (m/s).
+    fn world(vehicles: &[(VehicleClass, f64, f64)]) -> World {
+        let initial = |(index, &(class, s_m, speed_mps)): (usize, &(VehicleClass, f64, f64))| InitialVehicle {
+            id: ActorId::new(&format!("v{index}")).unwrap(),
+            vehicle: Vehicle::typical(class),
+            state: VehicleState { s_m, d_m: -1.875, speed_mps, ..VehicleState::default() },
+            weave: None,
+            has_ideal_actuators: true,
+        };
+        World::new(Road::straight(3), 0.9, PHYSICS_STEP, vehicles.iter().enumerate().map(initial).collect())
+    }
+
+    /// Runs the world for some seconds with a constant acceleration of each vehicle (m/s²), and returns the smallest gap between the first two (m).
+    fn drive(world: &mut World, duration_s: f64, accelerations_mps2: &[f64]) -> f64 {
+        let command = |mps2: &f64| Action { acceleration_mps2: *mps2, ..Action::default() };
+        let actions: Vec<Action> = accelerations_mps2.iter().map(command).collect();
+        let until = world.time() + Time::from_s(duration_s);
+        let mut least_m = f64::INFINITY;
+        while world.time() < until {
+            world.step(&actions, Phase::Approach);
+            let distance_m = world.state(0).s_m - world.state(1).s_m;
+            let [ahead_m, behind_m] = [0, 1].map(|actor| world.vehicle(actor).dimensions.length_m);
+            least_m = least_m.min(bumper_gap_m(distance_m, ahead_m, behind_m));
+        }
+        least_m
+    }
+
+    fn length_m(class: VehicleClass) -> f64 {
+        Vehicle::typical(class).dimensions.length_m
+    }
+
+    /// A car, and one 5 cm behind it that is faster by `closing_mps`.
+    fn close(closing_mps: f64) -> World {
+        let behind_m = 100.0 - length_m(VehicleClass::Car) - 0.05;
+        world(&[(VehicleClass::Car, 100.0, 20.0), (VehicleClass::Car, behind_m, 20.0 + closing_mps)])
+    }
+
+    #[test]
+    fn bumpers_that_meet_slowly_touch_and_both_drive_on() {
+        let mut world = close(0.3);
+        let least_m = drive(&mut world, 2.0, &[0.0, 0.0]);
+        assert!(world.collisions().is_empty() && world.touches().len() == 1, "{:?}", world.touches());
+        let touch = &world.touches()[0];
+        assert!((touch.relative_speed_mps - 0.3).abs() < 1e-9, "{touch:?}");
+        assert!(touch.delta_v_mps.iter().all(|delta_v_mps| (delta_v_mps - 0.15).abs() < 1e-9), "{touch:?}");
+        assert!(!world.is_wrecked(0) && !world.is_wrecked(1));
+        assert!([0, 1].map(|actor| world.state(actor).speed_mps).iter().all(|mps| (mps - 20.15).abs() < 1e-9));
+        assert!(least_m >= 0.0, "the boxes overlap by {least_m} m");
+    }
+
+    #[test]
+    fn a_vehicle_that_pushes_touches_once_and_does_not_overlap() {
+        let mut world = close(0.3);
+        drive(&mut world, 1.0, &[0.0, 0.0]);
+        let least_m = drive(&mut world, 3.0, &[-6.0, 1.0]);
+        assert!(world.collisions().is_empty() && world.touches().len() == 1, "{:?}", world.collisions());
+        assert!(least_m >= 0.0, "the boxes overlap by {least_m} m");
+    }
+
+    #[test]
+    fn a_touch_does_not_hide_a_later_hard_contact_of_the_same_pair() {
+        let mut world = close(0.3);
+        drive(&mut world, 1.0, &[0.0, 0.0]);
+        drive(&mut world, 1.0, &[0.0, -3.0]);
+        drive(&mut world, 3.0, &[-6.0, 1.0]);
+        assert_eq!((world.touches().len(), world.collisions().len()), (1, 1));
+        assert!(world.collisions()[0].relative_speed_mps > 2.0, "{:?}", world.collisions());
+    }
+
+    #[test]
+    fn a_touch_does_not_hide_a_later_hard_contact_with_a_third_vehicle() {
+        let behind_m = 100.0 - length_m(VehicleClass::Car) - 0.05;
+        let third = (VehicleClass::Car, behind_m - 30.0, 30.0);
+        let mut world = world(&[(VehicleClass::Car, 100.0, 20.0), (VehicleClass::Car, behind_m, 20.3), third]);
+        drive(&mut world, 4.0, &[0.0; 3]);
+        assert_eq!(world.touches().len(), 1);
+        assert!(world.collisions().iter().any(|hit| hit.relative_speed_mps > 9.0), "{:?}", world.collisions());
+    }
+
+    #[test]
+    fn a_fast_contact_a_motorcycle_and_a_wreck_collide_however_slowly() {
+        let mut fast = close(0.7);
+        drive(&mut fast, 1.0, &[0.0; 2]);
+        assert_eq!((fast.touches().len(), fast.collisions().len()), (0, 1));
+        let behind_m = 100.0 - 0.5 * (length_m(VehicleClass::Car) + length_m(VehicleClass::Motorcycle)) - 0.05;
+        let mut motorcycle = world(&[(VehicleClass::Car, 100.0, 20.0), (VehicleClass::Motorcycle, behind_m, 20.3)]);
+        drive(&mut motorcycle, 1.0, &[0.0; 2]);
+        assert_eq!((motorcycle.touches().len(), motorcycle.collisions().len()), (0, 1));
     }
 }

@@ -75,7 +75,8 @@ impl Section {
     fn rests_on(self, scenario: &str) -> bool {
         let is_headline = scenario == "low-thw-overtake";
         match self {
-            Self::Scenarios | Self::Ensemble => !scenario.starts_with("faults/"),
+            // Their tables have the scenarios of the library's folder, and those with traffic.
+            Self::Scenarios | Self::Ensemble => !scenario.contains('/') || scenario.starts_with("traffic/"),
             Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
             Self::Twins => super::rows::TWINS.contains(&scenario),
             Self::Faults => is_headline || scenario.starts_with("faults/"),

@@ -118,8 +118,8 @@ pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> R
             let arm = Arm { controller: controller.factory(), sensors: Some(sensors) };
             // `serde_json` writes numbers so that they read back to the bit.
             let text = match run_guarded(&scenario, RunKey { seed, sample }, &arm, &mut NoObserver) {
-                // Cost and promise follow from the same motion, and have tests of their own.
-                Ok(outcome) => serde_json::to_string(&Outcome { cost: None, promise: None, ..outcome })?,
+                // Cost, promise and what the ego meets ahead follow from the same motion, and have tests of their own.
+                Ok(outcome) => serde_json::to_string(&Outcome { cost: None, promise: None, ahead: None, ..outcome })?,
                 Err(error) => error.to_string(),
             };
             hasher.update(&(text.len() as u64).to_le_bytes());

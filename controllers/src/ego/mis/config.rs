@@ -151,7 +151,13 @@ impl Check for MisConfig {
     type Checked = MisSettings;
 
     fn check(&self, parameters: &Parameters) -> Result<MisSettings, ConfigError> {
-        let paper = MisSettings::PAPER;
+        self.over(MisSettings::PAPER, parameters)
+    }
+}
+
+impl MisConfig {
+    /// Returns the system with these settings in place of its own.
+    pub(crate) fn over(&self, base: MisSettings, parameters: &Parameters) -> Result<MisSettings, ConfigError> {
         let or = |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         let braking = Range::above(0.0, 9.0);
         Ok(MisSettings {
@@ -159,33 +165,33 @@ impl Check for MisConfig {
                 &self.max_deceleration_mps2,
                 "max-deceleration-mps2",
                 braking,
-                paper.max_deceleration_mps2,
+                base.max_deceleration_mps2,
             )?,
-            max_jerk_mps3: or(&self.max_jerk_mps3, "max-jerk-mps3", Range::above(0.0, 50.0), paper.max_jerk_mps3)?,
-            critical_gap_m: or(&self.critical_gap_m, "critical-gap-m", Range::closed(0.0, 50.0), paper.critical_gap_m)?,
-            thw_gain_s: or(&self.thw_gain_s, "thw-gain-s", Range::above(0.0, 10.0), paper.thw_gain_s)?,
-            short_thw_s: or(&self.short_thw_s, "short-thw-s", Range::above(0.0, 10.0), paper.short_thw_s)?,
-            engage_gap_m: or(&self.engage_gap_m, "engage-gap-m", Range::above(0.0, 300.0), paper.engage_gap_m)?,
+            max_jerk_mps3: or(&self.max_jerk_mps3, "max-jerk-mps3", Range::above(0.0, 50.0), base.max_jerk_mps3)?,
+            critical_gap_m: or(&self.critical_gap_m, "critical-gap-m", Range::closed(0.0, 50.0), base.critical_gap_m)?,
+            thw_gain_s: or(&self.thw_gain_s, "thw-gain-s", Range::above(0.0, 10.0), base.thw_gain_s)?,
+            short_thw_s: or(&self.short_thw_s, "short-thw-s", Range::above(0.0, 10.0), base.short_thw_s)?,
+            engage_gap_m: or(&self.engage_gap_m, "engage-gap-m", Range::above(0.0, 300.0), base.engage_gap_m)?,
             engage_closing_mps: or(
                 &self.engage_closing_mps,
                 "engage-closing-mps",
                 Range::above(0.0, 50.0),
-                paper.engage_closing_mps,
+                base.engage_closing_mps,
             )?,
-            hold_s: or(&self.hold_s, "hold-s", Range::closed(0.0, 10.0), paper.hold_s)?,
+            hold_s: or(&self.hold_s, "hold-s", Range::closed(0.0, 10.0), base.hold_s)?,
             worst_front_braking_mps2: or(
                 &self.worst_front_braking_mps2,
                 "worst-front-braking-mps2",
                 braking,
-                paper.worst_front_braking_mps2,
+                base.worst_front_braking_mps2,
             )?,
             follower_headway_s: or(
                 &self.follower_headway_s,
                 "follower-headway-s",
                 Range::closed(0.0, 5.0),
-                paper.follower_headway_s,
+                base.follower_headway_s,
             )?,
-            ..paper
+            ..base
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The counts: how often the ego collides in each arm, how sure that is, and what the system under test changes.
 
-use super::super::text::{goals, not_prevented};
+use super::super::text::{goals, imposed, not_prevented};
 use std::io;
 
 use maud::{Markup, html};
@@ -26,7 +26,7 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
         (text_heads(&["scenario", "controller"]))
         (number_heads(&["samples", "collisions", "rate", "95 % interval"]))
         th { "0 to " (percent(most)) }
-        (number_heads(&["largest ΔV [m/s]", "engaged", "goal in reach", "errors"]))
+        (number_heads(&["largest ΔV [m/s]", "touches", "R brakes > 3 m/s²", "engaged", "goal in reach", "errors"]))
     };
     let rows = html! {
         @for (name, counts) in scenarios {
@@ -43,11 +43,15 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
     Ok(html! {
         h2 { "Collisions of the ego" }
         (table(&head, &rows))
+        @for (name, counts) in scenarios {
+            @if let Some(sentence) = imposed(summary, counts) { p { (name) ": " (sentence) "." } }
+        }
         @if summary.is_paired() { (pairs(scenarios, summary.inference)?) }
         @if summary.has_references() { (arm_pairs(summary)) }
         p.note {
             "Rates are conditional on the sampled scenario: they say how often a sampled encounter ends in a collision of "
-            "the ego, not how often this happens on a road."
+            "the ego, not how often this happens on a road. Touches: samples in which two bumpers meet at less than 0.67 m/s; they are no "
+            "collisions. R brakes > 3 m/s²: samples in which the vehicle behind brakes harder before the lead vehicle brakes."
         }
     })
 }
@@ -67,6 +71,8 @@ fn arm_cells(arm: &ArmCounts, inference: Inference, most: f64, is_tested: bool) 
         (number(interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", percent(low), percent(high)))))
         td.bar { (charts::rate(rate, bar_interval(arm, inference), most, is_tested)?) }
         (number(if arm.collisions > 0 { format!("{:.1}", arm.max_delta_v_mps) } else { String::new() }))
+        (number(arm.touches))
+        (number(arm.imposed_share().map_or_else(|| "-".to_owned(), percent)))
         (number(arm.engagements))
         (number(arm.goals_in_reach))
         (number(arm.errors))

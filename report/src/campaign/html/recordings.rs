@@ -126,8 +126,12 @@ fn section(entry: &IndexEntry) -> Markup {
 
 type Number = (&'static str, fn(&Outcome) -> String);
 
-const NUMBERS: [Number; 6] = [
+/// The row of the margin increase system, which only its arms have.
+const ENGAGED: &str = "MIS engaged at [s]";
+
+const NUMBERS: [Number; 7] = [
     ("collisions", |outcome| outcome.collisions.len().to_string()),
+    ("touches", |outcome| outcome.touches.len().to_string()),
     ("hardest impact [m/s]", |outcome| {
         let speeds = outcome.collisions.iter().map(|collision| collision.relative_speed_mps);
         speeds.max_by(f64::total_cmp).map_or("-".to_owned(), |speed_mps| format!("{speed_mps:.1}"))
@@ -135,7 +139,7 @@ const NUMBERS: [Number; 6] = [
     ("smallest front headway [s]", |outcome| measured(outcome.margins.min_thw_front_s)),
     ("smallest rear headway [s]", |outcome| measured(outcome.margins.min_thw_rear_s)),
     ("hardest braking [m/s²]", |outcome| format!("{:.1}", outcome.margins.max_deceleration_mps2)),
-    ("MIS engaged at [s]", |outcome| outcome.mis.as_ref().map_or("-".to_owned(), |mis| measured(mis.engaged_at_s))),
+    (ENGAGED, |outcome| outcome.mis.as_ref().map_or("-".to_owned(), |mis| measured(mis.engaged_at_s))),
 ];
 
 fn measured(value: Measured) -> String {
@@ -148,7 +152,7 @@ fn numbers(outcomes: &[Outcome]) -> Markup {
         @for outcome in outcomes { th { (outcome.controller) } }
     };
     let rows = html! {
-        @for (name, value) in NUMBERS {
+        @for (name, value) in NUMBERS.into_iter().filter(|(name, _)| *name != ENGAGED || outcomes.iter().any(|outcome| outcome.mis.is_ok())) {
             tr { td { (name) } @for outcome in outcomes { td { (value(outcome)) } } }
         }
     };

@@ -60,6 +60,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
         end: if controller == "acc" { EndReason::Collision } else { EndReason::Duration },
         duration: Time::from_ms(16_520),
         collisions: if controller == "acc" { vec![hit] } else { Vec::new() },
+        touches: Vec::new(),
         moments: Vec::new(),
         margins,
         mis: if controller == "acc" { Err(Absent::NoMis) } else { Ok(mis) },
@@ -74,6 +75,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
             thw_raised_s: Ok(1.95),
             crossing_braking_mps2: if controller == "acc" { Err(Absent::NeverCrossed) } else { Ok(0.75) },
         }),
+        ahead: Some(Ahead { min_ttc_front_s: Ok(2.5), emergency_braking_at_s: Err(Absent::NoEmergencyBraking) }),
     }
 }
 
@@ -171,4 +173,34 @@ fn no_column_needs_quotes_in_sql_and_those_with_a_value_in_each_row_are_not_null
         assert!(field.name().chars().all(is_plain), "{}", field.name());
         assert_eq!(field.is_nullable(), !REQUIRED.contains(&field.name().as_str()), "{}", field.name());
     }
+}
+
+/// Returns what a sample counts for in an arm with this outcome.
+fn tally(outcome: Outcome) -> closecall_campaign::ledger::Tally {
+    closecall_campaign::record::ArmRecord::new(outcome.controller.clone(), Ok(outcome)).tally()
+}
+
+#[test]
+fn a_touch_is_no_collision_in_any_count_and_has_columns_of_its_own() {
+    use closecall_campaign::ledger::PairFate;
+
+    let hit = outcome(0, "acc");
+    let contact = Collision { relative_speed_mps: 0.25, ..hit.collisions[0].clone() };
+    let touched = Outcome { collisions: Vec::new(), touches: vec![contact], ..hit.clone() };
+    assert!(hit.ego_collided() && !touched.ego_collided() && touched.ego_touched() && !touched.others_collided());
+    let both = Outcome { touches: touched.touches.clone(), ..hit.clone() };
+    assert!(both.ego_collided() && both.ego_touched(), "a touch does not hide the collision");
+    let fate = |baseline: &Outcome, tested: &Outcome| PairFate::of(&tally(baseline.clone()), &tally(tested.clone()));
+    assert_eq!(fate(&hit, &touched), Some(PairFate::Prevented));
+    assert_eq!(fate(&touched, &hit), Some(PairFate::Induced));
+    assert_eq!(fate(&touched, &both), Some(PairFate::Induced));
+    assert_eq!(fate(&touched, &touched), Some(PairFate::Neither));
+    assert_eq!([&hit, &touched, &both].map(|outcome| tally(outcome.clone()).touched), [false, true, true]);
+    let folder = tempfile::tempdir().unwrap();
+    let rows = vec![OutcomeRow { result: Ok(touched), ..rows().swap_remove(0) }];
+    let batch = &read(&write(folder.path(), "touch.parquet", rows))[0];
+    let cell = |name: &str| array_value_to_string(batch.column_by_name(name).unwrap(), 0).unwrap();
+    let names =
+        ["collisions", "touches", "touch_relative_speed_mps", "ego_touched", "ego_collided", "impact_speed_mps"];
+    assert_eq!(names.map(cell), ["0", "1", "0.25", "true", "false", "0.0"]);
 }

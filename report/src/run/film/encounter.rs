@@ -32,6 +32,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
     Ok(Film {
         title: format!("{}: track {} behind track {}", encounter.data_name, rear.track_id, ego.track_id),
         arm: "recorded".to_owned(),
+        has_mis: false,
         level,
         period: CONTROL_STEP,
         road: straight_road(encounter.lanes, encounter.lane_width_m)?,

@@ -118,6 +118,8 @@ pub struct Film {
     pub(in crate::run) title: String,
     /// Name of the arm, which controls the ego; `recorded` for recorded traffic.
     pub(in crate::run) arm: String,
+    /// Whether the ego stack of the scenario has a margin increase system, so that the arm `acc` is the one without it.
+    pub(in crate::run) has_mis: bool,
     pub(in crate::run) level: Level,
     /// Time between two frames.
     pub(in crate::run) period: Time,

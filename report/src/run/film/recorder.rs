@@ -1,6 +1,6 @@
 //! The observer that records the film of a run.
 
-use closecall_controllers::CheckedDriver;
+use closecall_controllers::{CheckedDriver, EgoSettings};
 use closecall_sensors::camera::Pipeline;
 use closecall_sensors::lidar::RearLidar;
 use closecall_sensors::{Detection, NoiseKey, SensorMode};
@@ -71,6 +71,7 @@ impl FilmRecorder {
         let film = Film {
             title: format!("{} · {name} · seed {} · sample {}", scenario.name, key.seed, key.sample),
             arm: name.to_owned(),
+            has_mis: stack(scenario).is_some_and(|stack| stack.mis().is_some()),
             level,
             period: CONTROL_STEP,
             road: scenario.road,
@@ -177,10 +178,18 @@ impl FilmRecorder {
     }
 }
 
+/// Returns the ego stack of a scenario.
+fn stack(scenario: &Scenario) -> Option<&EgoSettings> {
+    match &scenario.actors[scenario.ego].driver {
+        CheckedDriver::Ego(settings) => Some(settings),
+        CheckedDriver::Human(_) => None,
+    }
+}
+
 /// Returns the comfort limit of the MIS, if the arm has one, and the friction limit.
 fn limits(scenario: &Scenario, arm: &Arm) -> Vec<Limit> {
     let mut limits = Vec::new();
-    if let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver
+    if let Some(settings) = stack(scenario)
         && arm.controller.has_mis(settings)
         && let Some(mis) = arm.controller.settings(settings).mis()
     {

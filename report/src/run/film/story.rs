@@ -4,7 +4,7 @@ use closecall_controllers::{DriverNote, EgoState};
 use closecall_traffic::Time;
 
 use super::{Film, headway_text};
-use crate::run::text::reason_text;
+use crate::run::text::{reason_text, touch_text};
 use closecall_scenarios::outcome::Collision;
 use closecall_simulation::RunEvent;
 
@@ -94,6 +94,7 @@ impl Film {
                 Some(StoryLine { time, text, is_severe: *to == EgoState::EmergencyBraking })
             }
             RunEvent::PhaseChanged { .. } => None,
+            RunEvent::Touch(touch) => plain(touch_text(touch)),
             RunEvent::Collision(reported) => {
                 let text = format!("COLLISION: {}", self.collision_text(self.collision_in_outcome(reported)));
                 Some(StoryLine { time, text, is_severe: true })

@@ -84,6 +84,7 @@ pub fn film_lane_change(
     let mut film = Film {
         title: format!("{} · lane change of track {track_id}", recording.name),
         arm: "recorded".to_owned(),
+        has_mis: false,
         level: Level::Full,
         period: PERIOD,
         road: road(recording, &tracks)?,
@@ -271,6 +272,9 @@ fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> Curr
         thw_front_s: gap_m(lead, Absent::NoLead).and_then(|gap_m| time_headway_s(gap_m, own_mps)),
         gap_rear_m: gap_m(follower, Absent::NoFollower),
         thw_rear_s: behind.and_then(|(_, speed_mps, gap_m)| time_headway_s(gap_m, speed_mps)),
+        ttc_front_s: lead
+            .ok_or(Absent::NoLead)
+            .and_then(|(_, speed_mps, gap_m)| time_to_collision_s(gap_m.max(0.0), own_mps, speed_mps)),
         ttc_rear_s: behind.and_then(|(_, speed_mps, gap_m)| time_to_collision_s(gap_m, speed_mps, own_mps)),
     }
 }

@@ -47,13 +47,13 @@ impl Film {
         }
     }
 
-    /// Returns the words for the arm: `without MIS` and `with MIS` for the built-in ego stack, the controller's name for
-    /// others.
+    /// Returns the words for the arm: `without MIS` and `with MIS` for the built-in ego stack of a scenario that has the system, the
+    /// controller's name for others.
     pub fn arm_label(&self) -> &str {
-        match self.arm.as_str() {
-            "acc" => "without MIS",
-            "mis" => "with MIS",
-            name => name,
+        match (self.arm.as_str(), self.has_mis) {
+            ("acc", true) => "without MIS",
+            ("mis", true) => "with MIS",
+            (name, _) => name,
         }
     }
 

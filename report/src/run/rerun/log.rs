@@ -9,6 +9,7 @@ use super::RecordingError;
 use super::plots::phase_name;
 use super::stream::Writer;
 use crate::run::film::{Film, KnownSpan, driver_note_text, ego_state_name};
+use crate::run::text::touch_text;
 use closecall_simulation::RunEvent;
 
 /// One line of the log.
@@ -97,6 +98,7 @@ fn line(film: &Film, time: Time, what: &RunEvent) -> Line {
             info("log/ego", text)
         }
         RunEvent::PhaseChanged { to } => info("log/phase", format!("phase: {}", phase_name(*to))),
+        RunEvent::Touch(touch) => warn("log/touch", touch_text(touch)),
         RunEvent::Collision(reported) => {
             let text = format!("COLLISION: {}", film.collision_text(film.collision_in_outcome(reported)));
             Line { time, entity: "log/collision", level: TextLogLevel::ERROR, text }

@@ -68,6 +68,7 @@ fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> 
         .text("faults", &faults.join("; "))?
         .flag("ego_collided", outcome.ego_collided())?
         .count("collisions", outcome.collisions.len() as u64)?
+        .count("touches", outcome.touches.len() as u64)?
         .number("duration_s", Ok(outcome.duration.s()))?
         .number("critical_moment_s", Ok(film.critical_moment().s()))?
         .number("min_thw_front_s", margins.min_thw_front_s)?

@@ -61,7 +61,7 @@ impl Run<'_> {
 
     /// Moves the world by one step and reports new collisions to the observer.
     pub(super) fn advance(&mut self, observer: &mut dyn Observer) {
-        let known = self.world.collisions().len();
+        let (known, known_touches) = (self.world.collisions().len(), self.world.touches().len());
         self.world.step(&self.actions, self.encounter.phase());
         for index in known..self.world.collisions().len() {
             let collision = &self.world.collisions()[index];
@@ -70,6 +70,9 @@ impl Run<'_> {
                 self.meter.note_collision(is_ahead);
             }
             observer.event(collision.time, &RunEvent::Collision(collision.clone()));
+        }
+        for touch in &self.world.touches()[known_touches..] {
+            observer.event(touch.time, &RunEvent::Touch(touch.clone()));
         }
     }
 

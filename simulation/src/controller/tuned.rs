@@ -1,0 +1,144 @@
+//! A built-in controller with settings of its own: `acc+aeb:aeb.trigger-mps2=5`.
+//!
+//! The settings of a scenario act on every arm. These act on one, so that two settings of a function can be compared on the same samples.
+
+use std::fmt;
+use std::sync::Arc;
+
+use closecall_controllers::{EgoController, EgoSettings, StackPatch};
+
+use super::BuiltIn;
+use crate::run::ControllerFactory;
+
+/// Separates the controller and its settings.
+const SEPARATOR: char = ':';
+/// The path of keys under which a scenario has the settings of the ego stack, behind `actor` and the actor's name.
+const STACK: [&str; 2] = ["driver", "ego-stack"];
+
+/// A built-in controller with settings of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tuned {
+    /// The controller.
+    pub base: BuiltIn,
+    /// The settings, as `KEY=VALUE` below the ego stack.
+    settings: Vec<String>,
+}
+
+/// A setting that an arm cannot have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{setting}` is no setting of the ego stack: {problem}")]
+pub struct TunedError {
+    /// The setting.
+    pub setting: String,
+    /// What is wrong, and what is allowed.
+    pub problem: String,
+}
+
+impl Tuned {
+    /// Returns the controller with one more setting, which is below the ego stack, or below the whole scenario. It replaces one of the same key.
+    ///
+    /// # Errors
+    /// [`TunedError`] if the ego stack has no such key, or the value is out of range.
+    pub fn with(mut self, setting: &str) -> Result<Self, TunedError> {
+        let fail = |problem: String| TunedError { setting: setting.to_owned(), problem };
+        let Some((key, value)) = setting.split_once('=') else {
+            return Err(fail("it has the form KEY=VALUE, as in `aeb.trigger-mps2=5`".to_owned()));
+        };
+        let parts: Vec<&str> = key.trim().split('.').collect();
+        let below = match parts.as_slice() {
+            ["actor", _, driver, stack, below @ ..] if [*driver, *stack] == STACK => below,
+            all => all,
+        };
+        let key = below.join(".");
+        let is_other = |known: &String| known.split_once('=').is_none_or(|(other, _)| other != key);
+        self.settings.retain(is_other);
+        self.settings.push(format!("{key}={}", value.trim()));
+        self.patch().map_err(fail)?;
+        Ok(self)
+    }
+
+    /// Reads a controller with settings as [`Display`](fmt::Display) writes it.
+    pub(super) fn parse(base: BuiltIn, settings: &str) -> Result<Self, TunedError> {
+        let untuned = Self { base, settings: Vec::new() };
+        settings.split(SEPARATOR).try_fold(untuned, |tuned, setting| tuned.with(setting))
+    }
+
+    /// Returns a controller without settings of its own.
+    pub const fn new(base: BuiltIn) -> Self {
+        Self { base, settings: Vec::new() }
+    }
+
+    fn patch(&self) -> Result<StackPatch, String> {
+        StackPatch::parse(&self.settings.join("\n"))
+    }
+
+    /// Returns a factory of this controller.
+    pub(super) fn factory(&self) -> Arc<dyn ControllerFactory> {
+        // The settings were read before.
+        Arc::new(TunedFactory { name: self.to_string(), base: self.base, patch: self.patch().unwrap_or_default() })
+    }
+}
+
+impl fmt::Display for Tuned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.base)?;
+        self.settings.iter().try_for_each(|setting| write!(f, "{SEPARATOR}{setting}"))
+    }
+}
+
+struct TunedFactory {
+    name: String,
+    base: BuiltIn,
+    patch: StackPatch,
+}
+
+impl ControllerFactory for TunedFactory {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn is_built_in(&self) -> bool {
+        true
+    }
+
+    fn settings(&self, settings: &EgoSettings) -> EgoSettings {
+        self.base.settings(settings).patched(&self.patch)
+    }
+
+    fn has_mis(&self, settings: &EgoSettings) -> bool {
+        self.settings(settings).mis().is_some()
+    }
+
+    fn looks_back(&self, settings: &EgoSettings) -> bool {
+        self.has_mis(settings)
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        self.base.controller(self.settings(settings))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_of_one_arm_are_below_the_ego_stack_or_below_the_scenario() {
+        let tuned = Tuned::new(BuiltIn::Acc).with("aeb.trigger-mps2=5").unwrap();
+        assert_eq!(tuned.to_string(), "acc:aeb.trigger-mps2=5");
+        let same = Tuned::new(BuiltIn::Acc).with("actor.ego.driver.ego-stack.aeb.trigger-mps2 = 5").unwrap();
+        assert_eq!(same, tuned);
+        let replaced = tuned.with("aeb.trigger-mps2=6").unwrap().with("acc.time-gap-s=1.5").unwrap();
+        assert_eq!(replaced.to_string(), "acc:aeb.trigger-mps2=6:acc.time-gap-s=1.5");
+    }
+
+    #[test]
+    fn what_is_no_setting_of_the_stack_is_refused_with_what_is_allowed() {
+        let refusal = |text: &str| Tuned::new(BuiltIn::Acc).with(text).unwrap_err().to_string();
+        assert!(refusal("aeb.onset-mps2=5").contains("trigger-mps2"), "{}", refusal("aeb.onset-mps2=5"));
+        assert!(refusal("brakes.trigger-mps2=5").contains("aeb"), "{}", refusal("brakes.trigger-mps2=5"));
+        assert!(refusal("aeb.trigger-mps2=50").contains("9"), "{}", refusal("aeb.trigger-mps2=50"));
+        assert!(refusal("aeb.trigger-mps2=hard").contains("hard"), "{}", refusal("aeb.trigger-mps2=hard"));
+        assert!(refusal("aeb").contains("KEY=VALUE"), "{}", refusal("aeb"));
+    }
+}
