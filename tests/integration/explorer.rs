@@ -74,7 +74,7 @@ fn campaign(folder: &TempDir, samples: &str) -> PathBuf {
 
 fn open(folder: &TempDir, address: &str) -> Option<Page> {
     let mut page = Page::open(browser()?, &folder.path().join("profile"), address);
-    page.wait_for("document.documentElement.dataset.ready === 'yes'");
+    page.wait_for("document.documentElement?.dataset.ready === 'yes'");
     Some(page)
 }
 

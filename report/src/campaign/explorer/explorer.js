@@ -1,6 +1,6 @@
 'use strict';
 // Filters, counts and links the samples. Plotly draws.
-const BINS = 40, CELLS = 40, MOST_POINTS = 250, LISTED = 40, MISSING = 255;
+const BINS = 40, CELLS = [10, 40], MOST_POINTS = 250, LISTED = 25, MISSING = 255;
 const byId = id => document.getElementById(id);
 const unpacked = async id => {
   const text = atob(byId(id).textContent.trim()), bytes = new Uint8Array(text.length);
@@ -29,7 +29,9 @@ const columns = () => [...samples.parameters, ...samples.outcomes[arm]];
 const column = name => columns().find(one => one.name === name);
 const fateWord = fate => samples.is_paired ? data.fates[fate].pair : data.fates[fate].single;
 const isDark = () => matchMedia('(prefers-color-scheme: dark)').matches && !matchMedia('print').matches;
-const fateColour = fate => isDark() && data.fates[fate].colour === '#111111' ? '#f0f3f6' : data.fates[fate].colour;
+// The colours of the report, as far as they differ from the page by a contrast of 3 : 1.
+const CONTRAST = { light: { '#b5bfca': '#8390a0' }, dark: { '#111111': '#f0f3f6', '#b00020': '#ff5c6c', '#1f77b4': '#4a9fe0' } };
+const fateColour = fate => CONTRAST[isDark() ? 'dark' : 'light'][data.fates[fate].colour] ?? data.fates[fate].colour;
 
 // The ends of a column, and the bin of each value in it.
 const ends = one => {
@@ -89,7 +91,7 @@ const layout = (colours, more) => ({
   font: { color: colours.ink, size: 12, family: 'system-ui, sans-serif' }, hovermode: 'closest', selections: [],
   newselection: { line: { color: colours.link, width: 2 } }, activeselection: { fillcolor: colours.link, opacity: 0.2 }, ...more,
 });
-const config = { displayModeBar: false, responsive: true, doubleClick: false, scrollZoom: false };
+const config = { displayModeBar: false, logging: 0, responsive: true, doubleClick: false, scrollZoom: false };
 const box = (colours, more) => ({ type: 'rect', line: { color: colours.link, width: 2 }, fillcolor: colours.link, opacity: 0.15, layer: 'above', ...more });
 
 const drawHistogram = panel => {
@@ -113,7 +115,9 @@ const drawHistogram = panel => {
 };
 
 const drawPlane = panel => {
-  const [across, up] = [column(panel.x.value), column(panel.y.value)], [x, y] = [binned(across, CELLS), binned(up, CELLS)];
+  // A cell has some ten samples, if there are as many.
+  const cellCount = Math.min(Math.max(Math.round(Math.sqrt(samples.count / 10)), CELLS[0]), CELLS[1]);
+  const [across, up] = [column(panel.x.value), column(panel.y.value)], [x, y] = [binned(across, cellCount), binned(up, cellCount)];
   const { mask, fates, numbers, count } = samples, isMap = panel.id === 'map', collided = [false, false, true, true, false];
   const cells = new Float64Array(x.count * y.count), hits = new Float64Array(x.count * y.count);
   for (let row = 0; row < count; row++) {
@@ -234,6 +238,8 @@ const show = row => {
   if (data.is_served) part(happened, `sample/${name}/${number}`, 'The sample runs again.');
   history.replaceState(null, '', `#${name}/${number}`);
   panels.filter(panel => panel.y).forEach(drawPlane);
+  // On a narrow page the sample stands below the charts.
+  if (holder.getBoundingClientRect().top > innerHeight) holder.scrollIntoView();
 };
 
 const options = (select, names, chosen) => {

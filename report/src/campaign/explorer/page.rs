@@ -129,12 +129,24 @@ fn verdict(saved: &SavedCampaign) -> Option<String> {
     Some(text.lines().next()?.strip_prefix("## Closecall: ")?.replace('\\', ""))
 }
 
+/// Returns the class of a verdict, which colours it as in the report.
+fn class(verdict: Option<&str>) -> &'static str {
+    match verdict.and_then(|text| text.split(':').next()) {
+        Some("PASS") => "pass",
+        Some("FAIL") => "fail",
+        Some("INVALID" | "ERROR") => "invalid",
+        Some(_) => "inconclusive",
+        None => "open",
+    }
+}
+
 fn page(title: &str, saved: &SavedCampaign, packed: &Packed) -> Markup {
     let nonce: String = blake3::hash(SCRIPT.as_bytes()).to_hex().chars().take(32).collect();
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; \
          form-action 'none'; base-uri 'none'"
     );
+    let verdict = verdict(saved);
     let links = [(REPORT.to_owned(), "Report"), (format!("{RECORDINGS}/{RECORDINGS_PAGE}"), "Recordings")];
     html! {
         (DOCTYPE)
@@ -149,9 +161,9 @@ fn page(title: &str, saved: &SavedCampaign, packed: &Packed) -> Markup {
             }
             body {
                 main.explorer {
-                    header.open {
+                    header.(class(verdict.as_deref())) {
                         div {
-                            h1 { (verdict(saved).unwrap_or_else(|| format!("Samples of {title}"))) }
+                            h1 { (verdict.as_deref().map_or_else(|| format!("Samples of {title}"), str::to_owned)) }
                             p.what id="counts" role="status" { "Loading the samples." }
                             nav aria-label="Files of the campaign" {
                                 @for (path, name) in &links {
