@@ -68,7 +68,9 @@ pub(super) fn explore(saved: &SavedCampaign, viewer: &ViewerChoice<'_>) -> Resul
     outln!("{address}");
     print_error(format_args!("the explorer is open until Ctrl-C\n"));
     if let Err(error) = opener::open_browser(&address) {
-        print_error(format_args!("warning: no browser can be opened: {error}; the address above is that of the page\n"));
+        print_error(format_args!(
+            "warning: no browser can be opened: {error}; the address above is that of the page\n"
+        ));
     }
     let explorer = Explorer { saved, page, viewer, running: Mutex::default(), recordings: folder().map_err(served)? };
     server.serve(&|method, path| explorer.answer(method, path)).map_err(served)?;
@@ -97,8 +99,12 @@ impl Explorer<'_> {
             (Method::Get, [""]) => return page(self.page.clone()),
             (Method::Get, [REPORT]) => return self.file(Path::new(REPORT)),
             (Method::Get, [RECORDINGS, name]) => return self.recorded(name),
-            (Method::Get, ["sample", scenario, number]) => self.of(number, |sample| self.sample(scenario, sample)).map(page),
-            (Method::Get, ["twin", scenario, number]) => self.of(number, |sample| self.twin(scenario, sample)).map(page),
+            (Method::Get, ["sample", scenario, number]) => {
+                self.of(number, |sample| self.sample(scenario, sample)).map(page)
+            }
+            (Method::Get, ["twin", scenario, number]) => {
+                self.of(number, |sample| self.twin(scenario, sample)).map(page)
+            }
             (Method::Post, ["open", scenario, number]) => {
                 self.of(number, |sample| self.open(scenario, sample)).map(|said| Answer::text("200 OK", said))
             }
@@ -171,6 +177,7 @@ impl Explorer<'_> {
             file.take(MOST_BYTES).read_to_end(&mut body)?;
             Ok(body)
         };
-        read().map_or_else(|_| Answer::missing(), |body| Answer { status: "200 OK", kind: HTML, headers: SANDBOX, body })
+        read()
+            .map_or_else(|_| Answer::missing(), |body| Answer { status: "200 OK", kind: HTML, headers: SANDBOX, body })
     }
 }

@@ -27,7 +27,11 @@ impl Served {
         let written = crate::support::folder();
         let stand_in = Path::new(crate::support::ROOT).join("tests/fixtures/programs/rerun");
         let mut program = program();
-        program.args(["view", "--port", "1"]).arg(folder).env("WRITTEN", written.path()).env("CLOSECALL_RERUN", stand_in);
+        program
+            .args(["view", "--port", "1"])
+            .arg(folder)
+            .env("WRITTEN", written.path())
+            .env("CLOSECALL_RERUN", stand_in);
         program.env("BROWSER", "/nowhere/browser").env("PATH", "/nowhere:/usr/bin:/bin");
         let mut program = program.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut address = String::new();
@@ -125,9 +129,13 @@ fn a_failing_sample_is_found_looked_at_and_opened_in_the_viewer() {
     for part in ["struck E", "without MIS", "with MIS", "Parameters", "closecall replay"] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
-    page.evaluate("[...document.querySelectorAll('#sample button')].find(one => one.innerText === 'Passing twin').click()");
+    page.evaluate(
+        "[...document.querySelectorAll('#sample button')].find(one => one.innerText === 'Passing twin').click()",
+    );
     page.wait_for("document.getElementById('sample').innerText.includes('It passes when')");
-    page.evaluate("[...document.querySelectorAll('#sample button')].find(one => one.innerText === 'Open in Rerun').click()");
+    page.evaluate(
+        "[...document.querySelectorAll('#sample button')].find(one => one.innerText === 'Open in Rerun').click()",
+    );
     page.wait_for("document.querySelector('#sample [role=status]').innerText.includes('is open in the Rerun viewer')");
     let _ = fs::read_to_string(served.written.path().join("viewer")).unwrap();
 
@@ -152,13 +160,18 @@ fn the_file_needs_no_server_and_links_to_the_recorded_samples() {
     stdout(&exported, 0);
     let Some(mut page) = open(&folder, &format!("file://{}", file.display())) else { return };
     page.evaluate("document.querySelector('#list a').closest('tr').querySelector('button').click()");
-    let links = page.evaluate("[...document.querySelectorAll('#sample [role=status] a')].map(one => one.getAttribute('href'))");
+    let links =
+        page.evaluate("[...document.querySelectorAll('#sample [role=status] a')].map(one => one.getAttribute('href'))");
     let links: Vec<&str> = links.as_array().unwrap().iter().filter_map(|link| link.as_str()).collect();
     assert_eq!(links.len(), 2);
     assert!(links.iter().all(|link| out.join(link).is_file()), "{links:?}");
     let shown = page.evaluate("document.getElementById('sample').innerText");
     assert!(!shown.as_str().unwrap().contains("Open in Rerun"), "a file runs nothing");
-    assert!(page.requests().iter().all(|url| url.starts_with("file:") || url.starts_with("about:")), "{:?}", page.requests());
+    assert!(
+        page.requests().iter().all(|url| url.starts_with("file:") || url.starts_with("about:")),
+        "{:?}",
+        page.requests()
+    );
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 
@@ -194,7 +207,9 @@ fn the_server_leaves_its_folder_by_no_path_and_no_link() {
         let (status, body) = served.ask("GET", path);
         assert_eq!((status, body.contains("secret")), (404, false), "{path}");
     }
-    for path in ["sample/low-thw-overtake/20", "sample/none/1", "sample/low-thw-overtake/-1", "twin/low-thw-overtake/1e3"] {
+    for path in
+        ["sample/low-thw-overtake/20", "sample/none/1", "sample/low-thw-overtake/-1", "twin/low-thw-overtake/1e3"]
+    {
         assert_eq!(served.ask("GET", path).0, 409, "{path}");
     }
     assert_eq!(served.ask("POST", "sample/low-thw-overtake/1").0, 404);

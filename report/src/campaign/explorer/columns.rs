@@ -123,8 +123,7 @@ impl Samples {
         for (index, arm) in record.arms.into_iter().enumerate() {
             let Some(values) = self.outcomes.get_mut(index) else { continue };
             let ArmRecord { controller, result, .. } = arm;
-            let row =
-                OutcomeRow { scenario: record.scenario.clone(), seed, sample: record.sample, controller, result };
+            let row = OutcomeRow { scenario: record.scenario.clone(), seed, sample: record.sample, controller, result };
             let mut parameters = self.parameters.iter_mut();
             let mut values = values.iter_mut();
             for column in &self.sources {

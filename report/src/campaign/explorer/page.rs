@@ -77,7 +77,8 @@ pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: Comman
         let of = SavedSample { folder: ".", sample: PLACE, scenario };
         command_for(&Action::Replay(Replay { is_paired: arms.len() > 1, ..Replay::new(of) }))
     };
-    let style = |fate: Fate| FateStyle { pair: fate.word(true), single: fate.word(false), colour: css(fate_colour(fate)) };
+    let style =
+        |fate: Fate| FateStyle { pair: fate.word(true), single: fate.word(false), colour: css(fate_colour(fate)) };
     let data = Data {
         is_served,
         scenarios: &scenarios,
@@ -88,7 +89,10 @@ pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: Comman
     };
     let json = serde_json::to_vec(&data).map_err(|error| written(saved, error.into()))?;
     let [data, script] = [json, plotly::script().into_bytes()].map(|bytes| packed(&bytes));
-    let packed = Packed { data: data.map_err(|error| written(saved, error))?, plotly: script.map_err(|error| written(saved, error))? };
+    let packed = Packed {
+        data: data.map_err(|error| written(saved, error))?,
+        plotly: script.map_err(|error| written(saved, error))?,
+    };
     let title = files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ");
     Ok(page(&title, saved, &packed).into_string())
 }

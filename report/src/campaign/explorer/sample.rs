@@ -11,8 +11,8 @@ use crate::run::film::Film;
 pub fn sample_part(films: &[Film]) -> String {
     finished(&html! {
         p.headline { (Film::verdict_word(films)) }
-        (timeline(films))
         div.arms { (incident(films)) }
+        (timeline(films))
     })
 }
 
@@ -28,9 +28,9 @@ pub fn twin_part(minimized: &Minimized, films: &[Film]) -> String {
                     @for offset in &minimized.off_nominal {
                         tr {
                             td { (offset.name) }
-                            td.number { (offset.value) }
-                            td.number { (offset.sampled) }
-                            td.number { (offset.nominal) }
+                            td.number { (short(&offset.value)) }
+                            td.number { (short(&offset.sampled)) }
+                            td.number { (short(&offset.nominal)) }
                         }
                     }
                 }
@@ -40,9 +40,14 @@ pub fn twin_part(minimized: &Minimized, films: &[Film]) -> String {
             Some(twin) => p.headline { "It passes when " (twin.words) "." },
             None => p { "No single parameter was found with which it passes." },
         }
-        (timeline(films))
         div.arms { (incident(films)) }
+        (timeline(films))
     })
+}
+
+/// Returns a number with three digits behind the point. Words stay as they are.
+fn short(value: &str) -> String {
+    value.parse().map_or_else(|_| value.to_owned(), |number: f64| format!("{number:.3}"))
 }
 
 fn finished(part: &Markup) -> String {

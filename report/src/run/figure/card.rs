@@ -81,7 +81,8 @@ impl Window {
     fn of(films: &[Film]) -> Self {
         let shown = Film::shown_moment(films);
         let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time);
-        let (start, end) = (starts.min().unwrap_or(Time::ZERO), films.iter().map(Film::end).max().unwrap_or(Time::ZERO));
+        let (start, end) =
+            (starts.min().unwrap_or(Time::ZERO), films.iter().map(Film::end).max().unwrap_or(Time::ZERO));
         Self { from: (shown - BEFORE).max(start), to: (shown + AFTER).min(end) }
     }
 
