@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
+import re
+import shutil
+import tempfile
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,14 +40,60 @@ class CampaignResult:
     failures: list[dict[str, Any]]
     #: All keys of the output.
     report: dict[str, Any] = field(repr=False)
-    #: The folder of the campaign, if there is one.
+    #: The folder of the campaign, if ``out`` has named one.
     folder: Path | None = None
+    #: The files of a campaign without ``out``.
+    _kept: _Kept | None = field(default=None, repr=False, compare=False)
 
     def outcomes(self) -> _native.Table:
-        """Returns ``outcomes.parquet``: a row for each sample and controller."""
-        if self.folder is None:
-            raise UsageError("a campaign without `out` keeps no outcomes")
-        return _native.read_table(self.folder / "outcomes.parquet")
+        """Returns ``outcomes.parquet``: a row for each sample and controller. A campaign needs no ``out`` for it."""
+        return _native.read_table(self._files() / "outcomes.parquet")
+
+    def _files(self) -> Path:
+        if self.folder is not None:
+            return self.folder
+        if self._kept is None:
+            raise UsageError("a campaign on a cluster keeps its outcomes in a folder: name one with `out`")
+        return self._kept.results
+
+    def _repr_html_(self) -> str:
+        """Shows the verdict with its reasons, the counts of each controller, and the outcome map."""
+        heads = ("controller", "collisions", "rate", "95 % interval", "harm", "errors")
+        rows = [_row(name, counts, self.samples) for name, counts in self.report.get("controllers", {}).items()]
+        table = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        reasons = "".join(f"<li>{html.escape(str(reason))}</li>" for reason in self.report.get("reasons", []))
+        head = "".join(f"<th>{name}</th>" for name in heads)
+        return (
+            f"<p><strong>{html.escape(self.verdict)}</strong>: {self.samples} samples</p><ul>{reasons}</ul>"
+            f"<table><thead><tr>{head}</tr></thead><tbody>{table}</tbody></table>{self._outcome_map()}"
+        )
+
+    def _outcome_map(self) -> str:
+        """Returns the outcome map of the report as SVG; nothing if there is none, as of one varying parameter."""
+        try:
+            page = (self._files() / "report.html").read_text(encoding="utf-8")
+        except (OSError, UsageError):
+            return ""
+        _, _, rest = page.partition("Outcome map</h3>")
+        found = re.search(r"<svg.*?</svg>", rest, re.DOTALL)
+        return "" if found is None else f"<figure>{found.group()}<figcaption>Outcome map</figcaption></figure>"
+
+
+class _Kept:
+    """A folder that is removed with its last user, or at the end of the program."""
+
+    def __init__(self) -> None:
+        place = tempfile.mkdtemp(prefix="closecall-")
+        self.results = Path(place) / "results"
+        weakref.finalize(self, shutil.rmtree, place, ignore_errors=True)
+
+
+def _row(name: str, counts: dict[str, Any], samples: int) -> tuple[str, ...]:
+    low, high = counts.get("interval_95") or (None, None)
+    interval = "" if low is None or high is None else f"{100 * low:.3g} to {100 * high:.3g} %"
+    rate = counts.get("collision_rate")
+    shown = "" if rate is None else f"{100 * rate:.3g} %"
+    return name, f"{counts['collisions']} of {samples - counts['errors']}", shown, interval, f"{counts['harm']:.3g}", str(counts["errors"])
 
 
 def campaign(
@@ -110,12 +161,17 @@ def campaign(
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         which = option("arms" if arms is not None else "controller", names)
         named: dict[str, object] = {"samples": n, "paired": paired, "seed": whole("seed", seed), "design": design, "sensors": sensors, "jobs": jobs}
-        named |= {"out": None if out is None else os.fspath(out), "resume": resume, "gate": [gate] if isinstance(gate, str) else list(gate), "set": settings}
+        # Without `out` the results last as long as the object. No sample runs again for a recording.
+        kept = _Kept() if out is None and not is_remote and not resume else None
+        if kept is not None:
+            named |= {"record": "0"} if not {"record", "recordings"} & set(options) else {}
+        place = out if kept is None else kept.results
+        named |= {"out": None if place is None else os.fspath(place), "resume": resume, "gate": [gate] if isinstance(gate, str) else list(gate), "set": settings}
         further = [word for name, value in {**named, **options}.items() for word in option(name, value)]
         code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
     keys = json.loads(output)
     folder = None if out is None else Path(out)
-    return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys, folder)
+    return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys, folder, kept)
 
 
 #: The options that limit worker processes, with their largest values.
