@@ -220,29 +220,44 @@ fn the_server_leaves_its_folder_by_no_path_and_no_link() {
     assert_eq!(served.ask("GET", "recordings/own.html").0, 404);
 }
 
+/// A controller that says that it runs, in a file beside it.
+const TELLING: &str = r#"#!/bin/sh
+echo ran >> "$(dirname "$0")/ran"
+echo '{"type":"hello","protocol":1,"name":"telling","version":"1"}'
+read -r line
+while read -r line; do echo '{"acceleration_mps2":0.0,"state":"following"}'; done
+"#;
+
 #[test]
 fn commands_of_a_foreign_folder_do_not_run_by_a_click() {
-    let folder = folder();
-    let out = campaign(&folder, "20");
-    let ran = folder.path().join("ran");
-    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
-    let mut foreign: serde_json::Value = serde_json::from_str(&manifest).unwrap();
-    let arm = foreign["arms"].as_array_mut().unwrap().last_mut().unwrap();
-    assert!(arm.is_string() || arm.is_object(), "{arm}");
-    *arm = json!(format!("exec:touch {}", ran.display()));
-    fs::write(out.join("manifest.json"), foreign.to_string()).unwrap();
-    let served = program().arg("view").arg(&out).env("BROWSER", "/nowhere/browser").stdout(Stdio::piped()).spawn();
-    let mut served = served.unwrap();
+    let place = folder();
+    fs::write(place.path().join("telling.sh"), TELLING).unwrap();
+    let of_user = |user: &str| {
+        let mut command = program();
+        command
+            .current_dir(place.path())
+            .env("XDG_STATE_HOME", place.path().join(user))
+            .env("BROWSER", "/nowhere/browser");
+        command
+    };
+    let campaign =
+        ["campaign", "low-thw-overtake", "-n", "3", "--sensors", "object", "--no-gate", "--record", "failures:0"];
+    let controller = ["--controller", "exec:sh telling.sh", "--controller-timeout-ms", "60000", "--out", "out"];
+    stdout(&of_user("own").args(campaign).args(controller).output().unwrap(), 0);
+    let ran = place.path().join("ran");
+    fs::remove_file(&ran).unwrap();
+    let mut served = of_user("foreign").args(["view", "out"]).stdout(Stdio::piped()).spawn().unwrap();
     let mut address = String::new();
     BufReader::new(served.stdout.take().unwrap()).read_line(&mut address).unwrap();
-    if let Some(rest) = address.trim().strip_prefix("http://") {
-        let (host, _) = rest.split_once('/').unwrap();
+    let rest = address.trim().strip_prefix("http://").unwrap();
+    let (host, _) = rest.split_once('/').unwrap();
+    let path = &rest[host.len()..];
+    for part in ["sample", "twin"] {
         let mut stream = TcpStream::connect(host).unwrap();
-        let path = &rest[host.len()..];
-        write!(stream, "GET {path}sample/low-thw-overtake/1 HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        write!(stream, "GET {path}{part}/low-thw-overtake/1 HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
-        assert!(answer.starts_with("HTTP/1.1 409"), "{answer}");
+        assert!(answer.starts_with("HTTP/1.1 409") && answer.contains("telling.sh"), "{answer}");
     }
     served.kill().unwrap();
     served.wait().unwrap();
