@@ -13,7 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_campaign::folder::{MANIFEST, RECORDINGS, REPORT};
+use closecall_campaign::folder::{EXPLORER, MANIFEST, RECORDINGS, REPORT};
 use closecall_report::run::rerun::{RerunVersion, VersionError};
 
 use super::CliError;
@@ -75,7 +75,9 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
     };
     let is_campaign = campaign.join(MANIFEST).is_file();
     if let Some(path) = &args.export {
-        protect(&of_campaign(&campaign), &[("--export", Some(path))])?;
+        // The page itself is written anew.
+        let inputs = of_campaign(&campaign).into_iter().filter(|input| !input.ends_with(EXPLORER));
+        protect(&inputs.collect::<Vec<_>>(), &[("--export", Some(path))])?;
         export(&args.saved.open(&campaign)?, path)?;
         return Ok(ExitCode::Pass);
     }

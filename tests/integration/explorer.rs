@@ -163,6 +163,10 @@ fn the_file_needs_no_server_and_links_to_the_recorded_samples() {
     let file = out.join("explorer.html");
     let exported = program().args(["view", "--export"]).arg(&file).arg(&out).output().unwrap();
     stdout(&exported, 0);
+    // The page is written anew, and no other file of the folder is overwritten.
+    stdout(&program().args(["view", "--export"]).arg(&file).arg(&out).output().unwrap(), 0);
+    let refused = program().args(["view", "--export"]).arg(out.join("journal.jsonl")).arg(&out).output().unwrap();
+    assert_eq!(code(&refused), 2, "{}", message(&refused));
     let Some(mut page) = open(&folder, &format!("file://{}", file.display())) else { return };
     page.evaluate("document.querySelector('#list a').closest('tr').querySelector('button').click()");
     let links =

@@ -310,7 +310,10 @@ const start = async () => {
   form.addEventListener('change', event => { if (event.target.name === 'number') return; if (['scenario', 'arm'].includes(event.target.name)) choose(); update(); });
   byId('reset').addEventListener('click', () => { form.elements.reason.value = form.elements.cause.value = ''; choose(); update(); });
   document.addEventListener('keydown', event => { if (event.key === 'Escape') { panels.forEach(panel => { panel.brush = []; }); update(); } });
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => update());
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+    for (const input of document.querySelectorAll('#fates input')) input.nextElementSibling.style.setProperty('--key', fateColour(Number(input.value)));
+    update();
+  });
   if (hash[1] !== undefined && samples.row.has(Number(hash[1]))) show(samples.row.get(Number(hash[1])));
   document.documentElement.dataset.ready = 'yes';
 };
