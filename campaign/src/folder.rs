@@ -11,6 +11,7 @@
 //!  report.html        report for human readers; summary.md: the same for a pull request
 //!  recordings/        recordings (Rerun files) of selected samples, and a page that shows them
 //!  causes.json        what `explain` has found, if it was asked
+//!  explorer.html      the explorer as a file, if it was asked for
 //! ```
 
 use std::fs;
@@ -32,19 +33,22 @@ use super::wall_times::{self, WallTime, WallTimes};
 
 pub use crate::folder_error::FolderError;
 
-pub(crate) const MANIFEST: &str = "manifest.json";
+/// The file of a campaign's folder that says how the campaign was made.
+pub const MANIFEST: &str = "manifest.json";
 pub(crate) const JOURNAL: &str = "journal.jsonl";
 const WALL_TIMES: &str = "wall-times.jsonl";
 
 /// The report for human readers, in a campaign's folder.
 pub const REPORT: &str = "report.html";
+/// The file into which a user may put the explorer, in a campaign's folder.
+pub const EXPLORER: &str = "explorer.html";
 /// The folder of the recordings, in a campaign's folder.
 pub const RECORDINGS: &str = "recordings";
 /// The page of the recordings, in their folder.
 pub const RECORDINGS_PAGE: &str = "index.html";
 
 /// All files of a campaign's folder, without those of the recordings.
-pub(crate) const FILES: [&str; 12] = [
+pub(crate) const FILES: [&str; 13] = [
     MANIFEST,
     JOURNAL,
     WALL_TIMES,
@@ -57,6 +61,7 @@ pub(crate) const FILES: [&str; 12] = [
     REPORT,
     "summary.md",
     "causes.json",
+    EXPLORER,
 ];
 
 /// The files that are made from the journal.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
@@ -58,14 +59,35 @@ class CampaignResult:
         return folder / name
 
     def _repr_html_(self) -> str:
-        """Returns the report, with the verdict, the table of the arms and the map of the outcomes, for a notebook."""
+        """Shows the verdict with its reasons, the counts of each controller, and the outcome map."""
+        heads = ("controller", "collisions", "rate", "95 % interval", "harm", "errors")
+        rows = [_row(name, counts, self.samples) for name, counts in self.report.get("controllers", {}).items()]
+        table = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        reasons = "".join(f"<li>{html.escape(str(reason))}</li>" for reason in self.report.get("reasons", []))
+        head = "".join(f"<th>{name}</th>" for name in heads)
+        return (
+            f"<p><strong>{html.escape(self.verdict)}</strong>: {self.samples} samples</p><ul>{reasons}</ul>"
+            f"<table><thead><tr>{head}</tr></thead><tbody>{table}</tbody></table>{self._outcome_map()}"
+        )
+
+    def _outcome_map(self) -> str:
+        """Returns the outcome map of the report as SVG; nothing if there is none, as of one varying parameter."""
         try:
-            report = self._file("report.html").read_text(encoding="utf-8")
+            page = self._file("report.html").read_text(encoding="utf-8")
         except UsageError:
-            return f"<pre>{html.escape(repr(self))}</pre>"
-        # A frame keeps the styles of the report and of the notebook apart.
-        style = "width: 100%; height: 40em; border: 1px solid #8888; resize: vertical"
-        return f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(report)}" style="{style}"></iframe>'
+            return ""
+        _, _, rest = page.partition("Outcome map</h3>")
+        drawing = re.search(r"<svg.*?</svg>", rest, re.DOTALL)
+        return "" if drawing is None else f"<figure>{drawing.group()}<figcaption>Outcome map</figcaption></figure>"
+
+
+def _row(name: str, counts: dict[str, Any], samples: int) -> tuple[str, ...]:
+    """Returns the cells of a controller in the table of a result."""
+    low, high = counts.get("interval_95") or (None, None)
+    interval = "" if low is None or high is None else f"{100 * low:.3g} to {100 * high:.3g} %"
+    rate = counts.get("collision_rate")
+    shown = "" if rate is None else f"{100 * rate:.3g} %"
+    return name, f"{counts['collisions']} of {samples - counts['errors']}", shown, interval, f"{counts['harm']:.3g}", str(counts["errors"])
 
 
 class CampaignOptions(TypedDict, total=False):

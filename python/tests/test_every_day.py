@@ -41,10 +41,8 @@ def test_a_cell_without_a_folder_runs_twice_and_leaves_nothing(tmp_path: Path, m
     assert not kept.exists()
 
 
-def test_a_campaign_shows_its_report_in_a_notebook() -> None:
+def test_the_text_of_a_result_is_short() -> None:
     result = small(no_gate=True)
-    shown = result._repr_html_()
-    assert shown.startswith("<iframe") and "Outcome map" in shown and result.verdict in shown
     assert len(repr(result)) < 400 and "0x" not in repr(result)
 
 

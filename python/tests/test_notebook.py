@@ -88,3 +88,21 @@ def test_a_recording_is_whole(outcome: cc.Outcome, tmp_path: Path) -> None:
     with pytest.raises(cc.FileError) as raised:
         outcome.record(tmp_path / "none" / "run.rrd")
     assert raised.value.exit_code == 6
+
+
+def test_a_campaign_without_a_folder_has_outcomes_shows_itself_and_runs_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    first, second = (cc.campaign(SCENARIO, 30, seed=1, paired=True) for _ in range(2))
+    tables = [pyarrow.table(result.outcomes()) for result in (first, second)]
+    assert tables[0].num_rows == 60 and tables[0].equals(tables[1])
+    formats: dict[str, Any] = InteractiveShell.instance().display_formatter.format(first)[0]
+    shown = formats["text/html"]
+    for part in (first.verdict, "MIS-1", "<td>acc</td>", "<td>mis</td>", "<svg", "Outcome map"):
+        assert part in shown, part
+    assert first.folder is None
+    # The files go with the results.
+    assert len(list(tmp_path.iterdir())) == 2
+    del first, second
+    assert list(tmp_path.iterdir()) == []

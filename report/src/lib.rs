@@ -13,7 +13,7 @@
 //! * [`tables`]: the tables of one run: its trace, and the points of its LiDARs
 //! * [`traffic`]: texts and charts of what was found in trajectory data
 //!
-//! This crate is the only one that uses rerun and plotters.
+//! This crate is the only one that uses rerun, plotters and plotly.
 
 pub mod calibration;
 pub mod campaign;

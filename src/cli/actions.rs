@@ -18,8 +18,8 @@ pub(super) fn command_for(action: &Action<'_>) -> String {
             format!("closecall run {}{}", quoted(file), option("--controller", controller))
         }
         Action::Resume(resume) => resume_command(resume),
-        Action::View { folder, is_in_browser: false } => format!("closecall view {}", quoted(folder)),
-        Action::View { folder, is_in_browser: true } => format!("closecall view --web {}", quoted(folder)),
+        Action::View { folder, is_in_browser: false } => format!("closecall view --recordings {}", quoted(folder)),
+        Action::View { folder, is_in_browser: true } => format!("closecall view --recordings --web {}", quoted(folder)),
     }
 }
 

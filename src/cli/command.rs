@@ -126,7 +126,7 @@ enum Command {
     Explain(causes::ExplainArgs),
     /// Find the smallest failing case near a failing sample of a campaign, and the nearest case that passes
     Minimize(causes::MinimizeArgs),
-    /// Open recordings in the installed Rerun viewer, and the report of the last results in the browser
+    /// Explore the samples of a campaign in the browser, and open recordings in the installed Rerun viewer
     View(view::ViewArgs),
     /// Draw an encounter as a static figure, SVG or PNG
     Plot(plot::PlotArgs),

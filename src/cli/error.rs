@@ -266,7 +266,9 @@ impl From<&CliError> for ExitCode {
             | CliError::ResultsCut(_)
             | CliError::Chart(_)
             | CliError::Record(_)
-            | CliError::View(ViewError::Read { .. } | ViewError::Viewer(_) | ViewError::Browser { .. })
+            | CliError::View(
+                ViewError::Read { .. } | ViewError::Viewer(_) | ViewError::Browser { .. } | ViewError::Serve { .. },
+            )
             | CliError::Figure(_)
             | CliError::WriteRecording(_)
             | CliError::Dataset(_)

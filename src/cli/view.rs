@@ -1,24 +1,28 @@
-//! `closecall view`: opens recordings in the installed Rerun viewer, and the report of the last results in the browser.
+//! `closecall view`: opens the explorer of a campaign in the browser, and recordings in the installed Rerun viewer.
 //!
 //! ```text
-//!  PATH ────────▶ recordings ──▶ rerun [--web-viewer] FILE…
-//!  no PATH ─┬───▶ recordings ──▶ rerun [--web-viewer] FILE…
-//!           └───▶ report.html ─▶ browser
+//!  PATH of a campaign ────────▶ explorer ───▶ browser ──(open in Rerun)──▶ rerun
+//!  PATH of recordings ────────▶ recordings ─▶ rerun [--web-viewer] FILE…
+//!  PATH with --recordings ────▶ recordings ─▶ rerun [--web-viewer] FILE…
+//!  no PATH: the campaign in closecall-results; with --recordings its report is opened in the browser, too
 //! ```
 //!
-//! Closecall serves nothing itself. The command ends when the viewer ends.
+//! A viewer is waited for. The explorer is served until Ctrl-C.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_campaign::folder::{RECORDINGS, REPORT};
+use closecall_campaign::folder::{EXPLORER, MANIFEST, RECORDINGS, REPORT};
 use closecall_report::run::rerun::{RerunVersion, VersionError};
 
 use super::CliError;
+use super::explore::{ViewerChoice, explore, export};
 use super::help::{examples, heading};
 use super::output::{outln, print_error};
+use super::protect::{of_campaign, protect};
 use super::results::last_results;
+use super::saved::SavedArgs;
 use super::view_error::ViewError;
 use super::viewer::{INSTALL, Viewer};
 use crate::exit_code::ExitCode;
@@ -28,24 +32,33 @@ use crate::exit_code::ExitCode;
 #[command(after_help = examples([
     "closecall view",
     "closecall view pair.rrd",
-    "closecall view closecall-results --no-open",
+    "closecall view closecall-results --export explorer.html",
 ]))]
 pub(super) struct ViewArgs {
-    /// Recording (.rrd), a folder that has some, or the folder of a campaign [default: the report and the recordings of the last
-    /// campaign, in closecall-results]
+    /// Folder of a campaign, whose samples are explored in the browser; or a recording (.rrd) or a folder that has some, for the
+    /// viewer [default: the last campaign, in closecall-results]
     path: Option<PathBuf>,
+    /// Open the recordings of the campaign in the viewer instead of the explorer, and the report if no folder is named
+    #[arg(long, help_heading = heading::VIEWER)]
+    recordings: bool,
+    /// Write the explorer into a file, which needs no server, instead of opening it. It links to the recorded samples; put it into the
+    /// campaign's folder
+    #[arg(long, value_name = "FILE.html", conflicts_with_all = ["recordings", "web", "port", "no_open"], help_heading = heading::OUTPUT)]
+    export: Option<PathBuf>,
     /// Use the web build of the viewer, in the browser, instead of its window
     #[arg(long, help_heading = heading::VIEWER)]
     web: bool,
     /// Port of the viewer, which is 9876 unless stated; with --web the port of its page, which is 9090 unless stated
     #[arg(long, help_heading = heading::VIEWER)]
     port: Option<u16>,
-    /// Open nothing, only print the paths of the files, one per line
+    /// Open nothing, only print the paths of the report and the recordings, one per line
     #[arg(long, help_heading = heading::VIEWER)]
     no_open: bool,
     /// Program of the Rerun viewer
     #[arg(long, value_name = "PATH", env = "CLOSECALL_RERUN", hide_env_values = true, default_value = "rerun", help_heading = heading::VIEWER)]
     viewer: PathBuf,
+    #[command(flatten)]
+    saved: SavedArgs,
 }
 
 /// A recording, and the version of Rerun that it was written by.
@@ -56,16 +69,32 @@ struct Recording {
 }
 
 pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
+    let campaign = match &args.path {
+        Some(path) => path.clone(),
+        None => last_results()?.path().to_owned(),
+    };
+    let is_campaign = campaign.join(MANIFEST).is_file();
+    if let Some(path) = &args.export {
+        // The page itself is written anew.
+        let inputs = of_campaign(&campaign).into_iter().filter(|input| !input.ends_with(EXPLORER));
+        protect(&inputs.collect::<Vec<_>>(), &[("--export", Some(path))])?;
+        export(&args.saved.open(&campaign)?, path)?;
+        return Ok(ExitCode::Pass);
+    }
+    if is_campaign && !args.recordings && !args.no_open {
+        let viewer = ViewerChoice { program: &args.viewer, is_web: args.web, port: args.port };
+        explore(&args.saved.open(&campaign)?, &viewer)?;
+        return Ok(ExitCode::Pass);
+    }
     let (report, recordings) = match &args.path {
         Some(path) => (None, recordings(path)?),
         None => {
-            let results = last_results()?;
-            let recordings = match recordings(results.path()) {
+            let recordings = match recordings(&campaign) {
                 // A campaign without a collision has recorded nothing.
                 Err(ViewError::Nothing { .. }) => Vec::new(),
                 recordings => recordings?,
             };
-            (Some(results.file(REPORT)), recordings)
+            (Some(campaign.join(REPORT)), recordings)
         }
     };
     for path in report.iter().chain(recordings.iter().map(|recording| &recording.path)) {

@@ -41,4 +41,10 @@ pub enum ViewError {
         /// The reason.
         source: opener::OpenError,
     },
+    /// The explorer cannot be served.
+    #[error("failed to serve the explorer on this machine: {source}")]
+    Serve {
+        /// The reason.
+        source: io::Error,
+    },
 }

@@ -30,6 +30,7 @@ mod evidence_pages;
 mod exchange;
 mod exec_controller;
 mod exit_codes;
+mod explorer;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod failing_calls;
 mod faulty_controllers;
@@ -52,6 +53,7 @@ mod nothing_checked;
 mod odd_recordings;
 mod openscenario;
 mod own_controller;
+mod page;
 mod paper;
 mod paper_figure;
 mod perception;

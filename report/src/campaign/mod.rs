@@ -10,6 +10,7 @@ mod arm_pairs;
 mod causes;
 mod comparison;
 mod ensemble;
+pub mod explorer;
 mod files;
 pub mod findings;
 pub(crate) mod html;

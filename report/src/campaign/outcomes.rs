@@ -156,13 +156,36 @@ enum Cells {
     Flag(Cell<bool>),
 }
 
-struct Column {
-    name: String,
+/// A column of the table.
+pub(super) struct Column {
+    /// The column's name.
+    pub(super) name: String,
     unit: Option<&'static str>,
     cells: Cells,
 }
 
+/// The value of a cell for a reader: a flag is a word, a count a number.
+pub(super) enum CellValue {
+    Number(f64),
+    Word(String),
+}
+
 impl Column {
+    /// Returns true if the cells are numbers.
+    pub(super) const fn is_number(&self) -> bool {
+        matches!(self.cells, Cells::Number(_) | Cells::Count(_))
+    }
+
+    /// Returns the value of a row.
+    pub(super) fn value(&self, row: &OutcomeRow) -> Option<CellValue> {
+        match &self.cells {
+            Cells::Text(of) => of(row).map(CellValue::Word),
+            Cells::Number(of) => of(row).map(CellValue::Number),
+            Cells::Count(of) => of(row).map(|count| CellValue::Number(count as f64)),
+            Cells::Flag(of) => of(row).map(|flag| CellValue::Word(if flag { "yes" } else { "no" }.to_owned())),
+        }
+    }
+
     fn field(&self) -> Field {
         let of = match self.cells {
             Cells::Text(_) => DataType::Utf8,
@@ -224,7 +247,8 @@ impl Columns {
     }
 }
 
-fn columns(parameters: &BTreeMap<ParameterName, ParameterKind>) -> Vec<Column> {
+/// Returns the columns of the table.
+pub(super) fn columns(parameters: &BTreeMap<ParameterName, ParameterKind>) -> Vec<Column> {
     let mut columns = Columns::default();
     key_columns(&mut columns);
     for (name, kind) in parameters {
@@ -249,9 +273,12 @@ fn key_columns(columns: &mut Columns) {
     columns.number("duration_s", "s", |row| Some(row.outcome()?.duration.s()));
 }
 
+/// How the name of a parameter's column begins.
+pub(super) const PARAMETER: &str = "param_";
+
 /// Returns the name of a parameter's column: `param_closing_mps` for the parameter `closing-mps`.
 fn parameter_column_name(name: &ParameterName) -> String {
-    format!("param_{}", name.as_str().replace('-', "_"))
+    format!("{PARAMETER}{}", name.as_str().replace('-', "_"))
 }
 
 /// Adds the column of a parameter. The end of the parameter's name is its unit.

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The style sheet of all pages.
-const STYLE: &str = include_str!("style.css");
+pub(in crate::campaign) const STYLE: &str = include_str!("style.css");
 
 /// Returns a whole page.
 pub fn document(title: &str, body: &Markup) -> Markup {

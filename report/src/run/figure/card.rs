@@ -31,16 +31,27 @@ const CRITICAL: &str = "#c40018";
 /// Returns the card as a page. `replay` is the command that runs the sample again.
 pub(crate) fn card(films: &[Film], replay: &str) -> String {
     let Some(tested) = films.last() else { return String::new() };
-    let shown = Film::shown_moment(films);
-    let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min().unwrap_or(Time::ZERO);
-    let end = films.iter().map(Film::end).max().unwrap_or(Time::ZERO);
-    let window = Window { from: (shown - BEFORE).max(start), to: (shown + AFTER).min(end) };
+    let window = Window::of(films);
     let sample = tested.outcome().map_or_else(String::new, |outcome| {
         format!("{} · seed {} · sample {}", outcome.scenario, outcome.seed, outcome.sample)
     });
     let verdict = Film::verdict_word(films);
     let body = html! {
         h1 { (verdict) ": " (sample) }
+        (sections(films, window))
+        p { "Run it again, in the campaign's folder:" }
+        pre.command tabindex="0" { (replay) }
+    };
+    document(&format!("{verdict}: {sample}"), &body).into_string()
+}
+
+/// Returns both arms from above with their headways, as a part of a page.
+pub(crate) fn incident(films: &[Film]) -> Markup {
+    sections(films, Window::of(films))
+}
+
+fn sections(films: &[Film], window: Window) -> Markup {
+    html! {
         @for film in films {
             section.incident {
                 h2 { (film.arm_label()) }
@@ -55,10 +66,7 @@ pub(crate) fn card(films: &[Film], replay: &str) -> String {
             " s: E is the ego, F the lead vehicle, R the rear vehicle; other traffic is grey. The road is drawn twice as wide as it is. "
             "Below: time headway in front (orange) and behind (pink), with the threshold of 0.9 s."
         }
-        p { "Run it again, in the campaign's folder:" }
-        pre.command tabindex="0" { (replay) }
-    };
-    document(&format!("{verdict}: {sample}"), &body).into_string()
+    }
 }
 
 /// The time that a card shows.
@@ -69,6 +77,15 @@ struct Window {
 }
 
 impl Window {
+    /// Returns the time around the moment at which a recording of the films opens.
+    fn of(films: &[Film]) -> Self {
+        let shown = Film::shown_moment(films);
+        let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time);
+        let (start, end) =
+            (starts.min().unwrap_or(Time::ZERO), films.iter().map(Film::end).max().unwrap_or(Time::ZERO));
+        Self { from: (shown - BEFORE).max(start), to: (shown + AFTER).min(end) }
+    }
+
     /// Returns the times of the positions.
     fn times(self) -> impl Iterator<Item = Time> {
         let steps = (self.to - self.from).ns() / STEP.ns();

@@ -338,7 +338,8 @@ fn bands(svg: &mut Svg, films: &[Film], top: f64) {
     }
 }
 
-fn band_colour(state: closecall_controllers::EgoState) -> &'static str {
+/// Returns the colour of a state of the ego stack.
+pub(super) fn band_colour(state: closecall_controllers::EgoState) -> &'static str {
     use closecall_controllers::EgoState;
     match state {
         EgoState::Following => "#8a8f98",

@@ -20,12 +20,14 @@ mod scrubber;
 mod still;
 mod strip;
 mod svg;
+mod timeline;
 
-pub(crate) use card::card;
+pub(crate) use card::{card, incident};
 pub use encounter::encounter;
 pub use picture::{PictureError, PictureFile, parse_width_mm};
 pub(crate) use scrubber::scrubber;
 pub use still::still;
+pub(crate) use timeline::timeline;
 
 #[cfg(test)]
 mod tests;

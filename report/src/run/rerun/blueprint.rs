@@ -23,6 +23,7 @@ use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::components::Range1D;
 use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 
+pub(super) use self::nodes::BLUEPRINT_TIMELINE;
 use self::nodes::{Node, View, below, beside, named, tabs};
 use super::RecordingError;
 use super::palette;

@@ -19,6 +19,12 @@ pub enum RecordingError {
         /// The reason that the library gives.
         reason: String,
     },
+    /// A viewer does not take the recording.
+    #[error("failed to send the recording to the viewer: {reason}")]
+    Send {
+        /// The reason that the library gives.
+        reason: String,
+    },
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -28,5 +34,10 @@ impl RecordingError {
     /// Returns the error for a reason that the library gives while encoding.
     pub(super) fn encode(reason: impl std::fmt::Display) -> Self {
         Self::Encode { reason: reason.to_string() }
+    }
+
+    /// Returns the error for a reason that the library gives while sending.
+    pub(super) fn send(reason: impl std::fmt::Display) -> Self {
+        Self::Send { reason: reason.to_string() }
     }
 }

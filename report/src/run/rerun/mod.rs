@@ -20,6 +20,7 @@ mod error;
 mod fog;
 mod ghosts;
 mod log;
+mod looped;
 mod palette;
 mod parts;
 mod perceived;
@@ -36,6 +37,7 @@ mod version;
 mod write;
 
 pub use error::RecordingError;
+pub use looped::LoopedRecording;
 pub use version::{RerunVersion, VersionError};
 pub(crate) use write::write_recording_of;
 pub use write::{check_recording_possible, is_recording_enabled, write_recording, write_recording_unchecked};

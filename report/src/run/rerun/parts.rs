@@ -6,13 +6,18 @@
 //!   stream hold each other. The archetypes of containers and panels, which it would log, are therefore here too.
 //! * `rerun::sink` encodes into a file on a thread, which logs an error of the disk at most, or encodes a whole
 //!   recording into memory. The encoder writes message by message, and returns the error of the file.
-//! * Nothing reads the version in the header of a recording.
+//! * Nothing reads the version in the header of a recording, or its messages, and `rerun::sink` does not name the address that
+//!   its client takes.
 //!
 //! No other file uses a part of the library.
 
-pub(super) use rerun::external::re_log_encoding::{Decodable, EncodeError, Encoder, EncodingOptions, StreamHeader};
+pub(super) use rerun::external::re_log_encoding::{
+    Decodable, DecoderApp as Decoder, EncodeError, Encoder, EncodingOptions, StreamHeader,
+};
 pub(super) use rerun::external::re_log_types::BlueprintActivationCommand;
 pub(super) use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EntityBehavior, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis,
     TextLogColumns, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
 };
+pub(super) use rerun::external::re_sdk_types::datatypes::AbsoluteTimeRange;
+pub(super) use rerun::external::re_uri::ProxyUri;

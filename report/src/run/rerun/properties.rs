@@ -24,6 +24,9 @@ use super::recording::Recording;
 use crate::run::film::Film;
 use crate::units::unit_of;
 
+/// Name of the property of an arm that holds its critical moment (s).
+pub(super) const CRITICAL_MOMENT: &str = "critical_moment_s";
+
 /// Writes the properties of the recording.
 pub(super) fn write(recording: &Recording, films: &[Film]) -> Result<(), RecordingError> {
     let title =
@@ -70,7 +73,7 @@ fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> 
         .count("collisions", outcome.collisions.len() as u64)?
         .count("touches", outcome.touches.len() as u64)?
         .number("duration_s", Ok(outcome.duration.s()))?
-        .number("critical_moment_s", Ok(film.critical_moment().s()))?
+        .number(CRITICAL_MOMENT, Ok(film.critical_moment().s()))?
         .number("min_thw_front_s", margins.min_thw_front_s)?
         .number("min_thw_rear_s", margins.min_thw_rear_s)?
         .number("min_gap_front_m", margins.min_gap_front_m)?

@@ -12,7 +12,7 @@
 
 use std::io::Write;
 
-use rerun::log::ChunkBatcherConfig;
+use rerun::log::{ChunkBatcherConfig, LogMsg};
 use rerun::sink::MemorySinkStorage;
 use rerun::{
     AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, RecordingStreamError, SerializedComponentColumn,
@@ -143,17 +143,33 @@ impl Recording {
 }
 
 /// A stream of the library with the messages that came out of it.
-struct Stream {
+pub(super) struct Stream {
     stream: RecordingStream,
     storage: MemorySinkStorage,
 }
 
 impl Stream {
-    fn new(id: &StoreId) -> Result<Self, RecordingStreamError> {
+    pub(super) fn new(id: &StoreId) -> Result<Self, RecordingStreamError> {
         // Without a timer, the same run gives the same chunks.
         let builder = RecordingStreamBuilder::from_store_id(id).batcher_config(ChunkBatcherConfig::NEVER);
         let (stream, storage) = builder.send_properties(false).enabled(true).memory()?;
         Ok(Self { stream, storage })
+    }
+
+    /// Adds one row of components.
+    pub(super) fn send(
+        &self,
+        entity: EntityPath,
+        time: TimeColumn,
+        what: &dyn AsComponents,
+    ) -> Result<(), RecordingError> {
+        Ok(self.stream.send_columns(entity, [time], as_columns(what))?)
+    }
+
+    /// Waits for all messages, and takes them out of the stream.
+    pub(super) fn taken(&self) -> Result<Vec<LogMsg>, RecordingError> {
+        self.stream.flush_blocking().map_err(RecordingError::encode)?;
+        Ok(self.storage.take())
     }
 }
 

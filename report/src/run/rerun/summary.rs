@@ -65,6 +65,9 @@ fn push_head(page: &mut String, word: &str, film: &Film) {
     let _ = write!(page, "**{word}**{sample}\n\n");
 }
 
+/// How a note ends that says that a metric is not critical.
+const NOT_CRITICAL: &str = ": not critical";
+
 /// Appends the verdict on one film. That of a re-enactment stands below the comparison with the recorded encounter.
 fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
     // What is critical is read first.
@@ -91,9 +94,18 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         }
         None => {
             let _ = write!(page, "**{}**\n\n", film.title);
-            let critical = film.notes.iter().filter(is_critical);
-            for (time, note) in critical.chain(film.notes.iter().filter(|note| !is_critical(note))) {
+            for (time, note) in film.notes.iter().filter(is_critical) {
                 let _ = writeln!(page, "- {:.2} s: {note}", time.s());
+            }
+            // The rest takes a line of each kind, so that the verdict fits its view. The log has each in full.
+            let rest = || film.notes.iter().filter(|note| !is_critical(note));
+            let happened = rest().filter(|note| !note.1.contains(NOT_CRITICAL));
+            let happened: Vec<String> = happened.map(|(time, note)| format!("{:.2} s: {note}", time.s())).collect();
+            let measured: Vec<&str> = rest().filter_map(|note| Some(note.1.split_once(NOT_CRITICAL)?.0)).collect();
+            for (name, parts) in [("", happened.join("; ")), ("not critical: ", measured.join(", "))] {
+                if !parts.is_empty() {
+                    let _ = writeln!(page, "- {name}{parts}");
+                }
             }
         }
     }

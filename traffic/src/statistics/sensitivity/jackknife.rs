@@ -16,6 +16,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::maths;
 use crate::statistics::interval::COVERAGE;
 
 /// Number of replicates into which samples are divided. Student's factor is then 4 % above its
@@ -91,6 +92,20 @@ pub fn student(values: &[f64]) -> Option<Estimate> {
     (mean.is_finite() && half_width.is_finite()).then_some(estimate)
 }
 
+/// Estimates the mean of independent magnitudes, which are not negative; `None` of fewer than two values, or of a negative one.
+///
+/// Its interval is Student's for the logarithm of the mean: it is the mean divided and multiplied by `exp(t s / mean)`, where `s` is the
+/// standard error (K. P. Burnham, D. R. Anderson, G. C. White, C. Brownie and K. H. Pollock, *Design and analysis methods for fish
+/// survival experiments based on release-recapture*, American Fisheries Society Monograph 5 (1987) 212). It has no value below 0, and
+/// contains the mean. So does the percentile bootstrap, but it covers less: of 10 exponential values 84 instead of 93 %, and of the
+/// magnitudes of 10 normal ones 88 instead of 95 %.
+pub fn magnitude(values: &[f64]) -> Option<Estimate> {
+    let Estimate { value, interval_95: [_, high] } =
+        student(values).filter(|_| values.iter().all(|one| *one >= 0.0))?;
+    let factor = if value > 0.0 { maths::exp((high - value) / value) } else { 1.0 };
+    Some(Estimate { value, interval_95: [value / factor, value * factor] })
+}
+
 /// Returns the factor of the standard error of a mean of `count` values, two or more.
 fn student_factor(count: usize) -> f64 {
     match StudentsT::new(0.0, 1.0, count as f64 - 1.0) {
@@ -101,7 +116,31 @@ fn student_factor(count: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use rand::rngs::StdRng;
+    use rand::{RngExt as _, SeedableRng as _};
+
     use super::*;
+
+    #[test]
+    fn the_interval_of_a_magnitude_does_not_begin_below_0_and_covers_the_mean() {
+        // One event in ten: Student's interval begins below 0.
+        let rare: Vec<f64> = (0..10).map(|index| if index == 0 { 2.0 } else { 0.0 }).collect();
+        assert!(student(&rare).unwrap().interval_95[0] < 0.0);
+        let estimate = magnitude(&rare).unwrap();
+        assert!(0.0 < estimate.interval_95[0] && estimate.covers(estimate.value), "{estimate:?}");
+        assert_eq!(magnitude(&[0.0, 0.0, 0.0]).unwrap().interval_95, [0.0, 0.0]);
+        assert_eq!(magnitude(&[1.0, -1.0]), None, "no magnitude");
+        // Exponential values of mean 1, by the quantiles of independent streams: 92.6 % of the intervals contain it.
+        let mut rng = StdRng::seed_from_u64(1);
+        let mut draw = || -maths::ln(1.0 - rng.random::<f64>());
+        let covered = (0..2_000).filter(|_| {
+            let values: Vec<f64> = (0..10).map(|_| draw()).collect();
+            magnitude(&values).unwrap().covers(1.0)
+        });
+        let covered = covered.count();
+        // A share of 0.926 has a standard error of 0.006.
+        assert!((1_815..1_890).contains(&covered), "{covered}");
+    }
 
     #[test]
     fn a_mean_has_the_textbook_interval() {

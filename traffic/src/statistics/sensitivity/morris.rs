@@ -13,7 +13,7 @@
 
 use rand::{Rng, RngExt};
 
-use super::jackknife::{Estimate, student};
+use super::jackknife::{Estimate, magnitude};
 
 /// Number of levels p of the grid, as in Morris's and Campolongo's examples: an even number.
 const LEVELS: usize = 4;
@@ -126,6 +126,6 @@ impl Effects {
         let magnitudes: Vec<f64> = effects.iter().map(|effect| effect.abs()).collect();
         let squares = |mu: f64| effects.iter().map(|effect| (effect - mu).powi(2)).sum::<f64>();
         let sigma = mu.filter(|_| effects.len() > 1).map(|mu| (squares(mu) / (count - 1.0)).sqrt());
-        Self { mu, mu_star: student(&magnitudes), sigma, effects: effects.len(), missing }
+        Self { mu, mu_star: magnitude(&magnitudes), sigma, effects: effects.len(), missing }
     }
 }

@@ -188,7 +188,10 @@ impl Design {
             })
         };
         let is_event = outputs.iter().flatten().all(|output| *output == 0.0 || (output - 1.0).abs() <= f64::EPSILON);
-        let bounded = |quarter: usize| mean(quarter).map(|mean| if is_event { mean.within([0.0, 1.0]) } else { mean });
+        // A mean lies where the outputs can lie: that of harm is not negative, that of an event at most 1.
+        let is_positive = outputs.iter().flatten().all(|output| *output >= 0.0);
+        let range = [if is_positive { 0.0 } else { f64::NEG_INFINITY }, if is_event { 1.0 } else { f64::INFINITY }];
+        let bounded = |quarter: usize| mean(quarter).map(|mean| mean.within(range));
         let means = [bounded(0)?, bounded(1)?, bounded(2)?, bounded(3)?];
         Some(MainEffect { index: jackknife(&replicates, share_between)?, means })
     }

@@ -171,6 +171,16 @@ fn the_effects_of_a_linear_function_are_its_coefficients() {
 }
 
 #[test]
+fn the_interval_of_an_effect_that_is_seldom_seen_does_not_begin_below_0() {
+    let design = Trajectories::new(3, 10, &mut StdRng::seed_from_u64(6));
+    let outputs: Vec<Option<f64>> =
+        (0..design.len()).map(|index| Some(f64::from(u8::from(design.point(index)[0] > 0.93)))).collect();
+    let found = design.effects(&outputs)[0].mu_star.unwrap();
+    assert!(found.value > 0.0, "the effect is seen");
+    assert!(found.interval_95[0] > 0.0 && found.covers(found.value), "{found:?}");
+}
+
+#[test]
 fn screening_finds_the_factors_of_the_g_function_in_their_order() {
     let design = Trajectories::new(5, 100, &mut StdRng::seed_from_u64(4));
     let outputs: Vec<Option<f64>> = (0..design.len()).map(|index| Some(g_function(&design.point(index)))).collect();

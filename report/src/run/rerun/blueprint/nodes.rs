@@ -14,7 +14,7 @@ use super::super::parts::{
 use super::super::recording::Recording;
 
 /// The timeline on which the viewer reads a layout.
-const BLUEPRINT_TIMELINE: &str = "blueprint";
+pub(in crate::run::rerun) const BLUEPRINT_TIMELINE: &str = "blueprint";
 
 /// A view of a layout.
 pub(super) struct View {

@@ -479,3 +479,36 @@ fn recorded_beam_time_and_intensity_are_those_of_the_scan() {
         assert!(differs(|it| it.0.into()) && differs(|it| it.1) && differs(|it| it.2), "{layer}");
     }
 }
+
+#[test]
+fn a_recording_that_is_sent_loops_the_seconds_around_its_critical_moment_before_its_layout_is_activated() {
+    use crate::run::rerun::LoopedRecording;
+    use rerun::log::LogMsg;
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.rrd");
+    let film = filmed("low-thw-overtake", ControllerChoice::MIS, (None, Level::Objects));
+    write_recording_unchecked(&path, std::slice::from_ref(&film)).unwrap();
+    let messages = LoopedRecording::read(&path).unwrap().with_loop().unwrap();
+    let panels: Vec<(usize, Chunk)> = messages
+        .iter()
+        .enumerate()
+        .filter_map(|(index, message)| match message {
+            LogMsg::ArrowMsg(id, rows) if id.kind() == StoreKind::Blueprint => {
+                Some((index, Chunk::from_arrow_msg(rows).unwrap()))
+            }
+            _ => None,
+        })
+        .filter(|(_, chunk)| chunk.entity_path().to_string() == "/time_panel")
+        .collect();
+    let activation = messages.iter().position(|message| matches!(message, LogMsg::BlueprintActivationCommand(_)));
+    let [(_, of_file), (index, sent)] = &panels[..] else { panic!("{} panels", panels.len()) };
+    assert!(Some(*index) < activation);
+    let has = |chunk: &Chunk, part: &str| chunk.components_identifiers().any(|name| name.as_str().contains(part));
+    assert!(has(sent, "time_selection") && has(sent, "loop_mode") && has(sent, "play_state"));
+    // A file opens paused, at its critical moment.
+    assert!(!has(of_file, "time_selection"));
+    // A file without a run, and a file that is no recording, have no loop.
+    std::fs::write(folder.path().join("other.rrd"), "RRF2").unwrap();
+    assert!(LoopedRecording::read(&folder.path().join("other.rrd")).is_none());
+}

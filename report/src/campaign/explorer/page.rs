@@ -1,0 +1,253 @@
+//! The page of the explorer.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
+use closecall_campaign::folder::{RECORDINGS, RECORDINGS_PAGE, REPORT};
+use closecall_campaign::saved::SavedCampaign;
+use closecall_scenarios::ScenarioFile;
+use closecall_traffic::input::read_text;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::Serialize;
+
+use super::columns::Samples;
+use super::plotly;
+use crate::campaign::ReportError;
+use crate::campaign::html::page::STYLE;
+use crate::campaign::overview::{Fate, Overview};
+use crate::campaign::recordings::card_beside;
+use crate::charts::style::{css, fate_colour};
+
+/// The page's own style and script. The script filters, counts and links; Plotly draws.
+const OWN_STYLE: &str = include_str!("explorer.css");
+const SCRIPT: &str = include_str!("explorer.js");
+/// Number of histograms.
+const HISTOGRAMS: usize = 4;
+/// The number in the command of a sample that the page replaces by that of the chosen sample.
+const PLACE: u64 = 9_876_543_210;
+
+/// What the script reads.
+#[derive(Serialize)]
+struct Data<'a> {
+    is_served: bool,
+    scenarios: &'a [Samples],
+    fates: Vec<FateStyle>,
+    /// For each scenario the command that runs a sample again, with [`PLACE`] as its number.
+    commands: Vec<String>,
+    place: String,
+    /// For each scenario the recordings by the number of the sample, with their incident cards.
+    recordings: Vec<BTreeMap<u64, [String; 2]>>,
+}
+
+#[derive(Serialize)]
+struct FateStyle {
+    pair: &'static str,
+    single: &'static str,
+    colour: String,
+}
+
+/// Returns the page of a campaign. If it is served, it asks for the samples that are chosen.
+///
+/// # Errors
+/// [`ReportError`] if the folder cannot be read.
+pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: CommandFor) -> Result<String, ReportError> {
+    let manifest = saved.manifest();
+    let names = manifest.scenarios.iter().map(|scenario| scenario.name.as_str());
+    let files = names.map(|name| saved.file(Some(name))).collect::<Result<Vec<ScenarioFile>, _>>()?;
+    let arms: Vec<String> = manifest.arm_names().into_iter().collect();
+    let mut overview = Overview::new(&files, &arms);
+    let mut scenarios: Vec<Samples> = files.iter().map(|file| Samples::new(file, &arms)).collect();
+    for record in saved.folder().records()? {
+        let record = record?;
+        overview.push(&record);
+        if let Some(index) = files.iter().position(|file| file.config().name == record.scenario) {
+            scenarios[index].push(record, manifest.sampling.seed);
+        }
+    }
+    for (samples, overview) in scenarios.iter_mut().zip(&overview.scenarios) {
+        samples.finish(overview);
+    }
+    let command = |file: &ScenarioFile| {
+        let scenario = (files.len() > 1).then_some(file.config().name.as_str());
+        let of = SavedSample { folder: ".", sample: PLACE, scenario };
+        command_for(&Action::Replay(Replay { is_paired: arms.len() > 1, ..Replay::new(of) }))
+    };
+    let style =
+        |fate: Fate| FateStyle { pair: fate.word(true), single: fate.word(false), colour: css(fate_colour(fate)) };
+    let data = Data {
+        is_served,
+        scenarios: &scenarios,
+        fates: Fate::ALL.map(style).into(),
+        commands: files.iter().map(command).collect(),
+        place: PLACE.to_string(),
+        recordings: files.iter().map(|file| recordings(saved, &file.config().name)).collect(),
+    };
+    let json = serde_json::to_vec(&data).map_err(|error| written(saved, error.into()))?;
+    let [data, script] = [json, plotly::script().into_bytes()].map(|bytes| packed(&bytes));
+    let packed = Packed {
+        data: data.map_err(|error| written(saved, error))?,
+        plotly: script.map_err(|error| written(saved, error))?,
+    };
+    let title = files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ");
+    Ok(page(&title, saved, &packed).into_string())
+}
+
+fn written(saved: &SavedCampaign, source: std::io::Error) -> ReportError {
+    closecall_traffic::atomic::WriteError::new(saved.folder().path(), source).into()
+}
+
+/// What the page holds in compressed form.
+struct Packed {
+    data: String,
+    plotly: String,
+}
+
+/// Returns bytes in gzip, as base64.
+fn packed(bytes: &[u8]) -> std::io::Result<String> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(bytes)?;
+    Ok(BASE64_STANDARD.encode(encoder.finish()?))
+}
+
+/// Returns the recordings of a scenario in the campaign's folder, with their incident cards.
+fn recordings(saved: &SavedCampaign, scenario: &str) -> BTreeMap<u64, [String; 2]> {
+    let folder = saved.folder();
+    let entries = std::fs::read_dir(folder.file(RECORDINGS)).into_iter().flatten().flatten();
+    let number = |name: &str| name.strip_prefix(scenario)?.strip_prefix('-')?.strip_suffix(".rrd")?.parse().ok();
+    let recording = |entry: std::fs::DirEntry| {
+        let name = entry.file_name().into_string().ok()?;
+        let path = format!("{RECORDINGS}/{name}");
+        Some((number(&name)?, [path.clone(), card_beside(&path)]))
+    };
+    entries.filter_map(recording).collect()
+}
+
+/// Returns the verdict that the campaign's summary states.
+fn verdict(saved: &SavedCampaign) -> Option<String> {
+    let text = read_text(&saved.folder().file("summary.md")).ok()?;
+    Some(text.lines().next()?.strip_prefix("## Closecall: ")?.replace('\\', ""))
+}
+
+/// Returns the class of a verdict, which colours it as in the report.
+fn class(verdict: Option<&str>) -> &'static str {
+    match verdict.and_then(|text| text.split(':').next()) {
+        Some("PASS") => "pass",
+        Some("FAIL") => "fail",
+        Some("INVALID" | "ERROR") => "invalid",
+        Some(_) => "inconclusive",
+        None => "open",
+    }
+}
+
+fn page(title: &str, saved: &SavedCampaign, packed: &Packed) -> Markup {
+    let nonce: String = blake3::hash(SCRIPT.as_bytes()).to_hex().chars().take(32).collect();
+    let policy = format!(
+        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; \
+         form-action 'none'; base-uri 'none'"
+    );
+    let verdict = verdict(saved);
+    let links = [(REPORT.to_owned(), "Report"), (format!("{RECORDINGS}/{RECORDINGS_PAGE}"), "Recordings")];
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(policy);
+                meta name="referrer" content="no-referrer";
+                title { "Explorer: " (title) }
+                style { (PreEscaped(STYLE)) (PreEscaped(OWN_STYLE)) }
+            }
+            body {
+                main.explorer {
+                    header.(class(verdict.as_deref())) {
+                        div {
+                            h1 { (verdict.as_deref().map_or_else(|| format!("Samples of {title}"), str::to_owned)) }
+                            p.what id="counts" role="status" { "Loading the samples." }
+                            nav aria-label="Files of the campaign" {
+                                @for (path, name) in &links {
+                                    @if saved.folder().file(path).is_file() { a href=(path) target="_blank" rel="noopener" { (name) } }
+                                }
+                            }
+                        }
+                    }
+                    (filters(saved))
+                    div.views {
+                        div.charts-side {
+                            (plane("map", "Outcome map: share of samples with a collision, and samples"))
+                            (plane("scatter", "Two columns: number of samples, and samples"))
+                            div.histograms { @for index in 0..HISTOGRAMS { (histogram(index)) } }
+                        }
+                        aside id="sample" aria-label="Sample" aria-live="polite" tabindex="-1" {
+                            h2 { "Sample" }
+                            p { "Choose a point, a row of the list, or a number." }
+                        }
+                    }
+                    section aria-labelledby="list-title" {
+                        h2 id="list-title" { "Samples, the gravest first" }
+                        div id="list" {}
+                    }
+                }
+                script type="text/plain" id="plotly" { (PreEscaped(&packed.plotly)) }
+                script type="text/plain" id="data" { (PreEscaped(&packed.data)) }
+                script nonce=(nonce) { (PreEscaped(SCRIPT)) }
+                noscript { p { "The explorer needs a script. The report does not." } }
+            }
+        }
+    }
+}
+
+fn filters(saved: &SavedCampaign) -> Markup {
+    let manifest = saved.manifest();
+    html! {
+        form.filters id="filters" aria-label="Filters" {
+            label { "Scenario " select name="scenario" { @for scenario in &manifest.scenarios { option { (scenario.name) } } } }
+            label {
+                "Arm " select name="arm" {
+                    @for (index, name) in manifest.arm_names().iter().enumerate() {
+                        option value=(index) selected[index + 1 == manifest.arms.len()] { (name) }
+                    }
+                }
+            }
+            fieldset id="fates" { legend { "Outcome" } }
+            label { "Reason of the MIS " select name="reason" {} }
+            label { "Cause of the collision " select name="cause" {} }
+            label { "Sample " input name="number" type="number" min="0" step="1" size="8"; }
+            button type="submit" { "Show" }
+            button type="button" id="reset" { "Clear filters and brushes" }
+        }
+    }
+}
+
+fn plane(id: &str, title: &str) -> Markup {
+    html! {
+        section.view id=(id) aria-label=(title) {
+            h2 { (title) }
+            p.axes {
+                label { "Across " select name="x" {} }
+                label { "Up " select name="y" {} }
+                button type="button" name="clear" hidden { "Clear brush" }
+            }
+            div.chart role="img" aria-label=(title) {}
+        }
+    }
+}
+
+fn histogram(index: usize) -> Markup {
+    html! {
+        section.view.histogram id={ "histogram-" (index) } aria-label={ "Histogram " (index + 1) } {
+            p.axes {
+                label { "Column " select name="x" {} }
+                label { "from " input name="from" type="number" step="any"; }
+                label { "to " input name="to" type="number" step="any"; }
+                button type="button" name="clear" hidden { "Clear brush" }
+            }
+            div.chart role="img" aria-label={ "Histogram " (index + 1) } {}
+        }
+    }
+}
