@@ -16,6 +16,7 @@ use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
+use closecall_campaign::rare::Method;
 use closecall_campaign::remote::connect;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
@@ -45,6 +46,7 @@ use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{heartbeat, out, outln, print_error, print_failure};
 use super::plan::PlanArgs;
+use super::rare::{DesignChoice, Rare, RareArgs};
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
 use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
@@ -69,9 +71,12 @@ pub(super) struct CampaignArgs {
     /// without a seed draws one
     #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
     judge_seed: Option<JudgeSeed>,
-    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`
-    #[arg(long, default_value_t = Design::Random, help_heading = heading::SAMPLES)]
-    design: Design,
+    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or `importance` for a rare event,
+    /// which --event names. -n is then the largest number of runs [default: 200000]
+    #[arg(long, default_value_t = DesignChoice::Plain(Design::Random), help_heading = heading::SAMPLES)]
+    design: DesignChoice,
+    #[command(flatten)]
+    rare: RareArgs,
     #[command(flatten)]
     controller: ControllerArgs,
     /// Depth of the sensor simulation [default: that of the scenario]
@@ -167,7 +172,7 @@ impl CampaignArgs {
     }
 
     fn sampling(&self) -> Result<Sampling, CliError> {
-        Ok(Sampling { seed: self.seed()?, design: self.design, samples: self.plan.samples() })
+        Ok(Sampling { seed: self.seed()?, design: self.design.plain(), samples: self.plan.samples() })
     }
 
     fn workers(&self) -> Result<Workers, CliError> {
@@ -189,7 +194,7 @@ impl CampaignArgs {
         plan.use_sensors(self.sensors.map(SensorsChoice::mode))?;
         plan.partition = self.partition;
         plan.checks = self.plan.checks()?;
-        plan.inference = self.plan.inference(self.design)?;
+        plan.inference = self.plan.inference(self.design.plain())?;
         plan.workers = self.workers()?;
         plan.retry_crashed = self.retry_crashed;
         Ok(plan)
@@ -277,11 +282,60 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
     }
 }
 
+/// Estimates the probability of a rare event.
+fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliError> {
+    let is_named = [
+        (args.plan.names_preset(), "--preset"),
+        (args.plan.until_certain, "--until-certain"),
+        (args.plan.time_budget.is_some(), "--time-budget"),
+        (args.plan.names_checks(), "--check-share, --check-at-most and --no-validity-checks"),
+        (args.partition.is_some(), "--partition"),
+        (args.ray.is_some(), "--ray"),
+        (args.record.is_some(), "--record"),
+        (args.retry_crashed > 0, "--retry-crashed"),
+        (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
+        (args.gates.names_criterion()?, "a gate other than --max-probability"),
+        (args.artifacts.is_named(), "--strict-artifacts"),
+    ];
+    if let Some((_, option)) = is_named.into_iter().find(|(is_named, _)| *is_named) {
+        return Err(CliError::usage(format!(
+            "--design {method} draws weighted runs, which are no independent samples: it cannot be combined with {option}"
+        )));
+    }
+    let folder = match args.results.place()? {
+        Place::Named(path) => Some(path),
+        Place::Default | Place::Nowhere if args.results.is_resumed() => {
+            return Err(CliError::usage("--resume: name the folder of the campaign with --out"));
+        }
+        Place::Default | Place::Nowhere => None,
+    };
+    let controllers = args.comparison.controllers(&args.controller, args.rare.needs_pairs())?;
+    let rare = Rare {
+        method,
+        args: &args.rare,
+        budget: args.plan.named_samples(),
+        gate: args.gates.probability()?,
+        folder,
+        resume: args.results.is_resumed(),
+        format: args.format,
+    };
+    rare.run(&args.plan(controllers)?)
+}
+
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     check_arguments(args)?;
+    match args.design {
+        DesignChoice::Rare(method) => return rare_campaign(args, method),
+        DesignChoice::Plain(design) if args.rare.is_named() => {
+            return Err(CliError::usage(format!(
+                "--event is the rare event of --design subset or importance, and not of {design}: a gate such as --gate \"upper(induced) <= 0.01\" judges the samples of a plain campaign"
+            )));
+        }
+        DesignChoice::Plain(_) => {}
+    }
     let controllers = args.comparison.controllers(&args.controller, args.plan.wants_pairs())?;
     let is_paired = controllers.len() > 1;
-    let mut gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
+    let mut gates = args.gates.gates(is_paired, args.design.plain(), args.plan.preset_gates(is_paired))?;
     gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
     let planned = Planned {
         plan: &args.plan(controllers)?,

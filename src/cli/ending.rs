@@ -42,6 +42,11 @@ pub(super) enum Ending {
 }
 
 impl EndArgs {
+    /// Returns true if an option is named.
+    pub(super) const fn is_named(&self) -> bool {
+        self.fail_fast || self.max_errors.is_some() || self.retry_errors
+    }
+
     /// Returns the rule that ends the campaign early.
     pub(super) const fn rule(&self) -> EndRule {
         EndRule { fail_fast: self.fail_fast, max_errors: self.max_errors }

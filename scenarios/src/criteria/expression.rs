@@ -65,7 +65,7 @@ impl Quantity {
         matches!(self, Self::Baseline(_) | Self::Pair(_))
     }
 
-    fn is_flag(self) -> bool {
+    pub(super) fn is_flag(self) -> bool {
         match self {
             Self::Tested(measure) | Self::Baseline(measure) => measure.kind == MeasureKind::Flag,
             Self::Pair(_) => true,
@@ -204,7 +204,7 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
     })
 }
 
-fn parse_quantity(name: &str) -> Result<Quantity, String> {
+pub(super) fn parse_quantity(name: &str) -> Result<Quantity, String> {
     if let Some(flag) = PairFlag::named(name) {
         return Ok(Quantity::Pair(flag));
     }
