@@ -439,6 +439,8 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
 /// Counts the records of a running campaign, shows the progress, and applies the stop rule.
 struct Progress {
     names: Vec<String>,
+    /// The number of samples of each scenario; `None` of a part, which is judged with the others only.
+    counts: Option<Vec<u64>>,
     tally: Tally,
     stop: StopMonitor,
     end: EndMonitor,
@@ -459,7 +461,8 @@ impl Progress {
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
         let tally = Tally::new(campaign, gates);
-        Self { names, tally, stop, end, spent: SpentTime::default(), _heartbeat: heartbeat(&bar), bar }
+        let counts = campaign.partition.is_none().then(|| campaign.works.iter().map(|work| work.count()).collect());
+        Self { names, counts, tally, stop, end, spent: SpentTime::default(), _heartbeat: heartbeat(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
@@ -473,6 +476,12 @@ impl Progress {
         }
         if next.is_new {
             self.end.observe(next.record)?;
+            let (name, judge) = (&self.names[next.work], &self.tally.judge);
+            let count = self.counts.as_ref().map(|counts| counts[next.work]);
+            self.end.observe_gate(|| {
+                let lost = judge.lost(name, count?.saturating_sub(next.record.sample + 1))?;
+                Some((name.clone(), lost))
+            })?;
         } else {
             // The campaign went on after it.
             self.end.count(next.record);

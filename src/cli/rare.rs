@@ -15,6 +15,7 @@ use closecall_campaign::runner::Work;
 use closecall_campaign::session;
 use closecall_report::json::stamped;
 use closecall_scenarios::criteria::{EventExpression, Guide, Quantity};
+use closecall_scenarios::library;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::statistics::format::percent;
@@ -257,7 +258,10 @@ fn replay(work: &Work, nearest: &Nearest, sensors: Option<SensorMode>) -> String
         let value = nearest.parameters.get(name)?;
         Some(format!(" --set {}", quoted(&format!("{name}={value}"))))
     });
-    let (path, seed, noise) = (work.file.path().display().to_string(), work.sampling.seed, nearest.noise);
+    let name = &work.file.config().name;
+    let is_of_library = work.file.path() == library::path(name);
+    let path = if is_of_library { name.clone() } else { work.file.path().display().to_string() };
+    let (seed, noise) = (work.sampling.seed, nearest.noise);
     let varying: String = varying.collect();
     format!("closecall run {} {arms}{sensors} --seed {seed} --sample {noise}{settings}{varying}", quoted(&path))
 }

@@ -53,6 +53,7 @@ mod own_controller;
 mod paper;
 mod paper_figure;
 mod perception;
+mod rare;
 mod readme;
 mod reasons;
 mod reenact;

@@ -113,6 +113,8 @@ struct Run<'a, S> {
     seed: Seed,
     runs: u64,
     budget: u64,
+    /// The part of the budget that searches may use: what is left has to carry the estimate.
+    search_budget: u64,
 }
 
 /// Points with their responses and weights.
@@ -173,7 +175,7 @@ impl<S: Simulator> Run<'_, S> {
         let (mut nearest, mut without_progress) = (f64::NEG_INFINITY, 0);
         for level in 0..MOST_LEVELS {
             let runs = self.level_runs();
-            if self.left() < runs as u64 {
+            if self.runs + runs as u64 > self.search_budget {
                 return Ok(None);
             }
             let index = (number * MOST_LEVELS + level) as u64;
@@ -222,7 +224,7 @@ pub fn importance<S: Simulator>(
     seed: Seed,
     goal: Goal,
 ) -> Result<ImportanceResult, S::Error> {
-    let mut run = Run { simulator, dimensions, seed, runs: 0, budget: goal.budget };
+    let mut run = Run { simulator, dimensions, seed, runs: 0, budget: goal.budget, search_budget: goal.budget / 2 };
     let mut found: Vec<Mixture> = Vec::new();
     for number in 0..MOST_SEARCHES {
         let known: Vec<Component> = found.iter().flat_map(|mixture| mixture.components.clone()).collect();
@@ -235,7 +237,7 @@ pub fn importance<S: Simulator>(
         }
     }
     let pilot_runs = 2 * run.level_runs();
-    if found.is_empty() || run.left() < pilot_runs as u64 {
+    if found.is_empty() || run.left() < pilot_runs as u64 + LEAST_FINAL {
         // Nothing leads to the event: what is left shows how rare it is at most.
         return without_search(&mut run, &found, goal);
     }

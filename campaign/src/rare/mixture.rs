@@ -142,21 +142,21 @@ const MOST_LOG: f64 = 600.0;
 
 /// Weighted points.
 #[derive(Clone, Copy, Debug)]
-pub struct Weighted<'a> {
+pub(super) struct Weighted<'a> {
     /// The points.
-    pub points: &'a [&'a [f64]],
+    pub(super) points: &'a [&'a [f64]],
     /// Their weights, not negative.
-    pub weights: &'a [f64],
+    pub(super) weights: &'a [f64],
 }
 
 impl Weighted<'_> {
     /// Returns the effective number of points: (Σw)² / Σw² (L. Kish, *Survey Sampling*, 1965).
-    pub fn effective(&self) -> f64 {
+    fn effective(&self) -> f64 {
         effective(self.weights)
     }
 
     /// Fits a mixture. `None` of no points.
-    pub fn fit(&self, defensive: f64, rng: &mut Stream) -> Option<Mixture> {
+    pub(super) fn fit(&self, defensive: f64, rng: &mut Stream) -> Option<Mixture> {
         let size = self.effective();
         if !(size > 0.0) {
             return None;

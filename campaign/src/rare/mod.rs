@@ -29,7 +29,7 @@ mod tests;
 
 pub use estimate::{COVERAGE, Mean};
 pub use importance::{DEFENSIVE, Goal, ImportanceResult, NoInterval, importance};
-pub use journal::{RareFolder, RareManifest};
+pub use journal::{RareFolder, RareJournal, RareManifest};
 pub use method::Method;
 pub use mixture::{Component, Mixture};
 pub use nearness::{Nearness, NoGuide};

@@ -33,14 +33,14 @@ use super::importance::{Goal, NoInterval};
 use super::problem::{Point, Response, Seed, Simulator, draw_noise};
 
 /// Number of particles (-): an assumption; 100 to 1,000 are plausible.
-pub const PARTICLES: usize = 200;
+const PARTICLES: usize = 200;
 /// Share of the particles that reach the next level (-). Au and Beck use 0.1; 0.1 to 0.3 are plausible (K. M. Zuev et al., Computers & Structures 92–93 (2012)
 /// 283–296).
 const SHARE: f64 = 0.2;
 /// Moves of a particle in a level (-): an assumption; 1 to 5 are plausible.
 const MOVES: usize = 3;
 /// Number of repetitions that determine the number of all (-). Student's factor is then 7 % above that of infinitely many.
-pub const FIRST: usize = 20;
+const FIRST: usize = 20;
 /// Largest number of levels (-): they reach a probability of 1e-21.
 const MOST_LEVELS: usize = 30;
 /// Share of accepted moves at which the step width stays (-): 0.44 is the optimum in one dimension, 0.23 in many (A. Gelman, G. O. Roberts and W. R. Gilks,
