@@ -37,6 +37,8 @@ const MOST_LEVELS: usize = 20;
 const PATIENCE: usize = 2;
 /// Largest number of searches: the first, and those beside the regions that are known.
 const MOST_SEARCHES: usize = 8;
+/// Share of the probability of all known regions below which a further one ends the searches (-): an assumption; 0.01 to 0.1 are plausible.
+const SMALL_REGION: f64 = 0.03;
 /// Number of searches that start anew after a first one that did not come to the event.
 const FIRST_SEARCHES: usize = 2;
 /// Smallest number of runs of a level that lie beside the known regions (-): an assumption. With fewer, no room is left for another region.
@@ -48,7 +50,7 @@ const FEW_EVENTS: usize = 5;
 const WIDE_SD: f64 = 3.0;
 const MOST_WIDE: usize = 4;
 /// Smallest number of final runs (-): below it the error of a weighted mean is not nearly normal.
-const LEAST_FINAL: u64 = 400;
+const LEAST_FINAL: u64 = 600;
 /// Smallest number of final runs with an event for which there is an interval, and smallest effective number of them (-): assumptions. With fewer, the error
 /// is not nearly normal.
 const LEAST_EVENTS: u64 = 30;
@@ -106,6 +108,13 @@ pub struct ImportanceResult {
     pub mixture: Mixture,
 }
 
+/// A region of the event to which a search has led.
+struct Region {
+    mixture: Mixture,
+    /// A rough estimate of its probability, by the last level of the search. It decides whether the search goes on, and enters no result.
+    probability: f64,
+}
+
 /// The runs so far.
 struct Run<'a, S> {
     simulator: &'a mut S,
@@ -145,6 +154,11 @@ impl Drawn {
         kept
     }
 
+    fn weight_of_events(&self) -> f64 {
+        let all = self.responses.iter().zip(&self.weights);
+        all.filter(|(response, _)| response.is_event()).map(|(_, weight)| weight).sum()
+    }
+
     fn events(&self) -> usize {
         self.responses.iter().filter(|response| response.is_event()).count()
     }
@@ -170,7 +184,7 @@ impl<S: Simulator> Run<'_, S> {
     }
 
     /// Searches the event from the distribution of the scenario on, beside the regions that are known. `None` if it does not come nearer, or the budget ends.
-    fn search(&mut self, number: usize, known: &[Component], start: Mixture) -> Result<Option<Mixture>, S::Error> {
+    fn search(&mut self, number: usize, known: &[Component], start: Mixture) -> Result<Option<Region>, S::Error> {
         let mut mixture = start;
         let (mut nearest, mut without_progress) = (f64::NEG_INFINITY, 0);
         for level in 0..MOST_LEVELS {
@@ -190,7 +204,8 @@ impl<S: Simulator> Run<'_, S> {
             let Some(fitted) = fitted else { return Ok(None) };
             mixture = fitted;
             if threshold == f64::INFINITY {
-                return Ok(Some(mixture));
+                let probability = drawn.weight_of_events() / runs as f64;
+                return Ok(Some(Region { mixture, probability }));
             }
             without_progress = if threshold > nearest { 0 } else { without_progress + 1 };
             nearest = nearest.max(threshold);
@@ -226,12 +241,20 @@ pub fn importance<S: Simulator>(
 ) -> Result<ImportanceResult, S::Error> {
     let mut run = Run { simulator, dimensions, seed, runs: 0, budget: goal.budget, search_budget: goal.budget / 2 };
     let mut found: Vec<Mixture> = Vec::new();
+    let mut total = 0.0;
     for number in 0..MOST_SEARCHES {
         let known: Vec<Component> = found.iter().flat_map(|mixture| mixture.components.clone()).collect();
         let is_wide = !known.is_empty() && dimensions <= MOST_WIDE;
         let start = if is_wide { Mixture::wide(dimensions, WIDE_SD) } else { Mixture::standard() };
         match run.search(number, &known, start)? {
-            Some(mixture) => found.push(mixture),
+            Some(Region { mixture, probability }) => {
+                found.push(mixture);
+                total += probability;
+                // What is left beside such a region matters less still.
+                if probability < SMALL_REGION * total {
+                    break;
+                }
+            }
             None if found.is_empty() && number < FIRST_SEARCHES => {}
             None => break,
         }

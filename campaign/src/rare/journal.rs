@@ -17,8 +17,8 @@ use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
 use closecall_traffic::input;
 use serde::{Deserialize, Serialize};
 
+use super::error::RareError;
 use super::method::Method;
-use super::plan::RareError;
 use super::problem::{Point, Response};
 use super::report::RareReport;
 use crate::folder::FolderError;

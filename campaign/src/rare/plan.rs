@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::error::RareError;
 use super::importance::{Goal, importance};
 use super::journal::RareJournal;
 use super::method::Method;
@@ -10,47 +11,9 @@ use super::problem::Seed;
 use super::report::RareReport;
 use super::runs::Runs;
 use super::subset::subset;
-use crate::campaign_error::{CampaignError, WorkersError};
-use crate::folder::FolderError;
 use crate::runner::Work;
 use crate::stop::StopFlag;
 use crate::workers::Workers;
-use closecall_traffic::atomic::WriteError;
-
-/// Why a rare event has no result.
-#[derive(Debug, thiserror::Error)]
-pub enum RareError {
-    /// The folder or the workers cannot be used.
-    #[error(transparent)]
-    Campaign(#[from] CampaignError),
-    /// No parameter varies, so that no event is rarer than another.
-    #[error("no parameter of `{scenario}` varies: there is no probability to estimate")]
-    NothingVaries {
-        /// The scenario.
-        scenario: String,
-    },
-    /// A request from outside has ended the runs.
-    #[error("the runs were stopped")]
-    Stopped,
-}
-
-impl From<FolderError> for RareError {
-    fn from(error: FolderError) -> Self {
-        CampaignError::from(error).into()
-    }
-}
-
-impl From<WriteError> for RareError {
-    fn from(error: WriteError) -> Self {
-        CampaignError::from(error).into()
-    }
-}
-
-impl From<WorkersError> for RareError {
-    fn from(error: WorkersError) -> Self {
-        CampaignError::from(error).into()
-    }
-}
 
 /// How a rare event is sampled.
 #[derive(Clone, Copy, Debug)]

@@ -8,9 +8,9 @@ use closecall_scenarios::ScenarioFile;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 use closecall_traffic::Check;
 
+use super::error::RareError;
 use super::journal::{RareJournal, RareRecord};
 use super::nearness::Nearness;
-use super::plan::RareError;
 use super::problem::{Point, Response, Simulator};
 use super::report::Nearest;
 use crate::record::{ArmRecord, Record, SampleFailure};

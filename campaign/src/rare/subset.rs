@@ -279,13 +279,11 @@ pub fn subset<S: Simulator>(
 fn needed(values: &[f64], goal: Goal) -> usize {
     let Some(mean) = Mean::of(values) else { return FIRST };
     let factor = mean.relative_width() / goal.relative_width;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a number of repetitions; a cast saturates"
-    )]
     let needed = (FIRST as f64 * factor * factor).ceil();
-    if needed.is_finite() { (needed as usize).max(FIRST) } else { usize::MAX }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast of a large number saturates")]
+    let needed = needed as usize;
+    // No repetition with the event: the width is not a number, and the cast gives 0.
+    if factor.is_finite() { needed.max(FIRST) } else { usize::MAX }
 }
 
 /// Returns the mean of all values with the variance of the first, or with that of all if it is larger: estimates that are products are skewed, and the

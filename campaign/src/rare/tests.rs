@@ -56,14 +56,14 @@ const GOAL: Goal = Goal { relative_width: 0.5, budget: 200_000, value: 0 };
 /// Runs that plain sampling needs for that width, times the probability: (2·1.96 / 0.5)².
 const PLAIN: f64 = 61.47;
 
-/// Number of repetitions of a test, and the least share of them that covers the truth: five standard errors below 95 %.
-const REPETITIONS: u64 = 120;
-const LEAST_COVERED: f64 = 0.85;
+/// Number of repetitions of a test, and the least share of them that covers the truth: more than four standard errors below 95 %.
+const REPETITIONS: u64 = 40;
+const LEAST_COVERED: f64 = 0.8;
 
 /// Returns the share of repetitions whose interval contains the probability, and their mean number of runs.
 fn coverage(event: impl Fn(&Point) -> Response, dimensions: usize, probability: f64, by_subset: bool) -> (f64, f64) {
     let mut simulator = Function(event);
-    let repetitions = if by_subset { REPETITIONS / 4 } else { REPETITIONS };
+    let repetitions = if by_subset { REPETITIONS / 3 } else { REPETITIONS };
     let (mut covered, mut runs) = (0, 0);
     for seed in 0..repetitions {
         let (means, used) = if by_subset {
