@@ -43,7 +43,7 @@ const SMALL_REGION: f64 = 0.03;
 const FIRST_SEARCHES: usize = 2;
 /// Smallest number of runs of a level that lie beside the known regions (-): an assumption. With fewer, no room is left for another region.
 const LEAST_BESIDE: usize = 20;
-/// Number of events beside the known regions that lead a search (-): an assumption; 3 to 10 are plausible.
+/// Number of events of a level that lead a search (-): an assumption; 3 to 10 are plausible.
 const FEW_EVENTS: usize = 5;
 /// Standard deviation of the distribution from which the last search starts (-), and largest number of dimensions in which it does. With more of them, its
 /// points lie further out than any region that matters.
@@ -136,7 +136,7 @@ struct Drawn {
 
 impl Drawn {
     /// Returns the points that `keep` keeps, with their weights.
-    fn kept(&self, keep: impl Fn(&Response) -> bool) -> (Vec<&[f64]>, Vec<f64>) {
+    fn kept(&self, keep: &dyn Fn(&Response) -> bool) -> (Vec<&[f64]>, Vec<f64>) {
         let all = self.points.iter().zip(&self.responses).zip(&self.weights);
         all.filter(|((_, response), _)| keep(response)).map(|((point, _), w)| (point.normals.as_slice(), *w)).unzip()
     }
@@ -187,33 +187,42 @@ impl<S: Simulator> Run<'_, S> {
     fn search(&mut self, number: usize, known: &[Component], start: Mixture) -> Result<Option<Region>, S::Error> {
         let mut mixture = start;
         let (mut nearest, mut without_progress) = (f64::NEG_INFINITY, 0);
+        let mut best: Option<(usize, Region)> = None;
         for level in 0..MOST_LEVELS {
             let runs = self.level_runs();
             if self.runs + runs as u64 > self.search_budget {
-                return Ok(None);
+                break;
             }
             let index = (number * MOST_LEVELS + level) as u64;
             let drawn = self.draw(&mixture, runs, ("search", index))?.beside(known);
-            let Some(threshold) = threshold(&drawn.responses) else { return Ok(None) };
-            // A region beside the known ones may begin abruptly: a few events lead there better than many runs that are merely near.
-            let has_few = !known.is_empty() && drawn.events() >= FEW_EVENTS && threshold < f64::INFINITY;
-            let (points, weights) =
-                drawn.kept(|response| if has_few { response.is_event() } else { response.level() >= threshold });
-            let mut rng = self.seed.stream("fit", index);
-            let fitted = Weighted { points: &points, weights: &weights }.fit(DEFENSIVE, &mut rng);
-            let Some(fitted) = fitted else { return Ok(None) };
-            mixture = fitted;
-            if threshold == f64::INFINITY {
+            let Some(threshold) = threshold(&drawn.responses) else { break };
+            let events = drawn.events();
+            let fit = |part: &str, keep: &dyn Fn(&Response) -> bool| {
+                let (points, weights) = drawn.kept(keep);
+                Weighted { points: &points, weights: &weights }.fit(DEFENSIVE, &mut self.seed.stream(part, index))
+            };
+            // The event may never be likely, as when the random streams decide it: then the level with the most events leads to it.
+            if events >= FEW_EVENTS && best.as_ref().is_none_or(|(most, _)| events > *most) {
                 let probability = drawn.weight_of_events() / runs as f64;
-                return Ok(Some(Region { mixture, probability }));
+                best = fit("events", &Response::is_event).map(|mixture| (events, Region { mixture, probability }));
             }
+            let has_passed = best.as_ref().is_some_and(|(most, _)| events < *most);
+            if threshold == f64::INFINITY || has_passed {
+                break;
+            }
+            // A region beside the known ones may begin abruptly: a few events lead there better than many runs that are merely near.
+            let has_few = !known.is_empty() && events >= FEW_EVENTS;
+            let Some(fitted) = fit("fit", &|one| if has_few { one.is_event() } else { one.level() >= threshold }) else {
+                break;
+            };
+            mixture = fitted;
             without_progress = if threshold > nearest { 0 } else { without_progress + 1 };
             nearest = nearest.max(threshold);
             if without_progress == PATIENCE {
-                return Ok(None);
+                break;
             }
         }
-        Ok(None)
+        Ok(best.map(|(_, region)| region))
     }
 }
 
@@ -273,7 +282,7 @@ pub fn importance<S: Simulator>(
 
 /// Adds a fit of the pilot's events to the pooled mixture.
 fn refined(pooled: &Mixture, drawn: &Drawn, rng: &mut closecall_traffic::Stream) -> Mixture {
-    let (points, weights) = drawn.kept(Response::is_event);
+    let (points, weights) = drawn.kept(&Response::is_event);
     let fit = Weighted { points: &points, weights: &weights }.fit(DEFENSIVE, rng);
     match fit {
         Some(fit) => Mixture::pooled(&[pooled.clone(), fit], DEFENSIVE),
