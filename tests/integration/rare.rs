@@ -128,7 +128,6 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
         ("--design subset --event collision --until-certain --max-probability 0.1", "--until-certain"),
         ("--design subset --event collision --time-budget 9s", "--time-budget"),
         ("--design subset --event collision --no-validity-checks", "--no-validity-checks"),
-        ("--design subset --event collision --resume", "name the folder"),
         ("--design subset --event engaged", "with --guide MEASURE"),
         ("--design subset --event collision --relative-width 0", "not a number above 0"),
         ("--design subset --event crash", "not a measure; there are"),
@@ -153,8 +152,7 @@ fn a_gate_that_can_only_fail_ends_a_campaign_that_fails_fast() {
     let path = fixture();
     let gate = "min(min_gap_rear_m) >= 30";
     let campaign = |more: &[&str]| {
-        let fixed =
-            ["campaign", path.to_str().unwrap(), "-n", "400", "--controller", "acc", "--no-out", "--gate", gate];
+        let fixed = ["campaign", path.to_str().unwrap(), "-n", "400", "--controller", "acc", "--gate", gate];
         closecall(fixed.iter().chain(more))
     };
     let text = stdout(&campaign(&["--fail-fast"]), 1);

@@ -212,7 +212,8 @@ impl<S: Simulator> Run<'_, S> {
             }
             // A region beside the known ones may begin abruptly: a few events lead there better than many runs that are merely near.
             let has_few = !known.is_empty() && events >= FEW_EVENTS;
-            let Some(fitted) = fit("fit", &|one| if has_few { one.is_event() } else { one.level() >= threshold }) else {
+            let Some(fitted) = fit("fit", &|one| if has_few { one.is_event() } else { one.level() >= threshold })
+            else {
                 break;
             };
             mixture = fitted;
