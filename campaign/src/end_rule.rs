@@ -6,6 +6,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use closecall_scenarios::criteria::Expression;
 use serde_json::{Value, json};
 
 use crate::action::{Action, CommandFor, Replay, Resume, SavedSample};
@@ -17,14 +18,14 @@ use crate::summary::Summary;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EndRule {
     /// True if the first failing sample ends the campaign: the ego collides under the controller under test, or a
-    /// controller ends in an error.
+    /// controller ends in an error. So does a gate that fails whatever the remaining samples are.
     pub fail_fast: bool,
     /// Largest number of samples that may end in an error; `None` for any number.
     pub max_errors: Option<u64>,
 }
 
 /// The sample or the samples that have ended a campaign early.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum EarlyEnd {
     /// A sample has failed.
     Failure {
@@ -34,6 +35,13 @@ pub enum EarlyEnd {
         sample: u64,
         /// True if the sample ended in an error, false if the ego collided.
         is_error: bool,
+    },
+    /// A gate fails whatever the remaining samples are.
+    Gate {
+        /// The name of the scenario.
+        scenario: String,
+        /// The gate.
+        expression: Expression,
     },
     /// Too many samples have ended in an error.
     Errors {
@@ -51,6 +59,7 @@ impl fmt::Display for EarlyEnd {
             Self::Failure { scenario, sample, is_error: false } => {
                 write!(f, "sample {sample} of {scenario} has a collision of the ego")
             }
+            Self::Gate { scenario, expression } => write!(f, "{expression} can only fail in {scenario}"),
             Self::Errors { errors } => write!(f, "{errors} samples ended in an error"),
         }
     }
@@ -159,6 +168,15 @@ impl EndMonitor {
         if self.ending.is_some() { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     }
 
+    /// Ends a campaign that fails fast if `lost` has a gate that can only fail, with its scenario.
+    pub fn observe_gate(&mut self, lost: impl FnOnce() -> Option<(String, Expression)>) -> ControlFlow<End> {
+        let Some((scenario, expression)) = self.rule.fail_fast.then(lost).flatten() else {
+            return ControlFlow::Continue(());
+        };
+        self.ending = Some(EarlyEnd::Gate { scenario, expression });
+        ControlFlow::Break(End::Campaign)
+    }
+
     /// Returns what has ended the campaign early, or `None` if nothing has.
     pub fn into_ending(self) -> Option<EarlyEnd> {
         self.ending
@@ -181,6 +199,15 @@ mod tests {
         let mut monitor = EndMonitor::new(EndRule { fail_fast: true, max_errors: None });
         assert!(monitor.observe(&error(3)).is_break());
         assert_eq!(monitor.into_ending().unwrap().to_string(), "sample 3 of s ended in an error");
+    }
+
+    #[test]
+    fn a_gate_that_can_only_fail_ends_a_campaign_that_fails_fast_and_no_other() {
+        let lost = || Some(("s".to_owned(), "count(induced) <= 0".parse().unwrap()));
+        let mut monitor = EndMonitor::new(EndRule { fail_fast: true, max_errors: None });
+        assert!(monitor.observe_gate(|| None).is_continue() && monitor.observe_gate(lost).is_break());
+        assert_eq!(monitor.into_ending().unwrap().to_string(), "count(induced) <= 0 can only fail in s");
+        assert!(EndMonitor::new(EndRule::default()).observe_gate(lost).is_continue());
     }
 
     #[test]

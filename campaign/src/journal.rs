@@ -73,7 +73,7 @@ impl Journal {
     }
 }
 
-pub(super) fn line(record: &Record) -> io::Result<Vec<u8>> {
+pub(crate) fn line<T: serde::Serialize>(record: &T) -> io::Result<Vec<u8>> {
     let mut line = vec![b'0'; CHECKSUM_DIGITS];
     line.push(b' ');
     serde_json::to_writer(&mut line, record)?;
@@ -165,7 +165,7 @@ impl Entries {
 
 /// Reads a line. Of a line that is too long, as a damaged disk leaves it, no more than [`MOST_LINE_BYTES`] are kept, without its end.
 /// Returns its length (bytes), 0 at the end of the file.
-pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<u64> {
+pub(crate) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<u64> {
     line.clear();
     let mut read = reader.by_ref().take(MOST_LINE_BYTES).read_until(b'\n', line)? as u64;
     if read == MOST_LINE_BYTES && line.last() != Some(&b'\n') {
@@ -174,7 +174,7 @@ pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Re
     Ok(read)
 }
 
-pub(super) fn parse(line: &[u8]) -> Result<Record, String> {
+pub(crate) fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
     let Some(line) = line.strip_suffix(b"\n") else { return Err("the line is incomplete".to_owned()) };
     let (Some(sum), Some(b' '), Some(record)) =
         (line.get(..CHECKSUM_DIGITS), line.get(CHECKSUM_DIGITS), line.get(CHECKSUM_DIGITS + 1..))

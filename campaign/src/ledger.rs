@@ -21,33 +21,64 @@ pub enum Inference {
     Design,
 }
 
+/// Independent samples: what every binomial bound needs. There is no other way to a bound than through this type, and only [`Inference::independent`] makes it:
+/// the points of a design and the weighted runs of a rare event have none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Independent {
+    /// True if the number of samples depends on the outcomes or the clock.
+    is_sequential: bool,
+}
+
+impl Independent {
+    /// Returns the one-sided upper bound of a probability.
+    pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
+        match self.is_sequential {
+            false => interval::upper_bound(hits, samples, confidence),
+            true => sequence::upper_bound(hits, samples, confidence),
+        }
+    }
+
+    /// Returns the one-sided lower bound of a probability.
+    pub fn lower_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
+        match self.is_sequential {
+            false => interval::lower_bound(hits, samples, confidence),
+            true => sequence::lower_bound(hits, samples, confidence),
+        }
+    }
+
+    /// Returns the two-sided interval that covers the probability in a share `coverage` of repetitions.
+    pub fn interval(self, hits: u64, samples: u64, coverage: f64) -> [f64; 2] {
+        match self.is_sequential {
+            false => interval::clopper_pearson(hits, samples, coverage),
+            true => sequence::interval(hits, samples, coverage),
+        }
+    }
+}
+
 impl Inference {
-    /// Returns the one-sided upper bound of a probability; `None` if no bound is valid.
-    pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> Option<f64> {
+    /// Returns the samples as independent ones; `None` if they are points of a design.
+    pub const fn independent(self) -> Option<Independent> {
         match self {
-            Self::FixedSamples => Some(interval::upper_bound(hits, samples, confidence)),
-            Self::Sequential => Some(sequence::upper_bound(hits, samples, confidence)),
+            Self::FixedSamples => Some(Independent { is_sequential: false }),
+            Self::Sequential => Some(Independent { is_sequential: true }),
             Self::Design => None,
         }
     }
 
+    /// Returns the one-sided upper bound of a probability; `None` if no bound is valid.
+    pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> Option<f64> {
+        Some(self.independent()?.upper_bound(hits, samples, confidence))
+    }
+
     /// Returns the one-sided lower bound of a probability; `None` if no bound is valid.
     pub fn lower_bound(self, hits: u64, samples: u64, confidence: f64) -> Option<f64> {
-        match self {
-            Self::FixedSamples => Some(interval::lower_bound(hits, samples, confidence)),
-            Self::Sequential => Some(sequence::lower_bound(hits, samples, confidence)),
-            Self::Design => None,
-        }
+        Some(self.independent()?.lower_bound(hits, samples, confidence))
     }
 
     /// Returns the two-sided interval that covers the probability in a share `coverage` of repetitions; `None` if no bound
     /// is valid.
     pub fn interval(self, hits: u64, samples: u64, coverage: f64) -> Option<[f64; 2]> {
-        match self {
-            Self::FixedSamples => Some(interval::clopper_pearson(hits, samples, coverage)),
-            Self::Sequential => Some(sequence::interval(hits, samples, coverage)),
-            Self::Design => None,
-        }
+        Some(self.independent()?.interval(hits, samples, coverage))
     }
 
     /// Returns the two-sided interval at 95 %; `None` if no bound is valid.

@@ -49,6 +49,7 @@ pub mod partition;
 pub mod plan;
 mod plan_error;
 pub mod probability;
+pub mod rare;
 pub mod record;
 pub mod remote;
 mod repair;

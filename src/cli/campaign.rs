@@ -16,6 +16,7 @@ use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::{Plan, check_mis};
+use closecall_campaign::rare::Method;
 use closecall_campaign::remote::connect;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
@@ -46,6 +47,7 @@ use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{heartbeat, out, outln, print_error, print_failure};
 use super::plan::PlanArgs;
+use super::rare::{DesignChoice, Rare, RareArgs};
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
 use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
@@ -70,9 +72,12 @@ pub(super) struct CampaignArgs {
     /// without a seed draws one
     #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
     judge_seed: Option<JudgeSeed>,
-    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`
-    #[arg(long, default_value_t = Design::Random, help_heading = heading::SAMPLES)]
-    design: Design,
+    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or `importance` for a rare event,
+    /// which --event names. -n is then the largest number of runs [default: 200000]
+    #[arg(long, default_value_t = DesignChoice::Plain(Design::Random), help_heading = heading::SAMPLES)]
+    design: DesignChoice,
+    #[command(flatten)]
+    rare: RareArgs,
     #[command(flatten)]
     controller: ControllerArgs,
     /// Depth of the sensor simulation [default: that of the scenario]
@@ -168,7 +173,7 @@ impl CampaignArgs {
     }
 
     fn sampling(&self) -> Result<Sampling, CliError> {
-        Ok(Sampling { seed: self.seed()?, design: self.design, samples: self.plan.samples() })
+        Ok(Sampling { seed: self.seed()?, design: self.design.plain(), samples: self.plan.samples() })
     }
 
     fn workers(&self) -> Result<Workers, CliError> {
@@ -180,7 +185,7 @@ impl CampaignArgs {
 
     /// Reads every scenario, and returns them with the controllers of their arms. Scenarios of a folder that judge another function than the rest are left out,
     /// and named.
-    fn scenarios(&self) -> Result<(Vec<ScenarioFile>, Vec<ControllerChoice>), CliError> {
+    fn scenarios(&self, wants_pairs: bool) -> Result<(Vec<ScenarioFile>, Vec<ControllerChoice>), CliError> {
         let (set, of_arms) = self.set.by_arm();
         let mut files = Vec::new();
         for path in expand(&self.scenarios)? {
@@ -189,7 +194,7 @@ impl CampaignArgs {
         let functions = || files.iter().map(|(file, _)| file.config().function);
         let function = functions().find(|function| *function == Function::Mis).or(functions().next());
         let function = function.unwrap_or_default();
-        let controllers = self.comparison.controllers(&self.controller, function, self.plan.wants_pairs())?;
+        let controllers = self.comparison.controllers(&self.controller, function, wants_pairs)?;
         let controllers = tuned(controllers, &of_arms)?;
         let is_default = !self.controller.is_named() && self.comparison.arms.is_empty();
         let fits = |file: &ScenarioFile| match is_default {
@@ -220,7 +225,7 @@ impl CampaignArgs {
         plan.use_sensors(self.sensors.map(SensorsChoice::mode))?;
         plan.partition = self.partition;
         plan.checks = self.plan.checks()?;
-        plan.inference = self.plan.inference(self.design)?;
+        plan.inference = self.plan.inference(self.design.plain())?;
         plan.workers = self.workers()?;
         plan.retry_crashed = self.retry_crashed;
         Ok(plan)
@@ -308,11 +313,60 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
     }
 }
 
+/// Estimates the probability of a rare event.
+fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliError> {
+    let is_named = [
+        (args.plan.names_preset(), "--preset"),
+        (args.plan.until_certain, "--until-certain"),
+        (args.plan.time_budget.is_some(), "--time-budget"),
+        (args.plan.names_checks(), "--check-share, --check-at-most and --no-validity-checks"),
+        (args.partition.is_some(), "--partition"),
+        (args.ray.is_some(), "--ray"),
+        (args.record.is_some(), "--record"),
+        (args.retry_crashed > 0, "--retry-crashed"),
+        (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
+        (args.gates.names_criterion()?, "a gate other than --max-probability"),
+        (args.artifacts.is_named(), "--strict-artifacts"),
+    ];
+    if let Some((_, option)) = is_named.into_iter().find(|(is_named, _)| *is_named) {
+        return Err(CliError::usage(format!(
+            "--design {method} draws weighted runs, which are no independent samples: it cannot be combined with {option}"
+        )));
+    }
+    let folder = match args.results.place()? {
+        Place::Named(path) => Some(path),
+        Place::Default | Place::Nowhere if args.results.is_resumed() => {
+            return Err(CliError::usage("--resume: name the folder of the campaign with --out"));
+        }
+        Place::Default | Place::Nowhere => None,
+    };
+    let (files, controllers) = args.scenarios(args.rare.needs_pairs())?;
+    let rare = Rare {
+        method,
+        args: &args.rare,
+        budget: args.plan.named_samples(),
+        gate: args.gates.probability()?,
+        folder,
+        resume: args.results.is_resumed(),
+        format: args.format,
+    };
+    rare.run(&args.plan(files, controllers)?)
+}
+
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     check_arguments(args)?;
-    let (files, controllers) = args.scenarios()?;
+    match args.design {
+        DesignChoice::Rare(method) => return rare_campaign(args, method),
+        DesignChoice::Plain(design) if args.rare.is_named() => {
+            return Err(CliError::usage(format!(
+                "--event is the rare event of --design subset or importance, and not of {design}: a gate such as --gate \"upper(induced) <= 0.01\" judges the samples of a plain campaign"
+            )));
+        }
+        DesignChoice::Plain(_) => {}
+    }
+    let (files, controllers) = args.scenarios(args.plan.wants_pairs())?;
     let is_paired = controllers.len() > 1;
-    let mut gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
+    let mut gates = args.gates.gates(is_paired, args.design.plain(), args.plan.preset_gates(is_paired))?;
     gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
     let planned = Planned {
         plan: &args.plan(files, controllers)?,
@@ -416,6 +470,8 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
 /// Counts the records of a running campaign, shows the progress, and applies the stop rule.
 struct Progress {
     names: Vec<String>,
+    /// The number of samples of each scenario; `None` of a part, which is judged with the others only.
+    counts: Option<Vec<u64>>,
     tally: Tally,
     stop: StopMonitor,
     end: EndMonitor,
@@ -436,7 +492,8 @@ impl Progress {
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
         let tally = Tally::new(campaign, gates);
-        Self { names, tally, stop, end, spent: SpentTime::default(), _heartbeat: heartbeat(&bar), bar }
+        let counts = campaign.partition.is_none().then(|| campaign.works.iter().map(|work| work.count()).collect());
+        Self { names, counts, tally, stop, end, spent: SpentTime::default(), _heartbeat: heartbeat(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
@@ -450,6 +507,12 @@ impl Progress {
         }
         if next.is_new {
             self.end.observe(next.record)?;
+            let (name, judge) = (&self.names[next.work], &self.tally.judge);
+            let count = self.counts.as_ref().map(|counts| counts[next.work]);
+            self.end.observe_gate(|| {
+                let lost = judge.lost(name, count?.saturating_sub(next.record.sample + 1))?;
+                Some((name.clone(), lost))
+            })?;
         } else {
             // The campaign went on after it.
             self.end.count(next.record);

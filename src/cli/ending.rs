@@ -21,7 +21,7 @@ use crate::exit_code::ExitCode;
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct EndArgs {
     /// End at the first failing sample: the ego collides under the controller under test, or a controller ends in an
-    /// error. There is then no verdict
+    /// error; or as soon as a gate can only fail. There is then no verdict
     #[arg(long, help_heading = heading::EXECUTION)]
     fail_fast: bool,
     /// End as soon as more than N samples have ended in an error. There is then no verdict
@@ -42,6 +42,11 @@ pub(super) enum Ending {
 }
 
 impl EndArgs {
+    /// Returns true if an option is named.
+    pub(super) const fn is_named(&self) -> bool {
+        self.fail_fast || self.max_errors.is_some() || self.retry_errors
+    }
+
     /// Returns the rule that ends the campaign early.
     pub(super) const fn rule(&self) -> EndRule {
         EndRule { fail_fast: self.fail_fast, max_errors: self.max_errors }
@@ -52,7 +57,7 @@ impl Ending {
     fn exit_code(&self) -> ExitCode {
         match self {
             Self::Signal(signal) => (*signal).into(),
-            Self::Rule(EarlyEnd::Failure { is_error: false, .. }) => ExitCode::Fail,
+            Self::Rule(EarlyEnd::Failure { is_error: false, .. } | EarlyEnd::Gate { .. }) => ExitCode::Fail,
             Self::Rule(EarlyEnd::Failure { is_error: true, .. } | EarlyEnd::Errors { .. }) => ExitCode::SampleError,
         }
     }

@@ -34,6 +34,7 @@ mod paper;
 mod plan;
 mod plot;
 mod protect;
+mod rare;
 mod record;
 mod reenact;
 mod render;

@@ -104,6 +104,23 @@ impl PlanArgs {
         self.preset == Some(Preset::Pr)
     }
 
+    /// Returns the number of samples that is named.
+    pub(super) const fn named_samples(&self) -> Option<u64> {
+        self.samples
+    }
+
+    /// Returns true if a preset is named.
+    pub(super) const fn names_preset(&self) -> bool {
+        self.preset.is_some()
+    }
+
+    /// Returns true if other checks than the usual ones are named.
+    pub(super) fn names_checks(&self) -> bool {
+        self.no_validity_checks
+            || self.check_share.to_bits() != CheckPlan::SHARE.to_bits()
+            || self.check_at_most != CheckPlan::AT_MOST
+    }
+
     /// Returns true if a preset requests a baseline.
     pub(super) fn wants_pairs(&self) -> bool {
         self.preset.is_some()

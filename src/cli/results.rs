@@ -69,6 +69,11 @@ impl ResultsArgs {
         Self { out: Some(folder.to_owned()), no_out: false, resume }
     }
 
+    /// Returns true if an interrupted campaign is to go on.
+    pub(super) const fn is_resumed(&self) -> bool {
+        self.resume
+    }
+
     /// Returns the manifest of the campaign that is to be resumed, if there is one.
     pub(super) fn resumed(&self) -> Option<Manifest> {
         let folder = match self.place().ok().filter(|_| self.resume)? {
@@ -102,6 +107,11 @@ pub(super) struct ArtifactArgs {
 }
 
 impl ArtifactArgs {
+    /// Returns true if the option is named.
+    pub(super) const fn is_named(self) -> bool {
+        self.strict_artifacts
+    }
+
     /// Prints a warning for each report or recording that could not be written. Returns the exit code, if `verdict` is that of the
     /// verdict.
     pub(super) fn code(self, verdict: ExitCode, written: &Written) -> ExitCode {

@@ -57,6 +57,7 @@ mod page;
 mod paper;
 mod paper_figure;
 mod perception;
+mod rare;
 mod readme;
 mod reasons;
 mod reenact;

@@ -27,6 +27,7 @@ mod validate_memory;
 mod validate_mis;
 mod validate_object_sensors;
 mod validate_perception;
+mod validate_rare;
 mod validate_reference_models;
 mod validate_statistics;
 mod validate_tracking;

@@ -1,6 +1,6 @@
 //! Evaluates one gate over the samples of one scenario.
 
-use closecall_scenarios::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
+use closecall_scenarios::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, Operator, PairFlag, Quantity};
 use closecall_traffic::maths::powf;
 use closecall_traffic::statistics::needed::{MAX_SAMPLES, first_that_holds};
 use closecall_traffic::statistics::quantiles::quantile;
@@ -191,6 +191,28 @@ impl Accumulator {
         Evaluation { value, interval_95, samples, answer, needed: is_open.then(of_bound).flatten() }
     }
 
+    /// Returns true if the gate fails whatever the remaining `rest` samples are: the most favourable of them do not help. Of a sum, a mean and a percentile, it
+    /// does not know.
+    pub fn is_lost(&self, evidence: &Evidence, rest: u64) -> bool {
+        let Expression { aggregate, operator, .. } = self.expression;
+        if evidence.inference != Inference::FixedSamples || self.evaluate(evidence).answer != Answer::Missed {
+            return false;
+        }
+        let favourable = || {
+            let hits = self.hits + if operator == Operator::AtLeast { rest } else { 0 };
+            let samples = self.samples + rest;
+            Self { hits, samples, ..Self::new(self.expression) }.evaluate(evidence).answer == Answer::Missed
+        };
+        match (aggregate, operator) {
+            // Neither of them returns behind its bound.
+            (Aggregate::Count | Aggregate::Max, Operator::AtMost) | (Aggregate::Min, Operator::AtLeast) => true,
+            (Aggregate::Count, Operator::AtLeast) | (Aggregate::Share | Aggregate::Lower | Aggregate::Upper, _) => {
+                favourable()
+            }
+            _ => false,
+        }
+    }
+
     /// Returns the number of samples that decides a gate on a bound of a share, if the share stays as it is.
     fn needed(&self, inference: Inference) -> Option<u64> {
         let share = self.hits as f64 / self.samples as f64;
@@ -281,6 +303,49 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Returns whether a gate of a flag is lost after some samples, of which some are hits.
+    fn is_lost(gate: &str, hits: u64, samples: u64, rest: u64) -> bool {
+        let evidence =
+            Evidence { is_paired: true, is_varied: true, is_built_in: [true; 2], inference: Inference::FixedSamples };
+        Accumulator { hits, samples, ..Accumulator::new(gate.parse().unwrap()) }.is_lost(&evidence, rest)
+    }
+
+    #[test]
+    fn a_gate_is_lost_if_the_best_of_the_remaining_samples_do_not_save_it() {
+        for (gate, hits, samples, lost_with, saved_with) in [
+            ("count(induced) <= 2", 3, 10, Some(1_000_000), None),
+            ("count(engaged) >= 5", 1, 10, Some(3), Some(4)),
+            ("share(induced) <= 0.1", 5, 20, Some(29), Some(30)),
+            ("share(engaged) >= 0.9", 5, 10, Some(39), Some(40)),
+            ("upper(induced) <= 0.01", 9, 20, Some(0), Some(10_000)),
+            ("lower(engaged) >= 0.9", 1, 20, Some(5), Some(100_000)),
+        ] {
+            assert!(lost_with.is_none_or(|rest| is_lost(gate, hits, samples, rest)), "{gate}");
+            assert!(saved_with.is_none_or(|rest| !is_lost(gate, hits, samples, rest)), "{gate}");
+        }
+        assert!(!is_lost("count(induced) <= 2", 2, 10, 5), "the bound is allowed");
+        assert!(!is_lost("upper(induced) <= 0.01", 0, 20, 0), "too few samples are no failure");
+    }
+
+    #[test]
+    fn an_extreme_beyond_its_bound_is_lost_and_a_mean_is_not() {
+        let evidence =
+            Evidence { is_paired: false, is_varied: true, is_built_in: [true; 2], inference: Inference::FixedSamples };
+        let after = |gate: &str, value: f64| {
+            let expression: Expression = gate.parse().unwrap();
+            let (smallest, largest) = (Some(value), Some(value));
+            Accumulator { samples: 30, sum: 30.0 * value, smallest, largest, ..Accumulator::new(expression) }
+                .is_lost(&evidence, 1_000)
+        };
+        assert!(after("min(min_ttc_rear_s) >= 1", 0.5) && !after("min(min_ttc_rear_s) >= 1", 1.0));
+        assert!(after("max(max_jerk_mps3) <= 5", 5.1) && !after("max(max_jerk_mps3) >= 5", 4.0));
+        assert!(after("max(max_jerk_mps3) <= 5", f64::NAN), "what is not a number satisfies no bound");
+        assert!(!after("mean(max_jerk_mps3) <= 5", 9.0) && !after("sum(harm) <= 5", 9.0));
+        let design = Evidence { inference: Inference::Sequential, ..evidence };
+        let gate = Accumulator { hits: 9, samples: 9, ..Accumulator::new("count(engaged) <= 0".parse().unwrap()) };
+        assert!(gate.is_lost(&evidence, 1) && !gate.is_lost(&design, 1));
+    }
 
     #[test]
     fn a_percentile_asks_for_as_many_samples_as_reach_beyond_it() {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use closecall_scenarios::Function;
-use closecall_scenarios::criteria::{EGO_COLLIDED, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
+use closecall_scenarios::criteria::{EGO_COLLIDED, Expression, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
 use closecall_simulation::Arm;
 
 use super::evaluate::{Accumulator, Evidence, value};
@@ -72,9 +72,7 @@ impl Judge {
     pub fn new(works: &[Arc<Work>], set: &GateSet, inference: Inference) -> Self {
         let judged = |work: &Arc<Work>| {
             let config = work.file.config();
-            let of_prevented = |check: &closecall_scenarios::criteria::Expression| {
-                check.quantity == Quantity::Pair(PairFlag::Prevented)
-            };
+            let of_prevented = |check: &Expression| check.quantity == Quantity::Pair(PairFlag::Prevented);
             Judged {
                 scenario: config.name.clone(),
                 is_varied: is_varied(work.file.space()),
@@ -170,17 +168,25 @@ impl Judge {
             scenario: scenario.to_owned(),
             expression: gate.spec.expression,
             source: gate.spec.source.clone(),
-            evaluation: gate.accumulator.evaluate(&Evidence {
-                is_paired: self.is_paired,
-                is_varied,
-                is_built_in: self.is_built_in,
-                inference: self.inference,
-            }),
+            evaluation: gate.accumulator.evaluate(&self.evidence(is_varied)),
         };
         let of_scenario = |judged: &Judged| -> Vec<GateResult> {
             judged.gates.iter().map(|gate| result(gate, &judged.scenario, judged.is_varied)).collect()
         };
         self.scenarios.iter().flat_map(of_scenario).collect()
+    }
+
+    /// Returns the first gate of a scenario that fails whatever its remaining `rest` samples are.
+    pub fn lost(&self, scenario: &str, rest: u64) -> Option<Expression> {
+        let judged = self.scenarios.iter().find(|judged| judged.scenario == scenario)?;
+        let evidence = self.evidence(judged.is_varied);
+        let lost = judged.gates.iter().find(|gate| gate.accumulator.is_lost(&evidence, rest));
+        lost.map(|gate| gate.spec.expression)
+    }
+
+    fn evidence(&self, is_varied: bool) -> Evidence {
+        let Self { is_paired, is_built_in, inference, .. } = *self;
+        Evidence { is_paired, is_varied, is_built_in, inference }
     }
 
     /// Returns how each requirement fares in each scenario that names it, in the order of the marks.

@@ -13,6 +13,7 @@ mod result;
 mod set;
 
 pub use assemble::{AssemblyError, PresetGates};
+pub(crate) use evaluate::value;
 pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
 pub use judge::Judge;
 pub use options::GateOptions;

@@ -116,7 +116,7 @@ impl Quantity {
         }
     }
 
-    fn is_flag(self) -> bool {
+    pub(super) fn is_flag(self) -> bool {
         match self {
             Self::Tested(measure) | Self::Baseline(measure) => measure.kind == MeasureKind::Flag,
             Self::Pair(_) | Self::Compared(_) => true,
@@ -260,7 +260,7 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
     })
 }
 
-fn parse_quantity(name: &str) -> Result<Quantity, String> {
+pub(super) fn parse_quantity(name: &str) -> Result<Quantity, String> {
     if let Some(at) = name.find(['>', '<']) {
         let (number, threshold) = (name[..at].trim(), name[at + 1..].trim());
         let side = if name[at..].starts_with('>') { Side::Above } else { Side::Below };

@@ -8,9 +8,11 @@
 //! This module holds the language and the measures of one run. The crate `closecall-campaign` evaluates criteria over many.
 
 mod config;
+mod event;
 mod expression;
 mod measure;
 
 pub use config::{FlagName, GateConfig};
+pub use event::{Event, EventError, EventExpression, Guide, GuideError};
 pub use expression::{Aggregate, Comparison, Expression, ExpressionError, Operator, Quantity, Side};
 pub use measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag, SLOWED_FOR_REAR};

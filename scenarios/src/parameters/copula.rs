@@ -75,7 +75,8 @@ impl Copula {
         let variates: Vec<f64> = self.rows.iter().map(|(index, _)| variate(numbers[*index])).collect();
         for (place, (index, row)) in self.rows.iter().enumerate().skip(1) {
             let mixed: f64 = row[..=place].iter().zip(&variates).map(|(weight, z)| weight * z).sum();
-            numbers[*index] = normal.cdf(mixed);
+            // A quantile function takes numbers below 1.
+            numbers[*index] = normal.cdf(mixed).min(1.0 - f64::EPSILON / 2.0);
         }
     }
 }

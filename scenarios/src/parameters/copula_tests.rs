@@ -1,10 +1,11 @@
 //! Correlated parameters: their distributions stay, their ranks correlate, and wrong correlations are refused.
 
+use closecall_traffic::statistics::normal::TruncatedStandardNormal;
 use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{ParameterName, Value};
 
 use super::{ParameterSpace, ParametersConfig};
-use crate::sampling::Design;
+use crate::sampling::{Design, unit_point};
 use closecall_recorded::criticality::spearman;
 
 const INDEPENDENT: &str = "
@@ -84,4 +85,39 @@ fn wrong_correlations_are_refused_with_what_is_allowed() {
     assert!(parsed(impossible).unwrap_err().contains("no joint distribution"));
     let twice = impossible.replace("c = -0.9", "c = 0.7, a = 0.8");
     assert!(parsed(&twice).unwrap_err().contains("different rank correlations"));
+}
+
+#[test]
+fn independent_standard_normal_numbers_give_the_distribution_of_independent_samples() {
+    let (space, free) = (coupled("a = 0.6, c = -0.4").unwrap(), parsed(INDEPENDENT).unwrap());
+    let normal = TruncatedStandardNormal::new(f64::NEG_INFINITY, f64::INFINITY).unwrap();
+    for index in 0..200 {
+        // The numbers u of the uniform parameter and of the others, by name: e does not vary.
+        let numbers = unit_point(index, 5);
+        let normals: Vec<f64> = numbers[..4].iter().map(|u| normal.quantile(*u)).collect();
+        for space in [&space, &free] {
+            let (ours, expected) = (space.at_normals(&normals), space.values(numbers.clone()));
+            for name in ["a", "b", "c", "d", "e"].map(|name| ParameterName::new(name).unwrap()) {
+                match (ours.get(&name).unwrap(), expected.get(&name).unwrap()) {
+                    (Value::Number(one), Value::Number(other)) => assert!((one - other).abs() < 1e-6, "{name}"),
+                    (one, other) => assert_eq!(one, other, "{name}"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_point_of_normal_space_leaves_the_bounds() {
+    let space = coupled("a = 0.6, c = -0.4").unwrap();
+    for z in [-1e300, -40.0, -9.0, 9.0, 40.0, 1e300] {
+        let values = space.at_normals(&[z, -z, z, z]);
+        for (name, entry) in space.iter() {
+            let Some([low, high]) = entry.distribution.bounds() else { continue };
+            let Some(Value::Number(value)) = values.get(name) else { panic!("{name}") };
+            // An unbounded distribution is cut at a probability of 1e-16 for its bounds.
+            let is_inside = (low..=high).contains(value) || name.as_str() == "c" && *value > 0.0 && value.is_finite();
+            assert!(is_inside, "{name} at {z}: {value}");
+        }
+    }
 }

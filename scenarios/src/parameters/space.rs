@@ -1,8 +1,9 @@
 //! The checked parameters of a scenario.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_1_SQRT_2;
 
-use closecall_traffic::{ParameterName, Parameters, Value};
+use closecall_traffic::{ParameterName, Parameters, Value, maths};
 
 use super::copula::Copula;
 use super::{Distribution, FittedConfig, ObservedConfig};
@@ -63,6 +64,14 @@ pub enum Variation {
     Continuous,
 }
 
+/// Probability of the median.
+const HALF: f64 = 0.5;
+
+/// Returns the standard normal probability below `z`, within what a quantile function takes: above 0 and below 1.
+fn probability_below(z: f64) -> f64 {
+    (0.5 * maths::erfc(-z * FRAC_1_SQRT_2)).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)
+}
+
 impl ParameterSpace {
     pub(super) const fn new(entries: BTreeMap<ParameterName, SpaceEntry>, copula: Copula) -> Self {
         Self { entries, copula }
@@ -110,6 +119,17 @@ impl ParameterSpace {
             Variation::None => distribution.nominal(),
             _ => coordinates.next().map_or_else(|| distribution.nominal(), |u| distribution.quantile(*u)),
         })
+    }
+
+    /// Returns the values at a point of standard normal space, which has a number for each parameter of [`Self::varying`]. Correlated parameters are
+    /// coupled, so that independent standard normal numbers give the distribution from which independent samples are drawn.
+    pub fn at_normals(&self, normals: &[f64]) -> Parameters {
+        let mut coordinates = normals.iter();
+        let number = |entry: &SpaceEntry| match entry.distribution.variation() {
+            Variation::None => HALF,
+            _ => coordinates.next().map_or(HALF, |z| probability_below(*z)),
+        };
+        self.values(self.entries.values().map(number).collect())
     }
 
     /// Returns the nominal values, then variations of them with one parameter at one of its bounds or labels.

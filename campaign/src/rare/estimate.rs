@@ -1,0 +1,100 @@
+//! An estimate with its interval.
+//!
+//! Both methods end with independent values whose mean is the probability: the weighted values of single runs, or the estimates of independent
+//! repetitions. Their mean is unbiased, and its error is nearly normal. The interval of a probability is symmetric in its logarithm, because weights
+//! and products of shares are skewed to the right: the interval reaches further up than down, and not below 0.
+
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use closecall_traffic::maths::exp;
+
+/// Coverage of the reported intervals.
+pub const COVERAGE: f64 = 0.95;
+
+/// A mean of independent values.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Mean {
+    /// The mean.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Degrees of freedom of the standard error.
+    pub degrees_of_freedom: f64,
+}
+
+impl Mean {
+    /// Returns the mean of independent values; `None` of fewer than two.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        if values.len() < 2 {
+            return None;
+        }
+        let count = values.len() as f64;
+        let value = values.iter().sum::<f64>() / count;
+        let variance = values.iter().map(|one| (one - value) * (one - value)).sum::<f64>() / (count - 1.0);
+        Some(Self { value, standard_error: (variance / count).sqrt(), degrees_of_freedom: count - 1.0 })
+    }
+
+    /// Returns Student's factor for a one-sided bound.
+    fn factor(&self, confidence: f64) -> f64 {
+        StudentsT::new(0.0, 1.0, self.degrees_of_freedom)
+            .map_or(f64::INFINITY, |student| student.inverse_cdf(confidence))
+    }
+
+    /// Returns the two-sided interval of a probability; `None` if the mean is not above 0.
+    pub fn interval_of_probability(&self, coverage: f64) -> Option<[f64; 2]> {
+        let one_sided = 0.5 * (1.0 + coverage);
+        Some([self.lower_bound(one_sided)?, self.upper_bound(one_sided)?])
+    }
+
+    /// Returns the one-sided lower bound of a probability; `None` if the mean is not above 0.
+    pub fn lower_bound(&self, confidence: f64) -> Option<f64> {
+        (self.value > 0.0).then(|| self.value * exp(-self.factor(confidence) * self.standard_error / self.value))
+    }
+
+    /// Returns the one-sided upper bound of a probability; `None` if the mean is not above 0.
+    pub fn upper_bound(&self, confidence: f64) -> Option<f64> {
+        let high = || self.value * exp(self.factor(confidence) * self.standard_error / self.value);
+        (self.value > 0.0).then(|| high().min(1.0))
+    }
+
+    /// Returns the two-sided interval of a quantity of either sign.
+    pub fn interval(&self, coverage: f64) -> [f64; 2] {
+        let half = self.factor(0.5 * (1.0 + coverage)) * self.standard_error;
+        [self.value - half, self.value + half]
+    }
+
+    /// Returns the width of the 95 % interval, relative to the value.
+    pub fn relative_width(&self) -> f64 {
+        2.0 * self.factor(0.5 * (1.0 + COVERAGE)) * self.standard_error / self.value.abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_of_few_values_is_students() {
+        let mean = Mean::of(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
+        // t of 4 degrees of freedom at 97.5 %: 2.776.
+        let half = 2.776 * 0.707_11;
+        let [low, high] = mean.interval(0.95);
+        assert!((low - 3.0 + half).abs() < 1e-3 && (high - 3.0 - half).abs() < 1e-3);
+        assert!((mean.relative_width() - 2.0 * half / 3.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_interval_of_a_probability_is_never_below_zero() {
+        let mean = Mean::of(&[1e-6, 0.0, 0.0, 2e-6, 9e-6]).unwrap();
+        let [low, high] = mean.interval_of_probability(0.95).unwrap();
+        assert!(0.0 < low && low < mean.value && mean.value < high);
+        assert!(mean.interval(0.95)[0] < 0.0, "a symmetric interval would reach below 0");
+    }
+
+    #[test]
+    fn no_event_has_no_interval() {
+        assert_eq!(Mean::of(&[0.0; 10]).unwrap().interval_of_probability(0.95), None);
+        assert_eq!(Mean::of(&[1.0]), None);
+    }
+}

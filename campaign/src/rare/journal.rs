@@ -1,0 +1,240 @@
+//! The folder of a campaign that samples a rare event: a manifest, a journal of the responses, and the result.
+//!
+//! ```text
+//!  rare-manifest.json   how the campaign was made
+//!  rare-journal.jsonl   one line per run, in the order in which the method asked for it; each with a checksum
+//!  rare.json            the result
+//!  lock                 locked while the campaign runs
+//! ```
+//!
+//! The files have names of their own, so that no command takes the weighted runs for the independent samples of a plain campaign.
+
+use std::fs::{self, OpenOptions};
+use std::io::{BufReader, Write as _};
+use std::path::{Path, PathBuf};
+
+use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
+use closecall_traffic::input;
+use serde::{Deserialize, Serialize};
+
+use super::error::RareError;
+use super::method::Method;
+use super::problem::{Point, Response};
+use super::report::RareReport;
+use crate::folder::FolderError;
+use crate::journal::{line, parse, read_line};
+use crate::lock::Lock;
+use crate::manifest::Manifest;
+use crate::record::SampleFailure;
+
+const MANIFEST: &str = "rare-manifest.json";
+const JOURNAL: &str = "rare-journal.jsonl";
+const RESULT: &str = "rare.json";
+
+/// A point in the journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct KeptPoint {
+    normals: Vec<f64>,
+    noise: u64,
+}
+
+impl From<&Point> for KeptPoint {
+    fn from(point: &Point) -> Self {
+        Self { normals: point.normals.clone(), noise: point.noise }
+    }
+}
+
+/// A response in the journal. A score that is not finite is absent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct KeptResponse {
+    score: Option<f64>,
+    events: [bool; 2],
+}
+
+impl From<Response> for KeptResponse {
+    fn from(response: Response) -> Self {
+        Self { score: Some(response.score).filter(|score| score.is_finite()), events: response.events }
+    }
+}
+
+impl From<KeptResponse> for Response {
+    fn from(kept: KeptResponse) -> Self {
+        Self { score: kept.score.unwrap_or(f64::NEG_INFINITY), events: kept.events }
+    }
+}
+
+/// One line of the journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct RareRecord {
+    pub(super) scenario: String,
+    pub(super) run: u64,
+    pub(super) point: KeptPoint,
+    pub(super) response: KeptResponse,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) failure: Option<SampleFailure>,
+}
+
+/// Everything that determines the result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RareManifest {
+    /// The method.
+    pub method: Method,
+    /// The event.
+    pub event: String,
+    /// The number that leads to it, if one was named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guide: Option<String>,
+    /// Width of the 95 % interval that was asked for, relative to the estimate.
+    pub relative_width: f64,
+    /// Largest number of runs of each scenario.
+    pub budget: u64,
+    /// The scenarios, controllers and sensors.
+    pub campaign: Manifest,
+}
+
+impl RareManifest {
+    fn differences(&self, other: &Self) -> Vec<String> {
+        let mut differences = self.campaign.differences(&other.campaign);
+        let mut compare = |name: &str, there: String, here: String| {
+            if there != here {
+                differences.push(format!("{name}: {there} there, {here} here"));
+            }
+        };
+        let guide = |manifest: &Self| manifest.guide.clone().unwrap_or_else(|| "none".to_owned());
+        compare("method", self.method.to_string(), other.method.to_string());
+        compare("event", self.event.clone(), other.event.clone());
+        compare("guide", guide(self), guide(other));
+        compare("relative width", self.relative_width.to_string(), other.relative_width.to_string());
+        compare("budget", self.budget.to_string(), other.budget.to_string());
+        differences
+    }
+}
+
+/// The folder of a campaign that samples a rare event, locked.
+#[derive(Debug)]
+pub struct RareFolder {
+    path: PathBuf,
+    _lock: Lock,
+}
+
+impl RareFolder {
+    /// Locks a folder: a new or empty one, or with `resume` the one of the same campaign.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the folder cannot be used.
+    pub fn lock(path: &Path, manifest: &RareManifest, resume: bool) -> Result<Self, FolderError> {
+        fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
+        let read = |source| FolderError::Read { path: path.to_owned(), source };
+        let mut is_new = true;
+        for entry in fs::read_dir(path).map_err(read)? {
+            let name = entry.map_err(read)?.file_name();
+            is_new &= Lock::is_file_name(&name) || is_temporary(&name);
+        }
+        let file = path.join(MANIFEST);
+        if !is_new && !file.exists() {
+            return Err(FolderError::NotACampaign { path: path.to_owned() });
+        }
+        let lock = Lock::acquire(path)?;
+        if !is_new {
+            let fail = |message: String| FolderError::Content { path: file.clone(), line: 1, message };
+            let text = input::read_text(&file)
+                .map_err(|source| FolderError::Read { path: file.clone(), source: std::io::Error::other(source) })?;
+            let there: RareManifest = serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
+            let differences = there.differences(manifest);
+            if !differences.is_empty() {
+                return Err(FolderError::OtherCampaign { path: path.to_owned(), differences });
+            }
+            if !resume {
+                return Err(FolderError::AlreadyThere { path: path.to_owned() });
+            }
+        } else {
+            write_file(&file, |out| {
+                serde_json::to_writer_pretty(&mut *out, manifest)?;
+                out.write_all(b"\n")
+            })?;
+        }
+        Ok(Self { path: path.to_owned(), _lock: lock })
+    }
+
+    /// Opens the journal: its intact lines are read, and the rest is cut off.
+    ///
+    /// # Errors
+    /// [`FolderError`] if it cannot be read or written.
+    pub fn journal(&self) -> Result<RareJournal, FolderError> {
+        let path = self.path.join(JOURNAL);
+        let fail = |source| FolderError::from(WriteError::new(&path, source));
+        let mut options = OpenOptions::new();
+        options.create(true).read(true).write(true).truncate(false);
+        let file = input::open_in_folder(&path, &mut options).map_err(fail)?;
+        let (mut records, mut end, mut buffer) = (Vec::new(), 0, Vec::new());
+        let mut reader = BufReader::new(&file);
+        loop {
+            let read = read_line(&mut reader, &mut buffer).map_err(fail)?;
+            let Some(record) = Some(read).filter(|read| *read > 0).and_then(|_| parse(&buffer).ok()) else { break };
+            records.push(record);
+            end += read;
+        }
+        file.set_len(end).map_err(fail)?;
+        let mut file = file;
+        std::io::Seek::seek(&mut file, std::io::SeekFrom::Start(end)).map_err(fail)?;
+        Ok(RareJournal { path, file, kept: records.into_iter(), line: 0 })
+    }
+
+    /// Writes the result.
+    ///
+    /// # Errors
+    /// [`WriteError`] if it cannot be written.
+    pub fn write(&self, reports: &[RareReport]) -> Result<PathBuf, WriteError> {
+        let path = self.path.join(RESULT);
+        write_file(&path, |out| {
+            serde_json::to_writer_pretty(&mut *out, &serde_json::json!({ "scenarios": reports }))?;
+            out.write_all(b"\n")
+        })?;
+        Ok(path)
+    }
+}
+
+/// The journal of a campaign: what it holds, then what is appended.
+#[derive(Debug)]
+pub struct RareJournal {
+    path: PathBuf,
+    file: fs::File,
+    kept: std::vec::IntoIter<RareRecord>,
+    line: usize,
+}
+
+impl RareJournal {
+    /// Returns the next line, if there is one.
+    ///
+    /// # Errors
+    /// [`FolderError::Content`] if it is of another point.
+    pub(super) fn next(&mut self, scenario: &str, run: u64, point: &Point) -> Result<Option<RareRecord>, RareError> {
+        let Some(record) = self.kept.next() else { return Ok(None) };
+        self.line += 1;
+        let is_same = record.scenario == scenario && record.run == run && record.point == KeptPoint::from(point);
+        if is_same {
+            return Ok(Some(record));
+        }
+        let message = format!("run {run} of `{scenario}` is not the point that the seed leads to");
+        Err(FolderError::Content { path: self.path.clone(), line: self.line, message }.into())
+    }
+
+    /// Appends a line.
+    ///
+    /// # Errors
+    /// [`WriteError`] if it cannot be written completely.
+    pub(super) fn append(&mut self, record: &RareRecord) -> Result<(), RareError> {
+        let fail = |source| WriteError::new(&self.path, source);
+        let line = line(record).map_err(fail)?;
+        self.file.write_all(&line).map_err(|source| WriteError::new(&self.path, source))?;
+        Ok(())
+    }
+
+    /// Synchronises the journal to the disk.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the operating system reports a failure.
+    pub fn sync(&self) -> Result<(), WriteError> {
+        self.file.sync_data().map_err(|source| WriteError::new(&self.path, source))
+    }
+}

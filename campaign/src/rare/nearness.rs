@@ -1,0 +1,99 @@
+//! How near a sample came to an event: the score that guides a search.
+//!
+//! A score decides how many runs a search needs, and nothing else: no estimate and no interval depends on it. A bound of a number is its own guide. A
+//! collision of the ego is guided by its smallest gap, and `induced` and `prevented` by the smallest gap in the arm that is to collide, plus the change of
+//! velocity of a collision in the arm that is not to.
+
+use closecall_scenarios::criteria::{EGO_COLLIDED, Event, EventExpression, Guide, Measure, PairFlag, Quantity};
+use closecall_scenarios::outcome::Outcome;
+
+use super::problem::Response;
+use crate::gate::value;
+use crate::record::Record;
+
+/// The events of a campaign, with what leads to them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearness {
+    expression: EventExpression,
+    guide: Option<Guide>,
+}
+
+/// An event to which nothing leads.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("nothing tells how near a sample comes to `{event}`: name a number of the sample that leads to it")]
+pub struct NoGuide {
+    /// The event.
+    pub event: Event,
+}
+
+impl Nearness {
+    /// Returns the events with what leads to them: `guide`, if one is named.
+    ///
+    /// # Errors
+    /// [`NoGuide`] if none is named, and an event has none of its own.
+    pub fn new(expression: EventExpression, guide: Option<Guide>) -> Result<Self, NoGuide> {
+        let has_guide = |event: &Event| match event.quantity {
+            _ if guide.is_some() || event.excess(0.0).is_some() => true,
+            Quantity::Tested(measure) | Quantity::Baseline(measure) => measure.name == EGO_COLLIDED,
+            Quantity::Pair(_) => true,
+        };
+        match expression.events().find(|event| !has_guide(event)) {
+            Some(event) => Err(NoGuide { event }),
+            None => Ok(Self { expression, guide }),
+        }
+    }
+
+    /// Returns the events.
+    pub const fn expression(&self) -> EventExpression {
+        self.expression
+    }
+
+    /// Returns the number that leads to the events, if one is named.
+    pub const fn guide(&self) -> Option<Guide> {
+        self.guide
+    }
+
+    /// Returns what a sample tells of the events. A sample without an outcome has none, and is as far from them as any.
+    pub fn response(&self, record: &Record) -> Response {
+        let EventExpression { first, second } = self.expression;
+        let happened = |event: Event| value(event.quantity, record).is_some_and(|value| event.happens(value));
+        let events = [happened(first), second.is_some_and(happened)];
+        if record.arms.iter().any(|arm| arm.result.is_err()) {
+            return Response { score: f64::NEG_INFINITY, events: [false; 2] };
+        }
+        let scores = self.expression.events().filter_map(|event| self.score(event, record));
+        Response { score: scores.fold(f64::NEG_INFINITY, f64::max), events }
+    }
+
+    fn score(&self, event: Event, record: &Record) -> Option<f64> {
+        let tested = record.arms.len().checked_sub(1)?;
+        let outcome = |index: usize| record.arms.get(index)?.result.as_ref().ok();
+        let (own, other) = match event.quantity {
+            Quantity::Tested(_) => (tested, None),
+            Quantity::Baseline(_) => (0, None),
+            Quantity::Pair(PairFlag::Induced) => (tested, Some(0)),
+            Quantity::Pair(PairFlag::Prevented) => (0, Some(tested)),
+        };
+        if let Some(guide) = self.guide {
+            return guide.0.of(outcome(own)?).map(|value| guide.nearness(value));
+        }
+        if let Some(excess) = value(event.quantity, record).and_then(|value| event.excess(value)) {
+            return Some(excess);
+        }
+        if event.excess(0.0).is_some() {
+            // The sample does not have the number.
+            return None;
+        }
+        let struck = other.and_then(outcome).and_then(Outcome::ego_delta_v_mps).unwrap_or(0.0);
+        Some(-(smallest_gap_m(outcome(own)?) + struck))
+    }
+}
+
+/// Gap of a sample in which no vehicle is near the ego in its lane (m): beyond the range of the sensors.
+const NO_GAP_M: f64 = 200.0;
+
+/// Returns the smallest gap of the ego to the vehicle ahead or behind.
+fn smallest_gap_m(outcome: &Outcome) -> f64 {
+    let of = |name: &str| Measure::named(name).and_then(|measure| measure.of(outcome)).unwrap_or(NO_GAP_M);
+    of("min_gap_front_m").min(of("min_gap_rear_m"))
+}

@@ -1,0 +1,77 @@
+//! Samples a rare event of one scenario.
+
+use std::sync::Arc;
+
+use super::error::RareError;
+use super::importance::{Goal, importance};
+use super::journal::RareJournal;
+use super::method::Method;
+use super::nearness::Nearness;
+use super::problem::Seed;
+use super::report::RareReport;
+use super::runs::Runs;
+use super::subset::subset;
+use crate::runner::Work;
+use crate::stop::StopFlag;
+use crate::workers::Workers;
+
+/// How a rare event is sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct RarePlan {
+    /// The method.
+    pub method: Method,
+    /// The events, with what leads to them.
+    pub nearness: Nearness,
+    /// When the sampling ends.
+    pub goal: Goal,
+    /// The number of worker threads, and the time limit of a run.
+    pub workers: Workers,
+}
+
+impl RarePlan {
+    /// Samples the events of a scenario. The runs of `journal` are not run again. `on_run` is called after each run.
+    ///
+    /// # Errors
+    /// [`RareError`] if there is no result. The campaign can go on from its journal.
+    pub fn run(
+        &self,
+        work: &Arc<Work>,
+        journal: Option<&mut RareJournal>,
+        stop: &StopFlag,
+        on_run: &mut dyn FnMut(),
+    ) -> Result<RareReport, RareError> {
+        let (file, seed) = (&work.file, work.sampling.seed);
+        let dimensions = file.space().varying().count();
+        if dimensions == 0 {
+            return Err(RareError::NothingVaries { scenario: file.config().name.clone() });
+        }
+        let mut runs = Runs {
+            file,
+            arms: &work.arms,
+            seed,
+            nearness: self.nearness,
+            workers: self.workers,
+            stop,
+            journal,
+            on_run,
+            done: 0,
+            errors: 0,
+            first_error: None,
+            nearest: Vec::new(),
+        };
+        let mut report = match self.method {
+            Method::Importance => {
+                let found = importance(&mut runs, dimensions, Seed(seed), self.goal)?;
+                RareReport::of_importance(self, &found)
+            }
+            Method::Subset => RareReport::of_subset(self, &subset(&mut runs, dimensions, Seed(seed), self.goal)?),
+        };
+        if let Some(journal) = &runs.journal {
+            journal.sync()?;
+        }
+        report.scenario.clone_from(&file.config().name);
+        report.parameters = file.space().varying().map(|(name, _)| name.to_string()).collect();
+        (report.errors, report.first_error, report.nearest) = (runs.errors, runs.first_error, runs.nearest);
+        Ok(report)
+    }
+}

@@ -1,0 +1,255 @@
+//! What is reported of a rare event, for people and for programs.
+
+use std::fmt;
+
+use closecall_traffic::Parameters;
+use serde::Serialize;
+
+use super::estimate::{COVERAGE, Mean};
+use super::importance::{ImportanceResult, NoInterval};
+use super::method::Method;
+use super::plan::RarePlan;
+use super::subset::{Level, SubsetResult};
+use crate::record::SampleFailure;
+
+/// Least effective number of runs for which the report does not warn that a few of them carry the estimate (-), and largest share of one run: assumptions.
+const FEW_EFFECTIVE: f64 = 50.0;
+const LARGE_SHARE: f64 = 0.1;
+/// Share of the estimate outside every component above which the report warns (-): an assumption; 0.02 to 0.2 are plausible.
+const LARGE_OUTSIDE: f64 = 0.1;
+
+/// An estimate with its interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The event, or the difference of two.
+    pub of: String,
+    /// The estimate.
+    pub value: f64,
+    /// The 95 % interval; `None` of an event that never happened beside one that did.
+    pub interval_95: Option<[f64; 2]>,
+    /// The mean from which both follow.
+    #[serde(skip)]
+    pub mean: Mean,
+}
+
+/// An event near the nominal case.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Nearest {
+    /// Distance to the nominal case in standard normal space (standard deviations).
+    pub distance_sd: f64,
+    /// The key of its random streams: the number of its sample.
+    pub noise: u64,
+    /// Which of the events happened.
+    pub events: [bool; 2],
+    /// Its parameters.
+    pub parameters: Parameters,
+}
+
+/// The result of one scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RareReport {
+    /// The scenario.
+    pub scenario: String,
+    /// The events.
+    pub event: String,
+    /// The method.
+    pub method: Method,
+    /// The width that was asked for, relative to the estimate.
+    pub relative_width: f64,
+    /// All runs.
+    pub runs: u64,
+    /// Runs that ended in an error. They count as runs without the event.
+    pub errors: u64,
+    /// The first error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_error: Option<SampleFailure>,
+    /// The estimates: the event, and of a difference the second event and the difference.
+    pub estimates: Vec<Estimate>,
+    /// Why there are none.
+    pub no_interval: Option<NoInterval>,
+    /// Upper 95 % bound of the probability of the event, if no run had it and there is one.
+    pub upper_bound_without_event: Option<f64>,
+    /// The parameters that were moved. The random streams were drawn anew.
+    pub parameters: Vec<String>,
+    /// Details of importance sampling.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub importance: Option<ImportanceDetails>,
+    /// Details of subset simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subset: Option<SubsetDetails>,
+    /// The events nearest to the nominal case.
+    pub nearest: Vec<Nearest>,
+}
+
+/// Details of importance sampling.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImportanceDetails {
+    /// The runs on which the estimate rests.
+    pub final_runs: u64,
+    /// Those with an event.
+    pub events: u64,
+    /// Effective number of those with an event.
+    pub effective_events: f64,
+    /// Largest share of the estimate that rests on one run.
+    pub largest_share: f64,
+    /// Share of the estimate that lies where no search has a component.
+    pub outside: f64,
+    /// Searches that came to the event.
+    pub searches: usize,
+    /// Components of the mixture: each has a weight, and a mean and a standard deviation for each parameter.
+    pub components: Vec<super::mixture::Component>,
+}
+
+/// Details of subset simulation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SubsetDetails {
+    /// The levels before the event.
+    pub levels: Vec<Level>,
+    /// Independent repetitions.
+    pub repetitions: usize,
+    /// Repetitions whose particles did not come to the event.
+    pub extinct: usize,
+}
+
+impl RareReport {
+    fn new(plan: &RarePlan, runs: u64, means: Option<[Mean; 3]>, no_interval: Option<NoInterval>) -> Self {
+        let expression = plan.nearness.expression();
+        let names = match expression.second {
+            None => vec![expression.first.to_string()],
+            Some(second) => vec![expression.first.to_string(), second.to_string(), expression.to_string()],
+        };
+        let estimate = |(index, of): (usize, String), mean: Mean| Estimate {
+            of,
+            value: mean.value,
+            interval_95: if index == 2 {
+                Some(mean.interval(COVERAGE))
+            } else {
+                mean.interval_of_probability(COVERAGE)
+            },
+            mean,
+        };
+        let estimates = means.map_or_else(Vec::new, |means| {
+            names.into_iter().enumerate().zip(means).map(|(of, mean)| estimate(of, mean)).collect()
+        });
+        Self {
+            scenario: String::new(),
+            event: expression.to_string(),
+            method: plan.method,
+            relative_width: plan.goal.relative_width,
+            runs,
+            errors: 0,
+            first_error: None,
+            estimates,
+            no_interval,
+            upper_bound_without_event: None,
+            parameters: Vec::new(),
+            importance: None,
+            subset: None,
+            nearest: Vec::new(),
+        }
+    }
+
+    pub(super) fn of_importance(plan: &RarePlan, found: &ImportanceResult) -> Self {
+        let details = ImportanceDetails {
+            final_runs: found.final_runs,
+            events: found.events,
+            effective_events: found.effective,
+            largest_share: found.largest_share,
+            outside: found.outside,
+            searches: found.searches,
+            components: found.mixture.components.clone(),
+        };
+        Self {
+            upper_bound_without_event: found.upper_bound_without_event,
+            importance: Some(details),
+            ..Self::new(plan, found.runs, found.means, found.no_interval)
+        }
+    }
+
+    pub(super) fn of_subset(plan: &RarePlan, found: &SubsetResult) -> Self {
+        let details =
+            SubsetDetails { levels: found.levels.clone(), repetitions: found.repetitions, extinct: found.extinct };
+        Self { subset: Some(details), ..Self::new(plan, found.runs, found.means, found.no_interval) }
+    }
+
+    /// Returns the estimate that the goal is about: the event, or the difference.
+    pub fn main(&self) -> Option<&Estimate> {
+        self.estimates.last()
+    }
+
+    /// Returns what makes the estimate doubtful, in words.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if let Some(details) = self.importance.as_ref().filter(|_| !self.estimates.is_empty()) {
+            if details.effective_events < FEW_EFFECTIVE || details.largest_share > LARGE_SHARE {
+                warnings.push(format!(
+                    "{:.0} effective runs carry the estimate, and one of them {:.0} % of it: another seed may differ by more than the interval",
+                    details.effective_events,
+                    100.0 * details.largest_share
+                ));
+            }
+            if details.outside > LARGE_OUTSIDE {
+                warnings.push(format!(
+                    "{:.0} % of the estimate lies where no search led: there may be another region of the event",
+                    100.0 * details.outside
+                ));
+            }
+        }
+        let width = self.main().filter(|estimate| estimate.mean.relative_width() > 1.25 * self.relative_width);
+        if let Some(estimate) = width {
+            warnings.push(format!(
+                "the interval is {:.2} wide, relative to the estimate; {} was asked for: the budget is too small, or the variance larger than planned",
+                estimate.mean.relative_width(),
+                self.relative_width
+            ));
+        }
+        warnings
+    }
+}
+
+impl fmt::Display for RareReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {} by {}, {} runs", self.scenario, self.event, self.method, self.runs)?;
+        for Estimate { of, value, interval_95, .. } in &self.estimates {
+            match interval_95 {
+                Some([low, high]) => writeln!(f, "  {of}: {value:.3e}, 95 % interval {low:.3e} to {high:.3e}")?,
+                None => writeln!(f, "  {of}: in no run; no interval")?,
+            }
+        }
+        match self.no_interval {
+            None => {}
+            Some(NoInterval::NotReached) => writeln!(f, "  no run came to the event: there is no estimate")?,
+            Some(NoInterval::TooFewEvents) => writeln!(f, "  too few runs came to the event for an interval")?,
+            Some(NoInterval::Budget) => writeln!(f, "  the budget ended before the runs that an estimate rests on")?,
+        }
+        if let Some(bound) = self.upper_bound_without_event {
+            writeln!(f, "  its probability is at most {bound:.3e} with 95 % confidence")?;
+        }
+        if let Some(details) = &self.importance {
+            let (runs, events, effective) = (details.final_runs, details.events, details.effective_events);
+            writeln!(
+                f,
+                "  {runs} weighted runs, {events} with the event, which are worth {effective:.0} of equal weight"
+            )?;
+        }
+        if let Some(SubsetDetails { levels, repetitions, extinct }) = &self.subset {
+            let levels = levels.len();
+            writeln!(
+                f,
+                "  {repetitions} independent repetitions with {levels} levels, {extinct} of them without the event"
+            )?;
+        }
+        writeln!(f, "  moved: {}; drawn anew: all random streams of drivers and sensors", self.parameters.join(", "))?;
+        if let Some(error) = &self.first_error {
+            writeln!(
+                f,
+                "  {} runs ended in an error, and count as runs without the event; the first: {}",
+                self.errors, error.message
+            )?;
+        }
+        for warning in self.warnings() {
+            writeln!(f, "  warning: {warning}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,306 @@
+//! `closecall campaign --design subset|importance`: the probability of a rare event, with an interval.
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use clap::Args;
+use closecall_campaign::arguments::positive;
+use closecall_campaign::plan::Plan;
+use closecall_campaign::probability::ProbabilityGate;
+use closecall_campaign::rare::{
+    Goal, Method, Nearest, Nearness, RareError, RareFolder, RareManifest, RarePlan, RareReport,
+};
+use closecall_campaign::runner::Work;
+use closecall_campaign::session;
+use closecall_report::json::stamped;
+use closecall_scenarios::criteria::{EventExpression, Guide, Quantity};
+use closecall_scenarios::library;
+use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_traffic::statistics::format::percent;
+use serde_json::json;
+
+use super::CliError;
+use super::actions::quoted;
+use super::args::Format;
+use super::backend::{check_backend, check_cameras};
+use super::campaign::progress_bar;
+use super::help::heading;
+use super::output::{heartbeat, out, outln, print_error, print_written};
+use super::terminal::for_terminal;
+use crate::exit_code::ExitCode;
+
+/// Largest number of runs of each scenario, unless another one is named.
+const BUDGET: u64 = 200_000;
+
+/// How the samples of a campaign are drawn: by a design, or by a method for rare events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DesignChoice {
+    /// A sampling design.
+    Plain(Design),
+    /// A method for rare events.
+    Rare(Method),
+}
+
+impl DesignChoice {
+    /// Returns the design; that of independent samples for a rare event, none of whose samples is judged by it.
+    pub(super) fn plain(self) -> Design {
+        match self {
+            Self::Plain(design) => design,
+            Self::Rare(_) => Design::Random,
+        }
+    }
+}
+
+impl fmt::Display for DesignChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Plain(design) => design.fmt(f),
+            Self::Rare(method) => method.fmt(f),
+        }
+    }
+}
+
+impl FromStr for DesignChoice {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let plain = word.parse().map(Self::Plain);
+        plain.or_else(|_| word.parse().map(Self::Rare)).map_err(|_| {
+            let names = Design::ALL.map(Design::name).into_iter().chain(Method::ALL.map(Method::name));
+            let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+            format!("`{word}` is not a sampling design: one of {} is needed", names.join(", "))
+        })
+    }
+}
+
+/// The rare event of a campaign.
+#[derive(Clone, Debug, Args)]
+pub(super) struct RareArgs {
+    /// With --design subset or importance: the event whose probability is estimated, a flag such as `collision` or `induced`, a
+    /// number with a bound such as "min_ttc_rear_s < 0.3", or a difference such as "prevented - induced".
+    /// docs/reference/criteria.md lists the measures
+    #[arg(long, value_name = "EVENT", help_heading = heading::SAMPLES)]
+    event: Option<EventExpression>,
+    /// With --event: the number that leads to the event, such as `min_thw_rear_s`. It decides how many runs a search needs, and
+    /// no result [default: the number of the event; the smallest gap of a collision]
+    #[arg(long, value_name = "MEASURE", requires = "event", help_heading = heading::SAMPLES)]
+    guide: Option<Guide>,
+    /// With --event: width of the 95 % interval, relative to the estimate, at which the sampling ends [default: 0.5]
+    #[arg(long, value_name = "W", value_parser = positive, requires = "event", help_heading = heading::SAMPLES)]
+    relative_width: Option<f64>,
+}
+
+/// Width of the interval, relative to the estimate, unless another one is named.
+const RELATIVE_WIDTH: f64 = 0.5;
+
+/// What the command line says of a rare event.
+pub(super) struct Rare<'a> {
+    pub(super) method: Method,
+    pub(super) args: &'a RareArgs,
+    /// Largest number of runs of each scenario.
+    pub(super) budget: Option<u64>,
+    pub(super) gate: Option<ProbabilityGate>,
+    /// The folder for the results, if they are kept.
+    pub(super) folder: Option<&'a Path>,
+    pub(super) resume: bool,
+    pub(super) format: Format,
+}
+
+impl RareArgs {
+    /// Returns true if the options name an event.
+    pub(super) const fn is_named(&self) -> bool {
+        self.event.is_some()
+    }
+
+    /// Returns true if the event compares with a baseline.
+    pub(super) fn needs_pairs(&self) -> bool {
+        self.event.is_some_and(|event| event.needs_pairs())
+    }
+
+    /// Returns the event.
+    fn nearness(&self, method: Method) -> Result<Nearness, CliError> {
+        let Some(event) = self.event else {
+            return Err(CliError::usage(format!(
+                "--design {method} needs the event that it looks for: name one with --event, such as --event collision"
+            )));
+        };
+        Nearness::new(event, self.guide)
+            .map_err(|error| CliError::usage(format!("--event: {error}, with --guide MEASURE")))
+    }
+}
+
+impl Rare<'_> {
+    /// Samples the event in every scenario of a plan, and prints the estimates.
+    pub(super) fn run(&self, plan: &Plan) -> Result<ExitCode, CliError> {
+        let nearness = self.args.nearness(self.method)?;
+        let campaign = plan.campaign();
+        if let Some(work) = campaign.works.first() {
+            check_event(nearness.expression(), work)?;
+        }
+        check_backend(plan.uses_classifier())?;
+        check_cameras(plan.mask_rcnn_cameras())?;
+        let goal = Goal {
+            relative_width: self.args.relative_width.unwrap_or(RELATIVE_WIDTH),
+            budget: self.budget.unwrap_or(BUDGET),
+            value: if nearness.expression().second.is_some() { 2 } else { 0 },
+        };
+        let rare = RarePlan { method: self.method, nearness, goal, workers: campaign.workers };
+        let manifest = RareManifest {
+            method: self.method,
+            event: nearness.expression().to_string(),
+            guide: nearness.guide().map(|guide| guide.0.name.to_owned()),
+            relative_width: goal.relative_width,
+            budget: goal.budget,
+            campaign: plan.manifest(session::arguments())?,
+        };
+        let folder = self.folder.map(|path| RareFolder::lock(path, &manifest, self.resume)).transpose()?;
+        let mut journal = folder.as_ref().map(RareFolder::journal).transpose()?;
+        let mut stop = campaign.stop.clone();
+        session::stop_on_request(&mut stop);
+        let bar = progress_bar(goal.budget.saturating_mul(campaign.works.len() as u64));
+        let _heartbeat = heartbeat(&bar);
+        let mut reports = Vec::new();
+        for work in &campaign.works {
+            match rare.run(work, journal.as_mut(), &stop, &mut || bar.inc(1)) {
+                Ok(report) => reports.push(report),
+                Err(RareError::Stopped) => return Ok(self.stopped(&bar)),
+                Err(RareError::Campaign(error)) => return Err(error.into()),
+                Err(error @ RareError::NothingVaries { .. }) => return Err(CliError::usage(error.to_string())),
+            }
+        }
+        bar.finish_and_clear();
+        if let Some(folder) = &folder {
+            print_written(&folder.write(&reports)?);
+        }
+        self.print(&reports, &campaign.works, plan.sensors);
+        Ok(ExitCode::first_of(reports.iter().map(|report| self.code(report))))
+    }
+
+    /// Says that a signal has ended the runs.
+    fn stopped(&self, bar: &indicatif::ProgressBar) -> ExitCode {
+        let runs = bar.position();
+        bar.finish_and_clear();
+        outln!("ENDED EARLY, without a result: {runs} runs are done");
+        match self.folder {
+            Some(_) => outln!("resume: the same command with --resume"),
+            None => outln!("nothing was kept: only a campaign with a folder (--out DIR) can be resumed"),
+        }
+        session::received().map_or(ExitCode::Interrupted, ExitCode::from)
+    }
+
+    fn code(&self, report: &RareReport) -> ExitCode {
+        if report.errors > 0 {
+            return ExitCode::SampleError;
+        }
+        match (&self.gate, report.main()) {
+            (Some(_), _) => self
+                .judge(report)
+                .map_or(ExitCode::Inconclusive, |passes| if passes { ExitCode::Pass } else { ExitCode::Fail }),
+            (None, Some(_)) => ExitCode::Pass,
+            (None, None) => ExitCode::Inconclusive,
+        }
+    }
+
+    /// Returns whether the probability is as low as allowed; `None` if the interval does not say it, or there is no gate.
+    fn judge(&self, report: &RareReport) -> Option<bool> {
+        let gate = self.gate?;
+        let Some(estimate) = report.main() else {
+            // The bound without an event has 95 % confidence.
+            let bound = report.upper_bound_without_event.filter(|_| gate.confidence() <= 0.95)?;
+            return (bound <= gate.max()).then_some(true);
+        };
+        let (low, high) =
+            (estimate.mean.lower_bound(gate.confidence())?, estimate.mean.upper_bound(gate.confidence())?);
+        if high <= gate.max() { Some(true) } else { (low >= gate.max()).then_some(false) }
+    }
+
+    fn print(&self, reports: &[RareReport], works: &[std::sync::Arc<Work>], sensors: Option<SensorMode>) {
+        let seed = works.first().map(|work| work.sampling.seed);
+        if self.format == Format::Json {
+            outln!("{:#}", stamped(json!({ "scenarios": reports }), seed, None));
+            return;
+        }
+        for (report, work) in reports.iter().zip(works) {
+            out!("{}", for_terminal(report));
+            if let Some(gate) = self.gate {
+                let verdict = match self.judge(report) {
+                    Some(true) => "PASS",
+                    Some(false) => "FAIL",
+                    None => "INCONCLUSIVE",
+                };
+                let (max, confidence) = (gate.max(), percent(gate.confidence()));
+                outln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
+            }
+            for nearest in &report.nearest {
+                let distance_sd = nearest.distance_sd;
+                let command = replay(work, nearest, sensors);
+                print_error(format_args!(
+                    "look: {command}  # {distance_sd:.2} standard deviations from the nominal case\n"
+                ));
+            }
+        }
+    }
+}
+
+/// Returns the command that runs an event again.
+fn replay(work: &Work, nearest: &Nearest, sensors: Option<SensorMode>) -> String {
+    let arms: Vec<&str> = work.arms.iter().map(|arm| arm.controller.name()).collect();
+    let arms = match &arms[..] {
+        [one] => format!("--controller {}", quoted(one)),
+        several => format!("--arms {}", quoted(&several.join(","))),
+    };
+    let sensors = sensors.map_or_else(String::new, |mode| format!(" --sensors {}", mode.name()));
+    let settings: String =
+        work.file.settings().iter().map(|set| format!(" --set {}", quoted(&set.to_string()))).collect();
+    let varying = work.file.space().varying().filter_map(|(name, _)| {
+        let value = nearest.parameters.get(name)?;
+        Some(format!(" --set {}", quoted(&format!("{name}={value}"))))
+    });
+    let name = &work.file.config().name;
+    let is_of_library = work.file.path() == library::path(name);
+    let path = if is_of_library { name.clone() } else { work.file.path().display().to_string() };
+    let (seed, noise) = (work.sampling.seed, nearest.noise);
+    let varying: String = varying.collect();
+    format!("closecall run {} {arms}{sensors} --seed {seed} --sample {noise}{settings}{varying}", quoted(&path))
+}
+
+/// Refuses an event that no sample of these arms can show.
+fn check_event(event: EventExpression, work: &Work) -> Result<(), CliError> {
+    if event.needs_pairs() && work.arms.len() < 2 {
+        return Err(CliError::usage(format!(
+            "--event `{event}` compares with a baseline: it needs --paired or --arms"
+        )));
+    }
+    for quantity in event.events().map(|event| event.quantity) {
+        let (measure, arm) = match quantity {
+            Quantity::Tested(measure) => (measure, work.arms.last()),
+            Quantity::Baseline(measure) => (measure, work.arms.first()),
+            Quantity::Pair(_) => continue,
+        };
+        if measure.is_reported() && arm.is_some_and(|arm| !arm.controller.is_built_in()) {
+            return Err(CliError::usage(format!(
+                "--event `{quantity}`: a controller from outside reports it of itself: name a measured value, such as slowed_for_rear"
+            )));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_design_is_named_as_on_the_command_line() {
+        for word in ["random", "sobol", "grid", "subset", "importance"] {
+            assert_eq!(word.parse::<DesignChoice>().unwrap().to_string(), word);
+        }
+        let error = "halton".parse::<DesignChoice>().unwrap_err();
+        assert_eq!(
+            error,
+            "`halton` is not a sampling design: one of `random`, `sobol`, `grid`, `subset`, `importance` is needed"
+        );
+    }
+}

@@ -1,0 +1,163 @@
+//! `campaign --design subset|importance` estimates the probability of a rare event, resumes to the same bytes, and refuses what does not fit.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::support::{closecall, code, folder, json, message, stderr, stdout};
+
+/// The collision probability of the fixture, by construction: Φ(−4).
+const TRUTH: f64 = 3.167_124e-5;
+
+fn fixture() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/known-rare-probability.toml")
+}
+
+fn rare(words: &str) -> std::process::Output {
+    let path = fixture();
+    let fixed = ["campaign", path.to_str().unwrap(), "--controller", "acc"];
+    closecall(fixed.into_iter().chain(words.split_whitespace()))
+}
+
+/// The words of a campaign by importance sampling.
+const BY_IMPORTANCE: &str = "--design importance --event collision --format json";
+
+#[test]
+fn both_methods_cover_a_probability_that_plain_sampling_does_not_reach() {
+    for method in ["importance", "subset"] {
+        let value = json(&rare(&format!("--design {method} --event collision --seed 1 --format json")), 0);
+        let report = &value["scenarios"][0];
+        let estimate = &report["estimates"][0];
+        let [low, high] = [0, 1].map(|end| estimate["interval_95"][end].as_f64().unwrap());
+        assert!(low <= TRUTH && TRUTH <= high, "{method}: {low} to {high}");
+        assert!((high - low) / estimate["value"].as_f64().unwrap() < 0.8, "{method}: {low} to {high}");
+        // Plain sampling needs 61.47/p runs for a relative width of 0.5: 1.9 million.
+        assert!(report["runs"].as_u64().unwrap() < 200_000, "{report}");
+        assert_eq!(report["parameters"][0], "gap-m");
+    }
+}
+
+#[test]
+fn a_number_with_a_bound_is_an_event_of_its_own() {
+    // The smallest gap is the gap at the start less 10 m: below 2 m beyond (30 − 12) / 5 = 3.6 standard deviations.
+    let path = fixture();
+    let event = "min_gap_rear_m < 2";
+    let words = ["campaign", path.to_str().unwrap(), "--controller", "acc", "--design", "importance", "--event", event];
+    let value = json(&closecall(words.into_iter().chain(["--format", "json"])), 0);
+    let interval = &value["scenarios"][0]["estimates"][0]["interval_95"];
+    let [low, high] = [0, 1].map(|end| interval[end].as_f64().unwrap());
+    assert!(low <= 1.591e-4 && 1.591e-4 <= high, "{low} to {high}");
+    assert_eq!(value["scenarios"][0]["event"], event);
+}
+
+#[test]
+fn a_campaign_that_was_cut_off_goes_on_to_the_same_bytes_with_any_number_of_threads() {
+    let place = folder();
+    let [one, other] = ["one", "other"].map(|name| place.path().join(name));
+    let run = |out: &Path, more: &str| rare(&format!("{BY_IMPORTANCE} --seed 3 --out {} {more}", out.display()));
+    let whole = stdout(&run(&one, "--jobs 1"), 0);
+    stdout(&run(&other, "--jobs 2"), 0);
+    let journal = |out: &Path| fs::read(out.join("rare-journal.jsonl")).unwrap();
+    assert_eq!(journal(&one), journal(&other));
+    // As a kill leaves it: within a line, and without a result.
+    let kept = journal(&other);
+    for share in [3, 2] {
+        fs::write(other.join("rare-journal.jsonl"), &kept[..kept.len() / share]).unwrap();
+        fs::remove_file(other.join("rare.json")).unwrap();
+        assert_eq!(stdout(&run(&other, "--jobs 3 --resume"), 0), whole);
+        assert_eq!(journal(&other), kept);
+        assert_eq!(fs::read(other.join("rare.json")).unwrap(), fs::read(one.join("rare.json")).unwrap());
+    }
+    let refused = run(&other, "--jobs 2");
+    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+    let seed = rare(&format!("{BY_IMPORTANCE} --seed 4 --resume --out {}", other.display()));
+    assert_eq!(code(&seed), 2);
+    assert!(message(&seed).contains("seed"), "{}", message(&seed));
+    let event = rare(&format!(
+        "--design importance --event others_collided --guide min_gap_rear_m --seed 3 --resume --out {}",
+        other.display()
+    ));
+    assert!(message(&event).contains("event: ego_collided there, others_collided here"), "{}", message(&event));
+    // No other command takes the weighted runs for samples.
+    let compared = closecall(["compare", one.to_str().unwrap(), other.to_str().unwrap()]);
+    assert_ne!(code(&compared), 0);
+    // A damaged line ends what is kept: its run and those behind it are run again.
+    let mut damaged = kept.clone();
+    damaged[30] ^= 1;
+    fs::write(other.join("rare-journal.jsonl"), damaged).unwrap();
+    assert_eq!(stdout(&run(&other, "--resume"), 0), whole);
+    assert_eq!(journal(&other), kept);
+}
+
+#[test]
+fn the_nearest_event_can_be_run_again() {
+    let output = rare("--design importance --event collision");
+    let shown = stderr(&output);
+    let command = shown.lines().find_map(|line| line.strip_prefix("look: closecall ")).unwrap();
+    let words = command.split("  #").next().unwrap().replace('\'', "");
+    let text = stdout(&closecall(words.split_whitespace()), 0);
+    assert!(text.contains("COLLISION of ego and rear"), "{text}");
+}
+
+#[test]
+fn a_gate_on_the_probability_is_judged_by_the_weighted_runs() {
+    let verdict = |max: &str| code(&rare(&format!("--design importance --event collision --max-probability {max}")));
+    assert_eq!([verdict("1e-4"), verdict("1e-6"), verdict("3.1e-5")], [0, 1, 4]);
+}
+
+#[test]
+fn a_budget_that_is_too_small_gives_no_number() {
+    for method in ["importance", "subset"] {
+        let output = rare(&format!("--design {method} --event collision -n 500"));
+        let text = stdout(&output, 4);
+        assert!(!text.contains("interval"), "{text}");
+        assert!(text.contains("no run came to the event") || text.contains("the budget ended"), "{text}");
+    }
+    let value = json(&rare("--design importance --event collision -n 100 --format json"), 4);
+    assert_eq!(value["scenarios"][0]["estimates"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
+    for (words, part) in [
+        ("--design importance", "name one with --event"),
+        ("--design subset --event collision --gate count(ego_collided)<=0", "a gate other than --max-probability"),
+        ("--design subset --event collision --max-collisions 3", "a gate other than --max-probability"),
+        ("--design subset --event collision --preset pr", "--preset"),
+        ("--design subset --event collision --partition 1/2 --out unused", "--partition"),
+        ("--design subset --event collision --fail-fast", "--fail-fast"),
+        ("--design subset --event collision --until-certain --max-probability 0.1", "--until-certain"),
+        ("--design subset --event collision --time-budget 9s", "--time-budget"),
+        ("--design subset --event collision --no-validity-checks", "--no-validity-checks"),
+        ("--design subset --event engaged", "with --guide MEASURE"),
+        ("--design subset --event collision --relative-width 0", "not a number above 0"),
+        ("--design subset --event crash", "not a measure; there are"),
+        ("--design subset --event induced", "it needs --paired or --arms"),
+        ("--design subset --event collision --guide engaged", "is not a number of a sample"),
+        ("--design halton --event collision", "one of `random`, `sobol`, `grid`, `subset`, `importance`"),
+        ("--event collision", "--design subset or importance"),
+        ("--guide min_gap_rear_m --design subset", "--event"),
+    ] {
+        let output = rare(words);
+        assert_eq!(code(&output), 2, "{words}: {}", stderr(&output));
+        assert!(message(&output).contains(part), "{words}: {}", message(&output));
+    }
+    let fixed = rare("--design importance --event collision --set gap-m=20");
+    assert_eq!(code(&fixed), 2);
+    assert!(message(&fixed).contains("no parameter of `known-rare-probability` varies"), "{}", message(&fixed));
+}
+
+#[test]
+fn a_gate_that_can_only_fail_ends_a_campaign_that_fails_fast() {
+    // The ego collides in neither arm; its smallest gap falls below 30 m in most samples.
+    let path = fixture();
+    let gate = "min(min_gap_rear_m) >= 30";
+    let campaign = |more: &[&str]| {
+        let fixed = ["campaign", path.to_str().unwrap(), "-n", "400", "--controller", "acc", "--gate", gate];
+        closecall(fixed.iter().chain(more))
+    };
+    let text = stdout(&campaign(&["--fail-fast"]), 1);
+    assert!(text.contains("ENDED EARLY, without a verdict: min(min_gap_rear_m) >= 30 can only fail"), "{text}");
+    assert!(!text.contains("400 of 400 samples"), "{text}");
+    let whole = stdout(&campaign(&[]), 1);
+    assert!(whole.contains("FAIL"), "{whole}");
+}
