@@ -5,7 +5,9 @@ use std::path::Path;
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig, Provenance};
 
-use crate::support::{all_of_library, closecall, families_of_library, folder, headline_with, json, library, message, stdout};
+use crate::support::{
+    all_of_library, closecall, families_of_library, folder, headline_with, json, library, message, stdout,
+};
 
 /// The smallest number of scenarios that the library holds.
 const LEAST_SCENARIOS: usize = 14;
@@ -169,7 +171,11 @@ fn without_emergency_braking_its_family_fails() {
     let path = library("aeb/aeb-lead-brakes");
     let same = ["campaign", path.to_str().unwrap(), "-n", "40", "--format", "json", "--arms", "cruise-aeb,acc-aeb"];
     let report = json(&closecall(same), 1);
-    assert!(report["reasons"][0].as_str().unwrap().starts_with("NOT MET: aeb-lead-brakes: AEB-1"), "{}", report["reasons"]);
+    assert!(
+        report["reasons"][0].as_str().unwrap().starts_with("NOT MET: aeb-lead-brakes: AEB-1"),
+        "{}",
+        report["reasons"]
+    );
 }
 
 #[test]
@@ -188,7 +194,11 @@ fn a_setting_acts_on_the_arm_that_it_names_alone() {
 fn arms_and_settings_that_change_nothing_are_refused() {
     for (scenario, options, part) in [
         ("aeb/aeb-lead-brakes", &["--arms", "acc,acc+aeb"][..], "are the same stack in this scenario"),
-        ("aeb/aeb-lead-brakes", &["--arms", "acc-aeb,acc+aeb", "--set", "acc-aeb:aeb.trigger-mps2=6"], "change nothing"),
+        (
+            "aeb/aeb-lead-brakes",
+            &["--arms", "acc-aeb,acc+aeb", "--set", "acc-aeb:aeb.trigger-mps2=6"],
+            "change nothing",
+        ),
         ("aeb/aeb-lead-brakes", &["--arms", "acc-aeb,acc+aeb", "--set", "mis:aeb.trigger-mps2=6"], "no arm is `mis`"),
         ("aeb/aeb-lead-brakes", &["--set", "acc+aeb:aeb.onset-mps2=6"], "trigger-mps2"),
         ("aeb/aeb-lead-brakes", &["--controller", "mis"], "needs a margin increase system"),

@@ -204,7 +204,7 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
         write!(f, "  delta-v up to {:.1} m/s", arm.max_delta_v_mps)?;
     }
     if arm.touches > 0 {
-        write!(f, "  {} touches", arm.touches)?;
+        write!(f, "  {} {}", arm.touches, if arm.touches == 1 { "touch" } else { "touches" })?;
     }
     if arm.engagements > 0 {
         write!(f, "  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach)?;
