@@ -45,6 +45,8 @@ const FIRST_SEARCHES: usize = 2;
 const LEAST_BESIDE: usize = 20;
 /// Number of events of a level that lead a search (-): an assumption; 3 to 10 are plausible.
 const FEW_EVENTS: usize = 5;
+/// Effective number of events of a level that a fit needs to lead to the region as well as it can (-): an assumption; 10 to 40 are plausible.
+const ENOUGH_EVENTS: f64 = 20.0;
 /// Standard deviation of the distribution from which the last search starts (-), and largest number of dimensions in which it does. With more of them, its
 /// points lie further out than any region that matters.
 const WIDE_SD: f64 = 3.0;
@@ -187,7 +189,7 @@ impl<S: Simulator> Run<'_, S> {
     fn search(&mut self, number: usize, known: &[Component], start: Mixture) -> Result<Option<Region>, S::Error> {
         let mut mixture = start;
         let (mut nearest, mut without_progress) = (f64::NEG_INFINITY, 0);
-        let mut best: Option<(usize, Region)> = None;
+        let mut best: Option<(f64, Region)> = None;
         for level in 0..MOST_LEVELS {
             let runs = self.level_runs();
             if self.runs + runs as u64 > self.search_budget {
@@ -197,16 +199,19 @@ impl<S: Simulator> Run<'_, S> {
             let drawn = self.draw(&mixture, runs, ("search", index))?.beside(known);
             let Some(threshold) = threshold(&drawn.responses) else { break };
             let events = drawn.events();
+            let worth = effective(&drawn.kept(&Response::is_event).1);
             let fit = |part: &str, keep: &dyn Fn(&Response) -> bool| {
                 let (points, weights) = drawn.kept(keep);
                 Weighted { points: &points, weights: &weights }.fit(DEFENSIVE, &mut self.seed.stream(part, index))
             };
-            // The event may never be likely, as when the random streams decide it: then the level with the most events leads to it.
-            if events >= FEW_EVENTS && best.as_ref().is_none_or(|(most, _)| events > *most) {
+            // The event may never be likely, as when the random streams decide it: then the level whose events are worth most leads to it.
+            let is_best = best.as_ref().is_none_or(|(most, _)| worth > *most);
+            if threshold == f64::INFINITY || events >= FEW_EVENTS && is_best {
                 let probability = drawn.weight_of_events() / runs as f64;
-                best = fit("events", &Response::is_event).map(|mixture| (events, Region { mixture, probability }));
+                best = fit("events", &Response::is_event).map(|mixture| (worth, Region { mixture, probability }));
             }
-            let has_passed = best.as_ref().is_some_and(|(most, _)| events < *most);
+            let has_passed =
+                best.as_ref().is_some_and(|(most, _)| 2.0 * worth < *most || worth < *most && *most >= ENOUGH_EVENTS);
             if threshold == f64::INFINITY || has_passed {
                 break;
             }
