@@ -82,7 +82,7 @@ def test_the_keywords_of_a_campaign_are_the_options_of_the_command() -> None:
     shown = re.findall(r"^ +(?:-[a-z], )?--([a-z-]+)", command("campaign", "--help").stdout, re.MULTILINE)
     options = {name.replace("-", "_") for name in shown}
     explicit = {"samples", "controller", "arms", "paired", "seed", "design", "sensors", "jobs", "out", "resume", "gate"}
-    settings_of_scenarios, of_the_command_line = {"set"}, {"help", "format", "no_out"}
+    settings_of_scenarios, of_the_command_line = {"set"}, {"help", "format", "no_out", "event", "guide", "relative_width"}
     assert set(_campaign.CampaignOptions.__annotations__) == options - explicit - settings_of_scenarios - of_the_command_line
 
 
