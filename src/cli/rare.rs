@@ -14,7 +14,7 @@ use closecall_campaign::rare::{
 use closecall_campaign::runner::Work;
 use closecall_campaign::session;
 use closecall_report::json::stamped;
-use closecall_scenarios::criteria::{EventExpression, Guide, Quantity};
+use closecall_scenarios::criteria::{EventExpression, Guide};
 use closecall_scenarios::library;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
@@ -274,11 +274,8 @@ fn check_event(event: EventExpression, work: &Work) -> Result<(), CliError> {
         )));
     }
     for quantity in event.events().map(|event| event.quantity) {
-        let (measure, arm) = match quantity {
-            Quantity::Tested(measure) => (measure, work.arms.last()),
-            Quantity::Baseline(measure) => (measure, work.arms.first()),
-            Quantity::Pair(_) => continue,
-        };
+        let Some((measure, in_baseline)) = quantity.measure() else { continue };
+        let arm = if in_baseline { work.arms.first() } else { work.arms.last() };
         if measure.is_reported() && arm.is_some_and(|arm| !arm.controller.is_built_in()) {
             return Err(CliError::usage(format!(
                 "--event `{quantity}`: a controller from outside reports it of itself: name a measured value, such as slowed_for_rear"

@@ -36,6 +36,7 @@ impl Nearness {
             _ if guide.is_some() || event.excess(0.0).is_some() => true,
             Quantity::Tested(measure) | Quantity::Baseline(measure) => measure.name == EGO_COLLIDED,
             Quantity::Pair(_) => true,
+            Quantity::Compared(_) => false,
         };
         match expression.events().find(|event| !has_guide(event)) {
             Some(event) => Err(NoGuide { event }),
@@ -71,6 +72,7 @@ impl Nearness {
         let (own, other) = match event.quantity {
             Quantity::Tested(_) => (tested, None),
             Quantity::Baseline(_) => (0, None),
+            Quantity::Compared(comparison) => (if comparison.in_baseline { 0 } else { tested }, None),
             Quantity::Pair(PairFlag::Induced) => (tested, Some(0)),
             Quantity::Pair(PairFlag::Prevented) => (0, Some(tested)),
         };
