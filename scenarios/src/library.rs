@@ -280,8 +280,10 @@ mod tests {
             names.sort();
             names
         };
-        let expected =
-            [names_in(&folder), names_in(&folder.join("traffic")), names_in(&folder.join("faults"))].concat();
+        let mut expected = names_in(&folder);
+        for family in ["traffic", "as-recorded", "aeb", "acc", "faults"] {
+            expected.extend(names_in(&folder.join(family)));
+        }
         assert_eq!(names().collect::<Vec<_>>(), expected);
         for (entry, (name, text)) in entries().unwrap().into_iter().zip(all()) {
             assert_eq!(entry.name, ScenarioFile::parse(&path(name), text, &[]).unwrap().config().name);

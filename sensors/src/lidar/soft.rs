@@ -102,8 +102,7 @@ pub(crate) struct SoftEcho {
 /// The effect of droplets on a beam.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DropletEffect {
-    /// The nearest false return, which may be too weak to be detected. `None` only if there surely is none
-    /// that can be detected.
+    /// The nearest false return, which may be too weak to be detected.
     pub(crate) echo: Option<SoftEcho>,
     /// Distance at which the beam enters the first plume (m).
     near_m: f32,
@@ -176,9 +175,10 @@ pub(crate) fn droplet_effect(
 ) -> DropletEffect {
     let Air { link, noise, .. } = *air;
     let beam = at.beam();
-    let mut effect = DropletEffect { echo: None, near_m: f32::INFINITY, optical_depth: 0.0 };
+    let fog = link.has_fog().then(|| fog(beam, air));
+    let mut effect = DropletEffect { echo: fog, near_m: f32::INFINITY, optical_depth: 0.0 };
     // Logarithms are computed only if needed: not for a beam that crosses no plume, ...
-    let (mut clump, mut depth) = (None, None);
+    let (mut clump, mut depth, mut has_echo) = (None, None, false);
     for plume in plumes.iter().filter(|plume| plume.columns.contains(&at.column)) {
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
         let clump = *clump.get_or_insert_with(|| -maths::ln(noise.uniform(at.clump(), Purpose::Plume)));
@@ -188,21 +188,17 @@ pub(crate) fn droplet_effect(
         effect.optical_depth += extinction * (to - from);
         let depth = *depth.get_or_insert_with(|| noise.uniform(beam, Purpose::Depth));
         // ... nor for one that surely returns no light from this plume, since −ln u ≥ 1 − u.
-        if effect.echo.is_some() || 0.5 * (1.0 - depth) >= effect.optical_depth {
+        if has_echo || 0.5 * (1.0 - depth) >= effect.optical_depth {
             continue;
         }
         let ends_at = -0.5 * maths::ln(depth);
         if ends_at < effect.optical_depth {
+            has_echo = true;
             let range_m = from + (ends_at - before) / extinction;
-            let power = soft_power(extinction, range_m, link);
-            effect.echo = Some(SoftEcho { range_m, power, source: PointSource::Spray });
-        }
-    }
-    // Fog that is too weak to be detected matters only before spray, whose light it takes for its own.
-    if link.has_fog() && (effect.echo.is_some() || air.may_return_from_fog(beam)) {
-        let fog = fog(beam, air);
-        if effect.echo.is_none_or(|spray| spray.range_m >= fog.range_m) {
-            effect.echo = Some(fog);
+            let echo = SoftEcho { range_m, power: soft_power(extinction, range_m, link), source: PointSource::Spray };
+            if effect.echo.is_none_or(|other| range_m < other.range_m) {
+                effect.echo = Some(echo);
+            }
         }
     }
     effect
