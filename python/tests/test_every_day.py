@@ -66,8 +66,8 @@ def test_lane_changes_and_criticality_are_tables(tmp_path: Path) -> None:
 
 
 def test_messages_name_keywords() -> None:
-    with pytest.raises(cc.UsageError, match="no keyword `max_colisions`; did you mean `max_collisions`") as raised:
-        small(max_colisions=3)
+    with pytest.raises(cc.UsageError, match="no keyword `max_collision`; did you mean `max_collisions`") as raised:
+        small(max_collision=3)
     with pytest.raises(cc.UsageError, match="max_collisions=") as raised:
         small(max_collisions="three")
     assert "--" not in str(raised.value)

@@ -2,7 +2,7 @@
 import closecall as cc
 
 cc.campaign("low-thw-overtake", n="many")
-cc.campaign("low-thw-overtake", max_colisions=3)
+cc.campaign("low-thw-overtake", max_collision=3)
 cc.campaign("low-thw-overtake", max_collisions="three")
 cc.campaign("low-thw-overtake", design="latin")
 cc.run("low-thw-overtake", sensors="lidar")
