@@ -313,9 +313,18 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError::Value`] if a value is out of range or contradicts another value.
     pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
+        self.concrete_at(parameters, &[])
+    }
+
+    /// Does what [`Self::concrete`] does. The message of an error has the values of `named`, too.
+    fn concrete_at(&self, parameters: &Parameters, named: &[String]) -> Result<Scenario, ScenarioError> {
         self.config.check(parameters).map_err(|source| {
-            let at = describe(&parameters_near(&self.text, &source.path), parameters);
-            self.located(source, at)
+            let near = match parameters_near(&self.text, &source.path) {
+                Some(near) => near,
+                None if named.is_empty() => parameters.iter().map(|(name, _)| name.as_str().to_owned()).collect(),
+                None => Vec::new(),
+            };
+            self.located(source, describe(&[near.as_slice(), named].concat(), parameters))
         })
     }
 
@@ -331,8 +340,11 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError::Value`] for the first of these scenarios that is not valid.
     pub fn check(&self) -> Result<(), ScenarioError> {
-        for parameters in self.space.extremes() {
-            self.concrete(&parameters)?;
+        let mut extremes = self.space.extremes();
+        let Some(medians) = extremes.next() else { return Ok(()) };
+        self.concrete(&medians)?;
+        for parameters in extremes {
+            self.concrete_at(&parameters, &differing(&medians, &parameters))?;
         }
         for index in 0..CHECKED_SAMPLES {
             self.concrete(&self.space.sample(Design::Random, 0, index, CHECKED_SAMPLES))?;
@@ -349,24 +361,30 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Returns the names of the parameters that a value uses, or else those of the nearest table around it that uses some. The whole
-/// file does not count: its parameters would hide the one that matters.
-fn parameters_near(text: &str, path: &KeyPath) -> Vec<String> {
-    let Ok(document) = toml::from_str::<toml::Table>(text) else { return Vec::new() };
-    let root = toml::Value::Table(document);
+/// file does not count: its parameters would hide the one that matters. Returns `None` for a value that is not in the file but
+/// follows from others, which may use any parameter.
+fn parameters_near(text: &str, path: &KeyPath) -> Option<Vec<String>> {
+    let root = toml::Value::Table(toml::from_str::<toml::Table>(text).ok()?);
     let mut around = vec![&root];
     for segment in &path.0 {
-        let below = around.last().and_then(|value| match segment {
-            Segment::Key(key) => value.get(key.as_str()),
-            Segment::Index(index) => value.get(*index),
+        let value = around.last()?;
+        around.push(match segment {
+            Segment::Key(key) => value.get(key.as_str())?,
+            Segment::Index(index) => value.get(*index)?,
         });
-        around.extend(below);
     }
-    let of_each = around.into_iter().skip(1).rev().map(|value| {
+    let names_of = |value: &toml::Value| {
         let mut names = Vec::new();
         append_names(value, &mut names);
-        names
-    });
-    of_each.into_iter().find(|names| !names.is_empty()).unwrap_or_default().into_iter().map(str::to_owned).collect()
+        names.into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    Some(around.into_iter().skip(1).rev().map(names_of).find(|names| !names.is_empty()).unwrap_or_default())
+}
+
+/// Returns the names of the parameters whose values differ.
+fn differing(typical: &Parameters, parameters: &Parameters) -> Vec<String> {
+    let pairs = typical.iter().zip(parameters.iter());
+    pairs.filter(|(one, other)| one.1 != other.1).map(|((name, _), _)| name.as_str().to_owned()).collect()
 }
 
 /// Returns the values of some parameters, as the end of a message.

@@ -247,7 +247,7 @@ impl From<&CliError> for ExitCode {
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
-            | CliError::Project(_)
+            | CliError::Project(ProjectError { is_io: false, .. })
             | CliError::View(ViewError::Nothing { .. } | ViewError::Foreign { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Controller(error) => FailureKind::from(error).into(),
@@ -263,6 +263,7 @@ impl From<&CliError> for ExitCode {
             CliError::Causes(error) => error.kind().into(),
             CliError::Sensors(error) => error.kind().into(),
             CliError::Write(_)
+            | CliError::Project(ProjectError { is_io: true, .. })
             | CliError::ResultsCut(_)
             | CliError::Chart(_)
             | CliError::Record(_)

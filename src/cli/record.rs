@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::SimulationArgs;
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::outln;
+use super::output::{outln, print_written};
 use super::protect::{of_scenario, protect};
 use crate::exit_code::ExitCode;
 
@@ -59,7 +59,8 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let (tracks, instants) =
         (recording.trajectories.len(), recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>());
     write_trajectories(&recording, &args.output)?;
-    outln!("{tracks} vehicles, {instants} instants written to {}", args.output.display());
+    outln!("{tracks} vehicles, {instants} instants");
+    print_written(&args.output);
     Ok(ExitCode::Pass)
 }
 
@@ -75,8 +76,9 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let (log, changes) = recorder.finish();
     write_in_car(&log, &args.output)?;
     write_ground_truth(&changes, &truth)?;
-    outln!("{} rows of the in-car log of {chosen} written to {}", log.frames.len(), args.output.display());
-    outln!("{} true lane changes written to {}", changes.len(), truth.display());
+    outln!("{} rows of the in-car log of {chosen}, {} true lane changes", log.frames.len(), changes.len());
+    print_written(&args.output);
+    print_written(&truth);
     Ok(ExitCode::Pass)
 }
 

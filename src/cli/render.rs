@@ -12,7 +12,7 @@ use serde_json::json;
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::outln;
+use super::output::{outln, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall tool render`.
@@ -65,8 +65,9 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
         let summary = render_aerial_dataset(&AerialDatasetOptions { set, pictures: scenes, seed }, &args.output)?;
         match args.format {
             Format::Json => outln!("{:#}", stamped(json!(summary), Some(seed), None)),
-            Format::Human => outln!("{summary} written to {}", args.output.display()),
+            Format::Human => outln!("{summary}"),
         }
+        print_written(&args.output);
         return Ok(ExitCode::Pass);
     }
     let content = if args.crops { Content::Crops } else { Content::Images };
@@ -76,9 +77,10 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),
         Format::Human => {
             let [car, truck, motorcycle, background] = summary.labels;
-            outln!("{} images of {} scenes written to {}", summary.pictures, summary.scenes, args.output.display());
+            outln!("{} images of {} scenes", summary.pictures, summary.scenes);
             outln!("labels: {car} cars, {truck} trucks, {motorcycle} motorcycles, {background} background");
         }
     }
+    print_written(&args.output);
     Ok(ExitCode::Pass)
 }

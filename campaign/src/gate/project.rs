@@ -19,6 +19,8 @@ pub struct ProjectError {
     pub path: PathBuf,
     /// What is wrong, with the line.
     pub message: String,
+    /// Whether the system cannot read the file.
+    pub is_io: bool,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -51,7 +53,7 @@ impl ProjectFile {
                         ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::PermissionDenied
                     ) =>
                 {
-                    return Err(ProjectError { path, message: error.to_string() });
+                    return Err(ProjectError { path, message: error.to_string(), is_io: true });
                 }
                 _ => (),
             }
@@ -60,9 +62,9 @@ impl ProjectFile {
     }
 
     fn read(path: &Path) -> Result<Self, ProjectError> {
-        let fail = |message: String| ProjectError { path: path.to_owned(), message };
-        let text = read_text(path).map_err(|error| fail(error.to_string()))?;
-        let config: ProjectConfig = toml::from_str(&text).map_err(|error| fail(error.to_string()))?;
+        let fail = |message: String, is_io| ProjectError { path: path.to_owned(), message, is_io };
+        let text = read_text(path).map_err(|error| fail(error.to_string(), error.kind() != ErrorKind::InvalidData))?;
+        let config: ProjectConfig = toml::from_str(&text).map_err(|error| fail(error.to_string(), false))?;
         Ok(Self { path: path.to_owned(), gate: config.gate })
     }
 
@@ -94,8 +96,11 @@ impl ProjectFile {
         }
         if let (None, Some(max)) = (&set.probability, self.gate.max_probability) {
             let confidence = self.gate.confidence.unwrap_or(ProbabilityGate::CONFIDENCE);
-            let gate = ProbabilityGate::new(max, confidence)
-                .map_err(|error| ProjectError { path: self.path, message: error.to_string() })?;
+            let gate = ProbabilityGate::new(max, confidence).map_err(|error| ProjectError {
+                path: self.path,
+                message: error.to_string(),
+                is_io: false,
+            })?;
             set.probability = Some(ProbabilitySpec { gate, source });
         }
         Ok(())
