@@ -254,7 +254,10 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         Decision::first_of(&findings.decisions).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
-            let what = "no gate was set and no requirement was checked: set a gate, or measure without a verdict";
+            let what = match gates.is_empty() {
+                true => "no gate was set and no requirement was checked: set a gate, or measure without a verdict",
+                false => "no gate and no requirement is decided",
+            };
             findings.add(Decision::NotJudged, what.to_owned());
         }
         Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)

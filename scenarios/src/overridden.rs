@@ -25,6 +25,11 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
     found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
+    let observed = before.parameters.0.iter().filter(|(name, parameter)| {
+        let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
+        parameter.observed.is_some() && kept.is_some_and(|kept| Some(kept) != parameter.observed.as_ref())
+    });
+    found.extend(observed.map(|(name, _)| format!("observed range of {name}")));
     found
 }
 
@@ -63,6 +68,7 @@ mod tests {
             ("requirements=[]", "requirement MIS-1"),
             ("expects=['lead_braked']", "expects rear_near"),
             ("expects-share=0.1", "expects-share 0.95"),
+            ("parameters.closing-mps.observed.max=14", "observed range of closing-mps"),
         ] {
             let found = overridden(&[setting]);
             assert!(found.iter().any(|what| what.starts_with(part)), "{setting}: {found:?}");

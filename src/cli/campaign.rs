@@ -322,6 +322,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         (args.plan.names_checks(), "--check-share, --check-at-most and --no-validity-checks"),
         (args.partition.is_some(), "--partition"),
         (args.ray.is_some(), "--ray"),
+        (args.draws_seed(), "a seed that is drawn: name one"),
         (args.record.is_some(), "--record"),
         (args.retry_crashed > 0, "--retry-crashed"),
         (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
@@ -330,7 +331,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
     ];
     if let Some((_, option)) = is_named.into_iter().find(|(is_named, _)| *is_named) {
         return Err(CliError::usage(format!(
-            "--design {method} draws weighted runs, which are no independent samples: it cannot be combined with {option}"
+            "the runs of --design {method} are no independent samples of the scenario: it cannot be combined with {option}"
         )));
     }
     let folder = match args.results.place()? {

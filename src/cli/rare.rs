@@ -137,7 +137,7 @@ impl Rare<'_> {
         let nearness = self.args.nearness(self.method)?;
         let campaign = plan.campaign();
         if let Some(work) = campaign.works.first() {
-            check_event(nearness.expression(), work)?;
+            check_event(nearness.expression(), work, self.gate.is_some())?;
         }
         check_backend(plan.uses_classifier())?;
         check_cameras(plan.mask_rcnn_cameras())?;
@@ -205,7 +205,7 @@ impl Rare<'_> {
 
     /// Returns whether the probability is as low as allowed; `None` if the interval does not say it, or there is no gate.
     fn judge(&self, report: &RareReport) -> Option<bool> {
-        let gate = self.gate?;
+        let gate = self.gate.filter(|_| report.errors == 0)?;
         let Some(estimate) = report.main() else {
             // The bound without an event has 95 % confidence.
             let bound = report.upper_bound_without_event.filter(|_| gate.confidence() <= 0.95)?;
@@ -216,24 +216,37 @@ impl Rare<'_> {
         if high <= gate.max() { Some(true) } else { (low >= gate.max()).then_some(false) }
     }
 
+    /// Returns the verdict on a report.
+    fn word(&self, report: &RareReport) -> &'static str {
+        match self.judge(report) {
+            _ if report.errors > 0 => "ERROR",
+            Some(true) => "PASS",
+            Some(false) => "FAIL",
+            None => "INCONCLUSIVE",
+        }
+    }
+
     fn print(&self, reports: &[RareReport], works: &[std::sync::Arc<Work>], sensors: Option<SensorMode>) {
         let seed = works.first().map(|work| work.sampling.seed);
         if self.format == Format::Json {
-            outln!("{:#}", stamped(json!({ "scenarios": reports }), seed, None));
+            let verdicts = self.gate.map(|gate| {
+                let words: Vec<&str> = reports.iter().map(|report| self.word(report)).collect();
+                json!({ "max_probability": gate.max(), "confidence": gate.confidence(), "verdicts": words })
+            });
+            outln!("{:#}", stamped(json!({ "scenarios": reports, "gate": verdicts }), seed, None));
             return;
         }
         for (report, work) in reports.iter().zip(works) {
             out!("{}", for_terminal(report));
             if let Some(gate) = self.gate {
-                let verdict = match self.judge(report) {
-                    Some(true) => "PASS",
-                    Some(false) => "FAIL",
-                    None => "INCONCLUSIVE",
-                };
+                let verdict = self.word(report);
                 let (max, confidence) = (gate.max(), percent(gate.confidence()));
                 outln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
             }
-            for nearest in &report.nearest {
+            // A run that no command line repeats: of a controller from outside, of standard input, of a member of an ensemble.
+            let is_named = work.file.path().is_file() || work.file.path() == library::path(&work.file.config().name);
+            let can_repeat = is_named && work.arms.iter().all(|arm| arm.controller.is_built_in());
+            for nearest in report.nearest.iter().filter(|_| can_repeat) {
                 let distance_sd = nearest.distance_sd;
                 let command = replay(work, nearest, sensors);
                 print_error(format_args!(
@@ -267,10 +280,15 @@ fn replay(work: &Work, nearest: &Nearest, sensors: Option<SensorMode>) -> String
 }
 
 /// Refuses an event that no sample of these arms can show.
-fn check_event(event: EventExpression, work: &Work) -> Result<(), CliError> {
+fn check_event(event: EventExpression, work: &Work, has_gate: bool) -> Result<(), CliError> {
     if event.needs_pairs() && work.arms.len() < 2 {
         return Err(CliError::usage(format!(
             "--event `{event}` compares with a baseline: it needs --paired or --arms"
+        )));
+    }
+    if event.second.is_some() && has_gate {
+        return Err(CliError::usage(format!(
+            "--max-probability bounds the probability of one event, and `{event}` is a difference of two"
         )));
     }
     for quantity in event.events().map(|event| event.quantity) {

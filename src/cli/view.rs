@@ -78,6 +78,12 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
         // The page itself is written anew.
         let inputs = of_campaign(&campaign).into_iter().filter(|input| !input.ends_with(EXPLORER));
         protect(&inputs.collect::<Vec<_>>(), &[("--export", Some(path))])?;
+        if path.extension().is_none_or(|end| end != "html") || path.starts_with(campaign.join(RECORDINGS)) {
+            return Err(CliError::usage(format!(
+                "--export {}: a name that ends with .html, and is not in the folder of the recordings, is needed",
+                path.display()
+            )));
+        }
         export(&args.saved.open(&campaign)?, path)?;
         return Ok(ExitCode::Pass);
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use closecall_scenarios::Function;
 use closecall_scenarios::criteria::{EGO_COLLIDED, Expression, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
 use closecall_simulation::Arm;
+use closecall_simulation::controller::ControllerChoice;
 
 use super::evaluate::{Accumulator, Evidence, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
@@ -67,6 +68,17 @@ pub struct Judge {
     scenarios: Vec<Judged>,
 }
 
+/// Returns what stands in place of the baseline of the scenario's function, if a check compares with it: it may be weaker, and what
+/// it does not prevent would count for the system under test. A controller from outside is somebody's own baseline.
+fn other_baseline(work: &Work) -> Option<String> {
+    let config = work.file.config();
+    let [baseline, _] = ControllerChoice::of_function(config.function);
+    let arm = work.arms.first().filter(|arm| work.arms.len() > 1 && arm.controller.is_built_in())?;
+    let (name, expected) = (arm.controller.name(), baseline.name());
+    let compares = config.checks.values().flatten().any(Expression::needs_pairs);
+    (compares && name != expected).then(|| format!("the baseline is `{name}` and not `{expected}`"))
+}
+
 impl Judge {
     /// Returns a judge without samples.
     pub fn new(works: &[Arc<Work>], set: &GateSet, inference: Inference) -> Self {
@@ -85,7 +97,7 @@ impl Judge {
                 least_share: config.expects_share,
                 happened: 0,
                 samples: 0,
-                overridden: config.overridden.clone(),
+                overridden: config.overridden.iter().cloned().chain(other_baseline(work)).collect(),
                 asks_for_action: config.checks.values().flatten().any(of_prevented),
                 function: config.function,
                 extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
@@ -135,7 +147,10 @@ impl Judge {
     /// Returns the scenarios that ask what the system under test prevents, and in which it never acted, with the action that is missing and their numbers of
     /// samples.
     pub fn without_action(&self) -> impl Iterator<Item = (&str, &'static str, u64)> {
-        let idle = |judged: &&Judged| judged.asks_for_action && judged.samples > 0 && judged.acted == 0;
+        let is_told = |judged: &Judged| self.is_paired || judged.function == Function::Mis;
+        let idle = move |judged: &&Judged| {
+            judged.asks_for_action && judged.samples > 0 && judged.acted == 0 && is_told(judged)
+        };
         let missing = |judged: &Judged| match judged.function {
             Function::Mis => "slowed the ego for a vehicle behind",
             Function::Aeb | Function::Acc => "moved the ego otherwise than the baseline",

@@ -41,7 +41,12 @@ impl Mean {
             .map_or(f64::INFINITY, |student| student.inverse_cdf(confidence))
     }
 
-    /// Returns the two-sided interval of a probability; `None` if the mean is not above 0.
+    /// Returns true if the values have bounds: they scatter, and their mean is above 0.
+    fn has_bounds(&self) -> bool {
+        self.value > 0.0 && self.standard_error > 0.0
+    }
+
+    /// Returns the two-sided interval of a probability; `None` if the mean is not above 0, or the values do not scatter.
     pub fn interval_of_probability(&self, coverage: f64) -> Option<[f64; 2]> {
         let one_sided = 0.5 * (1.0 + coverage);
         Some([self.lower_bound(one_sided)?, self.upper_bound(one_sided)?])
@@ -49,13 +54,13 @@ impl Mean {
 
     /// Returns the one-sided lower bound of a probability; `None` if the mean is not above 0.
     pub fn lower_bound(&self, confidence: f64) -> Option<f64> {
-        (self.value > 0.0).then(|| self.value * exp(-self.factor(confidence) * self.standard_error / self.value))
+        self.has_bounds().then(|| self.value * exp(-self.factor(confidence) * self.standard_error / self.value))
     }
 
     /// Returns the one-sided upper bound of a probability; `None` if the mean is not above 0.
     pub fn upper_bound(&self, confidence: f64) -> Option<f64> {
         let high = || self.value * exp(self.factor(confidence) * self.standard_error / self.value);
-        (self.value > 0.0).then(|| high().min(1.0))
+        self.has_bounds().then(|| high().min(1.0))
     }
 
     /// Returns the two-sided interval of a quantity of either sign.
@@ -93,7 +98,9 @@ mod tests {
     }
 
     #[test]
-    fn no_event_has_no_interval() {
+    fn no_event_and_no_scatter_have_no_interval() {
+        // Six hundred events in six hundred runs do not show that the probability is 1.
+        assert_eq!(Mean::of(&[1.0; 600]).unwrap().interval_of_probability(0.95), None);
         assert_eq!(Mean::of(&[0.0; 10]).unwrap().interval_of_probability(0.95), None);
         assert_eq!(Mean::of(&[1.0]), None);
     }

@@ -72,6 +72,10 @@ impl RarePlan {
         report.scenario.clone_from(&file.config().name);
         report.parameters = file.space().varying().map(|(name, _)| name.to_string()).collect();
         (report.errors, report.first_error, report.nearest) = (runs.errors, runs.first_error, runs.nearest);
+        if report.errors > 0 {
+            // A run that failed may have been an event.
+            report.upper_bound_without_event = None;
+        }
         Ok(report)
     }
 }

@@ -213,6 +213,9 @@ impl fmt::Display for RareReport {
         for Estimate { of, value, interval_95, .. } in &self.estimates {
             match interval_95 {
                 Some([low, high]) => writeln!(f, "  {of}: {value:.3e}, 95 % interval {low:.3e} to {high:.3e}")?,
+                None if *value > 0.0 => {
+                    writeln!(f, "  {of}: {value:.3e}; no interval, because the runs do not scatter")?
+                }
                 None => writeln!(f, "  {of}: in no run; no interval")?,
             }
         }

@@ -43,7 +43,11 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
             } else {
                 format!("all {scenarios} scenarios meet")
             };
-            Some(format!("{word}: {all} what is required, {met} of {} gates", judged.gates.len()))
+            let unchecked = judged.gates.iter().filter(|gate| gate.standing() == Standing::NotChecked).count();
+            Some(match unchecked {
+                0 => format!("{word}: {all} what is required, {met} of {} gates", judged.gates.len()),
+                _ => format!("{word}: {met} of {} gates are met, {unchecked} not checked", judged.gates.len()),
+            })
         }
         Decision::NotJudged | Decision::Overridden | Decision::SampleError | Decision::Invalid => first_reason(),
         Decision::Measured => None,
