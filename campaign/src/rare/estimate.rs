@@ -83,7 +83,7 @@ mod tests {
     fn the_interval_of_few_values_is_students() {
         let mean = Mean::of(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
         // t of 4 degrees of freedom at 97.5 %: 2.776.
-        let half = 2.776 * 0.707_11;
+        let half = 2.776 * (2.5_f64 / 5.0).sqrt();
         let [low, high] = mean.interval(0.95);
         assert!((low - 3.0 + half).abs() < 1e-3 && (high - 3.0 - half).abs() < 1e-3);
         assert!((mean.relative_width() - 2.0 * half / 3.0).abs() < 1e-3);

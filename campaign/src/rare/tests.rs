@@ -148,7 +148,7 @@ fn an_event_of_the_random_streams_alone_is_estimated_although_they_are_not_moved
     // One key of sixteen has the event beyond 3 standard deviations.
     let event = |point: &Point| {
         let z = point.normals[0];
-        Response { score: z, events: [z > 3.0 && point.noise % 16 == 0, false] }
+        Response { score: z, events: [z > 3.0 && point.noise.is_multiple_of(16), false] }
     };
     let truth = 1.349_898e-3 / 16.0;
     let found = importance(&mut Function(event), 2, Seed(5), GOAL).unwrap().means.unwrap();
