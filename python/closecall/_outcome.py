@@ -62,6 +62,10 @@ class Margins:
     min_gap_rear_m: float | None
     #: Smallest time to collision of the rear vehicle (s).
     min_ttc_rear_s: float | None
+    #: Smallest time to collision with the lead vehicle (s).
+    min_ttc_front_s: float | None
+    #: When the ego's automatic emergency braking began for the first time (s).
+    emergency_braking_at_s: float | None
     #: Largest deceleration (m/s²).
     max_deceleration_mps2: float
     #: Largest jerk (m/s³).
@@ -132,6 +136,8 @@ class Outcome:
     margins: Margins
     mis: MisSummary
     promise: Promise | None = None
+    #: Contacts of bumpers that are too slow to be collisions.
+    touches: tuple[Collision, ...] = ()
     _json: str = field(repr=False, compare=False, default="")
     _run: _native.Run | None = field(repr=False, compare=False, default=None)
 
@@ -145,6 +151,7 @@ class Outcome:
             moments=tuple(Moment(**one) for one in keys["moments"]),
             margins=Margins(**_split(keys["margins"])),
             mis=MisSummary(**_tuples(_split(keys["mis"]))),
+            touches=tuple(_collision(one) for one in keys.get("touches", [])),
             promise=None if keys["promise"] is None else Promise(**_split(keys["promise"])),
             _json=text,
             _run=run,

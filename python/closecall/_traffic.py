@@ -16,15 +16,12 @@ Layout = Literal["ngsim", "highd", "commonroad", "csv", "in-car"]
 
 
 class Rows(list[dict[str, Any]]):
-    """Rows of a table, as dictionaries. ``pyarrow.table(rows)``, ``polars.DataFrame(rows.table())`` and
-    ``pandas.DataFrame.from_arrow(rows)`` make a table of them."""
+    """Rows of a table, as dictionaries. ``pyarrow.table(rows.table())``, ``polars.DataFrame(rows.table())`` and
+    ``pandas.DataFrame.from_arrow(rows.table())`` make a table of them."""
 
     def table(self) -> _native.Table:
         """Returns the rows as a table. A nested key such as ``metrics`` gives columns such as ``metrics.thw_s``."""
         return _native.rows_table(json.dumps([_flat(row) for row in self]))
-
-    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
-        return self.table().__arrow_c_stream__(requested_schema)
 
 
 def _flat(row: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -46,7 +43,7 @@ def lane_changes(
 ) -> Rows | dict[str, Any]:
     """Finds the lane changes in a trajectory file, as ``closecall traffic lane-changes`` does.
 
-    The result has a dictionary for each, and is a table, too (:class:`Rows`). Each has ``track_id``, ``direction``, ``start_s``, ``crossing_s``, ``end_s``, ``duration_s``, ``speed_mps`` (m/s), ``complete`` and
+    The result has a dictionary for each, and can be read as a table (:class:`Rows`). Each has ``track_id``, ``direction``, ``start_s``, ``crossing_s``, ``end_s``, ``duration_s``, ``speed_mps`` (m/s), ``complete`` and
     more. With ``reference``, a list of known lane changes (CSV), the result is a dictionary with recall and precision.
 
     Raises :class:`InputError` with file, line and column (``key``) if the file cannot be used.
@@ -67,8 +64,8 @@ def criticality(
     """Computes how critical each lane change of a trajectory file is, as ``closecall traffic criticality`` does.
 
     ``speed_limit_mps`` (m/s) is 120 km/h by default. Each lane change has the keys of :func:`lane_changes` and ``metrics``
-    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``. The result is a table, too
-    (:class:`Rows`).
+    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``. The result can be read as
+    a table (:class:`Rows`).
     """
     named: dict[str, object] = {"speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone}
     return Rows(_json("criticality", [file], {**named, **_reading(layout, drop_bad_rows)}))

@@ -56,13 +56,13 @@ def test_lane_changes_and_criticality_are_tables(tmp_path: Path) -> None:
     assert command("traffic", "record", SCENARIO, "-n", "3", "--seed", "1", "--sensors", "object", "-o", file).returncode == 0
     changes, critical = cc.lane_changes(file), cc.criticality(file)
     assert isinstance(changes, cc.Rows)
-    table = pyarrow.table(changes)
+    table = pyarrow.table(changes.table())
     assert table.num_rows == len(changes) > 0
     assert table.column("track_id").to_pylist() == [row["track_id"] for row in changes]
     assert table.schema.field("start_s").type == pyarrow.float64() and table.schema.field("complete").type == pyarrow.bool_()
     metrics = pyarrow.table(critical.table())
     assert metrics.column("metrics.thw_s").to_pylist() == [row["metrics"].get("thw_s") for row in critical]
-    assert pyarrow.table(cc.Rows()).num_rows == 0
+    assert pyarrow.table(cc.Rows().table()).num_rows == 0
 
 
 def test_messages_name_keywords() -> None:

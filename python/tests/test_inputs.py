@@ -151,5 +151,5 @@ def test_a_campaign_without_out_keeps_nothing(tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     assert cc.campaign(SCENARIO, 2, sensors="object", no_gate=True).folder is None
     assert not list(tmp_path.iterdir())
-    with pytest.raises(cc.UsageError, match="name the folder of the campaign with --out"):
+    with pytest.raises(cc.UsageError, match="name the folder of the campaign with"):
         cc.campaign(SCENARIO, 2, sensors="object", resume=True)
