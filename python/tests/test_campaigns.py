@@ -466,10 +466,10 @@ def test_exit_codes_of_the_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"max_collision": 3}, "--max-collision"),
-        ({"paired": True, "controller": "acc"}, "paired compares"),
+        ({"max_collision": 3}, "no keyword `max_collision`"),
+        ({"paired": True, "controller": "acc"}, "paired= compares"),
         ({"arms": ["acc", "mis"], "paired": True}, "leave out `controller` and `paired`"),
-        ({"n": 0}, "samples"),
+        ({"n": 0}, "no sample at all"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
