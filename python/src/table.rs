@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, StringArray};
-use arrow::datatypes::SchemaRef;
+use arrow::datatypes::{Schema, SchemaRef};
 use arrow::error::ArrowError;
 use arrow::ffi::FFI_ArrowSchema;
 use arrow::ffi_stream::FFI_ArrowArrayStream;
@@ -96,6 +96,9 @@ pub(crate) fn rows_table(rows: &str) -> PyResult<Table> {
         if known.insert(name) {
             names.push(name);
         }
+    }
+    if names.is_empty() {
+        return Ok(Table::new(SchemaRef::new(Schema::empty()), Vec::new()));
     }
     let columns = names.into_iter().map(|name| {
         let values: Vec<Option<&Value>> =

@@ -66,7 +66,7 @@ def test_lane_changes_and_criticality_are_tables(tmp_path: Path) -> None:
     assert metrics.column("track_id").to_pylist() == [row["track_id"] for row in flat]
     nested = pyarrow.table(cc.Rows([{"metrics": {"thw_s": 0.5}}, {"metrics": {"thw_s": None}}]).table())
     assert nested.column("metrics.thw_s").to_pylist() == [0.5, None]
-    assert pyarrow.table(cc.Rows().table()).num_rows == 0
+    assert len(cc.Rows().table()) == 0
 
 
 def test_messages_name_keywords() -> None:
