@@ -170,8 +170,8 @@ impl Folder {
         Ok(true)
     }
 
-    /// Returns true if the folder has a file of this name. A file of which the system cannot say whether it is there is not
-    /// taken for missing: it would be overwritten.
+    /// Returns true if the folder has a file of this name. If the system cannot tell, that is an error: a file
+    /// that is taken for missing would be overwritten.
     pub(crate) fn has(&self, name: &str) -> Result<bool, FolderError> {
         let path = self.file(name);
         path.try_exists().map_err(|source| FolderError::Read { path, source })

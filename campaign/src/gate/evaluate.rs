@@ -304,7 +304,7 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Returns whether a gate of a flag is lost after some samples, of which some are hits.
+    /// Returns whether a gate of a flag is lost after these samples and hits.
     fn is_lost(gate: &str, hits: u64, samples: u64, rest: u64) -> bool {
         let evidence =
             Evidence { is_paired: true, is_varied: true, is_built_in: [true; 2], inference: Inference::FixedSamples };

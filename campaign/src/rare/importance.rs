@@ -57,7 +57,7 @@ const LEAST_FINAL: u64 = 600;
 /// is not nearly normal.
 const LEAST_EVENTS: u64 = 30;
 const LEAST_EFFECTIVE: f64 = 15.0;
-/// Factor by which the planned number of runs exceeds that of the pilot's variance, which is itself uncertain (-): an assumption.
+/// Factor on the number of runs that the pilot's variance asks for (-): an assumption. That variance is uncertain.
 const MARGIN: f64 = 1.2;
 
 /// When the sampling ends.
@@ -92,7 +92,7 @@ pub struct ImportanceResult {
     pub no_interval: Option<NoInterval>,
     /// Upper 95 % bound of the probability that any event happens, if no final run had one: no weight exceeds the inverse of the defensive share.
     pub upper_bound_without_event: Option<f64>,
-    /// All runs, those of the searches and the pilot included.
+    /// All runs, with the runs of the searches and of the pilot.
     pub runs: u64,
     /// The final runs, on which the estimate rests.
     pub final_runs: u64,

@@ -51,7 +51,7 @@ impl Samples for PointSamples {
     }
 }
 
-/// The runs of one scenario: those of a journal first, then new ones.
+/// The runs of one scenario: first the runs of a journal, then new runs.
 pub(super) struct Runs<'a> {
     pub(super) file: &'a ScenarioFile,
     pub(super) arms: &'a [Arm],

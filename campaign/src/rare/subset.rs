@@ -68,7 +68,7 @@ pub struct SubsetResult {
     pub means: Option<[Mean; 3]>,
     /// Why there are none.
     pub no_interval: Option<NoInterval>,
-    /// All runs, those of the pilot included.
+    /// All runs, with the runs of the pilot.
     pub runs: u64,
     /// The levels before the event.
     pub levels: Vec<Level>,
