@@ -88,6 +88,9 @@ impl Baseline {
     /// [`FolderError`] if the folder cannot be read.
     pub fn of(folder: &Folder) -> Result<Self, FolderError> {
         let manifest = folder.manifest()?;
+        if let Some(part) = manifest.partition {
+            return Err(FolderError::Part { path: folder.path().to_owned(), part });
+        }
         let mut collected: BTreeMap<String, Collected> = manifest
             .scenarios
             .iter()

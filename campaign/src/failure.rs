@@ -55,6 +55,8 @@ impl From<&FolderError> for FailureKind {
             FolderError::AlreadyThere { .. }
             | FolderError::OtherCampaign { .. }
             | FolderError::NotACampaign { .. }
+            | FolderError::RareEvent { .. }
+            | FolderError::Part { .. }
             | FolderError::Foreign { .. } => Self::Usage,
             FolderError::Content { .. } | FolderError::Incomplete { .. } => Self::InvalidInput,
         }

@@ -26,12 +26,13 @@ use super::journal::{self, Entry, Journal};
 use super::journal_plan::JournalPlan;
 use super::lock::{LOCK, Lock};
 use super::manifest::{MANIFEST_VERSION, Manifest};
+use super::rare;
 use super::record::Record;
 use super::saved_error::SavedError;
 use super::trust;
 use super::wall_times::{self, WallTime, WallTimes};
 
-pub use crate::folder_error::FolderError;
+pub use crate::folder_error::{FolderError, listed};
 
 /// The file of a campaign's folder that says how the campaign was made.
 pub const MANIFEST: &str = "manifest.json";
@@ -132,6 +133,9 @@ impl Folder {
         fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
         let is_new = folder.is_unused()?;
         let has_manifest = folder.has(MANIFEST)?;
+        if !has_manifest && folder.has(rare::MANIFEST)? {
+            return Err(FolderError::RareEvent { path: path.to_owned() });
+        }
         if !is_new && !has_manifest {
             return Err(FolderError::NotACampaign { path: path.to_owned() });
         }
@@ -237,6 +241,9 @@ impl Folder {
     /// Returns the manifest, and the BLAKE3 hash of its text.
     pub(crate) fn manifest_with_hash(&self) -> Result<(Manifest, String), FolderError> {
         let path = self.file(MANIFEST);
+        if !self.has(MANIFEST)? && self.has(rare::MANIFEST)? {
+            return Err(FolderError::RareEvent { path: self.path.clone() });
+        }
         let text = read_text(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
         let content = |line, message| FolderError::Content { path: path.clone(), line, message };
         let not_json = |error: serde_json::Error| content(error.line(), error.to_string());

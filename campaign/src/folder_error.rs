@@ -5,6 +5,20 @@ use std::path::PathBuf;
 
 use closecall_traffic::atomic::WriteError;
 
+use crate::partition::Partition;
+
+/// Largest number of differences that a message lists.
+const MOST_DIFFERENCES: usize = 12;
+
+/// Returns differences, one per line, and how many more there are.
+pub fn listed(differences: &[String]) -> String {
+    let mut lines = differences.iter().take(MOST_DIFFERENCES).cloned().collect::<Vec<_>>();
+    if let Some(more) = differences.len().checked_sub(MOST_DIFFERENCES).filter(|more| *more > 0) {
+        lines.push(format!("and {more} more"));
+    }
+    lines.join("\n  ")
+}
+
 /// The reason for which a campaign's folder cannot be used. The folder is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
@@ -32,7 +46,7 @@ pub enum FolderError {
     #[error(
         "failed to use {}: it holds the results of another campaign; name another folder, or delete this one:\n  {}",
         path.display(),
-        differences.join("\n  ")
+        listed(differences)
     )]
     OtherCampaign {
         /// The folder.
@@ -43,6 +57,17 @@ pub enum FolderError {
     /// The folder is not empty, and does not hold a campaign.
     #[error("failed to use {}: it is not empty and does not hold a campaign; name a new folder", path.display())]
     NotACampaign {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The folder holds the weighted runs of a rare event, which no command takes for independent samples.
+    #[error(
+        "failed to use {}: it holds a campaign that samples a rare event; its runs are weighted and no independent samples: its result is \
+         in {}",
+        path.display(),
+        path.join(crate::rare::RESULT).display()
+    )]
+    RareEvent {
         /// The folder.
         path: PathBuf,
     },
@@ -61,6 +86,14 @@ pub enum FolderError {
         path: PathBuf,
         /// The content of the lock file: the process that holds the lock.
         holder: String,
+    },
+    /// The folder holds one part of a campaign.
+    #[error("failed to use {}: it holds part {part} of its campaign, and a part says nothing about all; merge the parts first", path.display())]
+    Part {
+        /// The folder.
+        path: PathBuf,
+        /// The part.
+        part: Partition,
     },
     /// Samples of the plan are missing in the journal.
     #[error(

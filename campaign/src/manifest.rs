@@ -309,7 +309,21 @@ fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>
             }
         }
         _ if there == here => {}
-        _ => differences.push(format!("{key}: {there} there, {here} here")),
+        _ => {
+            let (there, here) = (shortened(&there.to_string()), shortened(&here.to_string()));
+            differences.push(format!("{key}: {there} there, {here} here"));
+        }
+    }
+}
+
+/// Largest number of characters of a value in a message.
+const VALUE_CHARACTERS: usize = 120;
+
+/// Returns the beginning of a value that is too long for a message.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(VALUE_CHARACTERS) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }
 
@@ -323,7 +337,9 @@ fn first_difference(there: &str, here: &str) -> Option<String> {
             (None, None) => return (there != here).then(|| "the ends of the texts differ".to_owned()),
             (there, here) if there == here => {}
             (there, here) => {
-                let shown = |text: Option<&str>| text.map_or_else(|| "nothing".to_owned(), |text| format!("`{text}`"));
+                let shown = |text: Option<&str>| {
+                    text.map_or_else(|| "nothing".to_owned(), |text| format!("`{}`", shortened(text)))
+                };
                 return Some(format!("line {line} is {} there, {} here", shown(there), shown(here)));
             }
         }

@@ -8,6 +8,7 @@ use closecall_traffic::atomic::WriteError;
 
 use super::campaign_error::CampaignError;
 use super::folder::{Folder, FolderError, LockedFolder};
+use super::folder_error::listed;
 use super::manifest::Manifest;
 use super::partition::Partition;
 use super::record::Record;
@@ -27,7 +28,7 @@ pub enum MergeError {
         path: PathBuf,
     },
     /// Two folders hold parts of different campaigns.
-    #[error("failed to merge: {} and {} hold parts of different campaigns:\n  {}", path.display(), first.display(), differences.join("\n  "))]
+    #[error("failed to merge: {} and {} hold parts of different campaigns:\n  {}", path.display(), first.display(), listed(differences))]
     OtherCampaign {
         /// The folder.
         path: PathBuf,

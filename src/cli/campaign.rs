@@ -169,7 +169,7 @@ impl CampaignArgs {
             return Err(CliError::usage("--judge-seed secret: the parts of a campaign need the same seed, so name it"));
         }
         let drawn = || RandomState::new().build_hasher().finish();
-        Ok(self.results.resumed().map_or_else(drawn, |manifest| manifest.sampling.seed))
+        Ok(self.results.resumed_seed().unwrap_or_else(drawn))
     }
 
     fn sampling(&self) -> Result<Sampling, CliError> {
@@ -322,7 +322,6 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         (args.plan.names_checks(), "--check-share, --check-at-most and --no-validity-checks"),
         (args.partition.is_some(), "--partition"),
         (args.ray.is_some(), "--ray"),
-        (args.draws_seed(), "a seed that is drawn: name one"),
         (args.record.is_some(), "--record"),
         (args.retry_crashed > 0, "--retry-crashed"),
         (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
@@ -352,6 +351,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         format: args.format,
     };
     rare.run(&args.plan(files, controllers)?)
+        has_drawn_seed: args.draws_seed(),
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {

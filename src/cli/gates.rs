@@ -95,10 +95,10 @@ impl GateArgs {
         Ok(Self { no_gate: !is_named, ..self.clone() })
     }
 
-    /// Returns true if a gate other than the one on the probability is named.
+    /// Returns true if a gate other than the one on the probability is named. To judge by none is no gate.
     pub(super) fn names_criterion(&self) -> Result<bool, CliError> {
         let has_flip_rate = self.max_flip_rate.to_bits() != MAX_FLIP_RATE.to_bits();
-        Ok(self.no_gate || has_flip_rate || self.max_flaky.is_some() || !self.criteria()?.is_empty())
+        Ok(has_flip_rate || self.max_flaky.is_some() || !self.criteria()?.is_empty())
     }
 
     /// Returns the criteria that the options stand for.

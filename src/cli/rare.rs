@@ -3,9 +3,12 @@
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use clap::Args;
+use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::arguments::positive;
+use closecall_campaign::interrupt::Signal;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::rare::{
@@ -19,10 +22,10 @@ use closecall_scenarios::library;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::statistics::format::percent;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::CliError;
-use super::actions::quoted;
+use super::actions::{command_for, quoted};
 use super::args::Format;
 use super::backend::{check_backend, check_cameras};
 use super::campaign::progress_bar;
@@ -106,6 +109,8 @@ pub(super) struct Rare<'a> {
     pub(super) folder: Option<&'a Path>,
     pub(super) resume: bool,
     pub(super) format: Format,
+    /// Whether the seed was drawn for this campaign.
+    pub(super) has_drawn_seed: bool,
 }
 
 impl RareArgs {
@@ -171,10 +176,15 @@ impl Rare<'_> {
             }
         }
         bar.finish_and_clear();
+        let seed = campaign.works.first().map(|work| work.sampling.seed);
+        let result = self.json(&reports, seed);
         if let Some(folder) = &folder {
-            print_written(&folder.write(&reports)?);
+            print_written(&folder.write(&result)?);
         }
-        self.print(&reports, &campaign.works, plan.sensors);
+        match self.format {
+            Format::Json => outln!("{result:#}"),
+            Format::Human => self.print(&reports, &campaign.works, plan.sensors),
+        }
         Ok(ExitCode::first_of(reports.iter().map(|report| self.code(report))))
     }
 
@@ -182,10 +192,20 @@ impl Rare<'_> {
     fn stopped(&self, bar: &indicatif::ProgressBar) -> ExitCode {
         let runs = bar.position();
         bar.finish_and_clear();
-        outln!("ENDED EARLY, without a result: {runs} runs are done");
-        match self.folder {
-            Some(_) => outln!("resume: the same command with --resume"),
-            None => outln!("nothing was kept: only a campaign with a folder (--out DIR) can be resumed"),
+        let command = session::arguments();
+        let resume =
+            || command_for(&Action::Resume(Resume { command: &command, retries_errors: false, moved_to: None }));
+        let resume = self.folder.map(|_| resume());
+        let signal = session::received().map_or("stopped", Signal::name);
+        match (self.format, resume) {
+            (Format::Json, resume) => outln!("{:#}", json!({ "ended_early": signal, "runs": runs, "resume": resume })),
+            (Format::Human, resume) => {
+                outln!("ENDED EARLY, without a result: {signal}; {runs} runs are done");
+                match resume {
+                    Some(command) => outln!("resume: {command}"),
+                    None => outln!("nothing was kept: only a campaign with a folder (--out DIR) can be resumed"),
+                }
+            }
         }
         session::received().map_or(ExitCode::Interrupted, ExitCode::from)
     }
@@ -226,16 +246,16 @@ impl Rare<'_> {
         }
     }
 
-    fn print(&self, reports: &[RareReport], works: &[std::sync::Arc<Work>], sensors: Option<SensorMode>) {
-        let seed = works.first().map(|work| work.sampling.seed);
-        if self.format == Format::Json {
-            let verdicts = self.gate.map(|gate| {
-                let words: Vec<&str> = reports.iter().map(|report| self.word(report)).collect();
-                json!({ "max_probability": gate.max(), "confidence": gate.confidence(), "verdicts": words })
-            });
-            outln!("{:#}", stamped(json!({ "scenarios": reports, "gate": verdicts }), seed, None));
-            return;
-        }
+    /// Returns the result for programs.
+    fn json(&self, reports: &[RareReport], seed: Option<u64>) -> Value {
+        let verdicts = self.gate.map(|gate| {
+            let words: Vec<&str> = reports.iter().map(|report| self.word(report)).collect();
+            json!({ "max_probability": gate.max(), "confidence": gate.confidence(), "verdicts": words })
+        });
+        stamped(json!({ "scenarios": reports, "gate": verdicts }), seed, None)
+    }
+
+    fn print(&self, reports: &[RareReport], works: &[Arc<Work>], sensors: Option<SensorMode>) {
         for (report, work) in reports.iter().zip(works) {
             out!("{}", for_terminal(report));
             if let Some(gate) = self.gate {
@@ -253,6 +273,9 @@ impl Rare<'_> {
                     "look: {command}  # {distance_sd:.2} standard deviations from the nominal case\n"
                 ));
             }
+        }
+        if let Some(work) = works.first().filter(|_| self.has_drawn_seed) {
+            outln!("  drawn for this campaign: --seed {}", work.sampling.seed);
         }
     }
 }

@@ -11,6 +11,7 @@ use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::folder::{Folder, FolderError, LockedFolder, REPORT};
 use closecall_campaign::manifest::Manifest;
+use closecall_campaign::rare::RareManifest;
 use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
@@ -74,14 +75,16 @@ impl ResultsArgs {
         self.resume
     }
 
-    /// Returns the manifest of the campaign that is to be resumed, if there is one.
-    pub(super) fn resumed(&self) -> Option<Manifest> {
+    /// Returns the seed of the campaign that is to be resumed, if there is one.
+    pub(super) fn resumed_seed(&self) -> Option<u64> {
         let folder = match self.place().ok().filter(|_| self.resume)? {
             Place::Named(path) => path,
             Place::Default => Path::new(RESULTS),
             Place::Nowhere => return None,
         };
-        SavedCampaign::open(folder).ok().map(|saved| saved.manifest().clone())
+        let rare = || RareManifest::read(folder).map(|manifest| manifest.campaign);
+        let manifest = SavedCampaign::open(folder).ok().map(|saved| saved.manifest().clone()).or_else(rare);
+        manifest.map(|manifest| manifest.sampling.seed)
     }
 
     /// Returns the place of the results. A caller in its own process, such as a Python program, has no default folder.

@@ -18,5 +18,6 @@ pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
 pub use judge::Judge;
 pub use options::GateOptions;
 pub use project::{ProjectError, ProjectFile};
+pub(crate) use result::rounded_up;
 pub use result::{ExpectationResult, GateResult, RequirementResult, Standing};
 pub use set::{GateSet, GateSource, GateSpec, MAX_FLIP_RATE, ProbabilitySpec};

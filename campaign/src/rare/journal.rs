@@ -3,14 +3,14 @@
 //! ```text
 //!  rare-manifest.json   how the campaign was made
 //!  rare-journal.jsonl   one line per run, in the order in which the method asked for it; each with a checksum
-//!  rare.json            the result
+//!  rare.json            the result, as it is printed for programs
 //!  lock                 locked while the campaign runs
 //! ```
 //!
 //! The files have names of their own, so that no command takes the weighted runs for the independent samples of a plain campaign.
 
 use std::fs::{self, OpenOptions};
-use std::io::{BufReader, Write as _};
+use std::io::{BufReader, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
@@ -20,16 +20,15 @@ use serde::{Deserialize, Serialize};
 use super::error::RareError;
 use super::method::Method;
 use super::problem::{Point, Response};
-use super::report::RareReport;
 use crate::folder::FolderError;
 use crate::journal::{line, parse, read_line};
 use crate::lock::Lock;
 use crate::manifest::Manifest;
 use crate::record::SampleFailure;
 
-const MANIFEST: &str = "rare-manifest.json";
+pub(crate) const MANIFEST: &str = "rare-manifest.json";
 const JOURNAL: &str = "rare-journal.jsonl";
-const RESULT: &str = "rare.json";
+pub(crate) const RESULT: &str = "rare.json";
 
 /// A point in the journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,8 +104,15 @@ impl RareManifest {
         compare("event", self.event.clone(), other.event.clone());
         compare("guide", guide(self), guide(other));
         compare("relative width", self.relative_width.to_string(), other.relative_width.to_string());
-        compare("budget", self.budget.to_string(), other.budget.to_string());
+        if other.budget < self.budget {
+            compare("budget", self.budget.to_string(), other.budget.to_string());
+        }
         differences
+    }
+
+    /// Reads the manifest of a folder; `None` if there is none that can be read.
+    pub fn read(folder: &Path) -> Option<Self> {
+        serde_json::from_str(&input::read_text(&folder.join(MANIFEST)).ok()?).ok()
     }
 }
 
@@ -114,11 +120,13 @@ impl RareManifest {
 #[derive(Debug)]
 pub struct RareFolder {
     path: PathBuf,
+    /// Whether the budget is larger than that of the journal's runs.
+    has_grown: bool,
     _lock: Lock,
 }
 
 impl RareFolder {
-    /// Locks a folder: a new or empty one, or with `resume` the one of the same campaign.
+    /// Locks a folder: a new or empty one, or with `resume` the one of the same campaign, whose budget may grow.
     ///
     /// # Errors
     /// [`FolderError`] if the folder cannot be used.
@@ -135,6 +143,7 @@ impl RareFolder {
             return Err(FolderError::NotACampaign { path: path.to_owned() });
         }
         let lock = Lock::acquire(path)?;
+        let mut has_grown = false;
         if !is_new {
             let fail = |message: String| FolderError::Content { path: file.clone(), line: 1, message };
             let text = input::read_text(&file)
@@ -147,13 +156,15 @@ impl RareFolder {
             if !resume {
                 return Err(FolderError::AlreadyThere { path: path.to_owned() });
             }
-        } else {
+            has_grown = manifest.budget > there.budget;
+        }
+        if is_new || has_grown {
             write_file(&file, |out| {
                 serde_json::to_writer_pretty(&mut *out, manifest)?;
                 out.write_all(b"\n")
             })?;
         }
-        Ok(Self { path: path.to_owned(), _lock: lock })
+        Ok(Self { path: path.to_owned(), has_grown, _lock: lock })
     }
 
     /// Opens the journal: its intact lines are read, and the rest is cut off.
@@ -166,32 +177,40 @@ impl RareFolder {
         let mut options = OpenOptions::new();
         options.create(true).read(true).write(true).truncate(false);
         let file = input::open_in_folder(&path, &mut options).map_err(fail)?;
-        let (mut records, mut end, mut buffer) = (Vec::new(), 0, Vec::new());
+        let (mut records, mut end, mut buffer): (Vec<KeptLine>, _, _) = (Vec::new(), 0, Vec::new());
         let mut reader = BufReader::new(&file);
         loop {
             let read = read_line(&mut reader, &mut buffer).map_err(fail)?;
             let Some(record) = Some(read).filter(|read| *read > 0).and_then(|_| parse(&buffer).ok()) else { break };
-            records.push(record);
+            records.push(KeptLine { record, start: end });
             end += read;
         }
         file.set_len(end).map_err(fail)?;
         let mut file = file;
-        std::io::Seek::seek(&mut file, std::io::SeekFrom::Start(end)).map_err(fail)?;
-        Ok(RareJournal { path, file, kept: records.into_iter(), line: 0 })
+        file.seek(SeekFrom::Start(end)).map_err(fail)?;
+        Ok(RareJournal { path, file, kept: records.into_iter(), line: 0, may_differ: self.has_grown })
     }
 
     /// Writes the result.
     ///
     /// # Errors
     /// [`WriteError`] if it cannot be written.
-    pub fn write(&self, reports: &[RareReport]) -> Result<PathBuf, WriteError> {
+    pub fn write(&self, result: &serde_json::Value) -> Result<PathBuf, WriteError> {
         let path = self.path.join(RESULT);
         write_file(&path, |out| {
-            serde_json::to_writer_pretty(&mut *out, &serde_json::json!({ "scenarios": reports }))?;
+            serde_json::to_writer_pretty(&mut *out, result)?;
             out.write_all(b"\n")
         })?;
         Ok(path)
     }
+}
+
+/// A line of the journal.
+#[derive(Debug)]
+struct KeptLine {
+    record: RareRecord,
+    /// Its place in the file (bytes).
+    start: u64,
 }
 
 /// The journal of a campaign: what it holds, then what is appended.
@@ -199,8 +218,10 @@ impl RareFolder {
 pub struct RareJournal {
     path: PathBuf,
     file: fs::File,
-    kept: std::vec::IntoIter<RareRecord>,
+    kept: std::vec::IntoIter<KeptLine>,
     line: usize,
+    /// Whether a larger budget may lead to other points than those of the journal.
+    may_differ: bool,
 }
 
 impl RareJournal {
@@ -209,11 +230,18 @@ impl RareJournal {
     /// # Errors
     /// [`FolderError::Content`] if it is of another point.
     pub(super) fn next(&mut self, scenario: &str, run: u64, point: &Point) -> Result<Option<RareRecord>, RareError> {
-        let Some(record) = self.kept.next() else { return Ok(None) };
+        let Some(KeptLine { record, start }) = self.kept.next() else { return Ok(None) };
         self.line += 1;
         let is_same = record.scenario == scenario && record.run == run && record.point == KeptPoint::from(point);
         if is_same {
             return Ok(Some(record));
+        }
+        if self.may_differ {
+            // A search that the smaller budget has cut short goes on here.
+            self.kept = Vec::new().into_iter();
+            let cut = self.file.set_len(start).and_then(|()| self.file.seek(SeekFrom::Start(start)));
+            cut.map_err(|source| FolderError::from(WriteError::new(&self.path, source)))?;
+            return Ok(None);
         }
         let message = format!("run {run} of `{scenario}` is not the point that the seed leads to");
         Err(FolderError::Content { path: self.path.clone(), line: self.line, message }.into())

@@ -28,6 +28,8 @@ mod subset;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use journal::{MANIFEST, RESULT};
+
 pub use error::RareError;
 pub use estimate::{COVERAGE, Mean};
 pub use importance::{DEFENSIVE, Goal, ImportanceResult, NoInterval, importance};

@@ -10,6 +10,7 @@ use super::importance::{ImportanceResult, NoInterval};
 use super::method::Method;
 use super::plan::RarePlan;
 use super::subset::{Level, SubsetResult};
+use crate::gate::rounded_up;
 use crate::record::SampleFailure;
 
 /// Least effective number of runs for which the report does not warn that a few of them carry the estimate (-), and largest share of one run: assumptions.
@@ -197,9 +198,16 @@ impl RareReport {
         }
         let width = self.main().filter(|estimate| estimate.mean.relative_width() > 1.25 * self.relative_width);
         if let Some(estimate) = width {
+            let width = estimate.mean.relative_width();
+            // The width falls with the square root of the number of runs.
+            let runs = if width.is_finite() {
+                let needed = self.runs as f64 * (width / self.relative_width).powi(2);
+                format!("some {} runs would give it", rounded_up(needed as u64))
+            } else {
+                "the budget is too small".to_owned()
+            };
             warnings.push(format!(
-                "the interval is {:.2} wide, relative to the estimate; {} was asked for: the budget is too small, or the variance larger than planned",
-                estimate.mean.relative_width(),
+                "the interval is {width:.2} wide, relative to the estimate; {} was asked for: {runs}",
                 self.relative_width
             ));
         }
