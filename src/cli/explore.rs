@@ -18,7 +18,7 @@ use std::sync::{Mutex, PoisonError};
 
 use closecall_campaign::folder::{RECORDINGS, REPORT};
 use closecall_campaign::saved::SavedCampaign;
-use closecall_report::campaign::explorer::{explorer_page, sample_part, twin_part};
+use closecall_report::campaign::explorer::{PagePlace, explorer_page, sample_part, twin_part};
 use closecall_report::run::film::{Film, Level, film_arms};
 use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::Setting;
@@ -53,15 +53,38 @@ pub(super) struct ViewerChoice<'a> {
 
 /// Writes the page into a file, which needs no server.
 pub(super) fn export(saved: &SavedCampaign, path: &Path) -> Result<(), CliError> {
-    let page = explorer_page(saved, false, command_for)?;
+    let to_folder = path_to(saved.folder().path(), path);
+    if to_folder.is_none() {
+        print_error(format_args!(
+            "note: {} is not in the campaign's folder or above it, so that it links neither report nor recordings\n",
+            path.display()
+        ));
+    }
+    let page = explorer_page(saved, &PagePlace::File(to_folder), command_for)?;
     write_file(path, |file| file.write_all(shown(&page).as_bytes()))?;
     print_written(path);
     Ok(())
 }
 
+/// Returns the path of a link from a page to a folder that lies beside it or below: empty, or ending with `/`.
+fn path_to(folder: &Path, page: &Path) -> Option<String> {
+    let beside = page.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (folder, beside) = (folder.canonicalize().ok()?, beside.canonicalize().ok()?);
+    let names: Option<Vec<&str>> = folder.strip_prefix(beside).ok()?.iter().map(|name| name.to_str()).collect();
+    Some(names?.iter().map(|name| format!("{}/", percent_encoded(name))).collect())
+}
+
+/// Returns a name as a part of an address.
+fn percent_encoded(name: &str) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+    name.bytes()
+        .map(|byte| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
+        .collect()
+}
+
 /// Serves the explorer until a signal ends the program.
 pub(super) fn explore(saved: &SavedCampaign, viewer: &ViewerChoice<'_>) -> Result<(), CliError> {
-    let page = shown(&explorer_page(saved, true, command_for)?).into_owned();
+    let page = shown(&explorer_page(saved, &PagePlace::Served, command_for)?).into_owned();
     let served = |source| ViewError::Serve { source };
     let server = PageServer::bind().map_err(served)?;
     let address = server.address();

@@ -92,16 +92,11 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
         explore(&args.saved.open(&campaign)?, &viewer)?;
         return Ok(ExitCode::Pass);
     }
-    let (report, recordings) = match &args.path {
-        Some(path) => (None, recordings(path)?),
-        None => {
-            let recordings = match recordings(&campaign) {
-                // A campaign without a collision has recorded nothing.
-                Err(ViewError::Nothing { .. }) => Vec::new(),
-                recordings => recordings?,
-            };
-            (Some(campaign.join(REPORT)), recordings)
-        }
+    let report = Some(campaign.join(REPORT)).filter(|report| args.path.is_none() || args.no_open && report.is_file());
+    let recordings = match recordings(&campaign) {
+        // A campaign without a collision has recorded nothing.
+        Err(ViewError::Nothing { .. }) if report.is_some() => Vec::new(),
+        recordings => recordings?,
     };
     for path in report.iter().chain(recordings.iter().map(|recording| &recording.path)) {
         outln!("{}", path.display());

@@ -146,11 +146,26 @@ const drawPlane = panel => {
   return Plotly.react(panel.chart, traces, layout(colours, { xaxis: axis(across, colours), yaxis: axis(up, colours), shapes }), config);
 };
 
+// The rows in the order of gravity: by the outcome, then by each of these columns; 1 if a small value is grave, -1 if a large one is.
+const GRAVITY = [['impact_speed_mps', -1], ['collision_relative_speed_mps', -1], ['touch_relative_speed_mps', -1], ['min_ttc_rear_s', 1], ['min_thw_rear_s', 1]];
+const gravest = () => {
+  const by = samples.gravest ??= {};
+  if (by[arm]) return by[arm];
+  const keys = GRAVITY.map(([name, sign]) => [column(name)?.values, sign]).filter(([values]) => values);
+  const key = (values, sign, row) => Number.isNaN(values[row]) ? Infinity : sign * values[row];
+  return by[arm] = Uint32Array.from({ length: samples.count }, (_, row) => row).sort((one, other) => {
+    if (samples.fates[one] !== samples.fates[other]) return samples.fates[other] - samples.fates[one];
+    for (const [values, sign] of keys) {
+      const [first, second] = [key(values, sign, one), key(values, sign, other)];
+      if (first !== second) return first < second ? -1 : 1;
+    }
+    return one - other;
+  });
+};
 const list = () => {
   shown = [];
-  const gravest = data.fates.map((_, fate) => fate).reverse();
-  for (const fate of gravest) for (let row = 0; row < samples.count && shown.length < LISTED; row++) if (samples.mask[row] && samples.fates[row] === fate) shown.push(row);
-  const listed = ['mis_reason', 'cause', 'collision_relative_speed_mps', 'min_thw_rear_s'].map(column).filter(Boolean);
+  for (const row of gravest()) { if (shown.length === LISTED) break; if (samples.mask[row]) shown.push(row); }
+  const listed = ['mis_reason', 'cause', 'collision_relative_speed_mps', 'touch_relative_speed_mps', 'min_ttc_rear_s', 'min_thw_rear_s'].map(column).filter(Boolean);
   const head = made('tr', {}, ...['sample', 'outcome', ...listed.map(one => one.label), 'recording'].map(name => made('th', {}, name)));
   const rows = shown.map(row => {
     const number = samples.numbers[row], recording = data.recordings[samples.index][number];

@@ -18,5 +18,5 @@ mod page;
 mod plotly;
 mod sample;
 
-pub use page::explorer_page;
+pub use page::{PagePlace, explorer_page};
 pub use sample::{sample_part, twin_part};

@@ -6,7 +6,7 @@ use std::io::Write;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
-use closecall_campaign::folder::{RECORDINGS, RECORDINGS_PAGE, REPORT};
+use closecall_campaign::folder::{FolderError, RECORDINGS, RECORDINGS_PAGE, REPORT};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::input::read_text;
@@ -51,19 +51,52 @@ struct FateStyle {
     colour: String,
 }
 
-/// Returns the page of a campaign. If it is served, it asks for the samples that are chosen.
+/// Where the page lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PagePlace {
+    /// A program serves it, and is asked for the samples that are chosen.
+    Served,
+    /// In a file. The path leads from there to the campaign's folder, and is empty or ends with `/`; without it the page links no
+    /// file of the folder.
+    File(Option<String>),
+}
+
+impl PagePlace {
+    /// Returns the path to the campaign's folder.
+    fn folder(&self) -> Option<&str> {
+        match self {
+            Self::Served => Some(""),
+            Self::File(path) => path.as_deref(),
+        }
+    }
+}
+
+/// How many samples of a campaign have run, if some are missing.
+struct Unfinished {
+    has: u64,
+    of: u64,
+}
+
+/// Returns the page of a campaign.
 ///
 /// # Errors
 /// [`ReportError`] if the folder cannot be read.
-pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: CommandFor) -> Result<String, ReportError> {
+pub fn explorer_page(saved: &SavedCampaign, place: &PagePlace, command_for: CommandFor) -> Result<String, ReportError> {
     let manifest = saved.manifest();
     let names = manifest.scenarios.iter().map(|scenario| scenario.name.as_str());
     let files = names.map(|name| saved.file(Some(name))).collect::<Result<Vec<ScenarioFile>, _>>()?;
     let arms: Vec<String> = manifest.arm_names().into_iter().collect();
     let mut overview = Overview::new(&files, &arms);
     let mut scenarios: Vec<Samples> = files.iter().map(|file| Samples::new(file, &arms)).collect();
-    for record in saved.folder().records()? {
-        let record = record?;
+    let mut unfinished = None;
+    for record in saved.folder().complete_records()? {
+        let record = match record {
+            Err(FolderError::Incomplete { has, of, .. }) => {
+                unfinished = Some(Unfinished { has, of });
+                break;
+            }
+            record => record?,
+        };
         overview.push(&record);
         if let Some(index) = files.iter().position(|file| file.config().name == record.scenario) {
             scenarios[index].push(record, manifest.sampling.seed);
@@ -80,12 +113,12 @@ pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: Comman
     let style =
         |fate: Fate| FateStyle { pair: fate.word(true), single: fate.word(false), colour: css(fate_colour(fate)) };
     let data = Data {
-        is_served,
+        is_served: *place == PagePlace::Served,
         scenarios: &scenarios,
         fates: Fate::ALL.map(style).into(),
         commands: files.iter().map(command).collect(),
         place: PLACE.to_string(),
-        recordings: files.iter().map(|file| recordings(saved, &file.config().name)).collect(),
+        recordings: files.iter().map(|file| recordings(saved, place, &file.config().name)).collect(),
     };
     let json = serde_json::to_vec(&data).map_err(|error| written(saved, error.into()))?;
     let [data, script] = [json, plotly::script().into_bytes()].map(|bytes| packed(&bytes));
@@ -94,7 +127,7 @@ pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: Comman
         plotly: script.map_err(|error| written(saved, error))?,
     };
     let title = files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ");
-    Ok(page(&title, saved, &packed).into_string())
+    Ok(page(&title, saved, place, unfinished.as_ref(), &packed).into_string())
 }
 
 fn written(saved: &SavedCampaign, source: std::io::Error) -> ReportError {
@@ -115,13 +148,14 @@ fn packed(bytes: &[u8]) -> std::io::Result<String> {
 }
 
 /// Returns the recordings of a scenario in the campaign's folder, with their incident cards.
-fn recordings(saved: &SavedCampaign, scenario: &str) -> BTreeMap<u64, [String; 2]> {
+fn recordings(saved: &SavedCampaign, place: &PagePlace, scenario: &str) -> BTreeMap<u64, [String; 2]> {
+    let Some(prefix) = place.folder() else { return BTreeMap::new() };
     let folder = saved.folder();
     let entries = std::fs::read_dir(folder.file(RECORDINGS)).into_iter().flatten().flatten();
     let number = |name: &str| name.strip_prefix(scenario)?.strip_prefix('-')?.strip_suffix(".rrd")?.parse().ok();
     let recording = |entry: std::fs::DirEntry| {
         let name = entry.file_name().into_string().ok()?;
-        let path = format!("{RECORDINGS}/{name}");
+        let path = format!("{prefix}{RECORDINGS}/{name}");
         Some((number(&name)?, [path.clone(), card_beside(&path)]))
     };
     entries.filter_map(recording).collect()
@@ -144,13 +178,25 @@ fn class(verdict: Option<&str>) -> &'static str {
     }
 }
 
-fn page(title: &str, saved: &SavedCampaign, packed: &Packed) -> Markup {
+fn page(
+    title: &str,
+    saved: &SavedCampaign,
+    place: &PagePlace,
+    unfinished: Option<&Unfinished>,
+    packed: &Packed,
+) -> Markup {
     let nonce: String = blake3::hash(SCRIPT.as_bytes()).to_hex().chars().take(32).collect();
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; \
          form-action 'none'; base-uri 'none'"
     );
-    let verdict = verdict(saved);
+    let verdict = match unfinished {
+        // The summary is of another end, or there is none.
+        Some(Unfinished { has, of }) => {
+            Some(format!("UNFINISHED: {has} of {of} samples have run, and there is no verdict"))
+        }
+        None => verdict(saved),
+    };
     let links = [(REPORT.to_owned(), "Report"), (format!("{RECORDINGS}/{RECORDINGS_PAGE}"), "Recordings")];
     html! {
         (DOCTYPE)
@@ -170,8 +216,10 @@ fn page(title: &str, saved: &SavedCampaign, packed: &Packed) -> Markup {
                             h1 { (verdict.as_deref().map_or_else(|| format!("Samples of {title}"), str::to_owned)) }
                             p.what id="counts" role="status" { "Loading the samples." }
                             nav aria-label="Files of the campaign" {
-                                @for (path, name) in &links {
-                                    @if saved.folder().file(path).is_file() { a href=(path) target="_blank" rel="noopener" { (name) } }
+                                @if let Some(prefix) = place.folder() {
+                                    @for (path, name) in links.iter().filter(|(path, _)| saved.folder().file(path).is_file()) {
+                                        a href={ (prefix) (path) } target="_blank" rel="noopener" { (name) }
+                                    }
                                 }
                             }
                         }
