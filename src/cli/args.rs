@@ -209,8 +209,15 @@ impl FittedArgs {
     /// Reads a scenario, applies the fitted distributions, then the changes of `set`, and checks it.
     pub(super) fn load(&self, path: &Path, set: &SetArgs) -> Result<ScenarioFile, ScenarioError> {
         let Some(fitted) = &self.fitted else { return set.load(path) };
-        let fitted = FittedFile::read(fitted)?.settings(&source::load(path, &[])?)?;
-        SetArgs { settings: [fitted, set.settings.clone()].concat() }.load(path)
+        let settings = FittedFile::read(fitted)?.settings(&source::load(path, &[])?)?;
+        let replaced = SetArgs { settings: [settings, set.settings.clone()].concat() }.load(path);
+        if replaced.is_err() && set.load(path).is_ok() {
+            print_error(format_args!(
+                "note: without --fitted the scenario is valid; a copy of {} without the lines of a parameter leaves its distribution as it is\n",
+                fitted.display()
+            ));
+        }
+        replaced
     }
 }
 

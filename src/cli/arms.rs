@@ -120,9 +120,15 @@ impl ComparisonArgs {
         tested.limited(&arms)
     }
 
-    /// Returns the arms of a run of a scenario.
-    pub(super) fn arms(&self, tested: &ArmArgs, file: &ScenarioFile) -> Result<Vec<Arm>, CliError> {
+    /// Returns the arms of a run of a scenario, with the settings of single arms.
+    pub(super) fn arms(
+        &self,
+        tested: &ArmArgs,
+        file: &ScenarioFile,
+        settings: &[(String, String)],
+    ) -> Result<Vec<Arm>, CliError> {
         let controllers = self.controllers(&tested.controller, file.config().function, false)?;
+        let controllers = tuned(controllers, settings)?;
         check_mis(file, &controllers)?;
         check_functions(file, &controllers)?;
         let controllers = ControllerChoice::factories(&controllers, None);

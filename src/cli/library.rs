@@ -49,6 +49,11 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
         (Format::Human, Some(what)) => {
             let is_meant = |one: &&LibraryEntry| if what == FAULTS { is_fault(one) } else { one.name.contains(what) };
             let meant: Vec<&LibraryEntry> = listed.iter().filter(is_meant).collect();
+            if meant.is_empty() && members.iter().any(|member| member.name == what) {
+                let said =
+                    format!("`{what}` is a member of the driver ensemble: `closecall list {MEMBERS}` describes it");
+                return Err(CliError::usage(said));
+            }
             if meant.is_empty() {
                 return Err(CliError::usage(format!(
                     "no scenario has `{what}` in its name: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"

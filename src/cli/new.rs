@@ -30,7 +30,7 @@ pub(super) struct NewArgs {
     #[arg(long, value_name = "LIBRARY_NAME", help_heading = heading::SCENARIO)]
     from: Option<String>,
     /// File to write [default: NAME.toml; in a repository with closecall.toml, scenarios/NAME.toml]
-    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", value_parser = scenario_file, help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
 }
 
@@ -46,11 +46,43 @@ pub(super) struct InitArgs {
     #[arg(default_value = ".")]
     dir: PathBuf,
     /// Git URL from which the CI job installs Closecall [default: to be filled in]
-    #[arg(long, value_name = "URL", help_heading = heading::CI)]
+    #[arg(long, value_name = "URL", value_parser = git_url, help_heading = heading::CI)]
     url: Option<String>,
     /// Commit or tag that the CI job installs [default: the commit of this program; to be filled in if it has none]
-    #[arg(long, value_name = "REV", help_heading = heading::CI)]
+    #[arg(long, value_name = "REV", value_parser = git_revision, help_heading = heading::CI)]
     rev: Option<String>,
+}
+
+/// Reads the name of a file that folders of scenarios find.
+fn scenario_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.extension().is_some_and(|end| end == "toml") {
+        Ok(path)
+    } else {
+        Err("the name of a scenario file ends with .toml".to_owned())
+    }
+}
+
+/// Reads an address from which `cargo install --git` installs. It stands in shell commands of CI jobs.
+fn git_url(text: &str) -> Result<String, String> {
+    let schemes = ["https://", "ssh://", "http://", "git://", "file://"];
+    let is_address = schemes.iter().any(|scheme| text.strip_prefix(scheme).is_some_and(|rest| !rest.is_empty()));
+    if is_address && text.chars().all(|letter| letter.is_ascii_graphic() && !"'\"`$\\".contains(letter)) {
+        Ok(text.to_owned())
+    } else {
+        Err("an address such as https://example.org/closecall.git or ssh://git@example.org/closecall.git is needed"
+            .to_owned())
+    }
+}
+
+/// Reads a commit, tag or branch.
+fn git_revision(text: &str) -> Result<String, String> {
+    let is_name = |letter: char| letter.is_ascii_alphanumeric() || "._/-+".contains(letter);
+    if !text.is_empty() && !text.starts_with('-') && !text.contains("..") && text.chars().all(is_name) {
+        Ok(text.to_owned())
+    } else {
+        Err("the name of a commit, tag or branch is needed, such as v0.1.0".to_owned())
+    }
 }
 
 pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {

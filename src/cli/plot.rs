@@ -73,12 +73,13 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.scenario.is_some() {
         return Err(CliError::usage("--scenario chooses a scenario of a campaign: name its folder instead of a file"));
     }
-    let file = args.set.load(&args.source)?;
+    let (set, of_arms) = args.set.by_arm();
+    let file = set.load(&args.source)?;
     protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--out", Some(args.output.path()))])?;
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
-    films(&scenario, RunKey { seed, sample }, &args.comparison.arms(&args.arm, &file)?)
+    films(&scenario, RunKey { seed, sample }, &args.comparison.arms(&args.arm, &file, &of_arms)?)
 }
 
 /// Films a sample of a campaign as the campaign ran it, in every arm.

@@ -49,14 +49,15 @@ pub(super) struct RunArgs {
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
-    let file = args.fitted.load(&args.scenario, &args.sim.set)?;
+    let (set, of_arms) = args.sim.set.by_arm();
+    let file = args.fitted.load(&args.scenario, &set)?;
     let fitted = args.fitted.fitted.iter().cloned().collect();
     protect(&[of_scenario(&file), args.comparison.files(&args.sim.arm), fitted].concat(), &args.watch.outputs())?;
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.sim.seed, sample: args.sample };
-    let arms = args.comparison.arms(&args.sim.arm, &file)?;
+    let arms = args.comparison.arms(&args.sim.arm, &file, &of_arms)?;
     for isolated in arms.iter().filter_map(|arm| arm.controller.isolated()) {
         isolated.check_variables(&scenario, None)?;
     }

@@ -95,11 +95,12 @@ fn state(path: &Path) -> Option<(SystemTime, u64)> {
 
 /// Checks the file, and runs its first samples.
 fn round(path: &Path, (set, fitted): (&SetArgs, &FittedArgs), args: &WatchingArgs) -> Result<(), CliError> {
-    let file = fitted.load(path, set)?;
+    let (set, of_arms) = set.by_arm();
+    let file = fitted.load(path, &set)?;
     let (name, parameters) = (&file.config().name, file.space().iter().len());
     outln!("{}: valid, {name} with {parameters} parameters", path.display());
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
-    let arms = args.comparison.arms(&args.arm, &file)?;
+    let arms = args.comparison.arms(&args.arm, &file, &of_arms)?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(&file, sampling, sample).map_err(fail)?;
