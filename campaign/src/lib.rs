@@ -22,6 +22,7 @@ pub mod baseline;
 mod campaign_error;
 pub mod compare;
 pub mod controller_watch;
+pub mod coverage;
 pub mod drift;
 pub mod end_rule;
 pub mod ensemble;

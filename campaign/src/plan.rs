@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use closecall_controllers::{CheckedDriver, DriverConfig};
+use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
@@ -79,6 +80,10 @@ impl Plan {
                 let (first, second) = (same.path().to_owned(), file.path().to_owned());
                 return Err(PlanError::SameName { first, second, name: name.clone() });
             }
+        }
+        let without_bins = |file: &&ScenarioFile| sampling.design == Design::Coverage && !file.space().has_strata();
+        if let Some(file) = scenarios.iter().find(without_bins) {
+            return Err(PlanError::NothingToFill { scenario: file.config().name.clone() });
         }
         let natives: Vec<_> = controllers.iter().filter_map(ControllerChoice::native).collect();
         for (index, controller) in controllers.iter().enumerate() {

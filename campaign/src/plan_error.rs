@@ -17,6 +17,14 @@ pub enum PlanError {
         /// The name of both.
         name: String,
     },
+    /// The sampling design `coverage` has no bins to visit.
+    #[error(
+        "{scenario}: the design `coverage` visits the bins that `[coverage]` names under `fill`, and the scenario names none that can be hit"
+    )]
+    NothingToFill {
+        /// The scenario.
+        scenario: String,
+    },
     /// A controller does not fit a scenario.
     #[error("{scenario}: {source}")]
     Controller {

@@ -19,6 +19,7 @@ use std::fmt;
 use closecall_traffic::statistics::format::percent;
 use serde::Serialize;
 
+use super::coverage::CoverageResult;
 use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
 use super::probability::{Answer, Finding};
@@ -136,6 +137,8 @@ pub struct Judgement {
     pub expectations: Vec<ExpectationResult>,
     /// What the samples of each scenario say about the probability of a collision, if that was asked.
     pub probabilities: Vec<(String, Finding)>,
+    /// What the samples of each scenario cover, if the scenario states what is to be covered.
+    pub coverage: Vec<(String, Vec<CoverageResult>)>,
     /// The gate on the number of flaky samples, if there is one.
     pub flaky: Option<FlakyGate>,
 }
@@ -264,7 +267,8 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     };
     // Last: it decides nothing, and the first reason that is no gate is the sentence of the verdict.
     judge_extrapolation(judge, &mut findings);
-    Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, flaky }
+    let coverage = judge.coverage().map(|(name, results)| (name.to_owned(), results)).collect();
+    Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, coverage, flaky }
 }
 
 /// Returns the subjects of the gates that somebody set and that no scenario decides: there is no sample in which they have a

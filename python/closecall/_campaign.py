@@ -138,7 +138,7 @@ def campaign(
     arms: Sequence[ControllerLike] | None = None,
     paired: bool = False,
     seed: int = 0,
-    design: Literal["random", "sobol", "grid"] = "random",
+    design: Literal["random", "sobol", "grid", "coverage"] = "random",
     sensors: SensorsLike | None = None,
     jobs: int | None = None,
     out: str | os.PathLike[str] | None = None,

@@ -57,7 +57,7 @@ class Scenario:
         return self._native.parameters
 
     def sample(
-        self, seed: int = 0, n: int = 1, design: Literal["random", "sobol", "grid"] = "random"
+        self, seed: int = 0, n: int = 1, design: Literal["random", "sobol", "grid", "coverage"] = "random"
     ) -> list[dict[str, float | str]]:
         """Returns the parameters of the samples 0 to ``n`` − 1, with the units that their names state.
 

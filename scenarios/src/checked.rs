@@ -8,6 +8,8 @@ use closecall_traffic::{
     VehicleState,
 };
 
+use crate::coverage::CoveragePlan;
+use crate::criteria::Quantity;
 use crate::grip::lateral_grip_mps2;
 
 use crate::run_key::RunKey;
@@ -182,6 +184,23 @@ impl ScenarioConfig {
         }
         if let Some(confidence) = self.gate.confidence {
             Range::above(0.5, BELOW_ONE).check(confidence, "confidence").map_err(|error| error.within("gate"))?;
+        }
+        Ok(())
+    }
+
+    /// Checks that what gates and checks ask to be covered is in the table.
+    pub(crate) fn check_coverage_gates(&self, plan: &CoveragePlan) -> Result<(), ConfigError> {
+        for expression in self.checks.values().flatten().chain(&self.gate.require) {
+            let Quantity::Covered(name) = expression.quantity else { continue };
+            if plan.target(name.as_str()).is_none() {
+                let names = plan.names();
+                let allowed = if names.is_empty() {
+                    "the names in [coverage], which is empty".to_owned()
+                } else {
+                    names.join(", ")
+                };
+                return Err(ConfigError::new("item", Problem::UnknownWord { value: name.to_string(), allowed }));
+            }
         }
         Ok(())
     }

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::events::EventConfig;
 use super::intervention::{FaultConfig, IdealConfig};
 use super::traffic::TrafficConfig;
+use crate::coverage::CoverageConfig;
 use crate::criteria::{Expression, FlagName, GateConfig};
 
 /// The version of the scenario file format that this program reads.
@@ -56,6 +57,10 @@ pub struct ScenarioConfig {
     /// pass.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overridden: Vec<String>,
+    /// What the samples should cover: bins of parameters, measures and attributes of the operational design domain, and crosses of
+    /// them. Default: nothing.
+    #[serde(default, skip_serializing_if = "CoverageConfig::is_empty")]
+    pub coverage: CoverageConfig,
     /// Longest duration of a run (s).
     pub duration_s: Num,
     /// The road.

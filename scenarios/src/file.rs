@@ -3,6 +3,7 @@
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use crate::coverage::CoveragePlan;
 use crate::parameters::ParameterSpace;
 use crate::sampling::Design;
 use closecall_sensors::SensorMode;
@@ -141,6 +142,7 @@ pub struct ScenarioFile {
     text: String,
     config: ScenarioConfig,
     space: ParameterSpace,
+    coverage: CoveragePlan,
     unused: Option<ParameterName>,
     trajectory_files: Vec<PathBuf>,
     settings: Vec<Setting>,
@@ -232,7 +234,23 @@ impl ScenarioFile {
             let line = locate::line_of(&text, &source.path);
             ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
         })?;
-        Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files, settings: settings.to_vec() })
+        let coverage = config.coverage.check(&space).and_then(|plan| config.check_coverage_gates(&plan).map(|()| plan));
+        let coverage = coverage.map_err(|error| {
+            let source = error.within("coverage");
+            let line = locate::line_of(&text, &source.path);
+            ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
+        })?;
+        let strata = coverage.strata(&space);
+        Ok(Self {
+            path: path.to_owned(),
+            text,
+            config,
+            space: space.with_strata(strata),
+            coverage,
+            unused,
+            trajectory_files,
+            settings: settings.to_vec(),
+        })
     }
 
     /// Returns the same file with another text, whose keys are checked. Settings and trajectory files stay as they are.
@@ -267,6 +285,11 @@ impl ScenarioFile {
     /// Returns the contents of the file, with all settings applied.
     pub fn config(&self) -> &ScenarioConfig {
         &self.config
+    }
+
+    /// Returns what the samples should cover.
+    pub fn coverage(&self) -> &CoveragePlan {
+        &self.coverage
     }
 
     /// Returns the distributions of the parameters.

@@ -12,6 +12,7 @@
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall
 //! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
 //! * [`criteria`]: what a file asks of the outcomes
+//! * [`coverage`]: what its samples should reach
 //! * [`openscenario`]: scenarios of OpenSCENARIO XML, as scenario files
 
 mod actor;
@@ -20,6 +21,7 @@ mod base;
 pub mod causal;
 mod checked;
 mod config;
+pub mod coverage;
 pub mod criteria;
 mod edit;
 mod events;

@@ -38,6 +38,7 @@ use super::parameters::{FittedConfig, ParameterConfig, ParametersConfig, Truncat
 use super::recorded_values::{rounded, to_steps};
 use super::reenacted::written;
 use super::{ScenarioError, ScenarioFile, library};
+use crate::coverage::CoverageConfig;
 
 /// The scenario of the library from which the drivers are taken.
 const HEADLINE: &str = "low-thw-overtake";
@@ -217,6 +218,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
         expects: Vec::new(),
         expects_share: EXPECTS_SHARE,
         overridden: Vec::new(),
+        coverage: CoverageConfig::default(),
         duration_s: rounded(gap_m / slowest_mps + AFTERWARDS_S),
         road: RoadConfig {
             lanes: approach.lanes,

@@ -5,7 +5,7 @@
 //! replay know it as well.
 
 use super::ScenarioConfig;
-use crate::criteria::{Expression, Operator};
+use crate::criteria::{Aggregate, Expression, Operator};
 
 /// The key of the text that names what was weakened.
 pub(super) const KEY: &str = "overridden";
@@ -25,6 +25,8 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
     found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
+    let asks_coverage = before.checks.values().flatten().any(|check| check.aggregate == Aggregate::Coverage);
+    found.extend((asks_coverage && before.coverage != after.coverage).then(|| "what is to be covered".to_owned()));
     let observed = before.parameters.0.iter().filter(|(name, parameter)| {
         let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
         parameter.observed.is_some() && kept.is_some_and(|kept| Some(kept) != parameter.observed.as_ref())

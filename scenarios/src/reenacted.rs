@@ -29,6 +29,7 @@ use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item};
 
+use crate::coverage::CoverageConfig;
 use crate::criteria::GateConfig;
 
 use super::config::{
@@ -153,6 +154,7 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
         expects: Vec::new(),
         expects_share: EXPECTS_SHARE,
         overridden: Vec::new(),
+        coverage: CoverageConfig::default(),
         duration_s: rounded(encounter.end.s()),
         road: RoadConfig {
             lanes: encounter.lanes,

@@ -25,7 +25,9 @@ use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::summary::Summary;
 use closecall_campaign::wall_times::SpentTime;
 use closecall_campaign::workers::Workers;
-use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
+use closecall_report::campaign::{
+    CampaignReport, CountsText, CoverageText, FlakyText, Tally, VerdictText, ensemble_text,
+};
 use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
@@ -349,9 +351,9 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         folder,
         resume: args.results.is_resumed(),
         format: args.format,
+        has_drawn_seed: args.draws_seed(),
     };
     rare.run(&args.plan(files, controllers)?)
-        has_drawn_seed: args.draws_seed(),
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
@@ -448,6 +450,7 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
             out!("{}", companion.text(&tally.summary));
             out!("{}", ensemble_text(&tally.summary, &manifest));
+            out!("{}", for_terminal(&CoverageText(&judged)));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: campaign.works.len() }));
             out!("{}", after_verdict(&judged));

@@ -7,7 +7,9 @@ use closecall_campaign::merge::Parts;
 use closecall_campaign::saved::{SavedCampaign, works};
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
-use closecall_report::campaign::{CampaignReport, CountsText, FlakyText, Tally, VerdictText, ensemble_text};
+use closecall_report::campaign::{
+    CampaignReport, CountsText, CoverageText, FlakyText, Tally, VerdictText, ensemble_text,
+};
 use closecall_report::json;
 
 use super::CliError;
@@ -90,6 +92,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
         Format::Human => {
             out!("{}", for_terminal(&CountsText(&tally.summary)));
             out!("{}", ensemble_text(&tally.summary, saved.manifest()));
+            out!("{}", for_terminal(&CoverageText(&judged)));
             out!("{}", FlakyText(&tally.overview));
             out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: works.len() }));
             out!("{}", after_verdict(&judged));

@@ -332,13 +332,13 @@ mod tests {
 
     #[test]
     fn a_design_is_named_as_on_the_command_line() {
-        for word in ["random", "sobol", "grid", "subset", "importance"] {
+        for word in ["random", "sobol", "grid", "coverage", "subset", "importance"] {
             assert_eq!(word.parse::<DesignChoice>().unwrap().to_string(), word);
         }
         let error = "halton".parse::<DesignChoice>().unwrap_err();
         assert_eq!(
             error,
-            "`halton` is not a sampling design: one of `random`, `sobol`, `grid`, `subset`, `importance` is needed"
+            "`halton` is not a sampling design: one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance` is needed"
         );
     }
 }

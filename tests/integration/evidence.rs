@@ -331,7 +331,10 @@ fn the_points_of_a_design_bound_no_probability() {
         }
         assert!(value["paired"]["mcnemar_p"].is_null(), "{design}");
         let text = stdout(&campaign(&path, &more), 4);
-        assert!(text.contains("the designs sobol and grid are not independent") && !text.contains("(95 %"), "{text}");
+        assert!(
+            text.contains("the designs sobol, grid and coverage are not independent") && !text.contains("(95 %"),
+            "{text}"
+        );
     }
     let message = message(&campaign(&library("low-thw-overtake"), &["--design", "grid", "--time-budget", "1s"]));
     assert!(message.contains("--design random"), "{message}");

@@ -16,6 +16,7 @@ mod ci_templates;
 mod circles;
 mod commands;
 mod comparison;
+mod coverage;
 mod determinism;
 mod digests;
 mod drift;

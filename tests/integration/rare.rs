@@ -133,7 +133,7 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
         ("--design subset --event crash", "not a measure; there are"),
         ("--design subset --event induced", "it needs --paired or --arms"),
         ("--design subset --event collision --guide engaged", "is not a number of a sample"),
-        ("--design halton --event collision", "one of `random`, `sobol`, `grid`, `subset`, `importance`"),
+        ("--design halton --event collision", "one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance`"),
         ("--event collision", "--design subset or importance"),
         ("--guide min_gap_rear_m --design subset", "--event"),
     ] {

@@ -35,6 +35,10 @@ pub enum OpenReason {
     NothingVaries,
     /// A controller from outside reports the value of itself.
     SelfReported,
+    /// The scenario has no coverage item or cross of this name.
+    NotInCoverage,
+    /// The samples have weights, and the value depends on how often they happen.
+    WeightedSamples,
     /// The samples are points of a design, and a bound of a probability needs independent ones.
     DependentSamples,
 }
@@ -46,8 +50,13 @@ impl OpenReason {
             Self::TooFewSamples => "too few samples to decide",
             Self::NoSamples => "no sample has this value",
             Self::NotPaired => "it needs a paired campaign",
+            Self::NotInCoverage => "the scenario has no coverage item or cross of this name",
             Self::DependentSamples => {
-                "the samples of the designs sobol and grid are not independent, so that no probability can be bounded"
+                "the samples of the designs sobol, grid and coverage are not independent, so that no probability can be bounded"
+            }
+            Self::WeightedSamples => {
+                "the samples of the design coverage visit each bin as often as any other, so that only a count, a smallest and a \
+                 largest value say something"
             }
             Self::NothingVaries => "no parameter varies enough, so that no probability can be bounded",
             Self::SelfReported => {
@@ -68,6 +77,8 @@ pub struct Evidence {
     pub is_built_in: [bool; 2],
     /// What determines the number of samples.
     pub inference: Inference,
+    /// Whether the samples have weights: they visit the bins of a coverage item or cross in turn.
+    pub is_weighted: bool,
 }
 
 /// Smallest number of samples by which a count, a sum, a mean or an extreme is met (-): an assumption; 10 to 59 are plausible. What no one of 20 samples
@@ -79,7 +90,8 @@ const LEAST_SAMPLES: u64 = 20;
 fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
     match aggregate {
         _ if !is_varied => 1,
-        Aggregate::Lower | Aggregate::Upper => 1,
+        // What samples cover, they cover.
+        Aggregate::Lower | Aggregate::Upper | Aggregate::Coverage => 1,
         Aggregate::Percentile(percent) => {
             let inside = 0.01 * percent.max(100.0 - percent);
             let reaching = |samples: &u64| inside >= 1.0 || 1.0 - powf(inside, *samples as f64) >= CONFIDENCE;
@@ -106,6 +118,20 @@ pub struct Evaluation {
     /// Number of such samples by which the gate is decided if the rest is like these; `None` if it is decided, or if more than
     /// 10⁸ would be needed.
     pub needed: Option<u64>,
+}
+
+impl Evaluation {
+    /// Returns the result of a gate on a coverage item or cross: its share and the samples in its bins, if the scenario has it.
+    pub(super) fn of_coverage(expression: &Expression, covered: Option<(f64, u64)>) -> Self {
+        let holds = |share: f64| expression.operator.holds(share, expression.bound);
+        let answer = match covered {
+            None => Answer::Open(OpenReason::NotInCoverage),
+            Some((share, _)) if holds(share) => Answer::Met,
+            Some(_) => Answer::Missed,
+        };
+        let (value, samples) = covered.map_or((None, 0), |(share, samples)| (Some(share), samples));
+        Self { value, interval_95: None, samples, answer, needed: None }
+    }
 }
 
 /// Gathers what a gate needs, sample by sample.
@@ -152,7 +178,7 @@ impl Accumulator {
 
     /// Returns the result.
     pub fn evaluate(&self, evidence: &Evidence) -> Evaluation {
-        let Evidence { is_paired, is_varied, is_built_in, inference } = *evidence;
+        let Evidence { is_paired, is_varied, is_built_in, inference, is_weighted } = *evidence;
         let Expression { aggregate, operator, bound, .. } = self.expression;
         let (hits, samples) = (self.hits, self.samples);
         let interval_95 = (aggregate.is_of_flag() && samples > 0 && is_varied)
@@ -167,6 +193,9 @@ impl Accumulator {
             self.expression.reported_by().into_iter().zip(is_built_in).any(|(reported, own)| reported && !own);
         if is_reported {
             return open(OpenReason::SelfReported);
+        }
+        if is_weighted && !matches!(aggregate, Aggregate::Count | Aggregate::Min | Aggregate::Max) {
+            return open(OpenReason::WeightedSamples);
         }
         let is_bound = matches!(aggregate, Aggregate::Lower | Aggregate::Upper);
         if is_bound && !is_varied {
@@ -253,6 +282,8 @@ impl Accumulator {
             Aggregate::Max => self.largest,
             Aggregate::Mean => Some(self.sum / samples as f64),
             Aggregate::Sum => Some(self.sum),
+            // A value of all samples together.
+            Aggregate::Coverage => None,
             Aggregate::Percentile(percent) => percentile(&self.values, percent),
         }
     }
@@ -296,7 +327,7 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
                 PairFlag::Induced => fate == PairFate::Induced,
             }))
         }
-        Quantity::Baseline(_) | Quantity::Pair(_) | Quantity::Compared(_) => None,
+        Quantity::Baseline(_) | Quantity::Pair(_) | Quantity::Compared(_) | Quantity::Covered(_) => None,
     }
 }
 
@@ -306,8 +337,13 @@ mod tests {
 
     /// Returns whether a gate of a flag is lost after these samples and hits.
     fn is_lost(gate: &str, hits: u64, samples: u64, rest: u64) -> bool {
-        let evidence =
-            Evidence { is_paired: true, is_varied: true, is_built_in: [true; 2], inference: Inference::FixedSamples };
+        let evidence = Evidence {
+            is_paired: true,
+            is_varied: true,
+            is_built_in: [true; 2],
+            inference: Inference::FixedSamples,
+            is_weighted: false,
+        };
         Accumulator { hits, samples, ..Accumulator::new(gate.parse().unwrap()) }.is_lost(&evidence, rest)
     }
 
@@ -330,8 +366,13 @@ mod tests {
 
     #[test]
     fn an_extreme_beyond_its_bound_is_lost_and_a_mean_is_not() {
-        let evidence =
-            Evidence { is_paired: false, is_varied: true, is_built_in: [true; 2], inference: Inference::FixedSamples };
+        let evidence = Evidence {
+            is_paired: false,
+            is_varied: true,
+            is_built_in: [true; 2],
+            inference: Inference::FixedSamples,
+            is_weighted: false,
+        };
         let after = |gate: &str, value: f64| {
             let expression: Expression = gate.parse().unwrap();
             let (smallest, largest) = (Some(value), Some(value));
@@ -345,6 +386,29 @@ mod tests {
         let design = Evidence { inference: Inference::Sequential, ..evidence };
         let gate = Accumulator { hits: 9, samples: 9, ..Accumulator::new("count(engaged) <= 0".parse().unwrap()) };
         assert!(gate.is_lost(&evidence, 1) && !gate.is_lost(&design, 1));
+    }
+
+    #[test]
+    fn weighted_samples_decide_only_what_does_not_depend_on_how_often_they_happen() {
+        let evidence = Evidence {
+            is_paired: false,
+            is_varied: true,
+            is_built_in: [true; 2],
+            inference: Inference::Design,
+            is_weighted: true,
+        };
+        let answer = |gate: &str| {
+            let expression: Expression = gate.parse().unwrap();
+            let gate = Accumulator { samples: 400, hits: 0, smallest: Some(2.0), ..Accumulator::new(expression) };
+            gate.evaluate(&evidence).answer
+        };
+        assert_eq!(answer("count(ego_collided) <= 0"), Answer::Met);
+        assert_eq!(answer("min(min_ttc_rear_s) >= 1"), Answer::Met);
+        for gate in
+            ["share(ego_collided) <= 0.1", "upper(ego_collided) <= 0.1", "mean(harm) <= 1", "p5(min_ttc_rear_s) >= 1"]
+        {
+            assert_eq!(answer(gate), Answer::Open(OpenReason::WeightedSamples), "{gate}");
+        }
     }
 
     #[test]

@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use closecall_scenarios::Function;
 use closecall_scenarios::criteria::{EGO_COLLIDED, Expression, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
+use closecall_scenarios::sampling::Design;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 
-use super::evaluate::{Accumulator, Evidence, value};
+use super::evaluate::{Accumulator, Evaluation, Evidence, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
+use crate::coverage::{CoverageCounter, CoverageResult};
 use crate::ledger::Inference;
 use crate::record::{ArmRecord, Record};
 use closecall_scenarios::parameters::SpaceEntry;
@@ -53,6 +55,8 @@ struct Judged {
     function: Function,
     /// The parameters that are sampled beyond what trajectory data show, in words.
     extrapolations: Vec<String>,
+    /// What the samples cover.
+    coverage: CoverageCounter,
     /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or moved it otherwise than the baseline.
     acted: u64,
 }
@@ -65,6 +69,7 @@ pub struct Judge {
     /// Whether the baseline, and the arm under test, are controllers of this program.
     is_built_in: [bool; 2],
     inference: Inference,
+    is_weighted: bool,
     scenarios: Vec<Judged>,
 }
 
@@ -101,6 +106,7 @@ impl Judge {
                 asks_for_action: config.checks.values().flatten().any(of_prevented),
                 function: config.function,
                 extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
+                coverage: CoverageCounter::new(work),
                 acted: 0,
             }
         };
@@ -111,6 +117,7 @@ impl Judge {
             is_measurement: set.is_measurement,
             is_built_in: [is_built_in(arms.first()), is_built_in(arms.last())],
             inference,
+            is_weighted: works.iter().any(|work| work.sampling.design == Design::Coverage),
             scenarios: works.iter().map(judged).collect(),
         }
     }
@@ -123,6 +130,7 @@ impl Judge {
             return;
         }
         judged.observe_expectations(record);
+        judged.coverage.push(record);
         for gate in &mut judged.gates {
             gate.accumulator.push(record);
         }
@@ -179,16 +187,26 @@ impl Judge {
 
     /// Returns the result of every gate and requirement check, scenario by scenario.
     pub fn gates(&self) -> Vec<GateResult> {
-        let result = |gate: &Gate, scenario: &str, is_varied: bool| GateResult {
-            scenario: scenario.to_owned(),
+        let result = |gate: &Gate, judged: &Judged| GateResult {
+            scenario: judged.scenario.clone(),
             expression: gate.spec.expression,
             source: gate.spec.source.clone(),
-            evaluation: gate.accumulator.evaluate(&self.evidence(is_varied)),
+            evaluation: match gate.spec.expression.quantity {
+                Quantity::Covered(name) => {
+                    Evaluation::of_coverage(&gate.spec.expression, judged.coverage.share(name.as_str()))
+                }
+                _ => gate.accumulator.evaluate(&self.evidence(judged.is_varied)),
+            },
         };
-        let of_scenario = |judged: &Judged| -> Vec<GateResult> {
-            judged.gates.iter().map(|gate| result(gate, &judged.scenario, judged.is_varied)).collect()
-        };
+        let of_scenario =
+            |judged: &Judged| -> Vec<GateResult> { judged.gates.iter().map(|gate| result(gate, judged)).collect() };
         self.scenarios.iter().flat_map(of_scenario).collect()
+    }
+
+    /// Returns what the samples of each scenario cover, for those that state what is to be covered.
+    pub fn coverage(&self) -> impl Iterator<Item = (&str, Vec<CoverageResult>)> {
+        let results = self.scenarios.iter().map(|judged| (judged.scenario.as_str(), judged.coverage.results()));
+        results.filter(|(_, results)| !results.is_empty())
     }
 
     /// Returns the first gate of a scenario that fails whatever its remaining `rest` samples are.
@@ -200,8 +218,8 @@ impl Judge {
     }
 
     fn evidence(&self, is_varied: bool) -> Evidence {
-        let Self { is_paired, is_built_in, inference, .. } = *self;
-        Evidence { is_paired, is_varied, is_built_in, inference }
+        let Self { is_paired, is_built_in, inference, is_weighted, .. } = *self;
+        Evidence { is_paired, is_varied, is_built_in, inference, is_weighted }
     }
 
     /// Returns how each requirement fares in each scenario that names it, in the order of the marks.

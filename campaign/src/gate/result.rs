@@ -51,7 +51,7 @@ impl GateResult {
         match self.evaluation.answer {
             Answer::Met => Standing::Pass,
             Answer::Missed => Standing::Fail,
-            Answer::Open(super::OpenReason::NotPaired) => Standing::NotChecked,
+            Answer::Open(super::OpenReason::NotPaired | super::OpenReason::NotInCoverage) => Standing::NotChecked,
             Answer::Open(_) => Standing::Inconclusive,
         }
     }

@@ -36,7 +36,7 @@ impl Nearness {
             _ if guide.is_some() || event.excess(0.0).is_some() => true,
             Quantity::Tested(measure) | Quantity::Baseline(measure) => measure.name == EGO_COLLIDED,
             Quantity::Pair(_) => true,
-            Quantity::Compared(_) => false,
+            Quantity::Compared(_) | Quantity::Covered(_) => false,
         };
         match expression.events().find(|event| !has_guide(event)) {
             Some(event) => Err(NoGuide { event }),
@@ -70,6 +70,7 @@ impl Nearness {
         let tested = record.arms.len().checked_sub(1)?;
         let outcome = |index: usize| record.arms.get(index)?.result.as_ref().ok();
         let (own, other) = match event.quantity {
+            Quantity::Covered(_) => return None,
             Quantity::Tested(_) => (tested, None),
             Quantity::Baseline(_) => (0, None),
             Quantity::Compared(comparison) => (if comparison.in_baseline { 0 } else { tested }, None),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::coverage::line;
 use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
@@ -46,6 +47,11 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     text.push_str(&counts(findings.summary));
     text.push_str(&ensemble_markdown(findings.summary, findings.manifest));
     text.push_str(&requirements(findings));
+    for (scenario, results) in &findings.judged.coverage {
+        text.push_str(&format!("Coverage of {}:\n\n", cell(scenario)));
+        results.iter().for_each(|result| text.push_str(&format!("- {}\n", plain(&line(result)))));
+        text.push('\n');
+    }
     for scenario in &findings.overview.scenarios {
         text.push_str(&influence(findings, scenario));
         text.push_str(&worst(findings, scenario));

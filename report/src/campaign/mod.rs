@@ -9,6 +9,7 @@
 mod arm_pairs;
 mod causes;
 mod comparison;
+pub(crate) mod coverage;
 mod ensemble;
 pub mod explorer;
 mod files;
@@ -32,6 +33,7 @@ mod xunit_schema;
 
 pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};
+pub use coverage::CoverageText;
 pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{ArtifactError, CampaignReport, Written, check_folder};
 pub use recordings::{RecordedSample, Still};

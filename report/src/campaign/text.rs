@@ -35,7 +35,10 @@ impl fmt::Display for CountsText<'_> {
             )?;
         }
         if summary.inference == Inference::Design {
-            writeln!(f, "No rate has an interval: the samples of the designs sobol and grid are not independent.")?;
+            writeln!(
+                f,
+                "No rate has an interval: the samples of the designs sobol, grid and coverage are not independent."
+            )?;
         }
         writeln!(f, "Rates are conditional on the sampled scenario: they are not the risk on a road.")
     }

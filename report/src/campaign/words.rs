@@ -165,6 +165,7 @@ fn subject(aggregate: Aggregate, quantity: &Quantity) -> (String, bool) {
         Aggregate::Mean => (format!("mean of: {words}"), false),
         Aggregate::Sum => (format!("sum of: {words}"), false),
         Aggregate::Percentile(percent) => (format!("{percent} % percentile of: {words}"), false),
+        Aggregate::Coverage => (format!("share of the bins of {words} that samples hit"), true),
     }
 }
 
@@ -173,6 +174,7 @@ fn flag_words(quantity: &Quantity) -> String {
         Quantity::Tested(measure) => measure.meaning.to_owned(),
         Quantity::Baseline(measure) => format!("{} in the baseline", measure.meaning),
         Quantity::Pair(flag) => format!("a collision is {}", flag.name()),
+        Quantity::Covered(name) => name.to_string(),
         Quantity::Compared(Comparison { measure, in_baseline, side, threshold }) => {
             let arm = if *in_baseline { " in the baseline" } else { "" };
             let side = if *side == Side::Above { "above" } else { "below" };
@@ -230,6 +232,7 @@ mod tests {
             requirements: Vec::new(),
             expectations: Vec::new(),
             probabilities: Vec::new(),
+            coverage: Vec::new(),
             flaky: None,
         }
     }

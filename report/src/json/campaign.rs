@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 
 use super::influence::influence;
 use super::stamp::stamped;
+use crate::campaign::coverage::coverage_json;
 use crate::campaign::overview::{ErrorGroup, Overview, ScenarioOverview};
 use crate::campaign::words::reasons;
 use crate::campaign::{CampaignReport, ensemble_json};
@@ -62,6 +63,7 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
     object.insert("failures".to_owned(), summary.failures_json());
     object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("flaky_gate".to_owned(), json!(judged.flaky));
+    object.insert("coverage".to_owned(), coverage_json(judged));
     object.insert("wall_s".to_owned(), json!(wall_s));
     let scenarios: Map<String, Value> = summary
         .scenarios
@@ -187,7 +189,7 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
 }
 
 /// Why the samples of a design have no interval and no test.
-const DEPENDENT: &str = "the samples of the designs sobol and grid are not independent";
+const DEPENDENT: &str = "the samples of the designs sobol, grid and coverage are not independent";
 
 fn paired(pairs: &Pairs, inference: Inference) -> Value {
     let mut object = json!({

@@ -4,6 +4,7 @@
 //!  gate      = aggregate "(" quantity [ "|" condition ] ")" operator number
 //!  aggregate = "count" | "share" | "lower" | "upper"          of a flag
 //!            | "min" | "max" | "mean" | "sum" | "p" percent   of a number
+//!            | "coverage"                                    of an item or a cross of [coverage]
 //!  quantity  = [ "baseline." ] measure | pair flag | comparison
 //!  condition = [ "baseline." ] flag | pair flag | comparison
 //!  comparison = [ "baseline." ] number (">" | "<") threshold   a flag
@@ -13,10 +14,13 @@
 //! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is at least 1 s.
 //! `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in which the ego collides without the system,
 //! more than half are prevented with 95 % confidence. `lower` and `upper` are the exact one-sided bounds of a share.
+//! `coverage(closing-by-class) >= 0.95` asks that samples hit 95 % of the bins of that item or cross.
 //! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s² in at most 5 % of the samples.
 
 use std::fmt;
 use std::str::FromStr;
+
+use crate::coverage::CoverageName;
 
 use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
 
@@ -41,6 +45,8 @@ pub enum Aggregate {
     Sum,
     /// A percentile, from 0 to 100.
     Percentile(f64),
+    /// The share of the bins of a coverage item or cross that samples hit.
+    Coverage,
 }
 
 impl Aggregate {
@@ -94,13 +100,15 @@ pub enum Quantity {
     Pair(PairFlag),
     /// A number beyond a threshold.
     Compared(Comparison),
+    /// A coverage item or cross, which is a value of all samples together.
+    Covered(CoverageName),
 }
 
 impl Quantity {
     /// Returns true if the quantity exists only in a paired campaign.
     pub const fn needs_pairs(self) -> bool {
         match self {
-            Self::Tested(_) => false,
+            Self::Tested(_) | Self::Covered(_) => false,
             Self::Baseline(_) | Self::Pair(_) => true,
             Self::Compared(comparison) => comparison.in_baseline,
         }
@@ -112,7 +120,7 @@ impl Quantity {
             Self::Tested(measure) => Some((measure, false)),
             Self::Baseline(measure) => Some((measure, true)),
             Self::Compared(Comparison { measure, in_baseline, .. }) => Some((measure, in_baseline)),
-            Self::Pair(_) => None,
+            Self::Pair(_) | Self::Covered(_) => None,
         }
     }
 
@@ -120,6 +128,7 @@ impl Quantity {
         match self {
             Self::Tested(measure) | Self::Baseline(measure) => measure.kind == MeasureKind::Flag,
             Self::Pair(_) | Self::Compared(_) => true,
+            Self::Covered(_) => false,
         }
     }
 }
@@ -217,6 +226,9 @@ fn parse(text: &str) -> Result<Expression, String> {
         return Err(FORM.to_owned());
     };
     let aggregate = parse_aggregate(aggregate.trim())?;
+    if aggregate == Aggregate::Coverage {
+        return parse_coverage(inside.trim(), operator, bound);
+    }
     let (quantity, condition) = match inside.split_once('|') {
         Some((quantity, condition)) => (quantity, Some(parse_quantity(condition.trim())?)),
         None => (inside, None),
@@ -240,6 +252,15 @@ fn parse(text: &str) -> Result<Expression, String> {
     Ok(Expression { aggregate, quantity, condition, operator, bound })
 }
 
+fn parse_coverage(name: &str, operator: Operator, bound: f64) -> Result<Expression, String> {
+    let name: CoverageName = name.parse()?;
+    if operator == Operator::AtMost || !(0.0..=1.0).contains(&bound) {
+        return Err(format!("coverage is asked for as `coverage({name}) >= SHARE`, with a share from 0 to 1"));
+    }
+    let (aggregate, quantity) = (Aggregate::Coverage, Quantity::Covered(name));
+    Ok(Expression { aggregate, quantity, condition: None, operator, bound })
+}
+
 fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
     Ok(match name {
         "count" => Aggregate::Count,
@@ -250,10 +271,11 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
         "max" => Aggregate::Max,
         "mean" => Aggregate::Mean,
         "sum" => Aggregate::Sum,
+        "coverage" => Aggregate::Coverage,
         _ => match name.strip_prefix('p').and_then(|percent| percent.parse::<f64>().ok()) {
             Some(percent) if (0.0..=100.0).contains(&percent) => Aggregate::Percentile(percent),
             _ => {
-                let known = "count, share, lower, upper, min, max, mean, sum, and p0 to p100";
+                let known = "count, share, lower, upper, min, max, mean, sum, p0 to p100, and coverage";
                 return Err(format!("`{name}` is not an aggregate; there are {known}"));
             }
         },
@@ -315,6 +337,7 @@ impl fmt::Display for Aggregate {
             Self::Mean => f.write_str("mean"),
             Self::Sum => f.write_str("sum"),
             Self::Percentile(percent) => write!(f, "p{percent}"),
+            Self::Coverage => f.write_str("coverage"),
         }
     }
 }
@@ -325,6 +348,7 @@ impl fmt::Display for Quantity {
             Self::Tested(measure) => f.write_str(measure.name),
             Self::Baseline(measure) => write!(f, "baseline.{}", measure.name),
             Self::Pair(flag) => f.write_str(flag.name()),
+            Self::Covered(name) => name.fmt(f),
             Self::Compared(Comparison { measure, in_baseline, side, threshold }) => {
                 let arm = if *in_baseline { "baseline." } else { "" };
                 let sign = if *side == Side::Above { '>' } else { '<' };
@@ -366,6 +390,7 @@ mod tests {
             "share(imposed_braking_mps2 > 3) <= 0.05",
             "upper(imposed_braking_mps2 > 3 | baseline.imposed_braking_mps2 < 3) <= 0.05",
             "count(min_ttc_rear_s < -0.5) <= 0",
+            "coverage(closing-by-class) >= 0.95",
         ] {
             let expression: Expression = text.parse().unwrap();
             assert_eq!(expression.to_string(), text);
@@ -407,6 +432,11 @@ mod tests {
             ("share(imposed_braking_mps2 > 3 > 2) <= 0.1", "is not a finite number"),
             ("share(imposed_braking_mps2 >= 3) <= 0.1", "one `<=` or `>="),
             ("max(imposed_braking_mps2 > 3) <= 1", "is a flag, which has"),
+            ("coverage(closing) <= 0.5", "`coverage(closing) >= SHARE`"),
+            ("coverage(closing) >= 1.5", "a share from 0 to 1"),
+            ("coverage(Closing) >= 0.5", "not the name of a coverage item"),
+            ("coverage(a | b) >= 0.5", "not the name of a coverage item"),
+            ("min(closing-by-class) >= 0.5", "not a measure"),
         ] {
             let error = text.parse::<Expression>().unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");

@@ -52,6 +52,11 @@ impl Measure {
         REPORTED.contains(&self.name)
     }
 
+    /// Returns the measures that rest on what happened, and not on what a controller reports.
+    pub fn measured() -> impl Iterator<Item = &'static Self> {
+        MEASURES.iter().filter(|measure| !measure.is_reported())
+    }
+
     /// Returns the measure with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         MEASURES.iter().find(|measure| measure.name == name)

@@ -67,6 +67,11 @@ impl Copula {
         Ok(Self { rows: members.into_iter().zip(rows).collect() })
     }
 
+    /// Returns true if the parameter with this index is coupled with others.
+    pub(super) fn couples(&self, index: usize) -> bool {
+        self.rows.iter().any(|(member, _)| *member == index)
+    }
+
     /// Couples the numbers u of all parameters, which are in the order of the names.
     pub(super) fn couple(&self, numbers: &mut [f64]) {
         let Some(normal) = TruncatedStandardNormal::new(f64::NEG_INFINITY, f64::INFINITY) else { return };

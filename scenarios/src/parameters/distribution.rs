@@ -219,6 +219,17 @@ impl Distribution {
         }
     }
 
+    /// Returns the numbers u whose quantile is this label; `None` if it is none of the distribution's.
+    pub(crate) fn interval_of(&self, label: &str) -> Option<[f64; 2]> {
+        let index = self.labels().iter().position(|one| one == label)?;
+        match &self.0 {
+            Kind::Choice(WeightedLabels { cumulative, .. }) => {
+                Some([index.checked_sub(1).map_or(0.0, |before| cumulative[before]), cumulative[index]])
+            }
+            _ => Some([0.0, 1.0]),
+        }
+    }
+
     /// Returns the smallest and the largest number, or `None` for labels.
     ///
     /// If a distribution is unbounded, the probability beyond the returned bound is 10⁻¹⁶.

@@ -22,6 +22,7 @@ mod copula_tests;
 mod distribution;
 mod finite;
 mod space;
+mod strata;
 #[cfg(test)]
 mod tests;
 
@@ -30,4 +31,6 @@ pub use config::{
     TruncatedNormalConfig, UniformConfig,
 };
 pub use distribution::Distribution;
+pub(crate) use strata::{Part, Strata, volume};
+
 pub use space::{ParameterSpace, Provenance, SpaceEntry, Variation};

@@ -6,6 +6,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use closecall_traffic::{ParameterName, Parameters, Value, maths};
 
 use super::copula::Copula;
+use super::strata::Strata;
 use super::{Distribution, FittedConfig, ObservedConfig};
 
 /// The provenance of a distribution.
@@ -51,6 +52,7 @@ impl SpaceEntry {
 pub struct ParameterSpace {
     entries: BTreeMap<ParameterName, SpaceEntry>,
     copula: Copula,
+    strata: Strata,
 }
 
 /// How much sampled values vary, in rising order.
@@ -73,8 +75,8 @@ fn probability_below(z: f64) -> f64 {
 }
 
 impl ParameterSpace {
-    pub(super) const fn new(entries: BTreeMap<ParameterName, SpaceEntry>, copula: Copula) -> Self {
-        Self { entries, copula }
+    pub(super) fn new(entries: BTreeMap<ParameterName, SpaceEntry>, copula: Copula) -> Self {
+        Self { entries, copula, strata: Strata::default() }
     }
 
     /// Returns the values at the numbers u of all parameters, in the order of the names. Correlated parameters are coupled
@@ -82,6 +84,26 @@ impl ParameterSpace {
     pub(crate) fn values(&self, mut numbers: Vec<f64>) -> Parameters {
         self.copula.couple(&mut numbers);
         self.map(|_, index, distribution| distribution.quantile(numbers[index]))
+    }
+
+    /// Returns the same parameters with the bins that the design `coverage` visits.
+    pub(crate) fn with_strata(self, strata: Strata) -> Self {
+        Self { strata, ..self }
+    }
+
+    /// Returns the bins that the design `coverage` visits.
+    pub(crate) const fn strata(&self) -> &Strata {
+        &self.strata
+    }
+
+    /// Returns true if there are bins that the design `coverage` can visit.
+    pub const fn has_strata(&self) -> bool {
+        !self.strata.is_empty()
+    }
+
+    /// Returns true if the parameter states a rank correlation with another one.
+    pub(crate) fn is_correlated(&self, index: usize) -> bool {
+        self.copula.couples(index)
     }
 
     /// Iterates over all parameters in the order of their names.
@@ -166,6 +188,6 @@ impl ParameterSpace {
 /// Collects parameters that are independent of each other.
 impl FromIterator<(ParameterName, SpaceEntry)> for ParameterSpace {
     fn from_iter<I: IntoIterator<Item = (ParameterName, SpaceEntry)>>(entries: I) -> Self {
-        Self { entries: entries.into_iter().collect(), copula: Copula::default() }
+        Self { entries: entries.into_iter().collect(), ..Self::default() }
     }
 }

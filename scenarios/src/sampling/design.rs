@@ -7,7 +7,7 @@ use closecall_traffic::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{grid, random, sobol};
+use super::{coverage, grid, random, sobol};
 use crate::parameters::{ParameterSpace, Variation};
 
 /// The sampling design: how a parameter space is sampled.
@@ -22,18 +22,21 @@ pub enum Design {
     /// All combinations of some levels of each parameter. All points have the same weight, so that a share of them is
     /// not a probability if labels have different weights.
     Grid,
+    /// Random samples that visit in turn the bins which `[coverage]` names under `fill`. A share of them is no probability: each bin
+    /// has a weight, the probability that the distributions give it.
+    Coverage,
 }
 
 /// The error for a word that is not the name of a design.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is not a sampling design: one of `random`, `sobol`, `grid` is needed")]
+#[error("`{word}` is not a sampling design: one of `random`, `sobol`, `grid`, `coverage` is needed")]
 pub struct UnknownDesign {
     word: String,
 }
 
 impl Design {
     /// All designs.
-    pub const ALL: [Self; 3] = [Self::Random, Self::Sobol, Self::Grid];
+    pub const ALL: [Self; 4] = [Self::Random, Self::Sobol, Self::Grid, Self::Coverage];
 
     /// Returns the name of the design, as on the command line and in files.
     pub const fn name(self) -> &'static str {
@@ -41,6 +44,7 @@ impl Design {
             Self::Random => "random",
             Self::Sobol => "sobol",
             Self::Grid => "grid",
+            Self::Coverage => "coverage",
         }
     }
 }
@@ -65,7 +69,7 @@ impl ParameterSpace {
     pub fn samples(&self, design: Design, n: u64) -> u64 {
         match design {
             _ if self.variation() == Variation::None => n.min(1),
-            Design::Random | Design::Sobol => n,
+            Design::Random | Design::Sobol | Design::Coverage => n,
             Design::Grid => grid::Grid::within(self, n).points(),
         }
     }
@@ -78,6 +82,7 @@ impl ParameterSpace {
             Design::Random => random::sample(self, seed, index),
             Design::Sobol => sobol::sample(self, seed, index),
             Design::Grid => grid::Grid::within(self, n).point(self, index),
+            Design::Coverage => coverage::sample(self, seed, index),
         }
     }
 }

@@ -9,10 +9,12 @@
 //! | `random` | independent, from the random stream of (seed, k, parameter name)         | no                        |
 //! | `sobol`  | Sobol sequence, Owen-scrambled by the seed, one dimension for each name  | no                        |
 //! | `grid`   | midpoints of equally probable parts, in all combinations                 | yes                       |
+//! | `coverage` | as `random`, within the part of each bin of a coverage cross, in turn  | no                        |
 //!
 //! Parameters that state rank correlations ([`crate::parameters`]) are coupled in `random` and `sobol`. A grid covers all
 //! combinations of its levels, whatever their correlation.
 
+mod coverage;
 mod design;
 mod grid;
 mod random;

@@ -3,7 +3,7 @@
 //! Each parameter draws from its own random stream, keyed by its name, so that adding or removing a parameter does not
 //! change the others.
 
-use closecall_traffic::{ActorId, Parameters, Stream, stream};
+use closecall_traffic::{ActorId, ParameterName, Parameters, Stream, stream};
 use rand::RngExt;
 
 use crate::parameters::ParameterSpace;
@@ -14,8 +14,12 @@ const OWNER: &str = "scenario";
 
 /// Returns the parameter values of sample `index`.
 pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameters {
-    let number = |name| scenario_stream(seed, index, &format!("parameter/{name}")).random();
-    space.values(space.iter().map(|(name, _)| number(name)).collect())
+    space.values(space.iter().map(|(name, _)| number(seed, index, name)).collect())
+}
+
+/// Returns the number u of a parameter.
+pub(super) fn number(seed: u64, index: u64, name: &ParameterName) -> f64 {
+    scenario_stream(seed, index, &format!("parameter/{name}")).random()
 }
 
 /// Returns a random stream that belongs to the scenario as a whole, not to an actor.

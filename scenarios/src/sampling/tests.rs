@@ -41,7 +41,7 @@ fn designs_are_named_as_in_files() {
         assert_eq!(serde_json::to_string(&design).unwrap(), format!("\"{design}\""));
     }
     let error = "halton".parse::<Design>().unwrap_err().to_string();
-    assert_eq!(error, "`halton` is not a sampling design: one of `random`, `sobol`, `grid` is needed");
+    assert_eq!(error, "`halton` is not a sampling design: one of `random`, `sobol`, `grid`, `coverage` is needed");
 }
 
 /// Kolmogorov's test in each dimension at the significance level 10⁻⁶, with fixed seeds.

@@ -16,6 +16,7 @@
 //! nothing. Only the page of the recordings runs a script. A campaign's page shows wall times and its date, so that it is
 //! not among the files that are byte-identical in a repetition.
 
+mod coverage;
 mod influence;
 mod ledger;
 pub(crate) mod page;

@@ -6,7 +6,7 @@ use closecall_scenarios::ScenarioFile;
 use maud::{Markup, PreEscaped, html};
 
 use super::page::legend_key;
-use super::{influence, samples};
+use super::{coverage, influence, samples};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{Fate, MARGINS, MarginBins, ScenarioOverview};
 use crate::campaign::recordings::card_beside;
@@ -33,7 +33,8 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
                 @if !is_above { (map(scenario)?) }
                 (influence::section(findings, scenario)?)
                 (margins(scenario)?)
-                (coverage(scenario)?)
+                (coverage::tables(findings.judged, &scenario.name))
+                (sampled_values(scenario)?)
             }
         }
     })
@@ -139,7 +140,7 @@ fn absent(arms: &[String], bins: &[MarginBins]) -> String {
     absent.map(|(arm, bins)| format!("{arm}: {} samples without", bins.absent)).collect::<Vec<_>>().join("; ")
 }
 
-fn coverage(scenario: &ScenarioOverview) -> io::Result<Markup> {
+fn sampled_values(scenario: &ScenarioOverview) -> io::Result<Markup> {
     if scenario.axes.is_empty() {
         return Ok(Markup::default());
     }
