@@ -33,6 +33,7 @@ use closecall_simulation::SampleError;
 use closecall_simulation::controller::ArmsError;
 use closecall_simulation::controller::native::NativeError;
 use closecall_studies::CausesError;
+use closecall_studies::fidelity::FidelityError;
 use closecall_studies::perception::StudyError;
 use closecall_traffic::atomic::WriteError;
 
@@ -161,6 +162,9 @@ pub enum CliError {
     /// A cause cannot be found.
     #[error(transparent)]
     Causes(#[from] CausesError),
+    /// Two campaigns are not two fidelities of the same samples.
+    #[error(transparent)]
+    Fidelity(#[from] FidelityError),
     /// The sensors cannot be studied.
     #[error(transparent)]
     Sensors(#[from] StudyError),
@@ -261,6 +265,8 @@ impl From<&CliError> for ExitCode {
             CliError::Merge(error) => FailureKind::from(error).into(),
             CliError::Compare(error) => FailureKind::from(error).into(),
             CliError::Causes(error) => error.kind().into(),
+            CliError::Fidelity(FidelityError::Folder(error)) => FailureKind::from(error).into(),
+            CliError::Fidelity(_) => ExitCode::Usage,
             CliError::Sensors(error) => error.kind().into(),
             CliError::Write(_)
             | CliError::Project(ProjectError { is_io: true, .. })

@@ -5,8 +5,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, export, generate, import, inspect, merge, paper, record, reenact,
-    render, robustness, sample, schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper, record,
+    reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -62,6 +62,8 @@ pub(super) enum Study {
     Map(causes::MapArgs),
     /// Count how often the encounter happens in trajectory files, and state the net effect of the system per 10^6 km
     Exposure(causes::ExposureArgs),
+    /// Sharpen the rates of a campaign with runs of the same samples, and more of them, with fast sensors
+    Fidelity(fidelity::FidelityArgs),
     /// Study the rear sensors without a controller: detection, errors, classes and consistency over distance and conditions
     Sensors(sensors::SensorsArgs),
 }
@@ -124,6 +126,7 @@ impl Study {
             Self::Frontier(args) => study::frontier(args),
             Self::Map(args) => causes::map(args),
             Self::Exposure(args) => causes::exposure(args),
+            Self::Fidelity(args) => fidelity::fidelity(args),
             Self::Sensors(args) => sensors::sensors(args),
         }
     }

@@ -19,6 +19,7 @@ mod ensemble;
 mod error;
 mod explore;
 mod export;
+mod fidelity;
 mod gates;
 mod generate;
 mod groups;

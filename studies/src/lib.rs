@@ -8,6 +8,7 @@
 //!  campaign       ─▶ cost          what the system costs where nothing happens
 //!                 ─▶ engagement    why the system does not engage
 //!  recordings     ─▶ exposure      how often the encounter happens on a road: the net effect per 10⁶ km
+//!  two campaigns  ─▶ fidelity      rates of the full chain, sharpened by runs with fast sensors
 //!  cases          ─▶ perception    where perception ends, how it errs, and what spoils it
 //! ```
 //!
@@ -21,6 +22,7 @@ pub mod engagement;
 pub mod explain;
 pub mod exposure;
 pub mod failures;
+pub mod fidelity;
 pub mod map;
 pub mod minimize;
 pub mod perception;
