@@ -46,7 +46,7 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
-    /// Something that no campaign has put there is where results belong.
+    /// The place of the results holds something that no campaign has put there.
     #[error("failed to use {}: {reason}; nothing is overwritten, moved or removed", path.display())]
     Foreign {
         /// The path.
@@ -64,7 +64,7 @@ pub enum FolderError {
     },
     /// Samples of the plan are missing in the journal.
     #[error(
-        "failed to use {}: it has {has} of the {of} samples of its campaign, and a part of them says nothing about all; \
+        "failed to use {}: it has {has} of the {planned} samples of its campaign, and a part of them says nothing about all; \
          resume it first",
         path.display()
     )]
@@ -74,7 +74,7 @@ pub enum FolderError {
         /// Number of samples that it has.
         has: u64,
         /// Number of samples of the plan.
-        of: u64,
+        planned: u64,
     },
     /// A file of the folder is damaged, or does not belong to the campaign.
     #[error("failed to read {}:{line}: {message}", path.display())]

@@ -48,16 +48,19 @@ pub struct Plan {
     pub workers: Workers,
     /// How often a sample runs again in a new process after its worker process has crashed or hung.
     pub retry_crashed: u32,
-    /// Scenarios and members of a driver ensemble that are not run, because the member changes nothing in the scenario.
+    /// Scenarios and members of a driver ensemble that are not run, because the member changes
+    /// nothing in the scenario.
     pub without_effect: Vec<(String, String)>,
 }
 
 impl Plan {
-    /// Returns a plan that runs each sample of each scenario once for each controller. The last controller is the one
-    /// under test. If there are several, the first is the baseline, and those between are references.
+    /// Returns a plan that runs each sample of each scenario once for each controller. The last
+    /// controller is the one under test. If there are several, the first is the baseline, and those
+    /// between are references.
     ///
     /// # Errors
-    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, a scenario no system for one that is tested, or a variable of an FMU has no counterpart.
+    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, a scenario
+    /// no system for one that is tested, or a variable of an FMU has no counterpart.
     pub fn new(
         scenarios: Vec<ScenarioFile>,
         sampling: Sampling,
@@ -113,7 +116,8 @@ impl Plan {
     /// Uses these sensors instead of those of each scenario, if any are given.
     ///
     /// # Errors
-    /// [`ScenarioError`] if a fault of a scenario could not act in this mode: the campaign would test nothing, and pass.
+    /// [`ScenarioError`] if a fault of a scenario could not act in this mode: the campaign would
+    /// test nothing, and pass.
     pub fn use_sensors(&mut self, sensors: Option<SensorMode>) -> Result<(), ScenarioError> {
         if let Some(mode) = sensors {
             self.scenarios.iter().try_for_each(|file| file.check_faults_in(mode))?;
@@ -178,7 +182,8 @@ impl Plan {
         Ok(std::iter::once(classifier).chain(models).collect())
     }
 
-    /// Returns what identifies the controllers that run as processes in the given folder, or in that of this program.
+    /// Returns what identifies the controllers that run as processes in the given folder, or in
+    /// that of this program.
     fn fingerprints(&self, folder: Option<&Path>) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
         let fingerprint = |choice| Fingerprint::of_choice(choice, folder, nominal.as_ref());
@@ -193,7 +198,8 @@ impl Plan {
         self.manifest_in(command, None)
     }
 
-    /// Does the same as [`Self::manifest`] for controllers that run in another folder than this program.
+    /// Does the same as [`Self::manifest`] for controllers that run in another folder than this
+    /// program.
     pub(crate) fn manifest_in(&self, command: Vec<String>, folder: Option<&Path>) -> Result<Manifest, FolderError> {
         let scenario = |file: &ScenarioFile| ManifestScenario {
             name: file.config().name.clone(),
@@ -224,7 +230,8 @@ impl Plan {
     }
 }
 
-/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none: it would be the baseline under another name.
+/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none:
+/// it would be the baseline under another name.
 ///
 /// # Errors
 /// [`PlanError::WithoutMis`] with the first such controller.
@@ -242,7 +249,8 @@ pub fn check_mis(file: &ScenarioFile, controllers: &[ControllerChoice]) -> Resul
     }
 }
 
-/// Refuses arms whose functions are the same in a scenario, and settings of an arm that change nothing: two arms would have one outcome.
+/// Refuses arms whose functions are the same in a scenario, and settings of an arm that change
+/// nothing: two arms would have one outcome.
 ///
 /// # Errors
 /// [`PlanError::SameStack`] or [`PlanError::NoEffect`] with the first such arms.

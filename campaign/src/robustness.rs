@@ -1,4 +1,5 @@
-//! Studies of several trajectory files, how much noise and offset the criteria for lane changes tolerate, on all processors.
+//! Studies how much noise and offset the criteria for lane changes tolerate, over several
+//! trajectory files and on all processors.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +18,8 @@ pub enum RobustnessError {
     Mixed,
 }
 
-/// Studies trajectory files. Returns the result of each file, and that of all together; `None` if there are no files.
+/// Studies trajectory files. Returns the result of each file, and the result of all files together;
+/// `None` if there are no files.
 ///
 /// # Errors
 /// [`RobustnessError`] if a file cannot be used, or if the files cannot be studied together.

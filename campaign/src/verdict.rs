@@ -1,4 +1,4 @@
-//! The verdict of a campaign: what its gates, requirements, expectations and validity checks come to.
+//! The verdict of a campaign, from its gates, requirements, expectations and validity checks.
 //!
 //! | finding | decision | verdict | exit code |
 //! |---|---|---|---|
@@ -25,8 +25,9 @@ use super::probability::{Answer, Finding};
 use super::summary::Summary;
 use super::validity::CheckCounts;
 
-/// Share of the outcomes in which the system under test may not be available for some time, and the campaign still says what the
-/// system does (-). An assumption: with more, the usual run is one in which the system cannot act as it was built to.
+/// Share of the outcomes in which the system under test may not be available for some time, and the
+/// campaign still says what the system does (-). An assumption: with more, the usual run is one in
+/// which the system cannot act as it was built to.
 const MAX_UNAVAILABLE_SHARE: f64 = 0.5;
 
 /// The answer of a campaign.
@@ -41,7 +42,8 @@ pub enum Verdict {
     /// The samples do not decide a gate.
     #[serde(rename = "INCONCLUSIVE")]
     Inconclusive,
-    /// No gate and no requirement was checked, or the system under test was not available or never acted.
+    /// No gate and no requirement was checked, or the system under test was not available or never
+    /// acted.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
     /// A setting of the command line weakened what a scenario is judged by.
@@ -76,7 +78,8 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The finding that decides a judgement. If several hold, the first of [`Decision::PRECEDENCE`] decides.
+/// The finding that decides a judgement. If several hold, the first of [`Decision::PRECEDENCE`]
+/// decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
     /// Every gate that was checked is met.
@@ -134,7 +137,8 @@ pub struct Judgement {
     pub requirements: Vec<RequirementResult>,
     /// Whether what the scenarios expect of their runs happened.
     pub expectations: Vec<ExpectationResult>,
-    /// What the samples of each scenario say about the probability of a collision, if that was asked.
+    /// What the samples of each scenario say about the probability of a collision, if that was
+    /// asked.
     pub probabilities: Vec<(String, Finding)>,
     /// The gate on the number of flaky samples, if there is one.
     pub flaky: Option<FlakyGate>,
@@ -160,7 +164,7 @@ impl Judgement {
     }
 }
 
-/// What a campaign may have and still be believed.
+/// The limits within which a campaign is believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
     /// Share of checked verdicts that may flip at half the time step.
@@ -184,7 +188,8 @@ impl From<&GateSet> for Allowed {
 /// The number of flaky samples, and the gate on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct FlakyGate {
-    /// Samples with an outcome only because they were run again after their process had crashed or hung.
+    /// Samples with an outcome only because they were run again after their process had crashed or
+    /// hung.
     pub flaky: u64,
     /// Most such samples.
     pub max: u64,
@@ -221,10 +226,10 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     judge_samples(summary, judge, &mut findings);
     judge_action(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
-        let what = weakened.join("; ");
+        let weakenings = weakened.join("; ");
         findings.add(
             Decision::Overridden,
-            format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {what}"),
+            format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {weakenings}"),
         );
     }
     let probabilities = judge_probabilities(summary, judge, &mut findings);
@@ -254,21 +259,22 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         Decision::first_of(&findings.decisions).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
-            let what = match gates.is_empty() {
+            let missing = match gates.is_empty() {
                 true => "no gate was set and no requirement was checked: set a gate, or measure without a verdict",
                 false => "no gate and no requirement is decided",
             };
-            findings.add(Decision::NotJudged, what.to_owned());
+            findings.add(Decision::NotJudged, missing.to_owned());
         }
         Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)
     };
-    // Last: it decides nothing, and the first reason that is no gate is the sentence of the verdict.
+    // Last: it decides nothing, and the first reason that is no gate is the sentence of the
+    // verdict.
     judge_extrapolation(judge, &mut findings);
     Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, flaky }
 }
 
-/// Returns the subjects of the gates that somebody set and that no scenario decides: there is no sample in which they have a
-/// value. A gate that says nothing does not pass.
+/// Returns the subjects of the gates that somebody set and that no scenario decides: there is no
+/// sample in which they have a value. A gate that says nothing does not pass.
 fn undecidable(gates: &[GateResult]) -> BTreeSet<String> {
     let set = || gates.iter().filter(|gate| !matches!(gate.source, GateSource::Requirement(_)));
     let subjects = |gate: &GateResult| gate.expression.subject();
@@ -277,8 +283,8 @@ fn undecidable(gates: &[GateResult]) -> BTreeSet<String> {
     set().map(subjects).filter(|subject| !decided.contains(subject)).collect()
 }
 
-/// Returns true if the gates say something: a gate that somebody set is decided, or every check of every requirement is. A
-/// requirement that is checked in part is not checked.
+/// Returns true if the gates say something: a gate that somebody set is decided, or every check of
+/// every requirement is. A requirement that is checked in part is not checked.
 fn is_judged(gates: &[GateResult]) -> bool {
     let is_check = |gate: &&GateResult| matches!(gate.source, GateSource::Requirement(_));
     let (checks, set): (Vec<&GateResult>, Vec<&GateResult>) = gates.iter().partition(is_check);
@@ -342,15 +348,17 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
     expectations
 }
 
-/// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on assumptions.
+/// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on
+/// assumptions.
 fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
     for (name, parameters) in judge.extrapolations() {
         findings.note(format!("{name}: extrapolates beyond recorded traffic: {}", parameters.join("; ")));
     }
 }
 
-/// Says in how many samples the system under test was not available for some time. If those are more than
-/// [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it engages before its sensors fail.
+/// Says in how many samples the system under test was not available for some time. If those are
+/// more than [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it
+/// engages before its sensors fail.
 fn judge_availability(summary: &Summary, findings: &mut Findings) {
     for (name, counts) in &summary.scenarios {
         let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
@@ -361,7 +369,7 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
         );
         if tested.unavailable as f64 > MAX_UNAVAILABLE_SHARE * tested.outcomes as f64 {
             let reason = format!(
-                "{sentence}, more than {}, so that they do not decide what it does (it engaged in {})",
+                "{sentence}, more than {}, and they do not decide what it does (it engaged in {})",
                 percent(MAX_UNAVAILABLE_SHARE),
                 samples(tested.engagements)
             );
@@ -376,7 +384,7 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
 fn judge_action(judge: &Judge, findings: &mut Findings) {
     for (name, missing, count) in judge.without_action() {
         let reason = format!(
-            "{name}: the system under test never {missing} in {}, so that they do not decide what it does",
+            "{name}: the system under test never {missing} in {}, and they do not decide what it does",
             samples(count)
         );
         findings.add(Decision::NotJudged, reason);

@@ -38,7 +38,7 @@ fn replay_command(replay: &Replay<'_>) -> String {
     let controller = option("--controller", replay.controller);
     format!(
         "{}{paired}{controller}{settings}{}",
-        sample_command("replay", replay.of),
+        sample_command("replay", replay.sample),
         option("--record", replay.recording)
     )
 }

@@ -226,7 +226,7 @@ fn what_no_campaign_has_written_is_neither_overwritten_nor_moved() {
         fs::write(path.join("thesis.tex"), "do not lose this").unwrap();
         assert_refused(folder.path(), "no results of a campaign");
         fs::write(path.join("manifest.json"), "{\"name\": \"My app\", \"manifest_version\": 3}").unwrap();
-        assert_refused(folder.path(), "its manifest is not that of a campaign");
+        assert_refused(folder.path(), "its manifest does not belong to a campaign");
         clear();
         // The folder of a campaign that somebody has put there.
         stdout(&campaign(folder.path(), &["--out", "own"]), 0);

@@ -138,7 +138,7 @@ fn a_library_that_forks_files_no_outcome_under_another_sample() {
             .filter_map(|record| record.arms[0].result.as_ref().err().map(|failure| failure.message.clone()))
             .collect();
         let named = |message: &String| {
-            message.contains("is not that of the sample: ") || message.contains("a line that nobody had asked for")
+            message.contains("does not belong to the sample: ") || message.contains("a line that nobody had asked for")
         };
         assert!(!messages.is_empty() && messages.iter().all(named), "{messages:?}");
     }

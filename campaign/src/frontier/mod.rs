@@ -6,8 +6,8 @@
 //!  …              ┘                                                          └─▶ Pareto-optimal combinations
 //! ```
 //!
-//! All combinations run the same samples with the same random numbers. If all keys belong to the margin increase system, the
-//! baseline does not depend on them and runs once.
+//! All combinations run the same samples with the same random numbers. If all keys belong to the
+//! margin increase system, the baseline does not depend on them and runs once.
 
 mod plan;
 mod result;

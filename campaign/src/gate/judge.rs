@@ -53,7 +53,8 @@ struct Judged {
     function: Function,
     /// The parameters that are sampled beyond what trajectory data show, in words.
     extrapolations: Vec<String>,
-    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or moved it otherwise than the baseline.
+    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or
+    /// moved it otherwise than the baseline.
     acted: u64,
 }
 
@@ -68,8 +69,9 @@ pub struct Judge {
     scenarios: Vec<Judged>,
 }
 
-/// Returns what stands in place of the baseline of the scenario's function, if a check compares with it: it may be weaker, and what
-/// it does not prevent would count for the system under test. A controller from outside is somebody's own baseline.
+/// Returns a message if a weaker controller stands in for the baseline of the scenario's function,
+/// and a check compares with the baseline. The collisions that it fails to prevent would count for
+/// the system under test. A controller from outside is the user's own baseline.
 fn other_baseline(work: &Work) -> Option<String> {
     let config = work.file.config();
     let [baseline, _] = ControllerChoice::of_function(config.function);
@@ -133,7 +135,8 @@ impl Judge {
         self.is_measurement
     }
 
-    /// Returns the samples of a scenario that repeat the parameters or the outcome of an earlier one, and are not counted as evidence.
+    /// Returns the samples of a scenario that repeat the parameters or the outcome of an earlier
+    /// one, and are not counted as evidence.
     pub fn repeated(&self, scenario: &str) -> u64 {
         self.scenarios.iter().find(|judged| judged.scenario == scenario).map_or(0, |judged| judged.repeated)
     }
@@ -144,8 +147,8 @@ impl Judge {
         judged.map(|judged| (judged.scenario.as_str(), judged.overridden.as_slice()))
     }
 
-    /// Returns the scenarios that ask what the system under test prevents, and in which it never acted, with the action that is missing and their numbers of
-    /// samples.
+    /// Returns the scenarios that ask what the system under test prevents, and in which it never
+    /// acted, with the action that is missing and their numbers of samples.
     pub fn without_action(&self) -> impl Iterator<Item = (&str, &'static str, u64)> {
         let is_told = |judged: &Judged| self.is_paired || judged.function == Function::Mis;
         let idle = move |judged: &&Judged| {
@@ -204,7 +207,8 @@ impl Judge {
         Evidence { is_paired, is_varied, is_built_in, inference }
     }
 
-    /// Returns how each requirement fares in each scenario that names it, in the order of the marks.
+    /// Returns how each requirement fares in each scenario that names it, in the order of the
+    /// marks.
     pub fn requirements(&self, gates: &[GateResult]) -> Vec<RequirementResult> {
         let mut results = Vec::new();
         for judged in &self.scenarios {
@@ -250,8 +254,8 @@ fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String>
 }
 
 impl Judged {
-    /// A run that the ego's collision ended counts as one in which everything happened: what it would have come to is not
-    /// known, and it is no pass.
+    /// A run that the ego's collision ended counts as one in which everything happened. Its further
+    /// course is unknown, and the collision itself is no pass.
     fn observe_expectations(&mut self, record: &Record) {
         if record.arms.iter().any(|arm| arm.result.is_err()) {
             return;

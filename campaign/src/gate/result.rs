@@ -114,7 +114,8 @@ impl Evaluation {
     }
 }
 
-/// Returns a number of samples with its first two digits, rounded up: the rest of it rests on a share that is not known better.
+/// Returns a number of samples with its first two digits, rounded up. The share behind the number
+/// is not known more precisely.
 fn rounded_up(samples: u64) -> u64 {
     let step = samples.checked_ilog10().and_then(|digits| digits.checked_sub(1)).map_or(1, |digits| 10_u64.pow(digits));
     samples.div_ceil(step) * step
@@ -145,7 +146,8 @@ pub struct ExpectationResult {
     pub scenario: String,
     /// What is expected.
     pub expects: Vec<FlagName>,
-    /// Samples in which all of it happened, in every arm; a run that the ego's collision ended counts.
+    /// Samples in which all of it happened, in every arm; a run that the ego's collision ended
+    /// counts.
     pub happened: u64,
     /// Samples with an outcome in every arm.
     pub samples: u64,

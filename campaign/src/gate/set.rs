@@ -42,7 +42,8 @@ impl fmt::Display for GateSource {
     }
 }
 
-/// One criterion with its origin. It is judged on the samples of each scenario, one scenario at a time.
+/// One criterion with its origin. It is judged on the samples of each scenario, one scenario at a
+/// time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateSpec {
     /// The criterion.
@@ -100,19 +101,19 @@ impl GateSet {
         set
     }
 
-    /// Adds a criterion, unless one with the same left-hand side is there already: what is added first wins.
+    /// Adds a criterion, unless the set has one with the same left-hand side: the first one wins.
     pub fn push(&mut self, spec: GateSpec) {
         let subject = spec.expression.subject();
-        let is_known = |known: &GateSpec| {
-            known.expression.subject() == subject && known.expression.operator == spec.expression.operator
+        let is_known = |gate: &GateSpec| {
+            gate.expression.subject() == subject && gate.expression.operator == spec.expression.operator
         };
         if !self.specs.iter().any(is_known) {
             self.specs.push(spec);
         }
     }
 
-    /// Returns the gates of one scenario: those of the campaign, those of its file that these do not replace, and the checks
-    /// of its requirements.
+    /// Returns the gates of one scenario: the gates of the campaign, the gates of its file that
+    /// these do not replace, and the checks of its requirements.
     pub fn of_scenario(&self, file: &ScenarioFile) -> Vec<GateSpec> {
         let mut set = Self { specs: self.specs.clone(), ..Self::default() };
         for &expression in &file.config().gate.require {

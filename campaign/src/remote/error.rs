@@ -114,6 +114,7 @@ impl RemoteError {
 pub struct EngineError {
     /// What has failed.
     pub message: String,
-    /// True if the cluster cannot be used as it is: another version of the program, a missing file. False if it has failed.
+    /// True if the cluster cannot be used as it is: another version of the program, a missing file.
+    /// False if it has failed.
     pub is_input: bool,
 }

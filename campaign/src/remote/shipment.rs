@@ -1,5 +1,5 @@
-//! What a machine needs to run blocks of a campaign: the manifest, which holds the scenarios with their recorded traffic, and
-//! the files that the commands of controllers name.
+//! What a machine needs to run blocks of a campaign: the manifest, which holds the scenarios with
+//! their recorded traffic, and the files that the commands of controllers name.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -20,7 +20,7 @@ pub struct Shipment {
     pub manifest: String,
     /// The controllers of the program that has Closecall as a library. The engine ships them.
     pub controllers: Vec<String>,
-    /// The files that controllers name by a relative path: those of commands, libraries and FMUs.
+    /// The files that controllers name by a relative path: files of commands, libraries and FMUs.
     pub files: Vec<ShippedFile>,
 }
 
@@ -44,7 +44,8 @@ impl Shipment {
         let hosted = |arm: &&ControllerChoice| matches!(arm, ControllerChoice::Hosted(_));
         let mut files: Vec<ShippedFile> = Vec::new();
         for (name, path) in manifest.arms.iter().flat_map(named) {
-            // A program that was found by the search path, or has an absolute path, is a matter of each machine.
+            // A program that was found by the search path, or has an absolute path, is a matter of
+            // each machine.
             if is_within(&name) && Path::new(&name) == path && files.iter().all(|file| file.name != name) {
                 let fail = |source| RemoteError::File { path: path.clone(), source };
                 let is_executable = is_executable(&fs::metadata(&path).map_err(fail)?);
@@ -59,7 +60,8 @@ impl Shipment {
         })
     }
 
-    /// Writes the files into a new folder, which is removed when the value is dropped; `None` if there are none.
+    /// Writes the files into a new folder, which is removed when the value is dropped; `None` if
+    /// there are none.
     pub(super) fn unpack(&self) -> Result<Option<TempDir>, RemoteError> {
         if self.files.is_empty() {
             return Ok(None);

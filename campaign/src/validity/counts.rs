@@ -78,21 +78,21 @@ pub struct CheckCounts {
 
 impl CheckCounts {
     /// Adds the findings about one run. `collided` says whether the ego collided in that run.
-    pub fn push(&mut self, found: &ArmChecks, collided: bool) {
-        match found.not_checked {
+    pub fn push(&mut self, checks: &ArmChecks, collided: bool) {
+        match checks.not_checked {
             Some(_) => self.not_checked += 1,
             None => self.runs += 1,
         }
-        self.flips += u64::from(found.collided_at_half_step.is_some_and(|halved| halved != collided));
-        for &check in &found.broken {
+        self.flips += u64::from(checks.collided_at_half_step.is_some_and(|halved| halved != collided));
+        for &check in &checks.broken {
             self.count(check);
         }
     }
 
     /// Counts a failure of a check.
     pub fn count(&mut self, check: Invariance) {
-        for (count, known) in self.counts.iter_mut().zip(Invariance::ALL) {
-            *count += u64::from(known == check);
+        for (count, kind) in self.counts.iter_mut().zip(Invariance::ALL) {
+            *count += u64::from(kind == check);
         }
     }
 

@@ -1,4 +1,5 @@
-//! A simulated worker process: it answers from a table of true records, unless the schedule has a fault for it.
+//! A simulated worker process: it answers from a table of true records, unless the schedule has a
+//! fault for it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::os::unix::process::ExitStatusExt;
@@ -234,7 +235,8 @@ impl Process {
 }
 
 impl Peer for Process {
-    /// As the process of the operating system: what has arrived before the question is a line that nobody has asked for.
+    /// As the process of the operating system: what has arrived before the question is a line that
+    /// nobody has asked for.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         let shared = Arc::clone(&self.state);
         let mut state = lock(&shared);
