@@ -128,8 +128,8 @@ pub fn json(calibration: &Calibration, data: &FollowingData) -> Value {
     })
 }
 
-/// Returns a member of a driver ensemble with the pooled parameters, as the text of its file. It leaves headway and desired
-/// speed to the scenario: they are those of the recorded traffic.
+/// Returns a member of a driver ensemble with the pooled parameters, as the text of its file. It
+/// leaves headway and desired speed to the scenario, which has the values of the recorded traffic.
 pub fn member(calibration: &Calibration, data: &FollowingData, command: &str) -> String {
     let model = calibration.model.name();
     let files: Vec<String> = data

@@ -40,7 +40,7 @@ pub struct Still {
     pub sample: u64,
     /// The verdict on the pair, or on the only run.
     pub verdict: &'static str,
-    /// What happened in the arm under test and why, in one sentence.
+    /// The event in the arm under test and its cause, in one sentence.
     pub sentence: String,
     /// The picture, as SVG.
     pub svg: String,
@@ -77,8 +77,8 @@ pub(super) struct Recorded {
     pub(super) failures: Vec<(String, ReportError)>,
 }
 
-/// Runs the selected samples again, records all arms of each in one file, and writes the page. A sample that cannot be recorded costs
-/// no other.
+/// Runs the selected samples again, records all arms of each in one file, and writes the page. A
+/// sample that cannot be recorded costs no other.
 pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
@@ -87,7 +87,7 @@ pub(super) fn record(
 ) -> Result<Recorded, ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
-    // An earlier, identical campaign may have recorded other samples.
+    // A previous identical campaign may have recorded other samples.
     if path.try_exists().map_err(|source| WriteError::new(&path, source))? {
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
@@ -125,7 +125,8 @@ pub(super) fn record(
     Ok(recorded)
 }
 
-/// Returns the selected samples with their scenarios: the worst of each kind first, then those of each scenario.
+/// Returns the selected samples with their scenarios: first the worst of each kind, then the
+/// samples of each scenario.
 fn choose<'a>(
     saved: &SavedCampaign,
     scenarios: &[&'a ScenarioFile],
@@ -175,10 +176,10 @@ fn record_one(
     let films: Vec<Film> = films.into_iter().map(named).collect();
     let file = format!("{scenario}-{sample}.rrd");
     let is_paired = films.len() > 1;
-    // The folder may be moved: the command names it from the folder of the page.
+    // The folder may be moved, so the command names it relative to the folder of the page.
     let replay_from = |folder| {
-        let of = SavedSample { folder, sample, scenario: Some(scenario) };
-        command_for(&Action::Replay(Replay { is_paired, recording: Some(&file), ..Replay::new(of) }))
+        let saved_sample = SavedSample { folder, sample, scenario: Some(scenario) };
+        command_for(&Action::Replay(Replay { is_paired, recording: Some(&file), ..Replay::new(saved_sample) }))
     };
     let replay = replay_from("..");
     let story = films.iter().flat_map(|film| {

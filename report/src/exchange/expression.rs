@@ -1,7 +1,7 @@
 //! Values of attributes: numbers, parameters, and expressions of both.
 //!
-//! OpenSCENARIO names a parameter `$name` and writes an expression `${$name * 2}`. Names have underscores where those of
-//! Closecall have hyphens.
+//! OpenSCENARIO names a parameter `$name` and writes an expression `${$name * 2}`. Names have
+//! underscores in place of Closecall's hyphens.
 
 use std::fmt;
 use std::ops::{Add, Div, Mul, Sub};

@@ -28,7 +28,7 @@ const OWN_STYLE: &str = include_str!("explorer.css");
 const SCRIPT: &str = include_str!("explorer.js");
 /// Number of histograms.
 const HISTOGRAMS: usize = 4;
-/// The number in the command of a sample that the page replaces by that of the chosen sample.
+/// The sample number in a command. The page replaces it by the number of the chosen sample.
 const PLACE: u64 = 9_876_543_210;
 
 /// What the script reads.
@@ -51,7 +51,8 @@ struct FateStyle {
     colour: String,
 }
 
-/// Returns the page of a campaign. If it is served, it asks for the samples that are chosen.
+/// Returns the page of a campaign. If the page is served, it asks the server for the chosen
+/// samples.
 ///
 /// # Errors
 /// [`ReportError`] if the folder cannot be read.
@@ -74,8 +75,8 @@ pub fn explorer_page(saved: &SavedCampaign, is_served: bool, command_for: Comman
     }
     let command = |file: &ScenarioFile| {
         let scenario = (files.len() > 1).then_some(file.config().name.as_str());
-        let of = SavedSample { folder: ".", sample: PLACE, scenario };
-        command_for(&Action::Replay(Replay { is_paired: arms.len() > 1, ..Replay::new(of) }))
+        let saved_sample = SavedSample { folder: ".", sample: PLACE, scenario };
+        command_for(&Action::Replay(Replay { is_paired: arms.len() > 1, ..Replay::new(saved_sample) }))
     };
     let style =
         |fate: Fate| FateStyle { pair: fate.word(true), single: fate.word(false), colour: css(fate_colour(fate)) };

@@ -1,4 +1,5 @@
-//! The counts: how often the ego collides in each arm, how sure that is, and what the system under test changes.
+//! The counts: how often the ego collides in each arm, the confidence of this rate, and the changes
+//! by the system under test.
 
 use super::super::text::{goals, imposed, not_prevented};
 use std::io;

@@ -1,5 +1,5 @@
-//! The page of a campaign's recordings: a picture of each critical moment beside its numbers, and the commands that open
-//! the recording and run the sample again.
+//! The page of a campaign's recordings: a picture of each critical moment beside its numbers, and
+//! the commands that open the recording and run the sample again.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -78,7 +78,8 @@ fn page(entries: &[IndexEntry], command_for: CommandFor) -> Markup {
 /// Filters the entries, and moves the vehicles.
 const SCRIPT: &str = include_str!("recordings.js");
 
-/// Returns the choices by which the entries can be filtered: verdict, scenario, and the arm whose ego collides.
+/// Returns the choices by which the entries can be filtered: verdict, scenario, and the arm whose
+/// ego collides.
 fn filters(entries: &[IndexEntry]) -> Markup {
     let arms = entries.iter().flat_map(|entry| &entry.outcomes).map(|outcome| outcome.controller.clone());
     let choices: [(&str, &str, BTreeSet<String>); 3] = [

@@ -108,7 +108,8 @@ impl InfluenceCounts {
             let Some(happened) = event.of(record) else { continue };
             for (counts, class) in counts.iter_mut().zip(&of_parameters) {
                 if let Some(class) = class {
-                    // The points of a low-discrepancy sequence have a pattern in their numbers: a hash has none.
+                    // The points of a low-discrepancy sequence have a pattern in their numbers: a
+                    // hash has none.
                     counts.push(*class, split_mix(record.sample), happened);
                 }
             }
@@ -133,14 +134,14 @@ impl InfluenceCounts {
 
     fn of_event(&self, event: Event, counts: &[ClassCounts]) -> EventInfluence {
         let [samples, events] = counts.first().map_or([0; 2], ClassCounts::total);
-        let found = self
+        let parameters = self
             .parameters
             .iter()
             .zip(counts)
             .filter_map(|((name, _), counts)| Some((name.clone(), counts.influence()?)));
-        let mut found: Vec<(String, Influence)> = found.collect();
-        found.sort_by(|(_, a), (_, b)| b.index.value.total_cmp(&a.index.value));
-        EventInfluence { event, samples, events, parameters: (!found.is_empty()).then_some(found) }
+        let mut parameters: Vec<(String, Influence)> = parameters.collect();
+        parameters.sort_by(|(_, a), (_, b)| b.index.value.total_cmp(&a.index.value));
+        EventInfluence { event, samples, events, parameters: (!parameters.is_empty()).then_some(parameters) }
     }
 }
 
@@ -154,10 +155,11 @@ impl EventInfluence {
     }
 }
 
-/// Returns the class of a parameter's value: one of equally probable parts of its distribution, or its label.
+/// Returns the class of a parameter's value: one of equally probable parts of its distribution, or
+/// its label.
 fn class(name: &str, distribution: &Distribution, parameters: &Parameters) -> Option<usize> {
-    match parameters.iter().find(|(known, _)| known.as_str() == name)?.1 {
-        Value::Label(label) => distribution.labels().iter().position(|known| known == label),
+    match parameters.iter().find(|(parameter, _)| parameter.as_str() == name)?.1 {
+        Value::Label(label) => distribution.labels().iter().position(|candidate| candidate == label),
         Value::Number(value) => {
             let share = distribution.cdf(*value)? * CLASSES as f64;
             #[expect(
