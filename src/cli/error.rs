@@ -77,7 +77,7 @@ pub enum CliError {
     Results(FolderError),
     /// The default folder of a campaign's results holds only the first of them.
     #[error(
-        "{0}\nthe campaign went on without its folder: the verdict counts every sample, and --resume runs those again that are not kept"
+        "{0}\nthe campaign went on without its folder: the verdict counts every sample, and --resume runs the samples again that are not kept"
     )]
     ResultsCut(WriteError),
     /// A file cannot be written.

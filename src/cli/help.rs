@@ -1,6 +1,7 @@
-//! The form of each command's help: options under headings that name a purpose, and three examples at the end.
+//! The form of each command's help: options under headings that name a purpose, and three examples
+//! at the end.
 
-/// The headings of options, each the purpose of what stands under it.
+/// The headings of options. Each names the purpose of its options.
 pub(super) mod heading {
     /// The scenario, and changes of it.
     pub(in crate::cli) const SCENARIO: &str = "Scenario";

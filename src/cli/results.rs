@@ -1,8 +1,9 @@
-//! Where a campaign keeps its results: in the folder of `--out`, nowhere with `--no-out`, else in `closecall-results`.
+//! Where a campaign keeps its results: in the folder of `--out`, nowhere with `--no-out`, else in
+//! `closecall-results`.
 //!
-//! Nobody has asked for the default folder. If it cannot be written, because the disk is full or the working folder read-only, the
-//! campaign goes on without it, prints its verdict, and ends with the exit code of a file that cannot be written. If something
-//! else is at its path, nothing runs.
+//! Nobody has asked for the default folder. If it cannot be written, because the disk is full or
+//! the working folder read-only, the campaign goes on without it, prints its verdict, and ends with
+//! the exit code of a file that cannot be written. If something else is at its path, nothing runs.
 
 use std::path::{Path, PathBuf};
 
@@ -40,8 +41,9 @@ const OPEN: &str = if cfg!(target_os = "macos") {
 /// Where a campaign keeps its results.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ResultsArgs {
-    /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and recordings. It must be new or empty
-    /// [default: closecall-results, which replaces the last results there; these become closecall-results.previous]
+    /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and
+    /// recordings. It must be new or empty [default: closecall-results, which replaces the last
+    /// results there; these become closecall-results.previous]
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Keep no results, only print them
@@ -84,7 +86,8 @@ impl ResultsArgs {
         SavedCampaign::open(folder).ok().map(|saved| saved.manifest().clone())
     }
 
-    /// Returns the place of the results. A caller in its own process, such as a Python program, has no default folder.
+    /// Returns the place of the results. A caller in its own process, such as a Python program, has
+    /// no default folder.
     pub(super) fn place(&self) -> Result<Place<'_>, CliError> {
         match &self.out {
             Some(path) => Ok(Place::Named(path)),
@@ -100,8 +103,8 @@ impl ResultsArgs {
 /// What a missing report means.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct ArtifactArgs {
-    /// End with the exit code of the failure if a report or a recording cannot be written. Without it, that is a warning, and the
-    /// verdict decides
+    /// End with the exit code of the failure if a report or a recording cannot be written. Without
+    /// it, that is a warning, and the verdict decides
     #[arg(long, help_heading = heading::OUTPUT)]
     strict_artifacts: bool,
 }
@@ -112,8 +115,8 @@ impl ArtifactArgs {
         self.strict_artifacts
     }
 
-    /// Prints a warning for each report or recording that could not be written. Returns the exit code, if `verdict` is that of the
-    /// verdict.
+    /// Prints a warning for each report or recording that could not be written. Returns the exit
+    /// code. `verdict` is the code of the verdict.
     pub(super) fn code(self, verdict: ExitCode, written: &Written) -> ExitCode {
         for failure in &written.failures {
             print_error(format_args!("warning: {failure}\n"));
@@ -223,19 +226,20 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
     Ok(taken.locked)
 }
 
-/// Returns the samples to record: those of the command line, else the worst of each kind. These are not recorded if the environment
-/// switches recordings off.
+/// Returns the samples to record: the samples of the command line, else the worst of each kind. The
+/// environment can switch off the latter recordings.
 pub(super) fn selection(named: Option<Selection>) -> Selection {
     named.unwrap_or_else(|| Selection { each_kind: is_recording_enabled(), ..Selection::default() })
 }
 
-/// Returns true if a campaign can do without its default folder: the folder cannot be written. Else something is in the way, of
-/// which the user should know before anything runs.
+/// Returns true if a campaign can do without its default folder: the folder cannot be written. Else
+/// something is in the way, of which the user should know before anything runs.
 fn may_go_on(error: &FolderError) -> bool {
     matches!(error, FolderError::Write(_))
 }
 
-/// Prints to standard error which files a campaign has written, and the commands that open its report and its recordings.
+/// Prints to standard error which files a campaign has written, and the commands that open its
+/// report and its recordings.
 pub(super) fn print_results(folder: &Folder, recorded: &[RecordedSample]) {
     print_report_files(folder);
     let word = |path: &Path| quoted(&path.display().to_string());

@@ -296,7 +296,7 @@ fn the_name_of_a_grouped_command_alone_is_answered_with_its_whole_name() {
         let output = closecall([name.as_str(), "file.csv", "--format", "json"]);
         assert_eq!(code(&output), 2, "{name}");
         let said = stderr(&output);
-        assert!(said.starts_with(&format!("error: the command is now `closecall {whole}`\n")), "{said}");
+        assert!(said.starts_with(&format!("error: the command is `closecall {whole}`\n")), "{said}");
     }
     let elsewhere = stderr(&closecall(["traffic", "merge", "a", "b"]));
     assert!(elsewhere.contains("`closecall tool merge`"), "{elsewhere}");
