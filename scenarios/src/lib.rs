@@ -5,13 +5,14 @@
 //!          text, checked keys                         numbers, checked ranges
 //! ```
 //!
-//! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled. The parameter values of
-//! one sample turn it into a *concrete* scenario, [`Scenario`], which is valid by construction.
+//! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled.
+//! The parameter values of one sample turn it into a *concrete* scenario, [`Scenario`], which is
+//! valid by construction.
 //!
 //! * [`parameters`], [`sampling`]: the distributions of the parameters, and the designs that draw from them
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall
-//! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
-//! * [`criteria`]: what a file asks of the outcomes
+//! * [`outcome`], [`harm`], [`causal`]: the results of a run
+//! * [`criteria`]: the demands of a file on the outcomes
 //! * [`openscenario`]: scenarios of OpenSCENARIO XML, as scenario files
 
 mod actor;

@@ -1,8 +1,9 @@
-//! Settings of the command line that weaken what a scenario is judged by.
+//! Settings of the command line that weaken the criteria of a scenario.
 //!
-//! `--set` may change every value. If it removes a check, moves its bound to the easier side, or asks for less to happen, the scenario that is judged
-//! is not the one that the file states. The text then names what was weakened, under the key `overridden`, so that a saved campaign, a part of it and a
-//! replay know it as well.
+//! `--set` may change every value. If it removes a check, moves its bound to the easier side, or
+//! asks for less to happen, the judged scenario differs from the scenario of the file. The text
+//! then names the weakened demands, under the key `overridden`, and a saved campaign, a part of it
+//! and a replay know them as well.
 
 use super::ScenarioConfig;
 use crate::criteria::{Expression, Operator};
@@ -12,25 +13,25 @@ pub(super) const KEY: &str = "overridden";
 
 /// Returns what `after` demands less than `before`.
 pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
-    let mut found = before.overridden.clone();
+    let mut weakenings = before.overridden.clone();
     for (mark, asked) in &before.checks {
         let kept = after.checks.get(mark).map_or(&[][..], Vec::as_slice);
         let is_kept = |old: &Expression| kept.iter().any(|new| is_as_strict(new, old));
-        found.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
+        weakenings.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
     }
     let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
-    found.extend(requirements.map(|mark| format!("requirement {mark}")));
+    weakenings.extend(requirements.map(|mark| format!("requirement {mark}")));
     let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
-    found.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
+    weakenings.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
-    found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
+    weakenings.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
     let observed = before.parameters.0.iter().filter(|(name, parameter)| {
         let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
         parameter.observed.is_some() && kept.is_some_and(|kept| Some(kept) != parameter.observed.as_ref())
     });
-    found.extend(observed.map(|(name, _)| format!("observed range of {name}")));
-    found
+    weakenings.extend(observed.map(|(name, _)| format!("observed range of {name}")));
+    weakenings
 }
 
 fn is_as_strict(new: &Expression, old: &Expression) -> bool {
@@ -70,8 +71,8 @@ mod tests {
             ("expects-share=0.1", "expects-share 0.95"),
             ("parameters.closing-mps.observed.max=14", "observed range of closing-mps"),
         ] {
-            let found = overridden(&[setting]);
-            assert!(found.iter().any(|what| what.starts_with(part)), "{setting}: {found:?}");
+            let weakenings = overridden(&[setting]);
+            assert!(weakenings.iter().any(|weakening| weakening.starts_with(part)), "{setting}: {weakenings:?}");
         }
     }
 

@@ -10,10 +10,12 @@
 //!  operator  = "<=" | ">="
 //! ```
 //!
-//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is at least 1 s.
-//! `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in which the ego collides without the system,
-//! more than half are prevented with 95 % confidence. `lower` and `upper` are the exact one-sided bounds of a share.
-//! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s² in at most 5 % of the samples.
+//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is
+//! at least 1 s. `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in
+//! which the ego collides without the system, more than half are prevented with 95 % confidence.
+//! `lower` and `upper` are the exact one-sided bounds of a share.
+//! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s²
+//! in at most 5 % of the samples.
 
 use std::fmt;
 use std::str::FromStr;
@@ -64,7 +66,7 @@ pub enum Side {
 pub struct Comparison {
     /// The number.
     pub measure: &'static Measure,
-    /// Whether it is that of the baseline, and not that of the arm under test.
+    /// Whether the measure is taken in the baseline, instead of the arm under test.
     pub in_baseline: bool,
     /// Where the flag holds.
     pub side: Side,
@@ -73,7 +75,8 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Returns 1 if a value lies beyond the threshold, and 0 if not. What is not a number stays so, and satisfies no gate.
+    /// Returns 1 if a value lies beyond the threshold, and 0 if not. What is not a number stays so,
+    /// and satisfies no gate.
     pub fn of(&self, value: f64) -> f64 {
         let holds = match self.side {
             Side::Above => value > self.threshold,
@@ -106,7 +109,7 @@ impl Quantity {
         }
     }
 
-    /// Returns the measure, and whether it is that of the baseline; `None` for a flag of the pair.
+    /// Returns the measure, and whether it is taken in the baseline; `None` for a flag of the pair.
     pub const fn measure(self) -> Option<(&'static Measure, bool)> {
         match self {
             Self::Tested(measure) => Some((measure, false)),
@@ -164,19 +167,21 @@ impl Expression {
         self.quantity.needs_pairs() || self.condition.is_some_and(Quantity::needs_pairs)
     }
 
-    /// Returns the arms of which the gate judges what they report of themselves: the baseline, and the arm under test.
+    /// Returns the arms whose own reports the gate judges: the baseline, and the arm under test.
     pub fn reported_by(&self) -> [bool; 2] {
         let quantities = || std::iter::once(self.quantity).chain(self.condition);
         let reports = |by_baseline: bool| {
-            let reported = |of: Quantity| {
-                of.measure().is_some_and(|(measure, in_baseline)| in_baseline == by_baseline && measure.is_reported())
+            let reported = |quantity: Quantity| {
+                quantity
+                    .measure()
+                    .is_some_and(|(measure, in_baseline)| in_baseline == by_baseline && measure.is_reported())
             };
             quantities().any(reported)
         };
         [reports(true), reports(false)]
     }
 
-    /// Returns the left-hand side, which identifies what is judged.
+    /// Returns the left-hand side, which identifies the judged quantity.
     pub fn subject(&self) -> String {
         let condition = self.condition.map_or_else(String::new, |condition| format!(" | {condition}"));
         format!("{}({}{condition})", self.aggregate, self.quantity)
@@ -253,8 +258,8 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
         _ => match name.strip_prefix('p').and_then(|percent| percent.parse::<f64>().ok()) {
             Some(percent) if (0.0..=100.0).contains(&percent) => Aggregate::Percentile(percent),
             _ => {
-                let known = "count, share, lower, upper, min, max, mean, sum, and p0 to p100";
-                return Err(format!("`{name}` is not an aggregate; there are {known}"));
+                let names = "count, share, lower, upper, min, max, mean, sum, and p0 to p100";
+                return Err(format!("`{name}` is not an aggregate; there are {names}"));
             }
         },
     })

@@ -1,8 +1,9 @@
 //! Sampling designs: the parameter values of sample 0, 1, 2 …
 //!
-//! For each sample and parameter, a design chooses one number u in [0, 1), and the quantile function of the parameter
-//! ([`crate::parameters`]) maps it to a value. Every design is addressed by the sample index, so that each sample can
-//! be computed alone, in any order and on any thread, always with the same bits.
+//! For each sample and parameter, a design chooses one number u in [0, 1), and the quantile
+//! function of the parameter ([`crate::parameters`]) maps it to a value. Every design is addressed
+//! by the sample index, so that each sample can be computed alone, in any order and on any thread,
+//! always with the same bits.
 //!
 //! | design   | number u of sample k                                                     | depends on sample count n |
 //! |----------|--------------------------------------------------------------------------|---------------------------|
@@ -10,8 +11,8 @@
 //! | `sobol`  | Sobol sequence, Owen-scrambled by the seed, one dimension for each name  | no                        |
 //! | `grid`   | midpoints of equally probable parts, in all combinations                 | yes                       |
 //!
-//! Parameters that state rank correlations ([`crate::parameters`]) are coupled in `random` and `sobol`. A grid covers all
-//! combinations of its levels, whatever their correlation.
+//! Parameters that state rank correlations ([`crate::parameters`]) are coupled in `random` and
+//! `sobol`. A grid covers all combinations of its levels, whatever their correlation.
 
 mod design;
 mod grid;

@@ -5,8 +5,8 @@ use std::str::FromStr;
 use super::exec::NAME as EXEC;
 use super::{ControllerChoice, UnknownController};
 
-/// Controllers as they are given to one `--arms`: separated by commas. A command may contain commas, so that `exec:COMMAND`
-/// takes the rest of the list.
+/// Controllers as they are given to one `--arms`: separated by commas. A command may contain
+/// commas, so that `exec:COMMAND` takes the rest of the list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ArmList(pub Vec<ControllerChoice>);
 

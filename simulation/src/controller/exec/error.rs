@@ -3,9 +3,10 @@
 use std::io;
 use std::process::ExitStatus;
 
-/// Why a process did not give a valid answer. The process has been killed, and the sample has no outcome.
+/// Why a process did not give a valid answer. The process has been killed, and the sample has no
+/// outcome.
 ///
-/// The messages depend on what the process did, not on how long it took, so that they are reproducible.
+/// The messages depend on the actions of the process, not on their duration: they are reproducible.
 #[derive(Debug, thiserror::Error)]
 pub enum ExecError {
     /// The quotes of the command do not match, or the command is empty.
@@ -67,14 +68,14 @@ pub enum ExecError {
         line: String,
     },
     /// The process answered another question than the one it was asked.
-    #[error("the process answered {line:?} for the control step at {found} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
+    #[error("the process answered {line:?} for the control step at {answer} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
     OtherStep {
         /// The beginning of the line.
         line: String,
         /// The time of the control step (ns).
         expected: i64,
         /// The time that the answer repeats.
-        found: String,
+        answer: String,
         /// Number of answers before, including the greeting.
         answered: u64,
     },
@@ -93,7 +94,7 @@ pub enum ExecError {
         reason: String,
     },
     /// A key is absent, or its value has the wrong type.
-    #[error("the process answered {line:?}: `{key}` must be {expected}, it is {found}")]
+    #[error("the process answered {line:?}: `{key}` must be {expected}, it is {answer}")]
     Key {
         /// The beginning of the line.
         line: String,
@@ -102,7 +103,7 @@ pub enum ExecError {
         /// What is allowed.
         expected: &'static str,
         /// What was found.
-        found: String,
+        answer: String,
     },
     /// The acceleration is not a finite number.
     #[error("the process asked for an acceleration of {value} m/s², which is not a finite number")]
@@ -111,12 +112,12 @@ pub enum ExecError {
         value: String,
     },
     /// The process uses another version of the protocol.
-    #[error("the process speaks version {found} of the protocol, this is version {own}")]
+    #[error("the process speaks version {answer} of the protocol, this is version {expected}")]
     Version {
         /// The version of the process.
-        found: String,
+        answer: String,
         /// The version of Closecall.
-        own: u32,
+        expected: u32,
     },
     /// The process exceeded its memory limit.
     #[error("the process holds more than the {limit_mib} MiB of memory allowed")]
@@ -133,7 +134,8 @@ impl ExecError {
     }
 }
 
-/// Describes when an error happened by the number of answers before it. The first answer is the greeting.
+/// Describes when an error happened by the number of answers before it. The first answer is the
+/// greeting.
 fn when(answered: u64) -> String {
     match answered {
         0 => "before its greeting".to_owned(),
