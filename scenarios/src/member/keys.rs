@@ -49,7 +49,7 @@ pub(super) fn unknown(key: &str) -> Option<String> {
     if all().any(|key_name| key_name == key) {
         return None;
     }
-    let key_name: Vec<String> = all().map(|key_name| format!("`{key_name}`")).collect();
+    let names: Vec<String> = all().map(|key_name| format!("`{key_name}`")).collect();
     let names = names.join(", ");
     Some(format!("expected one of {names}{}", hint(key, &names)))
 }

@@ -1,4 +1,5 @@
-//! `docs/reference/output.md` against the files, columns and keys that small campaigns and runs write.
+//! `docs/reference/output.md` against the files, columns and keys that small campaigns and runs
+//! write.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -45,8 +46,8 @@ fn columns(path: &Path) -> Vec<[String; 3]> {
     columns.collect()
 }
 
-/// The documented columns of a table, each with its type and its unit. A value that may be absent has its reason in a
-/// column of its own behind it.
+/// The documented columns of a table, each with its type and its unit. A value that may be absent
+/// has its reason in a column of its own behind it.
 fn documented_columns(table: &str) -> Vec<[String; 3]> {
     let rows = rows(&format!("columns: {table} -->"));
     let columns = rows.iter().flat_map(|cells| {
@@ -83,7 +84,7 @@ fn the_columns_of_a_campaign_s_tables_are_those_documented() {
         assert!(parameters.iter().any(|[_, written, _]| written == kind), "no parameter is a {kind}");
     }
     assert!(parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, known, _]| known == kind)));
-    // The unit of this table stands in Arrow's metadata alone.
+    // Only Arrow's metadata state the unit of this table.
     let names = |columns: Vec<[String; 3]>| columns.into_iter().map(|[name, kind, _]| [name, kind]).collect::<Vec<_>>();
     for table in ["timings.parquet", "arm_pairs.parquet"] {
         assert_eq!(names(columns(&out.join(table))), names(documented_columns(table)));
@@ -147,8 +148,8 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let (headline, harmless) = (headline.to_str().unwrap(), harmless.to_str().unwrap());
     let both = ["campaign", headline, harmless, "-n", "10", "--seed", "1", "--set", "duration-s=60"];
     let with = |more: &[&str], code| program(&[&both[..], more].concat(), code);
-    // Few samples leave a strict bound open; a loose one is certain after some of them, which the clock may not decide.
-    // They leave the requirements open in both.
+    // Few samples leave a strict bound open. A loose bound is certain after some of them, which the
+    // clock may not decide. They leave the requirements open in both.
     let open = with(&["--paired", "--max-probability", "0.2", "--out", &at("open"), "--record", "worst:1"], 4);
     let certain = with(&["--paired", "--max-probability", "0.6", "--until-certain"], 4);
     // A flag has an interval and a percentile has none; the last gate needs more samples.

@@ -1,4 +1,5 @@
-//! The search for what a test needs. Each function says that the test is skipped if it finds nothing.
+//! The search for the requirements of a test. Each function says that the test is skipped if it
+//! finds nothing.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -50,8 +51,8 @@ pub fn has_python() -> bool {
     found(runs("python3", "--version"), Need::Python, "python3 is not installed").is_some()
 }
 
-/// Returns a Python interpreter that has the packages `onnxruntime` and `numpy`: that of the environment in which the shared library of
-/// ONNX Runtime lies.
+/// Returns a Python interpreter with the packages `onnxruntime` and `numpy`, from the environment
+/// of the shared library of ONNX Runtime.
 ///
 /// # Panics
 /// As [`skip`].
@@ -60,8 +61,8 @@ pub fn python_with_onnxruntime() -> Option<PathBuf> {
     found(python_around(&onnxruntime()?, "numpy, onnxruntime"), Need::Python, reason)
 }
 
-/// Returns a Python interpreter that has the packages `rerun`, `datafusion`, `pandas` and `matplotlib`: that of the environment in which
-/// the Rerun viewer lies.
+/// Returns a Python interpreter with the packages `rerun`, `datafusion`, `pandas` and `matplotlib`,
+/// from the environment of the Rerun viewer.
 ///
 /// # Panics
 /// As [`skip`].
@@ -70,7 +71,8 @@ pub fn python_with_rerun() -> Option<PathBuf> {
     found(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
 }
 
-/// Returns the interpreter of the Python environment in which a file lies, if it has these packages.
+/// Returns the interpreter of the Python environment in which a file lies, if it has these
+/// packages.
 fn python_around(file: &Path, packages: &str) -> Option<PathBuf> {
     let mut programs = file.ancestors().map(|folder| folder.join("bin/python")).filter(|path| path.is_file());
     programs.find(|python| {
