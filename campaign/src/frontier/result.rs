@@ -65,7 +65,7 @@ impl Point {
             with += u64::from(collides_with);
         }
         let samples = lost_mps.len() as u64;
-        let share = |hits: u64, of: u64| {
+        let share = |hits: u64, trials: u64| {
             let interval_95 = clopper_pearson(hits, trials, COVERAGE);
             (trials > 0).then(|| Estimate { value: hits as f64 / trials as f64, interval_95 })
         };

@@ -84,7 +84,7 @@ fn failures(recordings: &[RecordedChanges], each: &[Robustness]) -> Vec<Vec<Stri
                 (_, Some(level)) => format!("{level} m/√s"),
                 (_, None) => "no level".to_owned(),
             };
-        std::iter::once(recording.name.clone()).chain((0..found.criteria.len()).map(level)).collect()
+        std::iter::once(recording.name.clone()).chain((0..robustness.criteria.len()).map(level)).collect()
     };
     recordings.iter().zip(each).map(row).collect()
 }

@@ -226,7 +226,7 @@ fn over_time(
     curves: &[(&str, &'static str)],
     value: impl Fn(&Frame, usize) -> Option<f64>,
 ) -> Vec<Curve<'static>> {
-    let curve = |film_index: usize, which: usize| {
+    let curve = |film_index: usize, curve_index: usize| {
         let (name, colour) = curves[curve_index];
         Curve {
             name: named(films, film_index, name),

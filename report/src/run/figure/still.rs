@@ -33,7 +33,7 @@ pub fn still(film: &Film) -> String {
     );
     strip::draw(&mut svg, (film, None), frame_index, (STRIP, REACH_M));
     let start = film.frames.first().map_or(0.0, |frame| frame.time.s());
-    let curve = |name: &str, colour, of: fn(&Frame) -> Option<f64>| Curve {
+    let curve = |name: &str, colour, value: fn(&Frame) -> Option<f64>| Curve {
         name: name.to_owned(),
         stroke: Stroke::solid(colour, 1.8),
         points: film.frames.iter().map(|frame| (frame.time.s(), value(frame))).collect(),
