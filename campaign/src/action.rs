@@ -1,7 +1,7 @@
 //! Actions that a user can take next, such as to run a sample again.
 //!
-//! A library knows what can be done, such as to run a sample again. The program that calls the
-//! library knows how its user asks for it, and passes a [`CommandFor`]. So no library names an
+//! A library knows the possible actions, such as to run a sample again. The program that calls the
+//! library knows how its user asks for them, and passes a [`CommandFor`]. So no library names an
 //! option of the command line.
 
 /// Returns the command by which the user of a program does something.

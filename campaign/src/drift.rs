@@ -256,8 +256,7 @@ mod tests {
     use super::*;
 
     /// Number of fitted values of each quantity, and the log-normal distribution that they come
-    /// from: median and standard deviation of the logarithm, close to those of the library's fitted
-    /// file.
+    /// from: median and standard deviation of the logarithm, close to the library's fitted file.
     const TRUTH: [(Quantity, usize, [f64; 2]); 6] = [
         (Quantity::CutOutThw, 40, [0.76, 0.58]),
         (Quantity::LaneChangeDuration, 30, [4.7, 0.38]),

@@ -180,7 +180,7 @@ impl EndMonitor {
         ControlFlow::Break(End::Campaign)
     }
 
-    /// Returns what has ended the campaign early, or `None` if nothing has.
+    /// Returns the reason for which the campaign ended early, or `None` if it did not.
     pub fn into_ending(self) -> Option<EarlyEnd> {
         self.ending
     }

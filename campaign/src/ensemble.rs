@@ -61,7 +61,7 @@ impl Quantity {
         !matches!(self, Self::HarmChange)
     }
 
-    /// Returns what one entry shows; `None` if the quantity is not defined.
+    /// Returns the value of one entry; `None` if the quantity is not defined.
     fn of(self, counts: &Counts, tested: usize) -> Option<Observed> {
         let share = |hits: u64, samples: u64| {
             (samples > 0)

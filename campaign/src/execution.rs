@@ -162,8 +162,8 @@ impl Campaign {
     /// Runs the samples that the folder's journal does not hold yet; all samples if there is no
     /// folder.
     ///
-    /// `on_record` receives every record in the order of the plan, those of the journal first. If
-    /// it breaks, the scenario or the campaign ends after that record.
+    /// `on_record` receives every record in the order of the plan, the records of the journal
+    /// first. If it breaks, the scenario or the campaign ends after that record.
     ///
     /// If [`Self::stop`] is set, no further sample starts, and the campaign ends with the samples
     /// that are done.

@@ -18,7 +18,7 @@ pub enum FailureKind {
     InvalidInput,
     /// A sample has no outcome.
     Sample,
-    /// What runs is not what the campaign began with.
+    /// The program, a file or a controller differs from the start of the campaign.
     Validity,
     /// A file or folder cannot be read or written.
     Io,

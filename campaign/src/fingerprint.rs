@@ -1,5 +1,5 @@
-//! What identifies a controller that runs as a process: the files that its command names, and what
-//! it states about itself. A campaign keeps it, so that a changed controller is noticed when the
+//! The identity of a controller that runs as a process: the files that its command names, and its
+//! own statements. A campaign keeps the identity, and a changed controller is noticed when the
 //! campaign is resumed or replayed.
 //!
 //! Files that the command does not name, such as the modules that a script imports, are not
@@ -45,9 +45,9 @@ pub struct Fingerprint {
 }
 
 impl Fingerprint {
-    /// Returns the fingerprint of a controller that runs in the given folder, or in that of this
-    /// program. The process is started once and greeted with the values of `scenario`. A process
-    /// that cannot be greeted has no identity.
+    /// Returns the fingerprint of a controller that runs in the given folder, or in the folder of
+    /// this program. The process is started once and greeted with the values of `scenario`. A
+    /// process that cannot be greeted has no identity.
     pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
         let hash = |(name, path): (String, PathBuf)| {
             // A file that cannot be read has no hash, and so differs from a readable file.
@@ -135,9 +135,9 @@ pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<St
     there.iter().filter_map(|earlier| Some(earlier.differences(same(earlier)?))).flatten().collect()
 }
 
-/// Returns the existing files that the command names, each as it is named and with its path: whole
-/// words, and what follows `=` in a word. The program is looked for in `PATH` if it is named
-/// without a folder.
+/// Returns the existing files that the command names, each with its name and its path: whole words,
+/// and the part of a word after `=`. The program is looked for in `PATH` if it is named without a
+/// folder.
 pub fn named_files(settings: &ExecSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     let words = settings.words().unwrap_or_default();
     let mut files: Vec<(String, PathBuf)> = Vec::new();

@@ -48,7 +48,7 @@ pub const RECORDINGS: &str = "recordings";
 /// The page of the recordings, in their folder.
 pub const RECORDINGS_PAGE: &str = "index.html";
 
-/// All files of a campaign's folder, without those of the recordings.
+/// All files of a campaign's folder, without its recordings.
 pub(crate) const FILES: [&str; 13] = [
     MANIFEST,
     JOURNAL,

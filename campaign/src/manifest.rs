@@ -154,7 +154,7 @@ pub struct Manifest {
     /// The controllers: the baseline first if there are several, the one under test last,
     /// references between them.
     pub arms: Vec<ControllerChoice>,
-    /// The sensors; those of each scenario if `None`.
+    /// The sensors; `None` for the sensors of each scenario.
     pub sensors: Option<SensorMode>,
     /// The samples that are checked for validity.
     pub checks: CheckPlan,
@@ -229,8 +229,8 @@ impl Manifest {
         texts.iter().filter_map(|text| text.parse().ok()).collect()
     }
 
-    /// Returns the manifest as JSON without what does not affect the outcomes: the command line,
-    /// whether it named a folder, the working folder, the paths of the scenario files, the
+    /// Returns the manifest as JSON without the parts that do not affect the outcomes: the command
+    /// line, whether it named a folder, the working folder, the paths of the scenario files, the
     /// partition, and the build of the program. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {

@@ -27,7 +27,7 @@ pub(crate) const MARGINS: [Margin; 5] = [
 /// to a collision.
 const PROBABILITIES: [(&str, f64); 4] = [("min", 0.0), ("p01", 0.01), ("p05", 0.05), ("p50", 0.5)];
 
-/// A change of a margin up to this much is no regression (s or m): it is below what a report shows.
+/// A change of a margin up to this much is no regression (s or m): no report shows it.
 const SMALLEST_CHANGE: f64 = 0.01;
 
 /// Quantiles of a margin, by name (s or m).

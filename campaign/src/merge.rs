@@ -1,5 +1,5 @@
-//! Merges the parts of a campaign. The merged journal equals that of one machine that ran the whole
-//! campaign.
+//! Merges the parts of a campaign. The merged journal equals the journal of one machine that ran
+//! the whole campaign.
 
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};

@@ -36,7 +36,7 @@ pub struct Plan {
     scenarios: Vec<ScenarioFile>,
     sampling: Sampling,
     controllers: Vec<ControllerChoice>,
-    /// The sensors; those of each scenario if `None`.
+    /// The sensors; `None` for the sensors of each scenario.
     pub sensors: Option<SensorMode>,
     /// The part of the samples that is run; all of them if `None`.
     pub partition: Option<Partition>,
@@ -113,7 +113,7 @@ impl Plan {
         })
     }
 
-    /// Uses these sensors instead of those of each scenario, if any are given.
+    /// Uses these sensors instead of the sensors of each scenario, if any are given.
     ///
     /// # Errors
     /// [`ScenarioError`] if a fault of a scenario could not act in this mode: the campaign would
@@ -182,8 +182,8 @@ impl Plan {
         Ok(std::iter::once(classifier).chain(models).collect())
     }
 
-    /// Returns what identifies the controllers that run as processes in the given folder, or in
-    /// that of this program.
+    /// Returns what identifies the controllers that run as processes in the given folder, or in the
+    /// folder of this program.
     fn fingerprints(&self, folder: Option<&Path>) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
         let fingerprint = |choice| Fingerprint::of_choice(choice, folder, nominal.as_ref());

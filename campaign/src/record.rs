@@ -1,4 +1,4 @@
-//! The record of one sample: what the journal of a campaign keeps.
+//! The record of one sample in the journal of a campaign.
 
 use closecall_scenarios::outcome::{IMPOSED_BRAKING_MPS2, Outcome};
 use closecall_simulation::SampleError;
@@ -62,8 +62,8 @@ impl ArmRecord {
         self.result.is_err() || self.checks.as_ref().is_some_and(|checks| checks.not_checked.is_some())
     }
 
-    /// Returns what this arm contributes to the counts, before the validity checks are taken into
-    /// account.
+    /// Returns the contribution of this arm to the counts, before the validity checks are taken
+    /// into account.
     pub fn tally(&self) -> Tally {
         match &self.result {
             Ok(outcome) => {
@@ -109,7 +109,7 @@ impl Record {
         self.arms.iter().filter_map(|arm| arm.checks.as_ref()).any(|checks| !checks.broken.is_empty())
     }
 
-    /// Returns what each arm contributes to the counts that are judged.
+    /// Returns the contribution of each arm to the judged counts.
     ///
     /// If halving the time step flips a verdict, the worse case for the system under test counts:
     /// the arm under test counts as collided, the baseline and the references as not collided.

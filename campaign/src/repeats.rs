@@ -34,7 +34,7 @@ fn spreads(entry: &SpaceEntry) -> bool {
 /// By what samples repeat each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Same {
-    /// By their parameters, of which there are finitely many.
+    /// By their parameters, which have finitely many values.
     Parameters,
     /// By their outcomes in every arm.
     Outcome,

@@ -6,10 +6,10 @@
 //! ```
 //!
 //! A new campaign takes the place of the last one, whose folder becomes the previous one. A folder
-//! is moved or removed only if a campaign has made it here on its own account, which its manifest
-//! says, and if it holds no other file than those of a campaign. Everything else at one of the two
-//! paths is refused and stays as it is: a file, a symbolic link, a folder with other files, the
-//! folder of a campaign that somebody has put there.
+//! is moved or removed only if its manifest says that a campaign has made it here on its own
+//! account, and if it holds only files of a campaign. Everything else at one of the two paths is
+//! refused and stays: a file, a symbolic link, a folder with other files, the folder of a campaign
+//! that the user has put there.
 //!
 //! Two campaigns that start in one working folder at the same time do not meet: the lock of the
 //! folder at `closecall-results` also guards the previous one, and a folder is moved while its lock
@@ -185,8 +185,8 @@ fn remove_files(folder: &Path, is_chosen: impl Fn(&OsStr) -> bool) -> Result<(),
     Ok(())
 }
 
-/// Says what is at a path where results belong, without changing it. If the results are to be
-/// replaced, they must be those of a campaign whose command line named no folder.
+/// Determines the state of a path for results, without changing it. Results that are to be replaced
+/// must belong to a campaign whose command line named no folder.
 fn inspect(path: &Path, is_replaced: bool) -> Result<Place, FolderError> {
     let read = |source| FolderError::Read { path: path.to_owned(), source };
     let kind = match fs::symlink_metadata(path) {
@@ -223,8 +223,8 @@ fn inspect(path: &Path, is_replaced: bool) -> Result<Place, FolderError> {
     Ok(Place::Results(kept))
 }
 
-/// Returns what the manifest of a campaign says, of whatever version of this program; `None` if it
-/// is not one.
+/// Returns the statements of a campaign's manifest, written by any version of this program; `None`
+/// if it is no manifest.
 fn kept(text: &[u8], path: &Path) -> Option<Kept> {
     let manifest: Value = serde_json::from_slice(text).ok()?;
     manifest.get("manifest_version")?.as_u64()?;
@@ -242,7 +242,7 @@ fn is_replaceable(text: &[u8]) -> bool {
     manifest.is_some_and(|manifest| manifest.get("replaceable") == Some(&Value::Bool(true)))
 }
 
-/// Returns what a folder holds beside the files of a campaign, by the paths below it.
+/// Returns the content of a folder beside the files of a campaign, by the paths below it.
 fn other_files(path: &Path, kept: &Kept) -> Result<Vec<String>, FolderError> {
     let is_recording = |name: &OsStr| {
         name == RECORDINGS_PAGE || is_temporary(name) || name.to_str().is_some_and(|name| kept.has_recording(name))
@@ -272,7 +272,7 @@ impl Kept {
     }
 }
 
-/// Returns the names of what a folder holds.
+/// Returns the names in a folder.
 fn names(folder: &Path) -> Result<Vec<std::ffi::OsString>, FolderError> {
     let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     entries.map_err(|source: io::Error| FolderError::Read { path: folder.to_owned(), source })

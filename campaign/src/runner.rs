@@ -47,7 +47,7 @@ impl fmt::Debug for Work {
 }
 
 impl Work {
-    /// Returns what the records of the scenario with its arms must be.
+    /// Returns the properties that the records of the scenario with its arms must have.
     pub(crate) fn identity(&self) -> Identity<'_, impl Iterator<Item = &str> + Clone> {
         let arms = self.arms.iter().map(|arm| arm.controller.name());
         Identity { file: &self.file, sampling: self.sampling, arms }
@@ -89,8 +89,8 @@ impl Samples for Work {
 }
 
 impl Work {
-    /// Runs one sample in one arm in this thread. `on_outcome` gets what is known before the
-    /// checks, if there are any.
+    /// Runs one sample in one arm in this thread. `on_outcome` gets the result before the checks,
+    /// if there are any.
     fn run_here(&self, sample: u64, arm: &Arm, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
@@ -155,7 +155,7 @@ pub fn run_guarded(
     guarded(|| simulate(scenario, key, arm, observer))
 }
 
-/// Runs what may panic. A panic is returned as an error of the sample.
+/// Runs code that may panic. A panic is returned as an error of the sample.
 ///
 /// # Errors
 /// The error of `run`, or [`SampleError::Panic`].

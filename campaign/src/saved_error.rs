@@ -1,4 +1,4 @@
-//! Why a saved campaign cannot provide what was requested.
+//! Why a saved campaign cannot fulfil a request.
 
 use std::path::PathBuf;
 

@@ -44,8 +44,8 @@ thread_local! {
 }
 
 impl Session {
-    /// Runs a command in this thread, and returns its result and what it has printed. The first of
-    /// the arguments is the program's name.
+    /// Runs a command in this thread, and returns its result and its output. The first of the
+    /// arguments is the program's name.
     pub fn run<T>(&self, arguments: &[OsString], command: impl FnOnce() -> T) -> (T, Printed) {
         RUNNING.set(Running { arguments: texts(arguments), session: Some(self.clone()), printed: Printed::default() });
         let result = command();

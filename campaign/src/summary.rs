@@ -153,7 +153,7 @@ impl Summary {
         Self { controllers, scenarios, inference: Inference::default(), is_unchecked: false, repeats }
     }
 
-    /// Returns a summary without samples of what is run.
+    /// Returns a summary without samples of these scenarios.
     pub fn of(works: &[Arc<Work>]) -> Self {
         let name = |arm: &Arm| arm.controller.name().to_owned();
         let controllers = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());

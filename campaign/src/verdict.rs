@@ -46,7 +46,7 @@ pub enum Verdict {
     /// acted.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
-    /// A setting of the command line weakened what a scenario is judged by.
+    /// A setting of the command line weakened the criteria of a scenario.
     #[serde(rename = "OVERRIDDEN")]
     Overridden,
     /// Some sample ended in an error.
@@ -90,7 +90,7 @@ pub enum Decision {
     Inconclusive,
     /// Nothing was checked, or the system under test was not there to be tested.
     NotJudged,
-    /// A setting weakened what a scenario is judged by.
+    /// A setting weakened the criteria of a scenario.
     Overridden,
     /// Some sample ended in an error.
     SampleError,
@@ -135,7 +135,7 @@ pub struct Judgement {
     pub gates: Vec<GateResult>,
     /// How each requirement fares in each scenario that names it.
     pub requirements: Vec<RequirementResult>,
-    /// Whether what the scenarios expect of their runs happened.
+    /// Whether the expectations of the scenarios happened.
     pub expectations: Vec<ExpectationResult>,
     /// What the samples of each scenario say about the probability of a collision, if that was
     /// asked.
@@ -356,8 +356,8 @@ fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
     }
 }
 
-/// Says in how many samples the system under test was not available for some time. If those are
-/// more than [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it
+/// States in how many samples the system under test was not available for some time. If their share
+/// exceeds [`MAX_UNAVAILABLE_SHARE`], the samples do not decide about the system, even if it
 /// engages before its sensors fail.
 fn judge_availability(summary: &Summary, findings: &mut Findings) {
     for (name, counts) in &summary.scenarios {
@@ -380,7 +380,7 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
     }
 }
 
-/// A system that never acted was not tested by a scenario that asks what it prevents.
+/// A system that never acted was not tested by a scenario that asks for prevented collisions.
 fn judge_action(judge: &Judge, findings: &mut Findings) {
     for (name, missing, count) in judge.without_action() {
         let reason = format!(

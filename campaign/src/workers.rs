@@ -82,9 +82,8 @@ pub(crate) trait Samples: Send + Sync + 'static {
     fn scenario(&self) -> &str;
     /// Returns the arms in which each sample runs.
     fn arms(&self) -> &[Arm];
-    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it any
-    /// more. `on_outcome` gets the run before its validity checks, if it is checked in this
-    /// process.
+    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it.
+    /// `on_outcome` gets the run before its validity checks, if it is checked in this process.
     fn run(&self, sample: u64, arm: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun;
 }
 

@@ -226,8 +226,8 @@ impl LibraryEntry {
     }
 }
 
-/// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic and
-/// then those with faults last.
+/// Returns the names of the scenarios in alphabetical order: first the plain ones, then the ones
+/// with surrounding traffic, and the ones with faults last.
 pub fn names() -> impl Iterator<Item = &'static str> {
     plain_names().chain(FAULTS.into_iter().map(|(name, _)| name))
 }

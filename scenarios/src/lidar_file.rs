@@ -113,7 +113,7 @@ mod tests {
         assert_eq!(lidar.pattern_file, None);
         assert_eq!(lidar.pattern, Some(LidarKindConfig::parse(LidarModel::Os1With64.file()).unwrap()));
         file.check().unwrap();
-        // The text needs the file no longer.
+        // The text alone suffices, without the file.
         let again = ScenarioFile::parse(Path::new("elsewhere.toml"), file.text(), &[]).unwrap();
         assert_eq!(again.config(), file.config());
     }

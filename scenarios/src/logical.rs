@@ -1,5 +1,5 @@
 //! Makes a logical scenario from a recorded approach: the encounter of the published method with
-//! the recorded vehicles, road and speeds, whose parameters vary around what was recorded.
+//! the recorded vehicles, road and speeds, whose parameters vary around the recorded values.
 //!
 //! ```text
 //!   target ─────────────────────────────────╭────────▶

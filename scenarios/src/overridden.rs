@@ -8,7 +8,7 @@
 use super::ScenarioConfig;
 use crate::criteria::{Expression, Operator};
 
-/// The key of the text that names what was weakened.
+/// The key of the text that names the weakened demands.
 pub(super) const KEY: &str = "overridden";
 
 /// Returns what `after` demands less than `before`.

@@ -22,7 +22,7 @@ pub const SCENARIOS: &str = "scenarios";
 /// The name of a project file, which holds the settings of a repository: a TOML file that is no
 /// scenario.
 pub const PROJECT_FILE: &str = "closecall.toml";
-/// The keys of which a scenario has at least one.
+/// The keys that identify a scenario: it has at least one of them.
 const KEYS_OF_SCENARIO: [&str; 3] = ["road", "actor", "base"];
 /// Largest length of a scenario on standard input (bytes).
 const MAX_LENGTH: u64 = 16 * 1024 * 1024;

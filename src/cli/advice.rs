@@ -29,7 +29,7 @@ impl Diagnostic for CliError {
     }
 }
 
-/// Returns what the user can do, if an option helps.
+/// Returns the advice for the user, if an option helps.
 fn advice(error: &CliError) -> Option<&'static str> {
     match error {
         CliError::Results(_) | CliError::ResultsCut(_) => Some(OTHER_FOLDER),

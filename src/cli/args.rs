@@ -86,7 +86,7 @@ pub(super) struct FilesArgs {
 }
 
 impl FilesArgs {
-    /// Reads the files, none of which may be given twice.
+    /// Reads the files. None may be given twice.
     pub(super) fn read_all(&self) -> Result<Vec<TrajectoryData>, CliError> {
         let options = self.read.options();
         let data_sets = self.files.iter().map(|path| read_noting(path, options)).collect::<Result<Vec<_>, _>>()?;

@@ -261,7 +261,7 @@ pub(super) trait Companion {
     fn begin(&mut self, folder: &Folder) -> Result<(), CliError>;
     /// Called after the last sample, before the reports are written.
     fn end(&mut self, folder: &Folder) -> Result<(), CliError>;
-    /// Returns what is printed of it.
+    /// Returns the text to print.
     fn text(&self, summary: &Summary) -> String;
     /// Returns the same for programs, with its key.
     fn json(&self) -> Option<(&'static str, Value)>;

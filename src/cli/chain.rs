@@ -5,7 +5,7 @@
 //!  files ─▶ flaws ─▶ lane changes ─▶ metrics ─▶ approaches ─▶ the most relevant ─▶ logical scenarios ─▶ campaign ─▶ report
 //! ```
 //!
-//! The folder is that of a campaign, so that all commands for campaigns work on it. It also holds:
+//! The folder is a campaign's folder, and all commands for campaigns work on it. It also holds:
 //!
 //! | file | content |
 //! |---|---|

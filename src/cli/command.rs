@@ -147,8 +147,8 @@ enum Command {
     /// encounters
     #[command(subcommand)]
     Traffic(Traffic),
-    /// Compute from many runs, without a verdict: what moves a result, what a system reaches, where
-    /// perception ends
+    /// Compute from many runs, without a verdict: influences on a result, margins of a system,
+    /// range of perception
     #[command(subcommand)]
     Study(Study),
     /// Write what other programs read: schema, completions, manual pages, labelled images,
@@ -317,8 +317,8 @@ fn wrong_stack() -> Option<String> {
         .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
 }
 
-/// Runs a command that another program calls, and returns the exit code of the command line and
-/// what it has printed. The first of the arguments is the program's name.
+/// Runs a command that another program calls, and returns the exit code of the command line and its
+/// output. The first of the arguments is the program's name.
 pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<ExitCode, CliError>, Printed) {
     session.run(arguments, || {
         let (command, onnxruntime) = parse(arguments).map_err(|error| CliError::refused(&error.to_string()))?;

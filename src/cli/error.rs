@@ -152,7 +152,7 @@ pub enum CliError {
     /// A sensitivity study cannot be planned.
     #[error(transparent)]
     Sensitivity(#[from] PlanFailure),
-    /// A saved campaign cannot provide what was requested.
+    /// A saved campaign cannot fulfil a request.
     #[error(transparent)]
     Saved(#[from] SavedError),
     /// The reports of a campaign cannot be written.

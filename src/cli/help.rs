@@ -7,7 +7,7 @@ pub(super) mod heading {
     pub(in crate::cli) const SCENARIO: &str = "Scenario";
     /// Which samples run, and how many.
     pub(in crate::cli) const SAMPLES: &str = "Samples";
-    /// What drives the ego vehicle, what it perceives, and what it is compared with.
+    /// The driver of the ego vehicle, its perception, and its references.
     pub(in crate::cli) const CONTROLLER: &str = "Controller and sensors";
     /// Which part of a trajectory file is used, and how it is read.
     pub(in crate::cli) const DATA: &str = "Trajectory data";
@@ -15,7 +15,7 @@ pub(super) mod heading {
     pub(in crate::cli) const METHOD: &str = "Method";
     /// The random scenes of labelled images.
     pub(in crate::cli) const SCENES: &str = "Scenes";
-    /// By what a result is judged.
+    /// The criteria of a result.
     pub(in crate::cli) const GATES: &str = "Gates";
     /// How the simulator itself is checked.
     pub(in crate::cli) const VALIDITY: &str = "Validity checks";

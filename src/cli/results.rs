@@ -163,7 +163,7 @@ impl Results {
                 }
             }
         };
-        // A command of a folder that runs elsewhere is not what the command line says.
+        // Only a folder whose commands run in this working folder is remembered as the user's own.
         let is_here = |there: &Manifest| there.working_folder == manifest.working_folder;
         if let Some(locked) =
             locked.as_ref().filter(|locked| locked.folder.manifest().is_ok_and(|there| is_here(&there)))
@@ -203,7 +203,7 @@ pub(super) fn remember(folder: &Folder) {
     }
 }
 
-/// Locks the default folder, and says what has become of earlier results.
+/// Locks the default folder, and reports the place of earlier results.
 fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest) -> Result<LockedFolder, FolderError> {
     let scenarios = campaign.works.iter().flat_map(|work| of_scenario(&work.file));
     let inputs: Vec<PathBuf> = scenarios.chain(manifest.arms.iter().flat_map(of_controller)).collect();
@@ -232,8 +232,8 @@ pub(super) fn selection(named: Option<Selection>) -> Selection {
     named.unwrap_or_else(|| Selection { each_kind: is_recording_enabled(), ..Selection::default() })
 }
 
-/// Returns true if a campaign can do without its default folder: the folder cannot be written. Else
-/// something is in the way, of which the user should know before anything runs.
+/// Returns true if a campaign can do without its default folder: the folder cannot be written.
+/// Otherwise the user should know of the obstacle before anything runs.
 fn may_go_on(error: &FolderError) -> bool {
     matches!(error, FolderError::Write(_))
 }

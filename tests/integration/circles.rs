@@ -5,8 +5,8 @@
 //! name ─▶ files that reach each other
 //! ```
 //!
-//! A file that only passes a name on is not what its user depends on: a path through a re-export
-//! leads to the file that declares the name.
+//! A file that only passes a name on is no dependency of its user: a path through a re-export leads
+//! to the file that declares the name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -145,7 +145,7 @@ impl Crate {
     }
 
     fn of(files: impl Iterator<Item = (Names, String)>) -> Self {
-        // A crate with a library and a program has two roots, of which the library comes first.
+        // A crate with a library and a program has two roots. The library comes first.
         let mut codes: BTreeMap<Names, String> = BTreeMap::new();
         for (module, code) in files {
             codes.entry(module).or_insert(code);

@@ -262,7 +262,7 @@ fn what_cannot_end_well_is_refused_before_any_sample_runs() {
     // The recordings have no place.
     let output = closecall(["campaign", "low-thw-overtake", "-n", "1000000", "--no-out", "--record", "worst:1"]);
     assert_eq!(code(&output), 2, "{}", stderr(&output));
-    // A name of which no file can be named.
+    // A name that no file can have.
     let long = at("long.toml");
     fs::write(&long, headline_with("name = \"low-thw-overtake\"", &format!("name = \"{}\"", "a".repeat(200)))).unwrap();
     let output = closecall(["campaign", long.to_str().unwrap(), "-n", "1000000"]);

@@ -307,7 +307,7 @@ fn other_programs_read_the_osi_messages_of_a_run() {
     let lanes: Vec<u64> = truth["lanes"].as_array().unwrap().iter().map(|lanes| lanes.as_u64().unwrap()).collect();
     assert_eq!((lanes[0], lanes[1..].iter().max()), (3, Some(&0)));
     assert!(tracks["tracks"].as_u64().unwrap() > 100 && tracks["rmse"].as_f64().unwrap() > 0.0);
-    // The positions are those of the trace.
+    // The positions equal the positions of the trace.
     let mut reader = csv::Reader::from_path(&trace).unwrap();
     let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
     let centres = truth["centres"].as_array().unwrap();

@@ -27,7 +27,7 @@ use crate::support::{ROOT, closecall, folder, library};
 
 /// Damaged files of each target.
 const ROUNDS: u64 = 60;
-/// Limit of the address space (KiB), of which threads reserve a part that they do not use.
+/// Limit of the address space (KiB). Threads reserve a part that they do not use.
 const MEMORY_KIB: u64 = 6 << 20;
 /// Limit of time for one file: many times the time of a valid one on a busy machine.
 const LIMIT: Duration = Duration::from_secs(60);

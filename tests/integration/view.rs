@@ -100,7 +100,7 @@ impl Place {
         names.iter().map(|name| self.path(name).display().to_string()).collect()
     }
 
-    /// Writes what a campaign leaves.
+    /// Writes the files of a campaign.
     fn with_results(names: &[&str]) -> Self {
         let place = Self::with_recordings(names);
         fs::create_dir_all(place.path("closecall-results")).unwrap();

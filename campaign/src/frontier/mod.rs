@@ -1,4 +1,5 @@
-//! The frontier of a system's settings: what each setting prevents, induces, and costs in speed.
+//! The frontier of a system's settings: the collisions that each setting prevents and induces, and
+//! its cost in speed.
 //!
 //! ```text
 //!  KEY = a, b, c  ┐

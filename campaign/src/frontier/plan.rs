@@ -74,7 +74,7 @@ pub struct FrontierPlan {
     pub sampling: Sampling,
     /// The controllers: the baseline first, the one under test last.
     pub controllers: Vec<ControllerChoice>,
-    /// The sensors; those of the scenario if `None`.
+    /// The sensors; `None` for the sensors of the scenario.
     pub sensors: Option<SensorMode>,
     /// The number of worker threads, and the time limit of a run.
     pub workers: Workers,

@@ -47,7 +47,7 @@ struct Judged {
     happened: u64,
     samples: u64,
     overridden: Vec<String>,
-    /// Whether the scenario asks what the system under test prevents.
+    /// Whether the scenario asks for collisions that the system under test prevents.
     asks_for_action: bool,
     /// The function that the scenario judges.
     function: Function,
@@ -164,7 +164,7 @@ impl Judge {
             .map(move |judged| (judged.scenario.as_str(), missing(judged), judged.samples))
     }
 
-    /// Returns what each scenario samples beyond trajectory data, in words.
+    /// Returns the values that each scenario samples beyond trajectory data, in words.
     pub fn extrapolations(&self) -> impl Iterator<Item = (&str, &[String])> {
         let judged = self.scenarios.iter().filter(|judged| !judged.extrapolations.is_empty());
         judged.map(|judged| (judged.scenario.as_str(), judged.extrapolations.as_slice()))
@@ -226,7 +226,7 @@ impl Judge {
         results
     }
 
-    /// Returns whether what the scenarios expect of their runs happened.
+    /// Returns whether the expectations of the scenarios happened.
     pub fn expectations(&self) -> Vec<ExpectationResult> {
         let result = |judged: &Judged| ExpectationResult {
             scenario: judged.scenario.clone(),

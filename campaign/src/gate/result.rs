@@ -139,7 +139,7 @@ pub struct RequirementResult {
     pub standing: Standing,
 }
 
-/// Whether what a scenario expects of its runs happened.
+/// Whether the expectation of a scenario happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpectationResult {
     /// The scenario.

@@ -61,10 +61,11 @@ pub struct ProbabilitySpec {
     pub source: GateSource,
 }
 
-/// The gates that hold for every scenario of a campaign; those of the scenario files come on top.
+/// The gates that hold for every scenario of a campaign. The gates of the scenario files come on
+/// top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateSet {
-    /// The criteria, those that win first.
+    /// The criteria. The first ones win.
     pub specs: Vec<GateSpec>,
     /// The gate on the probability of a collision.
     pub probability: Option<ProbabilitySpec>,

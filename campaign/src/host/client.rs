@@ -62,7 +62,7 @@ pub(super) trait World {
     }
 }
 
-/// A worker process, and what it is asked.
+/// A worker process, and its task.
 struct Worker<P> {
     peer: P,
     /// The identity of its task.

@@ -43,8 +43,8 @@ use super::record::{ArmRecord, Record, SampleFailure};
 use super::sampling::Sampling;
 use super::validity::CheckPlan;
 
-/// The kind of the failure of a sample that a worker process has refused to run, because the
-/// program or a file is another one than at the start.
+/// The kind of a sample's failure if a worker process has refused to run it, because the program or
+/// a file differs from the start of the campaign.
 const CHANGED: &str = "refused";
 /// The kind of the failure of a sample whose controller a worker process cannot read.
 const UNREADABLE: &str = "unreadable";
@@ -96,7 +96,7 @@ fn task_identity(line: &[u8]) -> String {
     blake3::hash(line).to_hex()[..DIGITS].to_owned()
 }
 
-/// What a worker process is asked, and what its answer repeats.
+/// A question to a worker process, which its answer repeats.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Question {
     /// The identity of the task: [`task_identity`].

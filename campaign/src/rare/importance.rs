@@ -13,7 +13,7 @@
 //!
 //! The final runs are independent of each other and of all runs before, given the mixture and their
 //! number, which the pilot determines. Their weighted mean is therefore unbiased, and its interval
-//! is that of a mean of independent values. The samples of the search enter no estimate.
+//! is the interval of a mean of independent values. The samples of the search enter no estimate.
 //!
 //! The defensive component keeps the share [`DEFENSIVE`] of the runs at the distribution of the
 //! scenario (T. Hesterberg, Technometrics 37 (1995) 185–194). No weight exceeds its inverse, so a
@@ -139,7 +139,7 @@ struct Run<'a, S> {
     seed: Seed,
     runs: u64,
     budget: u64,
-    /// The part of the budget that searches may use: what is left has to carry the estimate.
+    /// The part of the budget that searches may use. The rest has to carry the estimate.
     search_budget: u64,
 }
 
@@ -295,7 +295,7 @@ pub fn importance<S: Simulator>(
     }
     let pilot_runs = 2 * run.level_runs();
     if searches.is_empty() || run.left() < pilot_runs as u64 + LEAST_FINAL {
-        // Nothing leads to the event: what is left shows how rare it is at most.
+        // Nothing leads to the event: the rest of the budget shows how rare it is at most.
         return without_search(&mut run, &searches, goal);
     }
     let pooled = Mixture::pooled(&searches, DEFENSIVE);
@@ -388,8 +388,8 @@ fn finish<S: Simulator>(
     })
 }
 
-/// Spends what is left on the distribution of the scenario: plain sampling, whose bound holds
-/// without any search.
+/// Spends the rest of the budget on the distribution of the scenario: plain sampling, whose bound
+/// holds without any search.
 fn without_search<S: Simulator>(
     run: &mut Run<'_, S>,
     searches: &[Mixture],

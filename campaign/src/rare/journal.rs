@@ -196,7 +196,7 @@ impl RareFolder {
     }
 }
 
-/// The journal of a campaign: what it holds, then what is appended.
+/// The journal of a campaign: its old lines, then the appended ones.
 #[derive(Debug)]
 pub struct RareJournal {
     path: PathBuf,

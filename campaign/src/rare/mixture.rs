@@ -9,12 +9,12 @@
 //!
 //! A component has its own mean and standard deviation in each dimension. Most dimensions do not
 //! matter for a region. There the fit of few points would only add noise, which multiplies in the
-//! weights over all dimensions. So a mean or a standard deviation stays that of the standard normal
-//! distribution unless the points contradict it ([`SIGNIFICANCE`]).
+//! weights over all dimensions. So a mean or a standard deviation stays standard normal unless the
+//! points contradict it ([`SIGNIFICANCE`]).
 //!
-//! The number of components is that of the smallest Bayesian information criterion (G. Schwarz,
-//! *Estimating the dimension of a model*, Annals of Statistics 6 (1978) 461–464), in which a mean
-//! or a standard deviation counts only if it differs from the standard normal distribution.
+//! The smallest Bayesian information criterion determines the number of components (G. Schwarz,
+//! *Estimating the dimension of a model*, Annals of Statistics 6 (1978) 461–464). In it, a mean or
+//! a standard deviation counts only if it differs from the standard normal distribution.
 //! Expectation and maximization alternate (A. P. Dempster, N. M. Laird and D. B. Rubin, Journal of
 //! the Royal Statistical Society B 39 (1977) 1–38), from starts that lie apart as in k-means++ (D.
 //! Arthur and S. Vassilvitskii, SODA 2007, 1027–1035).

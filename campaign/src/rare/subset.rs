@@ -48,7 +48,7 @@ const SHARE: f64 = 0.2;
 /// Moves of a particle in a level (-): an assumption; 1 to 5 are plausible.
 const MOVES: usize = 3;
 /// Number of repetitions that determine the number of all (-). Student's factor is then 7 % above
-/// that of infinitely many.
+/// the factor of infinitely many.
 const FIRST: usize = 20;
 /// Largest number of levels (-): they reach a probability of 1e-21.
 const MOST_LEVELS: usize = 30;
@@ -303,9 +303,9 @@ fn needed(values: &[f64], goal: Goal) -> usize {
     if factor.is_finite() { needed.max(FIRST) } else { usize::MAX }
 }
 
-/// Returns the mean of all values with the variance of the first, or with that of all if it is
-/// larger: estimates that are products are skewed, and the variance of a few of them is small where
-/// their mean is, too.
+/// Returns the mean of all values with the variance of the first, or with the variance of all if it
+/// is larger. Estimates that are products are skewed, and the variance of a few small ones is
+/// small, too.
 fn stein(values: &[f64]) -> Mean {
     let count = values.len() as f64;
     let value = values.iter().sum::<f64>() / count;

@@ -34,7 +34,7 @@ fn one_region(probability: f64) -> impl Fn(&Point) -> Response {
     }
 }
 
-/// Two regions on opposite sides, of which the first has `share` of the probability.
+/// Two regions on opposite sides. The first has `share` of the probability.
 fn two_regions(probability: f64, share: f64) -> impl Fn(&Point) -> Response {
     let [up, down] = [share, 1.0 - share].map(|share| beyond(share * probability));
     move |point| {
@@ -43,8 +43,8 @@ fn two_regions(probability: f64, share: f64) -> impl Fn(&Point) -> Response {
     }
 }
 
-/// Two regions of which the score of the second rises so much faster that the first attracts nearly
-/// every run: at z = 1, the second seems nearer.
+/// Two regions. The score of the second rises much faster, and the first attracts nearly every run:
+/// at z = 1, the second seems nearer.
 fn misleading(probability: f64) -> impl Fn(&Point) -> Response {
     let limit = beyond(0.5 * probability);
     move |point| {
@@ -243,7 +243,7 @@ proptest! {
     }
 }
 
-/// A function that changes what it refers to.
+/// A function that changes a value outside.
 struct Recording<F>(F);
 
 impl<F: FnMut(&Point) -> Response> Simulator for Recording<F> {

@@ -90,7 +90,8 @@ pub enum RemoteError {
 }
 
 impl RemoteError {
-    /// Returns true if what was given cannot be used as it is. Otherwise something has failed.
+    /// Returns true if the given files or controllers cannot be used as they are. Otherwise
+    /// something has failed.
     pub const fn is_input(&self) -> bool {
         match self {
             Self::Engine(error) => error.is_input,

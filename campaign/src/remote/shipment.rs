@@ -36,7 +36,7 @@ pub struct ShippedFile {
 }
 
 impl Shipment {
-    /// Returns what a machine needs for this campaign.
+    /// Returns the shipment of this campaign.
     ///
     /// # Errors
     /// [`RemoteError::File`] if a file of a controller cannot be read.

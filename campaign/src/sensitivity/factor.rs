@@ -1,4 +1,4 @@
-//! The factors of a study: what is varied, and over which range.
+//! The factors of a study: the varied quantities and their ranges.
 
 use std::fmt;
 use std::str::FromStr;

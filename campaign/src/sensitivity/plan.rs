@@ -121,9 +121,9 @@ impl fmt::Debug for SensitivityPlan {
 }
 
 impl SensitivityPlan {
-    /// Returns the plan of a study of `file`. The factors are the parameters that vary, the `named`
-    /// keys, if `with_defaults` those of the list for driver, sensor and controller, and chance.
-    /// The last controller is the one under test; one before it is the baseline.
+    /// Returns the plan of a study of `file`. The factors are the varying parameters, the `named`
+    /// keys, the list for driver, sensor and controller if `with_defaults`, and chance. The last
+    /// controller is the one under test; one before it is the baseline.
     ///
     /// # Errors
     /// [`PlanFailure`] if a factor cannot be used, or there is none.

@@ -42,8 +42,8 @@ impl RunErrors {
     }
 }
 
-/// The mapping from points of the unit cube to runs. The coordinates are those of the parameters
-/// that vary, then the ranges, then chance.
+/// The mapping from points of the unit cube to runs. The coordinates are the varying parameters,
+/// then the ranges, then chance.
 #[derive(Clone, Debug)]
 pub(super) struct Cube {
     /// The scenario, with every range at its middle.

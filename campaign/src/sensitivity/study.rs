@@ -1,4 +1,4 @@
-//! Runs a study, and what it finds.
+//! Runs a study, and holds its results.
 
 use std::sync::Arc;
 

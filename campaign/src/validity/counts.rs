@@ -37,7 +37,7 @@ impl Invariance {
         }
     }
 
-    /// Returns what a failure of the check means, as a sentence.
+    /// Returns the meaning of a failure of the check, as a sentence.
     pub const fn finding(self) -> &'static str {
         match self {
             Self::Repetition => "the same run gave another outcome when repeated",
@@ -68,7 +68,7 @@ pub struct ArmChecks {
 pub struct CheckCounts {
     /// Number of runs that were checked: samples times arms.
     pub runs: u64,
-    /// Number of runs of which at least one check has no result, because it took too long.
+    /// Number of runs with at least one check without a result, because it took too long.
     pub not_checked: u64,
     /// Number of runs whose verdict (collision or none) flipped at half the time step.
     pub flips: u64,

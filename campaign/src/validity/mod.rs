@@ -16,8 +16,8 @@
 //! Time is no defect of the simulator: a check whose run takes too long has no result (*not
 //! checked*).
 //!
-//! If halving the step flips the verdict of a sample, the sample lies at the limit of what the step
-//! can resolve. It stays in the campaign, with the verdict that is worse for the system under test.
+//! If halving the step flips the verdict of a sample, the sample lies at the limit of the step's
+//! resolution. It stays in the campaign, with the verdict that is worse for the system under test.
 //! More than a few flips make the campaign invalid. Any other difference is an error of the
 //! simulator and makes the campaign invalid at once.
 

@@ -77,7 +77,7 @@ pub struct CampaignReport<'a> {
     pub manifest: &'a Manifest,
     /// The scenarios with their arms.
     pub works: &'a [Arc<Work>],
-    /// The counts, and what the reports show beside them.
+    /// The counts, and the further data of the reports.
     pub tally: &'a Tally,
     /// The verdict.
     pub judged: &'a Judgement,

@@ -272,7 +272,7 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
     table(&head, &rows)
 }
 
-/// Returns the recorded seconds of an encounter, and what was recorded of its samples.
+/// Returns the recorded seconds of an encounter, and the recordings of its samples.
 fn encounter(findings: &Findings<'_>, folder: &Folder, origin: &Origin) -> Markup {
     let picture = origin.picture.as_ref().and_then(|path| std::fs::read_to_string(folder.file(path)).ok());
     let of_scenario = findings.recordings.iter().filter(|((name, _, _), _)| *name == origin.scenario);

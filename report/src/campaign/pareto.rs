@@ -5,7 +5,7 @@ use std::fmt;
 
 use closecall_campaign::summary::{Counts, Summary};
 
-/// What an arm does, and what it costs.
+/// The effects and the cost of an arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Standing<'a> {
     arm: &'a str,
@@ -25,7 +25,7 @@ impl Standing<'_> {
     }
 }
 
-/// Writes what each arm prevents, induces and costs.
+/// Writes the prevented and induced collisions and the cost of each arm.
 impl fmt::Display for Standing<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [lost_s, slower_mps, imposed_mps2] = self.cost;

@@ -37,7 +37,7 @@ const SCHEMA: [Element; 9] = [
     Element { name: "skipped", children: &[], attributes: [&[], &["type", "message"]] },
 ];
 
-/// Returns what the schema refuses in a file.
+/// Returns the parts of a file that the schema refuses.
 pub(super) fn against_schema(xml: &str) -> Vec<String> {
     let mut reader = Reader::from_str(xml);
     let (mut open, mut refused) = (vec![String::new()], Vec::new());

@@ -68,8 +68,8 @@ fn distribution(name: &ParameterName, config: &ParameterConfig) -> Option<Elemen
     Some(Element::new("StochasticDistribution").with("parameterName", parameter_name(name)).child(inner))
 }
 
-/// Returns a log-normal distribution. Its expected value and variance are those of the value itself
-/// before truncation, and not of the logarithm: m·exp(σ²/2) and (exp(σ²) − 1)·exp(σ²)·m² for a
+/// Returns a log-normal distribution. Its expected value and variance belong to the value itself
+/// before truncation, and not to the logarithm: m·exp(σ²/2) and (exp(σ²) − 1)·exp(σ²)·m² for a
 /// median m.
 fn log_normal_element(config: &LogNormalConfig) -> Option<Element> {
     let growth = maths::exp(config.sigma * config.sigma);

@@ -16,7 +16,7 @@ const OPTIMAL: &str = "◆";
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrontierText<'a>(pub(super) &'a Frontier);
 
-/// The names of the columns behind those of the keys.
+/// The names of the columns that follow the keys.
 pub(super) const HEADS: [&str; 5] =
     ["collisions without", "with", "prevented (95 %)", "induced (95 %)", "speed lost (95 %)"];
 

@@ -27,7 +27,7 @@ pub struct Picture {
     pub svg: String,
 }
 
-/// The figures, with what they are drawn from.
+/// The figures, and the page that holds them.
 #[derive(Clone, Debug)]
 pub struct Paper {
     /// The pictures, in the order of the figures.

@@ -83,7 +83,7 @@ impl PairFlag {
         }
     }
 
-    /// Returns what the flag means, for people.
+    /// Returns the meaning of the flag, for people.
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::Prevented => "the ego collides in the baseline, and no vehicle collides in the arm under test",

@@ -68,8 +68,8 @@ pub enum Variation {
 /// Probability of the median.
 const HALF: f64 = 0.5;
 
-/// Returns the standard normal probability below `z`, within what a quantile function takes: above
-/// 0 and below 1.
+/// Returns the standard normal probability below `z`, within the domain of a quantile function:
+/// above 0 and below 1.
 fn probability_below(z: f64) -> f64 {
     (0.5 * maths::erfc(-z * FRAC_1_SQRT_2)).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)
 }

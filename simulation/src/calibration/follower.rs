@@ -44,8 +44,8 @@ const IDM: [ParameterSpec; 5] = [
     spec("comfortable-braking-mps2", 0.1, 6.0),
 ];
 
-/// Parameters of the Wiedemann 99 model. The ranges are limits of the search, after those of the
-/// open tool PvcTools.
+/// Parameters of the Wiedemann 99 model. The ranges are limits of the search, after the open tool
+/// PvcTools.
 const WIEDEMANN_99: [ParameterSpec; 11] = [
     of_traffic("desired-speed-mps", 8.0, 45.0),
     of_traffic("cc0-m", 0.5, 10.0),

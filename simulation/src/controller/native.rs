@@ -173,7 +173,7 @@ impl Probe {
 /// A library, an FMU or a process that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NativeError {
-    /// The file is not what is expected.
+    /// The file is not of the expected kind.
     #[error("failed to use the controller `{controller}`: {reason}")]
     Refused {
         /// The controller.

@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn an_ego_that_slows_down_does_not_give_itself_the_reason() {
-        // The rear vehicle closes at 10 m/s, of which 9 are the ego's own.
+        // The rear vehicle closes at 10 m/s. The ego's own part is 9 m/s.
         assert_eq!(cost_of(&[at(21.0, 50.0, 31.0)]).unprompted_deficit_mps, 9.0);
     }
 

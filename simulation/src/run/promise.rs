@@ -1,4 +1,4 @@
-//! Measures what becomes of the method's promise: the headway that is gained, and the braking
+//! Measures the fulfilment of the method's promise: the headway that is gained, and the braking
 //! around the crossing.
 //!
 //! ```text
@@ -31,7 +31,7 @@ pub(super) struct EgoMotion {
     pub(super) thw_front_s: Measured,
 }
 
-/// Collects what becomes of the promise.
+/// Collects the fulfilment of the promise.
 #[derive(Debug)]
 pub(super) struct PromiseMeter {
     /// Smallest front time headway until a vehicle behind is near (s).

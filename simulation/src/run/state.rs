@@ -359,7 +359,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Notes what becomes of the method's promise now.
+    /// Updates the fulfilment of the method's promise.
     fn note_promise(&mut self, rear: RearObservation) {
         if let (Some(actor), Ok(rear_gap_m)) = (rear.near, self.margins.gap_rear_m) {
             let ego_mps = self.world.state(self.scenario.ego).speed_mps;

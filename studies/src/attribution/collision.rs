@@ -106,7 +106,7 @@ pub fn phase_word(phase: Phase) -> &'static str {
     }
 }
 
-/// Returns what the ego stack does in a state.
+/// Returns the action of the ego stack in a state.
 pub fn state_word(state: EgoState) -> &'static str {
     match state {
         EgoState::Following => "ego following",

@@ -110,8 +110,8 @@ pub struct Explanation {
     pub controller: String,
     /// Depth of the sensor simulation: `full`, `object` or `ground-truth`.
     pub sensors: String,
-    /// The event in one sentence: who struck whom, after what, what the system did and why, and
-    /// which faults held.
+    /// The event in one sentence: who struck whom, after what, the actions of the system and their
+    /// reasons, and the faults that held.
     pub happened: String,
     /// The collision.
     pub collision: Attribution,

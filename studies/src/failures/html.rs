@@ -102,7 +102,7 @@ fn line(row: &FailureRow, is_named: bool, command_for: CommandFor) -> Markup {
     }
 }
 
-/// Returns what the failure is due to.
+/// Returns the cause of the failure.
 fn due_to(row: &FailureRow) -> String {
     match &row.cause {
         None => String::new(),

@@ -56,8 +56,8 @@ impl<'a> Trial<'a> {
     /// Returns whether a case fails. A case that is no valid scenario, or has no outcome, does not.
     pub(super) fn fails(&self, parameters: &Parameters) -> bool {
         let key = parameters.iter().map(|(name, value)| format!("{name}={value:?};")).collect::<String>();
-        if let Some(results) = self.results.lock().ok().and_then(|results| results.get(&key).copied()) {
-            return results;
+        if let Some(result) = self.results.lock().ok().and_then(|results| results.get(&key).copied()) {
+            return result;
         }
         let does_fail = self.case.file.concrete(parameters).is_ok_and(|scenario| self.holds_in(&scenario, fails));
         if let Ok(mut results) = self.results.lock() {

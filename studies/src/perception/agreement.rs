@@ -58,7 +58,7 @@ pub struct Agreement {
 }
 
 impl Verdict {
-    /// Returns what a run showed.
+    /// Returns the verdict of a run.
     pub fn of(outcome: &Outcome) -> Self {
         let mis = outcome.mis.as_ref().ok();
         Self {

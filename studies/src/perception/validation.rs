@@ -140,7 +140,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl Measured {
-    /// Returns what one of the sensors shows.
+    /// Returns the figures of one of the sensors.
     pub fn of(&self, chain: Chain) -> &Behaviour {
         match chain {
             Chain::Full => &self.full,

@@ -28,7 +28,7 @@ pub(crate) enum Effect {
     Hidden { left_m: f64 },
     /// So many points per scan are where nothing is.
     FalsePoints { at_least: f64 },
-    /// The same, and boxes and tracks equal those of a sensor without the fault.
+    /// The same, and boxes and tracks equal the ones of a sensor without the fault.
     GhostPointsOnly { at_least: f64 },
     /// The images of vehicles behind a guard rail have tracks, in no lane.
     BesideTheRoad,

@@ -135,7 +135,7 @@ pub(crate) struct Pair {
 /// their end if `is_timed`, and else for the whole drive.
 pub(crate) fn pair(name: &str, sensor: Of, (car, steps): (Option<Car>, i64), is_timed: bool) -> Pair {
     let without_camera = "sensors.rear-camera.pipeline=\"off\"";
-    // False points are then those of the fault.
+    // False points then come from the fault.
     let settings: &[&str] = match sensor {
         Of::RearCamera => &[],
         Of::RearLidar => &[without_camera, "sensors.rear-lidar.false-alarm-rate=0.0"],

@@ -100,8 +100,8 @@ fn is_default(probe: &Probe, at: &KeyPath, value: &toml::Value) -> bool {
     concrete(Some(value.clone())) == concrete(None)
 }
 
-/// A stated default as a value of the file. The minus sign of prose is another character than that
-/// of a file.
+/// A stated default as a value of the file. The minus sign of prose differs from the minus sign of
+/// a file.
 fn number(text: &str, kind: &Kind) -> Option<toml::Value> {
     let plain = text.replace('−', "-");
     match kind {

@@ -15,7 +15,7 @@
 //! 3. no PASS hides a sample without an outcome,
 //! 4. the last run completes the campaign to the records of an undisturbed one.
 //!
-//! The idea is that of FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled
+//! The idea comes from FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled
 //! Transactional Key Value Store", SIGMOD 2021). `CLOSECALL_SCHEDULES=1000000` sets the number of
 //! schedules, `CLOSECALL_SCHEDULE=SEED` runs one of them.
 
@@ -70,7 +70,7 @@ fn a_client_that_believes_every_answer_is_found_out() {
     assert!(matches!(violation, Violation::OtherOutcome { .. } | Violation::OwnJournalRefused { .. }), "{violation}");
 }
 
-/// Without the count of what is retried, a crash leaves no trace.
+/// Without the count of retries, a crash leaves no trace.
 #[test]
 fn a_client_that_repeats_in_silence_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Silent, 0..2_000);

@@ -96,7 +96,7 @@ enum Fault {
     ProcessAndCopy,
     /// It ends in the middle of its answer.
     Cut,
-    /// It prints what is no answer.
+    /// It prints a line that is no answer.
     Print,
     TooLong,
     CrashBefore,
@@ -146,7 +146,7 @@ impl Process {
         Answer { question: question.clone(), copied_from: None, record, wall_s: 0.01, check_s: 0.0, is_last: false }
     }
 
-    /// Runs a sample: writes what the process writes, and when.
+    /// Runs a sample: writes the lines of the process, and their times.
     fn serve(&mut self, state: &mut State, question: &Question, limit: Duration) {
         let right = self.answer(question, self.arm, question.sample);
         let at = state.now + ANSWER_TIME;
@@ -221,7 +221,7 @@ impl Process {
         }
     }
 
-    /// Takes what has arrived until `until`, the earliest first.
+    /// Takes the lines that have arrived until `until`, the earliest first.
     fn take(&mut self, until: Duration) -> Option<(Duration, Arrival)> {
         let first = self.pipe.first_entry().filter(|first| first.key().0 <= until.as_nanos())?;
         let at = Duration::from_nanos(u64::try_from(first.key().0).unwrap());
@@ -235,8 +235,8 @@ impl Process {
 }
 
 impl Peer for Process {
-    /// As the process of the operating system: what has arrived before the question is a line that
-    /// nobody has asked for.
+    /// Like the process of the operating system: a line that has arrived before the question is a
+    /// line without a question.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         let shared = Arc::clone(&self.state);
         let mut state = lock(&shared);

@@ -1,5 +1,5 @@
-//! One schedule: a campaign that is disturbed, interrupted, damaged and resumed, and what must hold
-//! of it.
+//! One schedule: a campaign that is disturbed, interrupted, damaged and resumed, and the properties
+//! that must hold.
 
 use std::fmt;
 use std::fs;

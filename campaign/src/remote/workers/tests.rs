@@ -178,7 +178,7 @@ fn a_machine_with_another_campaign_is_refused() {
     let other = Shipment { version: "0.0.1+00".to_owned(), ..shipment.clone() };
     let message = error(&other).to_string();
     assert!(message.contains("0.0.1+00") && message.contains(&manifest.closecall_version), "{message}");
-    // What the manifest says about the scenario must be what the machine makes of its text.
+    // The manifest's statements about the scenario must agree with the text that the machine reads.
     let mut changed = manifest.clone();
     changed.scenarios[0].blake3 = blake3::hash(b"").to_string();
     let other = Shipment::of(&changed).unwrap();

@@ -160,7 +160,7 @@ fn arm_pairs(summary: &Summary) -> Markup {
     }
 }
 
-/// Returns what the validity checks found in each scenario; empty if no run was checked.
+/// Returns the findings of the validity checks in each scenario; empty if no run was checked.
 pub(super) fn validity(findings: &Findings<'_>) -> Markup {
     let summary = findings.summary;
     if summary.scenarios.iter().all(|(_, counts)| counts.checks.runs == 0) {

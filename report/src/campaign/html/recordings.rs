@@ -27,7 +27,7 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) file: String,
     /// The command that runs the sample again.
     pub(in crate::campaign) replay: String,
-    /// For each arm: how the run ended in one sentence, and what the system under test did.
+    /// For each arm: the end of the run in one sentence, and the actions of the system under test.
     pub(in crate::campaign) story: Vec<String>,
     /// The critical moment, as SVG.
     pub(in crate::campaign) still: String,

@@ -43,7 +43,7 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     }
 }
 
-/// Returns what the system under test changed, in one sentence. `None` if the campaign has no
+/// Returns the changes by the system under test, in one sentence. `None` if the campaign has no
 /// baseline.
 fn headline(findings: &Findings<'_>) -> Option<String> {
     if !findings.summary.is_paired() {

@@ -116,7 +116,7 @@ impl InfluenceCounts {
         }
     }
 
-    /// Returns what the parameters say about each event.
+    /// Returns the influence of the parameters on each event.
     ///
     /// # Errors
     /// The reason for which nothing can be said.

@@ -1,8 +1,8 @@
 //! A picture as a PDF file of one page.
 //!
 //! The page has the shapes of the SVG picture, and its text as outlines of the bundled font: it
-//! looks alike everywhere, and needs no font. Only what the figures use is translated: paths in
-//! plain colours, dashes, opacity, and rectangles that clip.
+//! looks alike everywhere, and needs no font. Only the elements of the figures are translated:
+//! paths in plain colours, dashes, opacity, and rectangles that clip.
 
 use std::collections::BTreeSet;
 use std::io::Write as _;

@@ -156,9 +156,9 @@ impl Strip<'_> {
         if !self.film.is_main(actor) {
             return;
         }
-        // The name of the ego is below its body, those of the others are above: a vehicle beside
-        // the ego covers neither. The others' names extend away from the ego, so that the headway
-        // has room.
+        // The name of the ego is below its body, and the names of the others are above: a vehicle
+        // beside the ego covers neither. The others' names extend away from the ego, so that the
+        // headway has room.
         let text = format!("{} {:.1} m/s", self.film.vehicle_label(actor), state.speed_mps);
         let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
         let own_m = self.frame.states[self.film.ego].s_m;

@@ -25,7 +25,7 @@ const ENCOUNTER_HORIZON_S: f64 = 10.0;
 pub enum Level {
     /// The states of the vehicles, the events and the plots.
     Events,
-    /// Also the 3D scene: the vehicles, and what the ego perceives.
+    /// Also the 3D scene: the vehicles, and the ego's perception.
     Objects,
     /// Also the LiDAR points and camera images of the rear sensors, if these are simulated.
     #[default]
@@ -47,7 +47,7 @@ pub struct FilmActor {
     pub is_plotted: bool,
 }
 
-/// The part of a vehicle in what a film shows.
+/// The part of a vehicle in a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The ego; in the film of a recorded lane change, the vehicle that changes lanes.

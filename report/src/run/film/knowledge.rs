@@ -49,7 +49,7 @@ impl KnownSpan {
 }
 
 /// Returns the confirmed tracks of vehicles behind the ego. A track that has passed the rear bumper
-/// is no longer behind.
+/// is not behind.
 pub(super) fn rear_seen(tracks: &[Track], vehicles: &[SceneVehicle], ego: usize) -> Vec<RearSeen> {
     let ego_vehicle = &vehicles[ego];
     let is_known = |track: &&Track| {

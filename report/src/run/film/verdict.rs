@@ -11,7 +11,7 @@ use super::Film;
 /// above it.
 const CLEAR_VISIBILITY_M: f64 = 2_000.0;
 
-/// Returns what the system under test changes, by the rule of the campaigns.
+/// Returns the change by the system under test, by the rule of the campaigns.
 fn fate(baseline: &Outcome, tested: &Outcome) -> Option<PairFate> {
     let [baseline, tested] = [baseline, tested].map(|outcome| Tally {
         collided: Some(outcome.ego_collided()),

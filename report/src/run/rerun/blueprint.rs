@@ -64,7 +64,7 @@ pub(super) struct FilmContents {
     pub(super) plots: Vec<Plot>,
     /// Times of the first and the last frame.
     pub(super) span: [Time; 2],
-    /// The weather, if it is not that of a clear day.
+    /// The weather, except on a clear day.
     pub(super) weather: Option<String>,
 }
 

@@ -65,7 +65,7 @@ impl LoopedRecording {
         sink.flush_blocking(SEND_TIME).map_err(RecordingError::send)
     }
 
-    /// Returns the messages with that of the loop.
+    /// Returns the messages with the message of the loop.
     pub(super) fn with_loop(self) -> Result<Vec<LogMsg>, RecordingError> {
         let mut messages = Vec::with_capacity(self.messages.len() + 1);
         for message in self.messages {

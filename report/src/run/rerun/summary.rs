@@ -10,7 +10,7 @@ use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
 use closecall_scenarios::causal::CausalSentence;
 
-/// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
+/// Returns the verdict in Markdown: the event, how close it was, and the actions of the system.
 pub(super) fn verdict(films: &[Film]) -> String {
     let mut page = String::new();
     match (films, Film::pair_fate(films)) {
@@ -84,7 +84,7 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         push_head(page, word, film);
     }
     match film.sentence() {
-        // The comparison has it, and what the system did.
+        // The comparison has it, and the actions of the system.
         Some(_) if is_reenactment => {
             push_head(page, "Simulated", film);
         }

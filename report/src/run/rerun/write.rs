@@ -125,7 +125,7 @@ fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
     }
 }
 
-/// Writes a film and returns what its views can show.
+/// Writes a film and returns the possible contents of its views.
 fn write_film(
     writer: &Writer<'_>,
     canvas: &bird::Canvas<'_>,

@@ -51,8 +51,7 @@ fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> 
     whats.iter().map(|(time, archetype)| (*time, archetype as _)).collect()
 }
 
-/// Returns the boxes of the instances with class and score, as far as they reach into the shown
-/// picture.
+/// Returns the boxes of the instances with class and score, cut to the shown picture.
 fn boxes(instances: &[Instance]) -> Boxes2D {
     let ends = |instance: &Instance| in_picture(instance.box_px.map(|side| side as f32));
     let is_shown = |instance: &&Instance| ends(instance).1.iter().all(|side| *side > 0.0);
