@@ -300,8 +300,8 @@ impl Manifest {
 fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>) {
     let within = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
     match (there, here) {
-        (Value::Object(one), Value::Object(other)) => {
-            let names = one.keys().chain(other.keys().filter(|name| !one.contains_key(*name)));
+        (Value::Object(there), Value::Object(here)) => {
+            let names = there.keys().chain(here.keys().filter(|name| !there.contains_key(*name)));
             let incidental: &[&str] = match key.split_once('.') {
                 None if key.is_empty() => &INCIDENTAL,
                 Some(("scenarios", _)) => &INCIDENTAL_OF_SCENARIO,
@@ -309,17 +309,17 @@ fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>
             };
             for name in names.filter(|name| !incidental.contains(&name.as_str())) {
                 let part = |object: &serde_json::Map<String, Value>| object.get(name).cloned().unwrap_or(Value::Null);
-                compare(&within(name), &part(one), &part(other), differences);
+                compare(&within(name), &part(there), &part(here), differences);
             }
         }
-        (Value::Array(one), Value::Array(other)) if one.len() == other.len() => {
-            for (index, (there, here)) in one.iter().zip(other).enumerate() {
+        (Value::Array(there), Value::Array(here)) if there.len() == here.len() => {
+            for (index, (there, here)) in there.iter().zip(here).enumerate() {
                 let name = there.get("name").and_then(Value::as_str).map_or_else(|| index.to_string(), str::to_owned);
                 compare(&within(&name), there, here, differences);
             }
         }
-        (Value::String(one), Value::String(other)) if one.contains('\n') || other.contains('\n') => {
-            if let Some(line) = first_difference(one, other) {
+        (Value::String(there), Value::String(here)) if there.contains('\n') || here.contains('\n') => {
+            if let Some(line) = first_difference(there, here) {
                 differences.push(format!("{key}: {line}"));
             }
         }

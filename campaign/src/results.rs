@@ -232,7 +232,7 @@ fn kept(text: &[u8], path: &Path) -> Option<Kept> {
     let words = manifest.get("command")?.as_array()?.iter();
     let command = words.map(|word| word.as_str().map(str::to_owned)).collect::<Option<_>>()?;
     let names = manifest.get("scenarios")?.as_array()?.iter();
-    let scenarios = names.map(|one| one.get("name")?.as_str().map(str::to_owned)).collect::<Option<_>>()?;
+    let scenarios = names.map(|scenario| scenario.get("name")?.as_str().map(str::to_owned)).collect::<Option<_>>()?;
     Some(Kept { command, is_finished: is_file(&path.join(REPORT)), scenarios })
 }
 

@@ -34,13 +34,13 @@ pub fn robustness(
         let cases = Study::cases(setup);
         // The results are in the order of the cases for any number of threads.
         let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
-        let one = study.robustness(setup, &results);
-        let fits = all.as_mut().is_none_or(|all| all.add(&one));
+        let result = study.robustness(setup, &results);
+        let fits = all.as_mut().is_none_or(|all| all.add(&result));
         if !fits {
             return Err(RobustnessError::Mixed);
         }
-        all.get_or_insert_with(|| one.clone());
-        each.push(one);
+        all.get_or_insert_with(|| result.clone());
+        each.push(result);
     }
     Ok(all.map(|all| (each, all)))
 }

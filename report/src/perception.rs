@@ -138,33 +138,47 @@ impl Studies {
 type Named = ([&'static str; 3], &'static str, fn(&Figures) -> Option<Estimate>);
 
 const FIGURES: [Named; 15] = [
-    (["range_m", "range_low_95_m", "range_high_95_m"], "m", |it| Some(it.range_m)),
-    (["along_bias_m", "along_bias_low_95_m", "along_bias_high_95_m"], "m", |it| it.errors.map(|it| it[0].bias)),
-    (["along_rmse_m", "along_rmse_low_95_m", "along_rmse_high_95_m"], "m", |it| it.errors.map(|it| it[0].rmse)),
-    (["across_bias_m", "across_bias_low_95_m", "across_bias_high_95_m"], "m", |it| it.errors.map(|it| it[1].bias)),
-    (["across_rmse_m", "across_rmse_low_95_m", "across_rmse_high_95_m"], "m", |it| it.errors.map(|it| it[1].rmse)),
-    (["speed_bias_mps", "speed_bias_low_95_mps", "speed_bias_high_95_mps"], "m/s", |it| it.errors.map(|it| it[2].bias)),
-    (["speed_rmse_mps", "speed_rmse_low_95_mps", "speed_rmse_high_95_mps"], "m/s", |it| it.errors.map(|it| it[2].rmse)),
-    (["confirmed_after_s", "confirmed_after_low_95_s", "confirmed_after_high_95_s"], "s", |it| it.confirmed_after_s),
-    (["confirms", "confirms_low_95", "confirms_high_95"], "", |it| Some(it.confirms)),
-    (["false_tracks_per_h", "false_tracks_low_95_per_h", "false_tracks_high_95_per_h"], "1/h", |it| {
-        Some(it.false_tracks_per_h)
+    (["range_m", "range_low_95_m", "range_high_95_m"], "m", |figures| Some(figures.range_m)),
+    (["along_bias_m", "along_bias_low_95_m", "along_bias_high_95_m"], "m", |figures| {
+        figures.errors.map(|errors| errors[0].bias)
     }),
-    (["id_switches", "id_switches_low_95", "id_switches_high_95"], "", |it| Some(it.id_switches)),
-    (["unavailable", "unavailable_low_95", "unavailable_high_95"], "", |it| Some(it.unavailable)),
-    (["gospa_m", "gospa_low_95_m", "gospa_high_95_m"], "m", |it| Some(it.gospa_m)),
-    (["class_accuracy", "class_accuracy_low_95", "class_accuracy_high_95"], "", |it| it.class_accuracy),
-    (["nees", "nees_low_95", "nees_high_95"], "", |it| it.nees),
+    (["along_rmse_m", "along_rmse_low_95_m", "along_rmse_high_95_m"], "m", |figures| {
+        figures.errors.map(|errors| errors[0].rmse)
+    }),
+    (["across_bias_m", "across_bias_low_95_m", "across_bias_high_95_m"], "m", |figures| {
+        figures.errors.map(|errors| errors[1].bias)
+    }),
+    (["across_rmse_m", "across_rmse_low_95_m", "across_rmse_high_95_m"], "m", |figures| {
+        figures.errors.map(|errors| errors[1].rmse)
+    }),
+    (["speed_bias_mps", "speed_bias_low_95_mps", "speed_bias_high_95_mps"], "m/s", |figures| {
+        figures.errors.map(|errors| errors[2].bias)
+    }),
+    (["speed_rmse_mps", "speed_rmse_low_95_mps", "speed_rmse_high_95_mps"], "m/s", |figures| {
+        figures.errors.map(|errors| errors[2].rmse)
+    }),
+    (["confirmed_after_s", "confirmed_after_low_95_s", "confirmed_after_high_95_s"], "s", |figures| {
+        figures.confirmed_after_s
+    }),
+    (["confirms", "confirms_low_95", "confirms_high_95"], "", |figures| Some(figures.confirms)),
+    (["false_tracks_per_h", "false_tracks_low_95_per_h", "false_tracks_high_95_per_h"], "1/h", |figures| {
+        Some(figures.false_tracks_per_h)
+    }),
+    (["id_switches", "id_switches_low_95", "id_switches_high_95"], "", |figures| Some(figures.id_switches)),
+    (["unavailable", "unavailable_low_95", "unavailable_high_95"], "", |figures| Some(figures.unavailable)),
+    (["gospa_m", "gospa_low_95_m", "gospa_high_95_m"], "m", |figures| Some(figures.gospa_m)),
+    (["class_accuracy", "class_accuracy_low_95", "class_accuracy_high_95"], "", |figures| figures.class_accuracy),
+    (["nees", "nees_low_95", "nees_high_95"], "", |figures| figures.nees),
 ];
 
 /// The figures without intervals: name, unit, and the figure.
 type Plain = (&'static str, &'static str, fn(&Figures) -> Option<f64>);
 
 const PLAIN: [Plain; 4] = [
-    ("along_q95_m", "m", |it| it.errors.map(|it| it[0].q95)),
-    ("across_q95_m", "m", |it| it.errors.map(|it| it[1].q95)),
-    ("speed_q95_mps", "m/s", |it| it.errors.map(|it| it[2].q95)),
-    ("calibration_error", "", |it| it.calibration_error),
+    ("along_q95_m", "m", |figures| figures.errors.map(|errors| errors[0].q95)),
+    ("across_q95_m", "m", |figures| figures.errors.map(|errors| errors[1].q95)),
+    ("speed_q95_mps", "m/s", |figures| figures.errors.map(|errors| errors[2].q95)),
+    ("calibration_error", "", |figures| figures.calibration_error),
 ];
 
 /// The errors of a curve: names of bias, root mean square and 95 % quantile of the magnitude, unit,

@@ -20,8 +20,8 @@ pub enum ClosedBy {
 
 /// Returns the larger of two values. NaN counts as larger than every number, because it must never
 /// look safe.
-pub fn worse(one: f64, other: f64) -> f64 {
-    if one.is_nan() || one >= other { one } else { other }
+pub fn worse(first: f64, second: f64) -> f64 {
+    if first.is_nan() || first >= second { first } else { second }
 }
 
 /// Phase of the encounter of the ego with a rear vehicle.

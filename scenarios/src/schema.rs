@@ -190,10 +190,10 @@ fn range_at(problem: &Problem, key_path: &KeyPath, path: &[Segment]) -> Option<R
 }
 
 /// Returns the smallest range that contains both.
-fn hull(one: Range, other: Range) -> Range {
-    let low = one.low().min(other.low());
-    let includes_low = [one, other].iter().any(|range| range.low() <= low && range.includes_low());
-    let high = one.high().max(other.high());
+fn hull(first: Range, second: Range) -> Range {
+    let low = first.low().min(second.low());
+    let includes_low = [first, second].iter().any(|range| range.low() <= low && range.includes_low());
+    let high = first.high().max(second.high());
     if includes_low { Range::closed(low, high) } else { Range::above(low, high) }
 }
 

@@ -79,8 +79,8 @@ fn the_bytes_are_the_same_with_any_number_of_threads_resumed_and_merged() {
     let parts =
         ["1/2", "2/2"].map(|part| campaign(folder.path(), &part.replace('/', "-"), ARMS, &["--partition", part]));
     let merged = folder.path().join("merged");
-    let [one, two, out] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
-    stdout(&closecall(["tool", "merge", one, two, "--no-gate", "--record", "worst:0", "--out", out]), 0);
+    let [first, second, out] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
+    stdout(&closecall(["tool", "merge", first, second, "--no-gate", "--record", "worst:0", "--out", out]), 0);
     for file in ["journal.jsonl", "outcomes.parquet", "arm_pairs.parquet"] {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert_eq!(read(&whole), read(&merged), "{file}");
@@ -89,7 +89,7 @@ fn the_bytes_are_the_same_with_any_number_of_threads_resumed_and_merged() {
         stdout(&closecall(["replay", out, "3", "--controller", controller]), 0);
     }
     stdout(&closecall(["replay", out, "3", "--paired"]), 0);
-    let compared = stdout(&closecall(["compare", one, one]), 0);
+    let compared = stdout(&closecall(["compare", first, first]), 0);
     assert!(compared.contains("NO REGRESSION"), "{compared}");
 }
 
@@ -244,9 +244,9 @@ fn in_every_arm_the_ego_starts_in_balance_and_all_other_vehicles_start_as_in_the
             for (name, gap_s) in [("gap-1.6", 1.6), ("r157-gap", r157_s), ("r157-driver", 2.0), ("r157-fsm", 2.0)] {
                 let tested = start(name);
                 let context = format!("{}, sample {sample}, {name}", path.display());
-                for (actor, (one, other)) in baseline.states.iter().zip(&tested.states).enumerate() {
+                for (actor, (baseline_state, state)) in baseline.states.iter().zip(&tested.states).enumerate() {
                     if actor != scenario.ego {
-                        assert_eq!(one, other, "{context}: actor {actor}");
+                        assert_eq!(baseline_state, state, "{context}: actor {actor}");
                     }
                 }
                 let [before, now] = [&baseline, &tested].map(|start| start.states[scenario.ego]);

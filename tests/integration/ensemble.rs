@@ -171,8 +171,9 @@ fn brakes_at_s(config: &Wiedemann99Config, braking_mps2: f64) -> f64 {
     };
     for step in 0..600 {
         let time = Time::from_ms(10 * step);
-        let own = LaneNeighbours { lead: Some(ahead(1, 25.0, 2.0, time.s())), ..LaneNeighbours::default() };
-        let neighbours = Neighbours { own, beyond: Some(ahead(2, 60.0, 1.0, time.s())), ..Neighbours::default() };
+        let own_lane = LaneNeighbours { lead: Some(ahead(1, 25.0, 2.0, time.s())), ..LaneNeighbours::default() };
+        let neighbours =
+            Neighbours { own: own_lane, beyond: Some(ahead(2, 60.0, 1.0, time.s())), ..Neighbours::default() };
         let state = VehicleState { s_m: 30.0 * time.s(), d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
         let input = DriverInput {
             time,

@@ -163,8 +163,8 @@ fn a_weakened_check_gives_overridden_and_exit_code_4() {
         folder
     });
     let merged = folder.path().join("merged");
-    let [one, two, merged] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
-    let args = ["tool", "merge", one, two, "--out", merged, "--record", "worst:0"];
+    let [first, second, merged] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
+    let args = ["tool", "merge", first, second, "--out", merged, "--record", "worst:0"];
     assert!(stdout(&closecall(args), 4).contains("OVERRIDDEN"));
 }
 

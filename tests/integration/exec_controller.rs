@@ -152,17 +152,19 @@ fn campaign(controller: &str, out: &Path, samples: &str, more: &[&str]) -> Outpu
 }
 
 /// Returns true if two values are equal, with a tolerance of 1e-9 for numbers.
-fn agree(one: &Value, other: &Value) -> bool {
-    match (one, other) {
-        (Value::Number(one), Value::Number(other)) => (one.as_f64().unwrap() - other.as_f64().unwrap()).abs() <= 1e-9,
-        (Value::Array(one), Value::Array(other)) => {
-            one.len() == other.len() && one.iter().zip(other).all(|(one, other)| agree(one, other))
+fn agree(first: &Value, second: &Value) -> bool {
+    match (first, second) {
+        (Value::Number(first), Value::Number(second)) => {
+            (first.as_f64().unwrap() - second.as_f64().unwrap()).abs() <= 1e-9
         }
-        (Value::Object(one), Value::Object(other)) => {
-            one.len() == other.len()
-                && one.iter().all(|(key, value)| other.get(key).is_some_and(|other| agree(value, other)))
+        (Value::Array(first), Value::Array(second)) => {
+            first.len() == second.len() && first.iter().zip(second).all(|(first, second)| agree(first, second))
         }
-        (one, other) => one == other,
+        (Value::Object(first), Value::Object(second)) => {
+            first.len() == second.len()
+                && first.iter().all(|(key, value)| second.get(key).is_some_and(|second| agree(value, second)))
+        }
+        (first, second) => first == second,
     }
 }
 
@@ -179,8 +181,8 @@ fn the_python_example_behaves_like_the_built_in_cruise_control() {
     let (built_in, by_process) = (results(&built_in), results(&process));
     assert!(built_in.values().flatten().any(|outcome| !outcome["collisions"].as_array().unwrap().is_empty()));
     for (sample, outcome) in &built_in {
-        let [one, other] = [outcome, &by_process[sample]].map(|outcome| outcome.as_ref().unwrap());
-        assert!(agree(one, other), "sample {sample}: {one} {other}");
+        let [built_in, by_python] = [outcome, &by_process[sample]].map(|outcome| outcome.as_ref().unwrap());
+        assert!(agree(built_in, by_python), "sample {sample}: {built_in} {by_python}");
     }
     // The manifest holds the command, so a replay needs only the folder.
     let output = closecall(["replay", process.to_str().unwrap(), "3"]);

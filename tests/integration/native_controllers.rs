@@ -103,8 +103,8 @@ fn libraries_in_c_and_rust_have_the_outcomes_of_the_built_in_controller() {
         assert!(records.iter().all(is_as_baseline), "{}", library.display());
         assert!(records.iter().any(|record| record.arms[1].tally().collided == Some(true)), "nothing happens");
         // The number of jobs changes no byte.
-        let [one, three] = outs.each_ref().map(|out| std::fs::read(out.join("outcomes.parquet")).unwrap());
-        assert!(one == three);
+        let [one_job, three_jobs] = outs.each_ref().map(|out| std::fs::read(out.join("outcomes.parquet")).unwrap());
+        assert!(one_job == three_jobs);
         // A run outside of a campaign answers step by step, with the same bits.
         let run = |controller: &str| {
             let arguments = ["run", "low-thw-overtake", "--seed", "3", "--sample", "5", "--sensors", "object"];

@@ -102,7 +102,7 @@ fn the_recorded_samples_are_those_with_the_largest_harm_of_their_kind() {
     };
     let ego = |arm: &serde_json::Value| {
         let collisions = arm["collisions"].as_array().unwrap().iter();
-        collisions.flat_map(|one| one["between"].as_array().unwrap()).any(|one| one == "ego")
+        collisions.flat_map(|actor| actor["between"].as_array().unwrap()).any(|actor| actor == "ego")
     };
     let mut worst = [(0.0, None); 2];
     for line in journal.lines() {

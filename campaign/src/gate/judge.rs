@@ -222,7 +222,7 @@ impl Judge {
                 });
             }
         }
-        results.sort_by(|one, other| (&one.mark, &one.scenario).cmp(&(&other.mark, &other.scenario)));
+        results.sort_by(|a, b| (&a.mark, &a.scenario).cmp(&(&b.mark, &b.scenario)));
         results
     }
 

@@ -257,7 +257,7 @@ fn threshold(responses: &[Response]) -> Option<f64> {
         return None;
     }
     let mut levels: Vec<f64> = responses.iter().map(Response::level).collect();
-    levels.sort_by(|one, other| other.total_cmp(one));
+    levels.sort_by(|a, b| b.total_cmp(a));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
     let kept = (KEPT * levels.len() as f64).ceil() as usize;
     levels.get(kept.max(1) - 1).copied()

@@ -192,7 +192,7 @@ impl<S: Simulator> Run<'_, S> {
 /// is above the last level.
 fn next_score(particles: &[Particle], last: f64) -> Option<f64> {
     let mut scores: Vec<f64> = particles.iter().map(|(_, response)| response.level()).collect();
-    scores.sort_by(|one, other| other.total_cmp(one));
+    scores.sort_by(|a, b| b.total_cmp(a));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
     let kept = (SHARE * scores.len() as f64).ceil() as usize;
     let score = *scores.get(kept - 1)?;

@@ -152,8 +152,8 @@ fn choose<'a>(
     for (file, chooser) in &choosers {
         let (name, Some(ego)) = (&file.config().name, file.ego_id()) else { continue };
         for chosen in chooser.choose(saved.manifest().sampling.seed, ego) {
-            match all.iter_mut().find(|(known, one)| known == name && one.sample == chosen.sample) {
-                Some((_, known)) => known.reasons.extend(chosen.reasons),
+            match all.iter_mut().find(|(scenario, recorded)| scenario == name && recorded.sample == chosen.sample) {
+                Some((_, recorded)) => recorded.reasons.extend(chosen.reasons),
                 None => all.push((name, chosen)),
             }
         }

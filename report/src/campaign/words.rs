@@ -91,9 +91,7 @@ fn named(name: &str, marks: &[String]) -> String {
 /// the largest share comes first.
 pub(crate) fn worst_first(judged: &Judgement) -> Vec<&GateResult> {
     let mut gates: Vec<&GateResult> = judged.gates.iter().collect();
-    gates.sort_by(|one, other| {
-        other.standing().cmp(&one.standing()).then_with(|| missed_by(other).total_cmp(&missed_by(one)))
-    });
+    gates.sort_by(|a, b| b.standing().cmp(&a.standing()).then_with(|| missed_by(b).total_cmp(&missed_by(a))));
     gates
 }
 

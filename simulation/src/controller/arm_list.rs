@@ -52,8 +52,8 @@ impl ArmList {
     /// [`ArmsError`] if there is only one controller, or one is named twice.
     pub fn joined(lists: &[Self]) -> Result<Vec<ControllerChoice>, ArmsError> {
         let arms: Vec<ControllerChoice> = lists.iter().flat_map(|list| list.0.clone()).collect();
-        if let [one] = &arms[..] {
-            return Err(ArmsError::One { controller: one.to_string() });
+        if let [single] = &arms[..] {
+            return Err(ArmsError::One { controller: single.to_string() });
         }
         match arms.iter().enumerate().find(|(index, arm)| arms[..*index].contains(arm)) {
             Some((_, twice)) => Err(ArmsError::Twice { controller: twice.to_string() }),

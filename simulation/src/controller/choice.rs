@@ -274,8 +274,8 @@ impl FromStr for ControllerChoice {
         }
         if let Some((HOSTED, _)) = text.split_once(':') {
             let hosted = HostedController::new(text);
-            let found = hosted.is_registered().then_some(Self::Hosted(hosted));
-            return found.ok_or_else(|| UnknownController::Hosted { text: text.to_owned() });
+            let choice = hosted.is_registered().then_some(Self::Hosted(hosted));
+            return choice.ok_or_else(|| UnknownController::Hosted { text: text.to_owned() });
         }
         if let Some((controller, settings)) = text.split_once(':')
             && let Ok(Self::BuiltIn(base)) = controller.parse()
@@ -284,11 +284,11 @@ impl FromStr for ControllerChoice {
             return Ok(Self::Tuned(Tuned::parse(base, settings).map_err(fail)?));
         }
         if Functions::is_meant(text) {
-            let found = Functions::parse(text).map(|functions| BuiltIn::Stack(functions).into());
-            return found.ok_or_else(|| UnknownController::Functions { text: text.to_owned() });
+            let choice = Functions::parse(text).map(|functions| BuiltIn::Stack(functions).into());
+            return choice.ok_or_else(|| UnknownController::Functions { text: text.to_owned() });
         }
-        if let Some(found) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
-            return Ok(found.into());
+        if let Some(choice) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
+            return Ok(choice.into());
         }
         match text.strip_prefix(GAP) {
             Some(seconds) => seconds

@@ -92,8 +92,8 @@ impl ContactSearch {
                 }
             }
         }
-        self.ranks.sort_by(|(one_ranks, one), (other_ranks, other)| {
-            one.fraction.total_cmp(&other.fraction).then(one_ranks.cmp(other_ranks))
+        self.ranks.sort_by(|(one_ranks, a), (other_ranks, b)| {
+            a.fraction.total_cmp(&b.fraction).then(one_ranks.cmp(other_ranks))
         });
         touches.clear();
         touches.extend(self.ranks.iter().map(|(_, touch)| *touch));
@@ -115,8 +115,7 @@ impl ContactSearch {
             let actor = by_name[entry.rank];
             entry.reach_m = reach_m(&boxes.before[actor], &boxes.after[actor]);
         }
-        self.order
-            .sort_unstable_by(|one, other| one.reach_m[0].total_cmp(&other.reach_m[0]).then(one.rank.cmp(&other.rank)));
+        self.order.sort_unstable_by(|a, b| a.reach_m[0].total_cmp(&b.reach_m[0]).then(a.rank.cmp(&b.rank)));
     }
 }
 
@@ -215,7 +214,7 @@ mod tests {
                 }
             }
         }
-        touches.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
+        touches.sort_by(|a, b| a.fraction.total_cmp(&b.fraction));
         touches
     }
 

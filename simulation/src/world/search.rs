@@ -91,7 +91,7 @@ impl NeighbourSearch {
         for entry in &mut self.order {
             entry.s_m = self.extents[entry.actor].s_m;
         }
-        self.order.sort_unstable_by(|one, other| one.s_m.total_cmp(&other.s_m).then(one.actor.cmp(&other.actor)));
+        self.order.sort_unstable_by(|a, b| a.s_m.total_cmp(&b.s_m).then(a.actor.cmp(&b.actor)));
         self.touched.clear();
         self.touched.extend(self.extents.iter().map(|extent| strips(road, extent.sides_m())));
         self.bands.clear();

@@ -88,10 +88,7 @@ impl FailureRow {
 
 /// The order of the table: induced failures first, then unexplained ones, then failures with the
 /// most harm.
-pub fn order(one: &FailureRow, other: &FailureRow) -> Ordering {
+pub fn order(a: &FailureRow, b: &FailureRow) -> Ordering {
     let rank = |row: &FailureRow| (row.is_induced == Some(true), row.is_unexplained());
-    rank(other)
-        .cmp(&rank(one))
-        .then(other.harm.total_cmp(&one.harm))
-        .then((&one.scenario, one.sample).cmp(&(&other.scenario, other.sample)))
+    rank(b).cmp(&rank(a)).then(b.harm.total_cmp(&a.harm)).then((&a.scenario, a.sample).cmp(&(&b.scenario, b.sample)))
 }

@@ -35,7 +35,7 @@ pub(super) fn fewest(trial: &Trial<'_>) -> Found {
 /// fails.
 fn of_size(trial: &Trial<'_>, size: usize) -> Option<Vec<ParameterName>> {
     let mut sets = sets(&trial.differing, size);
-    sets.sort_by(|one, other| distance(trial, one).total_cmp(&distance(trial, other)));
+    sets.sort_by(|a, b| distance(trial, a).total_cmp(&distance(trial, b)));
     let fails = |set: &&Vec<ParameterName>| trial.fails(&trial.with(set));
     if trial.case.sensors() != SensorMode::Full {
         return sets.par_iter().find_first(fails).cloned();

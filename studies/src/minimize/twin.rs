@@ -44,7 +44,7 @@ pub(super) fn twin(
     // both directions.
     let moved = if candidates.is_empty() { moved_parameters(trial, values) } else { Vec::new() };
     let all = candidates.iter().chain(&moved);
-    let nearest = all.min_by(|one, other| one.distance.total_cmp(&other.distance));
+    let nearest = all.min_by(|a, b| a.distance.total_cmp(&b.distance));
     let by_parameter = nearest.map(|candidate| -> Result<_, SettingError> {
         let mut changed = values.clone();
         changed.insert(candidate.name.clone(), candidate.value.clone());
@@ -59,7 +59,7 @@ pub(super) fn twin(
     // The largest shift counts like a parameter that moves by the width of its distribution.
     Ok(match (by_parameter.transpose()?, by_start) {
         (Some((distance, twin)), Some((shift, other))) => Some(if distance <= shift { twin } else { other }),
-        (one, other) => one.or(other).map(|(_, twin)| twin),
+        (by_parameter, by_start) => by_parameter.or(by_start).map(|(_, twin)| twin),
     })
 }
 

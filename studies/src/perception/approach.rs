@@ -321,7 +321,7 @@ fn distance_m([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
 /// Returns the nearest track within the cut-off.
 fn nearest<'a>(tracks: &[&'a Track], truth_m: [f64; 2]) -> Option<&'a Track> {
     let apart_m = |track: &Track| distance_m(position_m(track), truth_m);
-    let nearest = tracks.iter().min_by(|one, other| apart_m(one).total_cmp(&apart_m(other)))?;
+    let nearest = tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
     (apart_m(nearest) <= CUTOFF_M).then_some(*nearest)
 }
 

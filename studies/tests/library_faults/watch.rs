@@ -64,7 +64,7 @@ pub(crate) struct Step {
 impl Step {
     /// Returns the track of the vehicle that the sensor watches.
     pub(crate) fn track(&self) -> Option<&Track> {
-        self.tracks.iter().min_by(|one, other| one.y_m().abs().total_cmp(&other.y_m().abs()))
+        self.tracks.iter().min_by(|a, b| a.y_m().abs().total_cmp(&b.y_m().abs()))
     }
 }
 

@@ -30,8 +30,8 @@ fn columns(path: &Path) -> Vec<[String; 3]> {
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
     let metadata = reader.metadata().file_metadata();
     let unit = |name: &str| {
-        let known = metadata.key_value_metadata()?.iter().find(|entry| entry.key == format!("unit:{name}"))?;
-        known.value.clone()
+        let unit = metadata.key_value_metadata()?.iter().find(|entry| entry.key == format!("unit:{name}"))?;
+        unit.value.clone()
     };
     let columns = metadata.schema_descr().columns().iter().map(|column| {
         let kind = match (column.physical_type(), column.logical_type_ref()) {
@@ -83,7 +83,9 @@ fn the_columns_of_a_campaign_s_tables_are_those_documented() {
     for kind in patterns.iter().map(|[_, kind, _]| kind) {
         assert!(parameters.iter().any(|[_, written, _]| written == kind), "no parameter is a {kind}");
     }
-    assert!(parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, known, _]| known == kind)));
+    assert!(
+        parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, documented_kind, _]| documented_kind == kind))
+    );
     // Only Arrow's metadata state the unit of this table.
     let names = |columns: Vec<[String; 3]>| columns.into_iter().map(|[name, kind, _]| [name, kind]).collect::<Vec<_>>();
     for table in ["timings.parquet", "arm_pairs.parquet"] {
@@ -234,8 +236,8 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     hold("lane-changes", each(&changes));
     let list = at("list.csv");
     let first = &changes[0];
-    let known = format!("overtake-without-brake,{},{},left,1\n", first["track_id"], first["crossing_s"]);
-    std::fs::write(&list, format!("recording_id,track_id,time_s,direction,clear\n{known}")).unwrap();
+    let known_change = format!("overtake-without-brake,{},{},left,1\n", first["track_id"], first["crossing_s"]);
+    std::fs::write(&list, format!("recording_id,track_id,time_s,direction,clear\n{known_change}")).unwrap();
     hold("lane-changes-scored", [&program(&["traffic", "lane-changes", &csv, "--reference", &list], 0)]);
     // Of few vehicles some metrics have no value, and some quantities too few.
     let few = at("few.csv");
@@ -244,8 +246,9 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     stdout(&closecall(record), 0);
     let alone = at("alone.csv");
     alone_in(&few, first["track_id"].as_u64().unwrap(), &alone);
-    let (many, one) = (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
-    hold("criticality", each(&many).into_iter().chain(each(&one)));
+    let (many, single) =
+        (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
+    hold("criticality", each(&many).into_iter().chain(each(&single)));
     hold("reenact", [&program(&["traffic", "reenact", &csv], 0)]);
     let sampled =
         program(&["traffic", "sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);

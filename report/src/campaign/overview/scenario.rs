@@ -103,7 +103,7 @@ impl ScenarioOverview {
     /// Returns the pair of parameters that tells the most about the outcome, or `None` if fewer
     /// than two parameters vary.
     pub fn map(&self) -> Option<&PairBins> {
-        let better = |one: &&PairBins, other: &&PairBins| one.information_nat().total_cmp(&other.information_nat());
+        let better = |a: &&PairBins, b: &&PairBins| a.information_nat().total_cmp(&b.information_nat());
         // `max_by` returns the last of equal elements: the order is reversed to get the first.
         self.pairs.iter().rev().max_by(better)
     }

@@ -169,7 +169,7 @@ const LABEL_PX: f32 = 9.0;
 fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String]) {
     let area = |index: usize| boxes[index].1[0] * boxes[index].1[1];
     let mut order: Vec<usize> = (0..boxes.len().min(labels.len())).collect();
-    order.sort_by(|&one, &other| area(other).total_cmp(&area(one)));
+    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
     let mut taken: Vec<[f32; 4]> = Vec::new();
     for index in order {
         let ([left, top], [width, height]) = boxes[index];

@@ -177,9 +177,9 @@ mod tests {
         0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
     }
 
-    fn contrast(one: Rgba, other: Rgba) -> f64 {
-        let [one, other] = [one, other].map(luminance);
-        (one.max(other) + 0.05) / (one.min(other) + 0.05)
+    fn contrast(first: Rgba, second: Rgba) -> f64 {
+        let [first, second] = [first, second].map(luminance);
+        (first.max(second) + 0.05) / (first.min(second) + 0.05)
     }
 
     #[test]

@@ -157,8 +157,8 @@ fn track_face_m(track: &Track) -> [f64; 2] {
 }
 
 /// Returns true if two faces are close enough for a track to belong to a vehicle.
-fn are_close(one: [f64; 2], other: [f64; 2]) -> bool {
-    maths::hypot(one[0] - other[0], one[1] - other[1]) <= MATCH_DISTANCE_M
+fn are_close(first: [f64; 2], second: [f64; 2]) -> bool {
+    maths::hypot(first[0] - second[0], first[1] - second[1]) <= MATCH_DISTANCE_M
 }
 
 /// Returns true if a point in the ego frame lies in one of the fields of view, or if their limits

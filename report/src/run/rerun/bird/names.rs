@@ -55,7 +55,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         Part::Other(_) | Part::Background => (frame.states[*actor].s_m - ego.s_m).abs(),
         Part::Ego | Part::Lead | Part::Rear => 0.0,
     };
-    named.sort_by(|one, other| rank(one).total_cmp(&rank(other)));
+    named.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     named.truncate(NAMED);
     let mut names: Vec<Name> = named
         .into_iter()

@@ -82,7 +82,7 @@ fn label(instance: &Instance) -> String {
 /// mask covers it, or 0.
 fn masks(instances: &[Instance]) -> SegmentationImage {
     let mut likely: Vec<&Instance> = instances.iter().filter(|instance| instance.score >= LIKELY).collect();
-    likely.sort_by(|one, other| other.score.total_cmp(&one.score));
+    likely.sort_by(|a, b| b.score.total_cmp(&a.score));
     let step = usize::from(PIXEL_STEP);
     let middle = |pixel: u32| f64::from(pixel) + 0.5 * f64::from(PIXEL_STEP);
     let columns = (0..PixelRect::IMAGE.width).step_by(step).map(middle);
