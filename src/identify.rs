@@ -5,7 +5,7 @@
 
 use std::process::Command;
 
-/// What the outcome of a sample follows from.
+/// The sources that determine the outcome of a sample.
 const SOURCES: [&str; 10] = [
     "traffic",
     "recorded",

@@ -17,7 +17,7 @@ pub struct ArmPair {
     pub baseline: usize,
     /// Index of the later arm.
     pub tested: usize,
-    /// What the later arm changes.
+    /// The changes by the later arm.
     pub pairs: Pairs,
 }
 
@@ -44,7 +44,7 @@ pub struct PairResult<'a> {
     pub baseline: &'a str,
     /// Name of the later arm.
     pub tested: &'a str,
-    /// What the later arm changes.
+    /// The changes by the later arm.
     pub pairs: &'a Pairs,
     /// The 95 % interval of the share of samples that the later arm prevents.
     pub prevented_95: Option<[f64; 2]>,

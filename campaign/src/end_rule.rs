@@ -83,13 +83,13 @@ pub struct EndedEarly<'a> {
     pub errors: u64,
     /// Why these samples ended in an error: the counts with their failures.
     pub summary: &'a Summary,
-    /// What is kept of the campaign; `None` if it has no folder.
+    /// The kept part of the campaign; `None` if it has no folder.
     pub kept: Option<Kept<'a>>,
     /// The commands to go on.
     pub command_for: CommandFor,
 }
 
-/// What is kept of a campaign that has ended early.
+/// The kept part of a campaign that has ended early.
 #[derive(Clone, Debug)]
 pub struct Kept<'a> {
     /// Its folder.

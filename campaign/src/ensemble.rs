@@ -22,7 +22,7 @@ use crate::summary::{Counts, Summary};
 /// The sign between the names of scenario and member.
 const SEPARATOR: char = '@';
 
-/// What is compared between members.
+/// A quantity that is compared between members.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Share of the baseline's collisions of the ego that the system prevents (-).
@@ -101,7 +101,7 @@ impl Quantity {
     }
 }
 
-/// What one entry shows.
+/// The observed value of one entry.
 #[derive(Clone, Copy, Debug)]
 struct Observed {
     /// The value of the quantity.

@@ -32,9 +32,9 @@ pub struct Campaign {
     pub partition: Option<Partition>,
     /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
-    /// What runs the samples, if the threads of this process do not.
+    /// The runner of the samples, if the threads of this process do not run them.
     pub remote: Option<Arc<dyn SampleRunner>>,
     /// True if samples of the journal that ended in an error are run again.
     pub retry_errors: bool,

@@ -12,7 +12,7 @@ use super::saved_error::SavedError;
 /// The kind of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureKind {
-    /// What was asked for does not exist or contradicts itself.
+    /// A requested thing does not exist or contradicts itself.
     Usage,
     /// A file cannot be used as it is.
     InvalidInput,

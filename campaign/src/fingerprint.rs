@@ -29,14 +29,14 @@ pub struct FileHash {
     pub blake3: String,
 }
 
-/// What identifies a controller that runs as a process.
+/// The identity of a controller that runs as a process.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// The command.
     pub command: String,
     /// The files that the command names, in its order. The program is among them if it is found.
     pub files: Vec<FileHash>,
-    /// What the process states about itself in its first answer.
+    /// The statements of the process in its first answer.
     pub identity: Identity,
     /// The files that the process has mapped or opened after its greeting. They differ from machine
     /// to machine.

@@ -17,7 +17,7 @@ use closecall_traffic::Parameters;
 use crate::record::{ArmRecord, Record};
 use crate::sampling::Sampling;
 
-/// What the records of one scenario must be.
+/// The properties that the records of one scenario must have.
 #[derive(Clone, Copy)]
 pub(crate) struct Identity<'a, Names> {
     pub(crate) file: &'a ScenarioFile,

@@ -25,7 +25,7 @@ pub struct Problem {
     pub line: Option<usize>,
     /// What is wrong.
     pub message: String,
-    /// What repairs it.
+    /// The repair of the problem.
     pub repair: String,
 }
 
@@ -36,7 +36,7 @@ pub struct Integrity {
     pub records: u64,
     /// Number of records of the plan that are missing.
     pub missing: u64,
-    /// What is wrong.
+    /// The problems.
     pub problems: Vec<Problem>,
     /// The repair of files that a campaign writes again if it is resumed.
     #[serde(skip)]

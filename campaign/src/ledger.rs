@@ -158,7 +158,7 @@ pub struct Tally {
     pub imposed: bool,
     /// Whether the margin increase system engages.
     pub engaged: bool,
-    /// Whether its goal is in reach when it engages.
+    /// Whether the system's goal is in reach when the system engages.
     pub goal_in_reach: bool,
     /// Whether the margin increase system is not available for some time.
     pub unavailable: bool,
@@ -259,7 +259,7 @@ impl ArmCounts {
     }
 }
 
-/// What the system under test changes in one sample.
+/// The change by the system under test in one sample.
 ///
 /// A collision between other vehicles (the rear vehicle runs into the lead vehicle, say) counts
 /// against the system: such a sample is not prevented, and it is induced if nothing collides

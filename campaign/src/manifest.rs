@@ -158,7 +158,7 @@ pub struct Manifest {
     pub sensors: Option<SensorMode>,
     /// The samples that are checked for validity.
     pub checks: CheckPlan,
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
     /// The networks that the sensors use.
     pub models: Vec<ManifestModel>,
@@ -167,7 +167,7 @@ pub struct Manifest {
     /// How often a sample runs again in a new process after its worker process has crashed or hung.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub retry_crashed: u32,
-    /// What identifies the controllers that run as processes.
+    /// The identities of the controllers that run as processes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub controllers: Vec<Fingerprint>,
     /// The folder in which the program ran, to which paths in the command of a controller are

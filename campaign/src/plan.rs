@@ -40,9 +40,9 @@ pub struct Plan {
     pub sensors: Option<SensorMode>,
     /// The part of the samples that is run; all of them if `None`.
     pub partition: Option<Partition>,
-    /// Which samples are checked for validity.
+    /// The samples that are checked for validity.
     pub checks: CheckPlan,
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
     /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,

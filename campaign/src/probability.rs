@@ -133,7 +133,7 @@ impl ProbabilityGate {
     }
 }
 
-/// What the samples say about the probability.
+/// The statement of the samples about the probability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
@@ -148,7 +148,7 @@ pub enum Answer {
 /// The answer with its bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What the samples say.
+    /// The statement of the samples.
     pub answer: Answer,
     /// The largest probability that is allowed.
     pub max: f64,

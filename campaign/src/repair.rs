@@ -23,7 +23,7 @@ use super::record::{ArmRecord, Record};
 use super::wall_times;
 use super::workers::Finished;
 
-/// What has been repaired.
+/// The result of a repair.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Repair {
     /// The damaged lines whose samples were run again.

@@ -31,7 +31,7 @@ fn spreads(entry: &SpaceEntry) -> bool {
     }
 }
 
-/// By what samples repeat each other.
+/// The feature by which samples repeat each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Same {
     /// By their parameters, which have finitely many values.

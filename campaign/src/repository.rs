@@ -13,7 +13,7 @@ const SCENARIO: &str = include_str!("repository/scenario.toml");
 const PROJECT: &str = include_str!("repository/closecall.toml");
 const GITHUB: &str = include_str!("../../docs/how-to/ci/github.yml");
 const GITLAB: &str = include_str!("../../docs/how-to/ci/gitlab.yml");
-/// What Git leaves alone: the results of campaigns.
+/// The files that Git ignores: the results of campaigns.
 const IGNORED: &str = "/closecall-results/\n/closecall-results.previous/\n";
 
 /// The schema of scenario files in a repository.
@@ -24,7 +24,7 @@ const TEMPLATE_NAME: &str = "NAME";
 /// The name of the first scenario of a repository.
 const FIRST_SCENARIO: &str = "late-overtake";
 
-/// Where a CI job finds Closecall.
+/// The source of Closecall for a CI job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Installation<'a> {
     /// The Git URL.

@@ -60,7 +60,7 @@ pub struct Moved {
     pub has_removed: bool,
 }
 
-/// What is at a path where results belong.
+/// The state of a path for results.
 enum Place {
     /// Nothing.
     Free,

@@ -64,7 +64,7 @@ pub enum SavedError {
     Sample {
         /// The sample.
         sample: u64,
-        /// Why it has no concrete scenario.
+        /// The reason for which the sample has no concrete scenario.
         source: SampleError,
     },
 }

@@ -22,7 +22,7 @@ pub struct Session {
     pub samples: Arc<[AtomicU64; 2]>,
 }
 
-/// What a command has printed.
+/// The output of a command.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Printed {
     /// The text of standard output.

@@ -31,7 +31,7 @@ pub struct Counts {
     pub samples: u64,
     /// Samples in which a validity check made a difference that it must not make.
     pub invalid: u64,
-    /// What the validity checks found.
+    /// The findings of the validity checks.
     pub checks: CheckCounts,
     /// Simulated time of all runs (s).
     pub simulated_s: f64,
@@ -135,11 +135,11 @@ pub struct Summary {
     pub controllers: Vec<String>,
     /// The counts of each scenario, by name.
     pub scenarios: Vec<(String, Counts)>,
-    /// What determines the numbers of samples.
+    /// The rule that determines the numbers of samples.
     pub inference: Inference,
     /// True if the validity checks were switched off.
     pub is_unchecked: bool,
-    /// Which samples of each scenario are new evidence.
+    /// The samples of each scenario that are new evidence.
     repeats: Vec<Repeats>,
 }
 

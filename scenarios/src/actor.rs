@@ -21,7 +21,7 @@ pub struct Actor {
     pub lane_keeping: Option<LaneKeeping>,
     /// How the desired speed of its driver varies, or `None` if it is constant.
     pub speed_keeping: Option<SpeedKeeping>,
-    /// What happens to it.
+    /// The vehicle's events.
     pub events: Vec<Event>,
     /// The fleet that its look is drawn from in each run; see [`Scenario::vehicle`].
     pub(crate) fleet: Option<FleetOf>,

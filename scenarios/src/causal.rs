@@ -48,7 +48,7 @@ impl VehicleLetters {
 /// The sentence about a run.
 #[derive(Clone, Copy, Debug)]
 pub struct CausalSentence<'a> {
-    /// What the run left behind.
+    /// The outcome of the run.
     pub outcome: &'a Outcome,
     /// The letters of its vehicles.
     pub letters: &'a VehicleLetters,

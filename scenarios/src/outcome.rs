@@ -6,7 +6,7 @@ pub use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, ActorId, Measured, Parameters, Time};
 use serde::{Deserialize, Serialize};
 
-/// Which of two vehicles closed the gap between them.
+/// The vehicle of two that closed the gap between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClosedBy {
@@ -60,7 +60,7 @@ pub struct Collision {
     pub between: [ActorId; 2],
     /// The side of each vehicle that was struck, in the order of `between`.
     pub struck_side: [BoxSide; 2],
-    /// Which of the two vehicles closed the gap.
+    /// The vehicle that closed the gap.
     pub closed_by: ClosedBy,
     /// Phase of the encounter in which it happened.
     pub phase: Phase,
@@ -178,7 +178,7 @@ pub struct ReachedMoment {
     pub time: Time,
 }
 
-/// Why a run ended.
+/// The reason for the end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EndReason {
@@ -269,7 +269,7 @@ pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Opti
         .or_else(|| before().next_back().map(|span| span.reason))
 }
 
-/// What the margin increase system (MIS) did in a run.
+/// The actions of the margin increase system (MIS) in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
     /// Time of its first engagement (s).
@@ -302,7 +302,7 @@ pub struct MisSummary {
     pub unavailable: Option<Unavailability>,
 }
 
-/// What the method promises, from the true states, in every arm.
+/// The method's promise, from the true states, in every arm.
 ///
 /// The promise: when the vehicle behind is at the critical distance, the front time headway has
 /// grown by 2 s, and the ego does not brake hard while that vehicle leaves the lane.
@@ -357,7 +357,7 @@ pub struct Outcome {
     pub ego: ActorId,
     /// The sampled parameter values.
     pub parameters: Parameters,
-    /// Why the run ended.
+    /// The reason for the end of the run.
     pub end: EndReason,
     /// Simulated duration of the run.
     pub duration: Time,

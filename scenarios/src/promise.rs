@@ -29,7 +29,7 @@ const _: () = assert!(GOAL_TOLERANCE_S < SHORTFALL_S);
 /// above the comfort limit of 1 m/s² with its overshoot; 1.2 to 3 are plausible.
 pub const HARD_BRAKING_MPS2: f64 = 1.5;
 
-/// What became of the goal.
+/// The result for the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Goal {
     /// The headway has grown by the goal.
@@ -98,11 +98,11 @@ pub fn is_due(outcome: &Outcome) -> Option<bool> {
 /// Why the system under test did not prevent a collision, in one word of a tally.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Hindrance {
-    /// It never engaged.
+    /// The system never engaged.
     NotEngaged(Reason),
-    /// It engaged, with this effect.
+    /// The system engaged, with this effect.
     Engaged(Goal),
-    /// It engaged, and nothing was promised.
+    /// The system engaged, and nothing was promised.
     NothingPromised,
 }
 

@@ -14,7 +14,7 @@ use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 use super::ScenarioConfig;
 
-/// Why a recorded speed profile cannot be used.
+/// The reason for which a recorded speed profile cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum RecordedError {
     /// The trajectory file cannot be read.
@@ -22,7 +22,7 @@ pub(super) enum RecordedError {
     TrajectoryData {
         /// The actor.
         actor: String,
-        /// What is wrong with the trajectory file.
+        /// The fault of the trajectory file.
         message: String,
     },
     /// The trajectory file has no such track.

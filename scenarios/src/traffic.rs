@@ -142,7 +142,7 @@ struct Rear {
     speed_mps: f64,
 }
 
-/// What is drawn for one vehicle.
+/// The drawn values of one vehicle.
 struct Drawn {
     vehicle: Vehicle,
     speed_mps: f64,

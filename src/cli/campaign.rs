@@ -133,9 +133,9 @@ pub(super) struct CampaignArgs {
 /// The seed of a campaign that judges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum JudgeSeed {
-    /// It is drawn when the campaign starts.
+    /// The seed is drawn when the campaign starts.
     Secret,
-    /// It is named.
+    /// The seed is named.
     Number(u64),
 }
 

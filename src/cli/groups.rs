@@ -52,7 +52,7 @@ pub(super) enum Traffic {
     Calibrate(calibrate::CalibrateArgs),
 }
 
-/// What is computed from many runs and judged by no gate.
+/// Results that are computed from many runs and judged by no gate.
 #[derive(Debug, Subcommand)]
 #[command(after_help = examples([
     "closecall study sensors --quick",

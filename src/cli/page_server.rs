@@ -32,7 +32,7 @@ const WRITE_TIME: Duration = Duration::from_secs(30);
 /// Random bytes of the token.
 const TOKEN_BYTES: usize = 16;
 
-/// What is asked for.
+/// The method of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
     /// Something to show.

@@ -99,7 +99,7 @@ pub(super) struct RareArgs {
 /// Width of the interval, relative to the estimate, unless another one is named.
 const RELATIVE_WIDTH: f64 = 0.5;
 
-/// What the command line says of a rare event.
+/// The arguments of the command line for a rare event.
 pub(super) struct Rare<'a> {
     pub(super) method: Method,
     pub(super) args: &'a RareArgs,

@@ -25,7 +25,7 @@ use crate::exit_code::ExitCode;
 /// Number of vehicles whose speeds are plotted: the ego, the lead vehicle and the rear vehicle.
 const PROTAGONISTS: usize = 3;
 
-/// What controls the rear vehicle.
+/// The driver of the rear vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum RearChoice {
     /// A model of a human driver: it reacts to the ego, follows as closely as recorded, and pulls
@@ -62,7 +62,7 @@ pub(super) struct ReenactArgs {
     /// can be re-enacted]
     #[arg(long, value_name = "ID", help_heading = heading::DATA)]
     track: Option<u64>,
-    /// What controls the rear vehicle
+    /// The driver of the rear vehicle
     #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     rear: RearChoice,
     #[command(flatten)]

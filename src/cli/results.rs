@@ -38,7 +38,7 @@ const OPEN: &str = if cfg!(target_os = "macos") {
     "xdg-open"
 };
 
-/// Where a campaign keeps its results.
+/// The place in which a campaign keeps its results.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ResultsArgs {
     /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and
@@ -57,7 +57,7 @@ pub(super) struct ResultsArgs {
 /// The place of the results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place<'a> {
-    /// They are not kept.
+    /// The results are not kept.
     Nowhere,
     /// The folder that the command line names.
     Named(&'a Path),
@@ -100,7 +100,7 @@ impl ResultsArgs {
     }
 }
 
-/// What a missing report means.
+/// The consequence of a missing report.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct ArtifactArgs {
     /// End with the exit code of the failure if a report or a recording cannot be written. Without
@@ -139,7 +139,7 @@ impl ArtifactArgs {
 #[derive(Debug)]
 pub(super) struct Results {
     pub(super) locked: Option<LockedFolder>,
-    /// Why the results are not kept completely, if they should be.
+    /// The reason for which the results are not kept completely, if they should be.
     lost: Option<CliError>,
 }
 

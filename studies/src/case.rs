@@ -37,7 +37,7 @@ pub enum CausesError {
     Sample {
         /// The sample's number.
         sample: u64,
-        /// Why it has no outcome.
+        /// The reason for which the sample has no outcome.
         source: SampleError,
     },
     /// The sample fails in the journal of the campaign, but not when it is run again.
@@ -191,7 +191,7 @@ impl Case {
     /// Runs the sample with further settings in any arm.
     ///
     /// # Errors
-    /// As for [`Self::run`].
+    /// Works like [`Self::run`].
     pub fn run_as(&self, settings: &[Setting], arm: &Arm, observer: &mut dyn Observer) -> Result<Outcome, CausesError> {
         let scenario = self.concrete(settings)?;
         run_guarded(&scenario, self.key(), arm, observer).map_err(|source| self.failed(source))

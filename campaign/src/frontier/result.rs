@@ -1,4 +1,4 @@
-//! What a frontier finds.
+//! The result of a frontier.
 
 use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
 use closecall_traffic::statistics::sensitivity::jackknife::{Estimate, student};

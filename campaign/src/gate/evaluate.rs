@@ -22,7 +22,7 @@ pub enum Answer {
     Open(OpenReason),
 }
 
-/// Why a gate is not decided.
+/// The reason for which a gate is not decided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpenReason {
     /// There are too few samples for the confidence that is asked for.
@@ -57,7 +57,7 @@ impl OpenReason {
     }
 }
 
-/// What else the answer of a gate depends on.
+/// Further facts on which the answer of a gate depends.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence {
     /// Whether the campaign has a baseline.
@@ -66,7 +66,7 @@ pub struct Evidence {
     pub is_varied: bool,
     /// Whether the baseline, and the arm under test, are controllers of this program.
     pub is_built_in: [bool; 2],
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
 }
 

@@ -32,7 +32,7 @@ impl Gate {
     }
 }
 
-/// What is judged of one scenario.
+/// The judged parts of one scenario.
 #[derive(Clone, Debug)]
 struct Judged {
     scenario: String,

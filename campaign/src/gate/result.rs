@@ -39,7 +39,7 @@ pub struct GateResult {
     pub scenario: String,
     /// The criterion.
     pub expression: Expression,
-    /// Where it comes from.
+    /// The origin of the gate.
     pub source: GateSource,
     /// Its value and answer.
     pub evaluation: Evaluation,
@@ -144,7 +144,7 @@ pub struct RequirementResult {
 pub struct ExpectationResult {
     /// The scenario.
     pub scenario: String,
-    /// What is expected.
+    /// The expected flags.
     pub expects: Vec<FlagName>,
     /// Samples in which all of it happened, in every arm; a run that the ego's collision ended
     /// counts.

@@ -15,7 +15,7 @@ use closecall_scenarios::criteria::Expression;
 
 use crate::probability::ProbabilityGate;
 
-/// Where a gate comes from.
+/// The origin of a gate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GateSource {
     /// The command line.
@@ -48,7 +48,7 @@ impl fmt::Display for GateSource {
 pub struct GateSpec {
     /// The criterion.
     pub expression: Expression,
-    /// Where it comes from.
+    /// The origin of the criterion.
     pub source: GateSource,
 }
 
@@ -57,7 +57,7 @@ pub struct GateSpec {
 pub struct ProbabilitySpec {
     /// The gate.
     pub gate: ProbabilityGate,
-    /// Where it comes from.
+    /// The origin of the gate.
     pub source: GateSource,
 }
 
@@ -75,7 +75,7 @@ pub struct GateSet {
     pub max_flip_rate: f64,
     /// Most flaky samples; any number if `None`.
     pub max_flaky: Option<u64>,
-    /// What a reader should know of the origin of the gates.
+    /// Remarks on the origin of the gates, for the reader.
     pub notes: Vec<String>,
 }
 

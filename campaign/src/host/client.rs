@@ -83,7 +83,7 @@ thread_local! {
     static CLIENT: RefCell<Client<OperatingSystem>> = RefCell::new(Client::new(OperatingSystem(Instant::now())));
 }
 
-/// Why a process has not run a sample. The process is gone.
+/// The reason for which a process has not run a sample. The process is gone.
 pub(super) enum Trouble {
     /// The process crashed or hung. Another process may succeed.
     Crash(SampleFailure),

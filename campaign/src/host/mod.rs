@@ -49,7 +49,7 @@ const CHANGED: &str = "refused";
 /// The kind of the failure of a sample whose controller a worker process cannot read.
 const UNREADABLE: &str = "unreadable";
 
-/// Why a worker process has refused to run a sample.
+/// A worker process's refusal to run a sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Refusal<'a> {
     /// The reason.
@@ -72,7 +72,7 @@ pub(crate) fn refusal(record: &Record) -> Option<Refusal<'_>> {
     record.arms.iter().filter_map(|arm| arm.result.as_ref().err()).find_map(Refusal::of)
 }
 
-/// What a worker process has to know before its first sample.
+/// The task of a worker process, which it needs before its first sample.
 #[derive(Serialize, Deserialize)]
 struct Task {
     /// The version of the program that gives the task.

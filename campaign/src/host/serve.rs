@@ -1,4 +1,4 @@
-//! What a worker process does: `closecall host …`.
+//! The work of a worker process: `closecall host …`.
 
 use std::fs::File;
 use std::io::{self, BufRead, Write};
@@ -24,7 +24,7 @@ use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
 use crate::workers::Samples;
 
-/// What a process answers that has loaded ONNX Runtime.
+/// The answer of a process that has loaded ONNX Runtime.
 pub(crate) const ONNXRUNTIME_WORKS: &str = "onnxruntime";
 
 /// Number of tracks in the measurement of a control step: dense traffic.
@@ -217,7 +217,7 @@ fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, String> {
     serde_json::from_str(line).map_err(|error| format!("failed to read a message: {error}"))
 }
 
-/// Where the answers go, and which process gives them.
+/// The output of the answers, and the process that gives them.
 #[derive(Clone)]
 struct Answering {
     answers: Arc<Mutex<File>>,

@@ -84,7 +84,7 @@ pub struct Goal {
     pub value: usize,
 }
 
-/// Why there is no interval.
+/// The reason for which there is no interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoInterval {
@@ -96,12 +96,12 @@ pub enum NoInterval {
     Budget,
 }
 
-/// What importance sampling has found.
+/// The result of importance sampling.
 #[derive(Clone, Debug)]
 pub struct ImportanceResult {
     /// The means of [`Response::values`].
     pub means: Option<[Mean; 3]>,
-    /// Why they have no interval.
+    /// The reason for which the means have no interval.
     pub no_interval: Option<NoInterval>,
     /// Upper 95 % bound of the probability that any event happens, if no final run had one: no
     /// weight exceeds the inverse of the defensive share.

@@ -46,7 +46,7 @@ pub(super) fn draw_noise(rng: &mut Stream) -> u64 {
     rng.next_u64() >> (u64::BITS - NOISE_BITS)
 }
 
-/// What a run tells of the event.
+/// The response of a run to the event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
     /// How near the run came to the event: a larger number is nearer. It guides the search, and no
@@ -79,7 +79,7 @@ impl Response {
     }
 }
 
-/// What runs points.
+/// A simulator, which runs points.
 pub trait Simulator {
     /// Why points cannot run.
     type Error;

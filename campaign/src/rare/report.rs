@@ -1,4 +1,4 @@
-//! What is reported of a rare event, for people and for programs.
+//! The report on a rare event, for people and for programs.
 
 use std::fmt;
 
@@ -41,7 +41,7 @@ pub struct Nearest {
     pub distance_sd: f64,
     /// The key of its random streams: the number of its sample.
     pub noise: u64,
-    /// Which of the events happened.
+    /// The events that happened.
     pub events: [bool; 2],
     /// Its parameters.
     pub parameters: Parameters,
@@ -67,7 +67,7 @@ pub struct RareReport {
     pub first_error: Option<SampleFailure>,
     /// The estimates: the event, and of a difference the second event and the difference.
     pub estimates: Vec<Estimate>,
-    /// Why there are none.
+    /// The reason for which there are no estimates.
     pub no_interval: Option<NoInterval>,
     /// Upper 95 % bound of the probability of the event, if no run had it and there is one.
     pub upper_bound_without_event: Option<f64>,

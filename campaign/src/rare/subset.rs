@@ -71,12 +71,12 @@ pub struct Level {
     pub step: f64,
 }
 
-/// What subset simulation has found.
+/// The result of subset simulation.
 #[derive(Clone, Debug)]
 pub struct SubsetResult {
     /// The means of [`Response::values`] over the repetitions.
     pub means: Option<[Mean; 3]>,
-    /// Why there are none.
+    /// The reason for which there are no means.
     pub no_interval: Option<NoInterval>,
     /// All runs, with the runs of the pilot.
     pub runs: u64,

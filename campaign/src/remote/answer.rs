@@ -40,7 +40,7 @@ pub(super) fn encode(version: &str, configuration: &str, results: &[Finished]) -
     Ok(bytes)
 }
 
-/// What the answer to a block must be.
+/// The expected answer to a block.
 pub(super) struct Expected<'a> {
     pub(super) version: &'a str,
     pub(super) configuration: &'a str,

@@ -1,4 +1,4 @@
-//! What an engine does, and the one that the program has.
+//! The interface of an engine, and the engine of the program.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;

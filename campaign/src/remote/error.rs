@@ -113,7 +113,7 @@ impl RemoteError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct EngineError {
-    /// What has failed.
+    /// The failure.
     pub message: String,
     /// True if the cluster cannot be used as it is: another version of the program, a missing file.
     /// False if it has failed.

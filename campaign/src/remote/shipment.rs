@@ -11,7 +11,7 @@ use super::error::RemoteError;
 use crate::fingerprint::named_files;
 use crate::manifest::Manifest;
 
-/// What a machine needs to run blocks of a campaign.
+/// The data that a machine needs to run blocks of a campaign.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shipment {
     /// The version of the program that has started the campaign.
@@ -31,7 +31,7 @@ pub struct ShippedFile {
     pub name: String,
     /// The content.
     pub content: Vec<u8>,
-    /// Whether it is a program.
+    /// Whether the file is a program.
     pub is_executable: bool,
 }
 

@@ -105,7 +105,7 @@ impl<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static> Samples for Points<P> {
     }
 }
 
-/// What the runs of a design have given.
+/// The results of the runs of a design.
 #[derive(Debug, Default)]
 pub(super) struct Ran {
     /// The outputs of each point; `None` if an arm ended in an error.

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::html::{number, number_heads, table, text_heads};
 
-/// What the members are not, for readers.
+/// A note for readers: the members are no sample.
 const NOTE: &str = "Members are ways in which humans drive, not a sample of drivers: no weights are assumed. Of an even number, \
                     the less favourable of the two in the middle is the median.";
 

@@ -53,12 +53,12 @@ pub struct ArtifactError {
     pub source: ReportError,
 }
 
-/// What a campaign has written at its end.
+/// The files that a campaign has written at its end.
 #[derive(Debug, Default)]
 pub struct Written {
     /// The recordings.
     pub recorded: Vec<RecordedSample>,
-    /// What could not be written.
+    /// The files that could not be written.
     pub failures: Vec<ArtifactError>,
 }
 
@@ -85,7 +85,7 @@ pub struct CampaignReport<'a> {
     pub command_for: CommandFor,
 }
 
-/// What reports show of single samples.
+/// The data of single samples in reports.
 #[derive(Clone, Copy)]
 struct Looks<'a> {
     /// The recordings.

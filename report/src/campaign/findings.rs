@@ -1,4 +1,4 @@
-//! What the reports for people are made of.
+//! The data of the reports for people.
 
 use std::collections::BTreeMap;
 

@@ -21,7 +21,7 @@ use super::html::{number, number_heads, table, text_heads};
 /// The file in the folder of the campaign.
 pub const ORIGINS: &str = "origins.json";
 
-/// Where the scenarios of a campaign come from.
+/// The origins of the scenarios of a campaign.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origins {
     /// The trajectory files.
@@ -134,9 +134,9 @@ impl Origin {
 /// The encounters with their results, as a table for human readers.
 #[derive(Clone, Copy, Debug)]
 pub struct OriginsText<'a> {
-    /// Where they come from.
+    /// The origins of the encounters.
     pub origins: &'a Origins,
-    /// What became of them.
+    /// The results of the encounters.
     pub summary: &'a Summary,
 }
 

@@ -332,7 +332,7 @@ fn collision_columns(columns: &mut Columns) {
     columns.number("collision_relative_speed_mps", "m/s", move |row| Some(first(row)?.relative_speed_mps));
 }
 
-/// What happened in the encounter, from the ground truth.
+/// The events of the encounter, from the ground truth.
 fn encounter_columns(columns: &mut Columns) {
     for name in ["rear_near", "rear_cut_out", "rear_crossed", "hazard", "rear_critical", "rear_passed", "lead_braked"] {
         columns.flag(name, move |row| Some(Measure::named(name)?.of(row.outcome()?)? == 1.0));

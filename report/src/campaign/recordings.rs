@@ -25,7 +25,7 @@ pub struct RecordedSample {
     pub scenario: String,
     /// The sample's number.
     pub sample: u64,
-    /// Why it was recorded, in words.
+    /// The reasons for its recording, in words.
     pub reasons: Vec<&'static str>,
     /// The file.
     pub path: PathBuf,
@@ -64,16 +64,16 @@ pub(super) fn card_beside(recording: &str) -> String {
     recording.strip_suffix(".rrd").map_or_else(String::new, |stem| format!("{stem}.html"))
 }
 
-/// What has been recorded.
+/// The results of the recording.
 #[derive(Default)]
 pub(super) struct Recorded {
-    /// Where the reports find the recordings.
+    /// The paths of the recordings, for the reports.
     pub(super) paths: Recordings,
     /// The recordings in the order of the page.
     pub(super) samples: Vec<RecordedSample>,
     /// Pictures of the recorded samples, in the same order.
     pub(super) stills: Vec<Still>,
-    /// What could not be recorded, in words, and why.
+    /// The recordings that failed, in words, and the reasons.
     pub(super) failures: Vec<(String, ReportError)>,
 }
 

@@ -80,7 +80,7 @@ pub struct Case<'a> {
 pub struct CaseFiles {
     /// Each file with its text.
     pub files: Vec<(PathBuf, String)>,
-    /// What each form cannot say.
+    /// The properties that each form cannot express.
     pub unsaid: Vec<(Form, Vec<String>)>,
 }
 

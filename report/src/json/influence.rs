@@ -1,4 +1,4 @@
-//! What moves the result of a campaign, as JSON.
+//! The influences on the result of a campaign, as JSON.
 
 use closecall_scenarios::sampling::Design;
 use closecall_traffic::statistics::sensitivity::given_data::Influence;

@@ -1,4 +1,4 @@
-//! What was found in trajectory data as JSON.
+//! Results from trajectory data as JSON.
 
 use closecall_recorded::fit::{FittedDistributions, FittedQuantity, Quantity, RankCorrelation};
 use closecall_recorded::lane_change::{LaneChange, Score};

@@ -44,7 +44,7 @@ impl Line<'_> {
     }
 }
 
-/// What a chart shows.
+/// The content of a chart.
 pub(super) struct Chart {
     /// Its title, with the unit.
     pub(super) title: &'static str,

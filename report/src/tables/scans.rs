@@ -44,7 +44,7 @@ pub struct ScanWriter {
     failed: Option<io::Error>,
 }
 
-/// What the scans are written to.
+/// The destination of the scans.
 enum Sink {
     /// A table, with the rows that are not written yet.
     Table(Box<ArrowWriter<File>>, Box<ScanColumns>),

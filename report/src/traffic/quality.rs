@@ -8,7 +8,7 @@ use closecall_recorded::trajectory_data::{QualityInspector, Tracks};
 pub struct QualityText<'a> {
     /// The tracks, which have been read to their end.
     pub tracks: &'a Tracks<'a>,
-    /// What was found in them.
+    /// The flaws of the tracks.
     pub inspector: &'a QualityInspector,
 }
 

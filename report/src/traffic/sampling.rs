@@ -139,7 +139,7 @@ fn headways(changer: &Trajectory, other: &Trajectory, lane: Lane, counts: impl F
 /// The run of one step: its measurements, and a film of the lane change.
 #[derive(Clone, Debug)]
 pub struct StepRun {
-    /// What was measured.
+    /// The measurements of the run.
     pub run: SampledRun,
     /// The film of the lane change; `None` if the vehicle never changes lanes.
     pub film: Option<Film>,

@@ -41,7 +41,7 @@ impl Comparison {
     }
 }
 
-/// What may happen in one sample.
+/// An event that may happen in one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// The flag, or the number that is compared.

@@ -22,7 +22,7 @@ use std::str::FromStr;
 
 use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
 
-/// What is computed from all samples.
+/// A value that is computed from all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aggregate {
     /// The number of samples in which a flag holds.
@@ -68,7 +68,7 @@ pub struct Comparison {
     pub measure: &'static Measure,
     /// Whether the measure is taken in the baseline, instead of the arm under test.
     pub in_baseline: bool,
-    /// Where the flag holds.
+    /// The side of the bound on which the flag holds.
     pub side: Side,
     /// The threshold, at which the flag does not hold.
     pub threshold: f64,
@@ -149,9 +149,9 @@ impl Operator {
 /// A gate: an aggregate, and the bound that it must satisfy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expression {
-    /// What is computed.
+    /// The aggregate that is computed.
     pub aggregate: Aggregate,
-    /// Of which value of each sample.
+    /// The value of each sample that is aggregated.
     pub quantity: Quantity,
     /// Only samples in which this flag holds count.
     pub condition: Option<Quantity>,

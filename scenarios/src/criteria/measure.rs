@@ -22,9 +22,9 @@ pub enum MeasureKind {
 pub struct Measure {
     /// The name in gates.
     pub name: &'static str,
-    /// Whether it counts or quantifies.
+    /// Whether the measure counts or quantifies.
     pub kind: MeasureKind,
-    /// What it means, for people.
+    /// The meaning of the measure, for people.
     pub meaning: &'static str,
     value: fn(&Outcome) -> Option<f64>,
 }

@@ -20,7 +20,7 @@ pub struct ApplyError {
     pub source: Box<ScenarioError>,
 }
 
-/// What a member makes of a scenario.
+/// The result of applying a member to a scenario.
 #[derive(Clone, Debug)]
 pub enum Application {
     /// The scenario with the member's drivers, named SCENARIO@MEMBER.

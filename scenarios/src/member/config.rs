@@ -57,7 +57,7 @@ pub enum MemberError {
     /// member.
     #[error("{place}: expected a file or folder of members (*.toml), or one of {names}{suggestion}")]
     Unknown {
-        /// What was not found.
+        /// The place that is no member.
         place: String,
         /// The members that are part of the program.
         names: String,

@@ -37,7 +37,7 @@ pub struct MemberEntry {
     pub name: String,
     /// How its drivers drive.
     pub description: String,
-    /// What it sets, each as `key = value`.
+    /// The member's settings, each as `key = value`.
     pub sets: Vec<String>,
     /// The source of each value.
     pub sources: Vec<String>,

@@ -64,7 +64,7 @@ pub struct ImportOptions {
 pub struct Imported {
     /// The text of the scenario file.
     pub text: String,
-    /// What the scenario says in another way than the file.
+    /// The parts that the scenario expresses in another way than the file.
     pub notes: Vec<String>,
     /// When events begin and end (s), as the storyboard was played.
     pub events: Vec<(f64, String)>,

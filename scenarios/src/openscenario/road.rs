@@ -18,7 +18,7 @@ pub(super) struct ImportedRoad {
     pub(super) lane_width_m: f64,
     pub(super) curvature_per_m: f64,
     pub(super) speed_limit_mps: Option<f64>,
-    /// What the scenario's road does not have.
+    /// The properties that the scenario's road lacks.
     pub(super) notes: Vec<String>,
 }
 

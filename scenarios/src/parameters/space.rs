@@ -57,11 +57,11 @@ pub struct ParameterSpace {
 /// How much sampled values vary, in rising order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Variation {
-    /// They are always the same.
+    /// The values are always the same.
     None,
     /// The parameters take finitely many values, and independent samples repeat each other.
     Discrete,
-    /// They come from a continuum.
+    /// The values come from a continuum.
     Continuous,
 }
 

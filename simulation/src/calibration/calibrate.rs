@@ -51,7 +51,7 @@ pub struct Calibration {
     pub errors_of_pooled: Errors,
     /// Errors of the pooled set on the held-out pairs; `None` if none is held out.
     pub errors_of_held_out: Option<Errors>,
-    /// What the population of single sets predicts for the held-out pairs.
+    /// The predictions of the population of single sets for the held-out pairs.
     pub predictive: Option<Predictive>,
 }
 

@@ -37,7 +37,7 @@ pub enum ArmsError {
         /// The controller.
         controller: String,
     },
-    /// One is named twice.
+    /// A controller is named twice.
     #[error("`{controller}` is named twice: every arm needs a controller of its own")]
     Twice {
         /// The controller.

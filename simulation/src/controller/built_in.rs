@@ -24,11 +24,11 @@ pub enum BuiltIn {
     MisExtended,
     /// As [`BuiltIn::Acc`], but slowing down gently from the first second on, without looking back.
     Blind,
-    /// As [`BuiltIn::Blind`], twice as hard and twice as far.
+    /// Like [`BuiltIn::Blind`], but twice as strong and over twice the distance.
     Crawl,
     /// The scenario's ego stack with the functions that the arm names.
     Stack(Functions),
-    /// As [`BuiltIn::Acc`], with another constant time gap.
+    /// Like [`BuiltIn::Acc`], with another constant time gap.
     Gap(TimeGap),
     /// As [`BuiltIn::Acc`], with the minimum following distance of UN Regulation 157.
     R157Gap,

@@ -22,7 +22,7 @@ use crate::run::ControllerFactory;
 pub enum ControllerChoice {
     /// A controller of this program.
     BuiltIn(BuiltIn),
-    /// The same with settings of its own.
+    /// A built-in controller with its own settings.
     Tuned(Tuned),
     /// A separate process for each sample.
     Exec(ExecSettings),

@@ -36,7 +36,7 @@ impl Functions {
     /// Cruise control and emergency braking.
     pub const CRUISE_AND_AEB: Self = Self { follows: false, aeb: Some(true), mis: false };
 
-    /// What is allowed, in words.
+    /// The allowed lists of functions, in words.
     pub const ALLOWED: &'static str =
         "`acc` or `cruise`, then `+aeb` or `-aeb`, then `+mis`, as in `acc-aeb`, `acc+aeb` and `cruise+aeb`";
 

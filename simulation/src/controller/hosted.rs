@@ -28,7 +28,7 @@ pub const PREFIX: &str = "python";
 type Factories = BTreeMap<String, Arc<dyn ControllerFactory>>;
 
 static REGISTRY: Mutex<Factories> = Mutex::new(BTreeMap::new());
-/// Why controllers cannot be loaded in this process, by their names.
+/// The reasons for which controllers cannot be loaded in this process, by their names.
 static REFUSED: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
 
 fn registry() -> MutexGuard<'static, Factories> {

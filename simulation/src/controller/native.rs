@@ -58,7 +58,7 @@ pub fn command(arguments: &[&str]) -> Vec<String> {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeSettings {
-    /// What the file is.
+    /// The kind of the file.
     pub kind: Kind,
     /// The file.
     pub path: String,
@@ -141,13 +141,13 @@ impl NativeSettings {
     }
 }
 
-/// What a process answers that has tried to load a library or an FMU.
+/// The answer of a process that has tried to load a library or an FMU.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Probe {
-    /// It can be used.
+    /// The file can be used.
     Identity(Identity),
-    /// It cannot be used.
+    /// The file cannot be used.
     Refused {
         /// The reason.
         reason: String,
@@ -196,7 +196,7 @@ pub enum NativeError {
     Start {
         /// The controller.
         controller: String,
-        /// Why it cannot be started.
+        /// The reason for which it cannot be started.
         reason: String,
     },
 }

@@ -32,7 +32,7 @@ pub(super) struct Rear {
     pub(super) acceleration_mps2: f64,
 }
 
-/// What the meter sees of one physics step.
+/// The meter's view of one physics step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Instant {
     /// Speed of the ego (m/s).

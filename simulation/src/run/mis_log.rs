@@ -11,9 +11,9 @@ pub(super) struct MisObservation<'a> {
     pub(super) command: &'a EgoCommand,
     pub(super) speed_mps: f64,
     pub(super) thw_front_s: Measured,
-    /// Where the vehicle behind is.
+    /// The position of the vehicle behind.
     pub(super) rear: RearObservation,
-    /// Why the system is not available; `None` if it is.
+    /// The reason for which the system is not available; `None` if it is.
     pub(super) failed: Option<Reason>,
 }
 
@@ -24,7 +24,7 @@ pub(super) struct RearObservation {
     pub(super) near: Option<usize>,
     /// Whether the lead vehicle brakes and the ego brakes hard in front of it.
     pub(super) is_hazard: bool,
-    /// Whether it has left the lane.
+    /// Whether the vehicle has left the lane.
     pub(super) has_crossed: bool,
     /// True only at the first control step at which it is at the critical distance.
     pub(super) is_critical: bool,

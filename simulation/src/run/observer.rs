@@ -72,7 +72,7 @@ pub enum RunEvent {
     DriverNote {
         /// Index of the driver's vehicle in the list of actors.
         actor: usize,
-        /// What the driver does.
+        /// The driver's action.
         note: DriverNote,
     },
     /// The ego stack changed its state.

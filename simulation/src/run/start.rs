@@ -1,4 +1,4 @@
-//! Where the ego starts.
+//! The start of the ego.
 //!
 //! A sample is the same in every arm: all other vehicles start at the same places with the same
 //! speeds, their drivers draw the same random numbers, and events on the clock happen at the same

@@ -32,7 +32,7 @@ use closecall_scenarios::outcome::{Ahead, EndReason, Moment, Outcome, Phase};
 /// m/s² of the paper's comfort limit with its overshoot; 1.2 to 3 are plausible.
 const HAZARD_BRAKING_MPS2: f64 = 1.5;
 
-/// What a run waits for.
+/// The next event for which a run waits.
 pub(super) enum Next {
     /// A command of the ego controller.
     Control,

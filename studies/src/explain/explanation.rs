@@ -28,7 +28,7 @@ pub struct StageRun {
     pub min_gap_rear_m: Option<f64>,
     /// Smallest gap to the vehicle ahead (m).
     pub min_gap_front_m: Option<f64>,
-    /// Why the run has no outcome.
+    /// The reason for which the run has no outcome.
     pub error: Option<String>,
 }
 
@@ -50,7 +50,7 @@ impl StageRun {
     }
 }
 
-/// What the failure is due to.
+/// The cause of the failure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Cause {
@@ -121,7 +121,7 @@ pub struct Explanation {
     pub missing: Vec<(Stage, String)>,
     /// The runs with two stages replaced. Empty if a stage alone prevents the failure.
     pub pairs: Vec<StageRun>,
-    /// What the failure is due to.
+    /// The cause of the failure.
     pub cause: Cause,
     /// The role of the margin increase system; `None` if the controller has none.
     pub mis: Option<MisEffect>,

@@ -1,4 +1,4 @@
-//! Which stages of a run are out of the ordinary.
+//! The stages of a run that are out of the ordinary.
 //!
 //! | stage | usual |
 //! |---|---|

@@ -68,7 +68,7 @@ pub struct CampaignShares {
     pub induced: u64,
 }
 
-/// What is missing for the net effect.
+/// A missing input of the net effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Missing {
@@ -110,7 +110,7 @@ pub struct NetEffect {
 /// The exposure, and the net effect if the inputs suffice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exposure {
-    /// What counts as an event.
+    /// The rule for events.
     pub rule: EventRule,
     /// The observation in trajectory files; `None` without files.
     pub observed: Option<Observed>,
@@ -123,7 +123,7 @@ pub struct Exposure {
     pub campaign: Option<CampaignShares>,
     /// The net effect; `None` if it cannot be said.
     pub effect: Option<NetEffect>,
-    /// What would have to be known.
+    /// The missing inputs.
     pub missing: Vec<Missing>,
 }
 

@@ -15,14 +15,14 @@ const SHORT_THW_S: f64 = 1.5;
 /// Speed below which a time headway is meaningless (m/s).
 const MIN_SPEED_MPS: f64 = 1.0;
 
-/// What counts as an event.
+/// The rule for events.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EventRule {
     /// Deceleration of the lead vehicle from which it counts as braking (m/s²).
     pub braking_mps2: f64,
 }
 
-/// What was observed in trajectory data.
+/// The observation in trajectory data.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Observed {
     /// Names of the data.

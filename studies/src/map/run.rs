@@ -66,7 +66,7 @@ pub enum MapError {
         detection_m: f64,
         /// The front time headway (s).
         front_thw_s: f64,
-        /// Why there is no outcome.
+        /// The reason for which there is no outcome.
         source: SampleError,
     },
 }
@@ -170,7 +170,7 @@ struct Cell {
     front_thw_s: f64,
 }
 
-/// What the theory says about a point.
+/// The theory's statement about a point.
 struct Theory {
     planned_mps2: f64,
     margin_s: f64,

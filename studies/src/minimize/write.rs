@@ -72,7 +72,7 @@ pub fn write_files(
     Ok(MinimizedFiles { failing: path.clone(), twin: passing.map(|_| twin.clone()) })
 }
 
-/// What a file says about its case.
+/// The text of a file about its case.
 struct Text<'a> {
     name: &'a str,
     minimized: &'a Minimized,

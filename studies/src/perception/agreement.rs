@@ -24,7 +24,7 @@ const DIFFERENT_S: f64 = 0.1;
 /// Name of the vehicle that approaches, as in the scenarios of the library.
 const REAR: &str = "rear";
 
-/// What one run of a sample showed.
+/// The verdict of one run of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
     /// Whether the ego collided.

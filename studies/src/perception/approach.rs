@@ -31,7 +31,7 @@ const APPEARS_AFTER_STEPS: i64 = 150;
 /// usual value for vehicles.
 pub const CUTOFF_M: f64 = 5.0;
 
-/// What one control step showed.
+/// The observation of one control step.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// True gap from the front of the vehicle to the ego's rear (m).
@@ -56,7 +56,7 @@ pub struct Tracked {
     pub confidence: f64,
 }
 
-/// What one approach showed.
+/// The observations of one approach.
 #[derive(Clone, Debug, Default)]
 pub struct Approach {
     /// Every control step from the first gap on.

@@ -47,7 +47,7 @@ pub struct Behaviour {
     pub lag_s: [f64; 2],
 }
 
-/// What one approach and its manoeuvres show.
+/// The sensors' view of one approach and its manoeuvres.
 #[derive(Clone, Debug)]
 pub(crate) struct Shown {
     pub(crate) steps: Vec<Step>,

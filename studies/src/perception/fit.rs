@@ -48,7 +48,7 @@ const GAPS_M: [f64; 2] = [20.0, 80.0];
 const TEST_RANGE_M: f64 = 100.0;
 const TEST_CLASS_RANGE_M: f64 = 60.0;
 
-/// What a fit is made of.
+/// The inputs of a fit.
 #[derive(Clone, Debug)]
 pub struct FitPlan<'a> {
     /// The scenario whose sensors are fitted.
@@ -100,7 +100,7 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
 /// fit does not hold for the new one.
 ///
 /// # Errors
-/// As [`fit`].
+/// Works like [`fit`].
 pub fn fit_errors(plan: &FitPlan<'_>, ranges: &RearFit) -> Result<RearFit, StudyError> {
     Ok(RearFit { errors: Fitter::new(plan)?.error_grids(ranges)?, validation: None, ..ranges.clone() })
 }

@@ -32,7 +32,7 @@ impl Extent {
     }
 }
 
-/// Why a study cannot be made.
+/// The reason for which a study cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The scenario with the sensors cannot be used.

@@ -42,9 +42,9 @@ pub struct Difference {
     pub weather: [f64; 2],
     /// Name of the figure.
     pub figure: &'static str,
-    /// That of the full chain.
+    /// The figure of the full chain.
     pub full: f64,
-    /// That of the object-level sensor.
+    /// The figure of the object-level sensor.
     pub object: f64,
 }
 
@@ -55,7 +55,7 @@ pub struct Measured {
     pub at: (VehicleClass, f64, [f64; 2]),
     /// In the full chain.
     pub full: Behaviour,
-    /// With the object-level sensor.
+    /// The behaviour with the object-level sensor.
     pub object: Behaviour,
 }
 

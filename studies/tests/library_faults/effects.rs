@@ -13,7 +13,7 @@ const CLOSING_BESIDE_MPS: f64 = 1.0;
 /// Distance from the ego's middle to its bumper (m).
 const HALF_EGO_M: f64 = 2.3;
 
-/// What a fault does.
+/// The effect of a fault.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Effect {
     /// The sensor loses its tracks in this step, and has failed for the ego a second later.
@@ -119,7 +119,7 @@ impl Effect {
     /// Checks that a scenario of the library has this effect.
     ///
     /// # Errors
-    /// What was found instead.
+    /// The value that differs from the effect.
     pub(crate) fn check(&self, name: &str, sensor: Of) -> Result<(), String> {
         let is_timed = matches!(self, Self::Dead { .. } | Self::Frozen { .. } | Self::FrozenImage { .. } | Self::Ghost);
         let Pair { usual, faulty } = pair(name, sensor, self.scene(sensor), is_timed);

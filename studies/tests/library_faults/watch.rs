@@ -49,7 +49,7 @@ pub(crate) struct Car {
     pub(crate) closing_mps: f64,
 }
 
-/// What one step showed.
+/// The observation of one step.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     /// The tracks of the sensor that a function may act on.

@@ -23,7 +23,7 @@ const SIGSEGV: i32 = 11;
 /// The true records: by arm, then by sample.
 pub(super) type Truth = Vec<Vec<ArmRecord>>;
 
-/// What all processes of a schedule share.
+/// The common state of all processes of a schedule.
 pub(super) struct State {
     /// The clock.
     pub(super) now: Duration,
@@ -49,7 +49,7 @@ pub(super) fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What arrives in the pipe.
+/// An arrival in the pipe.
 enum Arrival {
     Line(Vec<u8>),
     /// A line that says that a call hangs and that the process ends.
@@ -75,36 +75,36 @@ pub(super) struct Process {
     earlier: VecDeque<Question>,
 }
 
-/// What a process does instead of answering once.
+/// A fault of a process, instead of answering once.
 #[derive(Clone, Copy)]
 enum Fault {
-    /// It answers twice.
+    /// The process answers twice.
     Twice,
     /// An earlier answer comes once more, before the right one.
     EarlierAgain,
     /// A copy of the process (`fork`) has run ahead, and answers the next sample.
     AnotherSample,
-    /// It repeats the question, and gives the record of another sample.
+    /// The process repeats the question, and gives the record of another sample.
     AnotherRecord,
-    /// It gives the record of the other arm.
+    /// The process gives the record of the other arm.
     AnotherArm,
-    /// It answers for another campaign.
+    /// The process answers for another campaign.
     AnotherTask,
     /// Its copy answers, and says so.
     Copy,
     /// Both it and its copy answer, in either order.
     ProcessAndCopy,
-    /// It ends in the middle of its answer.
+    /// The process ends in the middle of its answer.
     Cut,
-    /// It prints a line that is no answer.
+    /// The process prints a line that is no answer.
     Print,
     TooLong,
     CrashBefore,
     CrashAfter,
     Hang,
-    /// It answers after the time limit.
+    /// The process answers after the time limit.
     Late,
-    /// It reports that a call hangs, and ends.
+    /// The process reports that a call hangs, and ends.
     HangingCall,
 }
 

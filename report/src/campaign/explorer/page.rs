@@ -31,7 +31,7 @@ const HISTOGRAMS: usize = 4;
 /// The sample number in a command. The page replaces it by the number of the chosen sample.
 const PLACE: u64 = 9_876_543_210;
 
-/// What the script reads.
+/// The data of the script.
 #[derive(Serialize)]
 struct Data<'a> {
     is_served: bool,
@@ -102,7 +102,7 @@ fn written(saved: &SavedCampaign, source: std::io::Error) -> ReportError {
     closecall_traffic::atomic::WriteError::new(saved.folder().path(), source).into()
 }
 
-/// What the page holds in compressed form.
+/// The compressed content of the page.
 struct Packed {
     data: String,
     plotly: String,

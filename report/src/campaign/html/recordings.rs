@@ -21,7 +21,7 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) scenario: String,
     /// The sample's number.
     pub(in crate::campaign) sample: u64,
-    /// Why it was recorded, in words.
+    /// The reasons for its recording, in words.
     pub(in crate::campaign) reasons: Vec<&'static str>,
     /// The recording's file, relative to the page.
     pub(in crate::campaign) file: String,
@@ -35,7 +35,7 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) scrubber: Markup,
     /// The verdict on the pair, or on the only run.
     pub(in crate::campaign) verdict: &'static str,
-    /// What happened in the arm under test and why, in one sentence.
+    /// The event in the arm under test and its cause, in one sentence.
     pub(in crate::campaign) sentence: String,
     /// The outcome of each arm, the baseline first.
     pub(in crate::campaign) outcomes: Vec<Outcome>,

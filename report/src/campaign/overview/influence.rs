@@ -1,4 +1,4 @@
-//! Which parameter moves the result, from the campaign's own samples.
+//! The influence of each parameter on the result, from the campaign's own samples.
 
 use closecall_campaign::ledger::PairFate;
 use closecall_campaign::partition::split_mix;
@@ -9,7 +9,7 @@ use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::sensitivity::given_data::{CLASSES, ClassCounts, Influence};
 use closecall_traffic::{Parameters, Value};
 
-/// What a report says if there are too few events.
+/// The text of a report with too few events.
 pub const FEW_EVENTS: &str = "too few samples with or without it to say";
 
 /// An event of a sample.
@@ -74,7 +74,7 @@ pub struct InfluenceCounts {
     counts: Vec<Vec<ClassCounts>>,
 }
 
-/// What the parameters say about one event.
+/// The influence of the parameters on one event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EventInfluence {
     /// The event.

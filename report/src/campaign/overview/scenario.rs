@@ -1,4 +1,4 @@
-//! What a report shows of one scenario.
+//! The data of one scenario in a report.
 
 use std::collections::BTreeMap;
 
@@ -55,7 +55,7 @@ pub struct ScenarioOverview {
     pub pairs: Vec<PairBins>,
     /// The distribution of each margin of [`MARGINS`] in each arm.
     pub margins: Vec<Vec<MarginBins>>,
-    /// What each parameter says about each event.
+    /// The influence of each parameter on each event.
     pub influence: InfluenceCounts,
     /// The worst samples of the arm under test, beginning with the worst.
     pub worst: Vec<WorstSample>,

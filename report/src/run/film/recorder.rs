@@ -45,7 +45,7 @@ pub struct FilmRecorder {
 /// A LiDAR with its latest scan, which is completed if the film keeps it.
 struct KeptLidar {
     name: &'static str,
-    /// Whether it is the first of those that look back.
+    /// Whether the LiDAR is the first one that looks back.
     is_main: bool,
     looks_ahead: bool,
     lidar: RearLidar,

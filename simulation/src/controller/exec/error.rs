@@ -102,7 +102,7 @@ pub enum ExecError {
         key: &'static str,
         /// What is allowed.
         expected: &'static str,
-        /// What was found.
+        /// The value of the answer.
         answer: String,
     },
     /// The acceleration is not a finite number.

@@ -214,7 +214,7 @@ fn within([low, high]: [f64; 2]) -> impl Fn(f64) -> f64 {
 #[derive(Clone, Copy, Debug)]
 struct Ratios {
     near: [f64; 6],
-    /// Of far vehicles; 1 if either has too few steps.
+    /// The ratios of far vehicles; 1 if either has too few steps.
     far: [f64; 4],
 }
 
@@ -317,7 +317,7 @@ fn correlation_time_s(errors: &[Vec<[f64; 4]>], axis: usize) -> f64 {
     -(LONGEST_LAG_STEPS as f64) * CONTROL_STEP.s() / maths::ln(before.clamp(low, high))
 }
 
-/// Which scans lose a vehicle.
+/// The scans that lose a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Losses {
     /// Gap up to which every scan measures it (m).

@@ -38,7 +38,7 @@ const PADDING_LETTERS: f64 = 1.5;
 #[derive(Clone, Copy)]
 struct Word<'a> {
     text: &'a str,
-    /// What a bar shows that is too short for the text.
+    /// The text of a bar that is too short for the whole text.
     short: &'a str,
     colour: Rgba,
 }
