@@ -29,7 +29,7 @@ pub struct FileHash {
     pub blake3: String,
 }
 
-/// The identity of a controller that runs as a process.
+/// What identifies a controller that runs as a process.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// The command.
@@ -50,7 +50,7 @@ impl Fingerprint {
     /// process that cannot be greeted has no identity.
     pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
         let hash = |(name, path): (String, PathBuf)| {
-            // A file that cannot be read has no hash, and so differs from a readable file.
+            // A file that cannot be read has no hash: it differs from one that can.
             let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
             FileHash { name, blake3 }
         };
@@ -135,9 +135,8 @@ pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<St
     there.iter().filter_map(|earlier| Some(earlier.differences(same(earlier)?))).flatten().collect()
 }
 
-/// Returns the existing files that the command names, each with its name and its path: whole words,
-/// and the part of a word after `=`. The program is looked for in `PATH` if it is named without a
-/// folder.
+/// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows
+/// `=` in a word. The program is looked for in `PATH` if it is named without a folder.
 pub fn named_files(settings: &ExecSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     let words = settings.words().unwrap_or_default();
     let mut files: Vec<(String, PathBuf)> = Vec::new();

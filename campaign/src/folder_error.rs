@@ -46,7 +46,7 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
-    /// The place of the results holds something that no campaign has put there.
+    /// Something that no campaign has put there is where results belong.
     #[error("failed to use {}: {reason}; nothing is overwritten, moved or removed", path.display())]
     Foreign {
         /// The path.

@@ -270,7 +270,7 @@ impl Manifest {
         let arms = self.arms.iter().zip(self.arm_names());
         let chosen = arms.filter(|(_, name)| names.contains(&name.as_str())).map(|(arm, _)| arm);
         let now: Vec<_> = chosen.filter_map(fingerprint).collect();
-        let is_asked = |fingerprint: &&Fingerprint| now.iter().any(|other| other.command == fingerprint.command);
+        let is_asked = |one: &&Fingerprint| now.iter().any(|other| other.command == one.command);
         let there: Vec<_> = self.controllers.iter().filter(is_asked).cloned().collect();
         fingerprint::differences(&there, &now)
     }

@@ -230,8 +230,7 @@ impl Plan {
     }
 }
 
-/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none:
-/// it would be the baseline under another name.
+/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none: it would be the baseline under another name.
 ///
 /// # Errors
 /// [`PlanError::WithoutMis`] with the first such controller.

@@ -7,8 +7,8 @@ use super::inert_fault::refuse_absent;
 use super::{ScenarioError, ScenarioFile};
 
 impl ScenarioFile {
-    /// Refuses a mode of the sensors, given instead of the file's, in which a fault of the file
-    /// could not act: the runs would pass for runs with the fault.
+    /// Refuses a mode of the sensors, given instead of the file's, in which a fault of the file could not act: the runs would pass
+    /// for runs with the fault.
     ///
     /// # Errors
     /// [`ScenarioError::Value`] with the fault.

@@ -11,8 +11,8 @@
 //!
 //! * [`parameters`], [`sampling`]: the distributions of the parameters, and the designs that draw from them
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall
-//! * [`outcome`], [`harm`], [`causal`]: the results of a run
-//! * [`criteria`]: the demands of a file on the outcomes
+//! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
+//! * [`criteria`]: what a file asks of the outcomes
 //! * [`openscenario`]: scenarios of OpenSCENARIO XML, as scenario files
 
 mod actor;

@@ -53,8 +53,8 @@ const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtak
 const AEB: [(&str, &str); 2] = embedded!["aeb": "aeb-lead-brakes", "aeb-lead-brakes-gently"];
 const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehicle-ahead"];
 
-/// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They
-/// say how they differ from their base.
+/// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
+/// base.
 const FAULTS: [(&str, &str); 82] = embedded![
     "faults":
     "camera-dead",

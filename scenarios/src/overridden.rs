@@ -13,25 +13,25 @@ pub(super) const KEY: &str = "overridden";
 
 /// Returns what `after` demands less than `before`.
 pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
-    let mut weakenings = before.overridden.clone();
+    let mut found = before.overridden.clone();
     for (mark, asked) in &before.checks {
         let kept = after.checks.get(mark).map_or(&[][..], Vec::as_slice);
         let is_kept = |old: &Expression| kept.iter().any(|new| is_as_strict(new, old));
-        weakenings.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
+        found.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
     }
     let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
-    weakenings.extend(requirements.map(|mark| format!("requirement {mark}")));
+    found.extend(requirements.map(|mark| format!("requirement {mark}")));
     let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
-    weakenings.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
+    found.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
-    weakenings.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
+    found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
     let observed = before.parameters.0.iter().filter(|(name, parameter)| {
         let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
         parameter.observed.is_some() && kept.is_some_and(|kept| Some(kept) != parameter.observed.as_ref())
     });
-    weakenings.extend(observed.map(|(name, _)| format!("observed range of {name}")));
-    weakenings
+    found.extend(observed.map(|(name, _)| format!("observed range of {name}")));
+    found
 }
 
 fn is_as_strict(new: &Expression, old: &Expression) -> bool {

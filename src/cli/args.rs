@@ -133,8 +133,7 @@ pub(super) enum LanesChoice {
     /// The lanes that the file states for each vehicle
     #[default]
     Recorded,
-    /// None: a lateral shift by most of a lane is a lane change. For files whose lanes are missing
-    /// or unreliable
+    /// None: a lateral shift by most of a lane is a lane change. For files whose lanes are missing or unreliable
     None,
 }
 

@@ -64,8 +64,7 @@ pub(super) enum Study {
     Sensitivity(study::SensitivityArgs),
     /// Compare settings of a system: what each prevents, induces, and costs in speed
     Frontier(study::FrontierArgs),
-    /// Map the margin that the system reaches, over approach speed, detection distance and front
-    /// time headway
+    /// Map the margin that the system reaches, over approach speed, detection distance and front time headway
     Map(causes::MapArgs),
     /// Count how often the encounter happens in trajectory files, and state the net effect of the
     /// system per 10^6 km

@@ -50,8 +50,7 @@ pub(super) struct InitArgs {
     /// Git URL from which the CI job installs Closecall [default: to be filled in]
     #[arg(long, value_name = "URL", help_heading = heading::CI)]
     url: Option<String>,
-    /// Commit or tag that the CI job installs [default: the commit of this program; to be filled in
-    /// if it has none]
+    /// Commit or tag that the CI job installs [default: the commit of this program; to be filled in if it has none]
     #[arg(long, value_name = "REV", help_heading = heading::CI)]
     rev: Option<String>,
 }

@@ -81,15 +81,15 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
-    let encounter = chosen(&args.file, &args.read, args.track)?;
-    let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
-    let file = scenario_of(&encounter, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
+    let found = chosen(&args.file, &args.read, args.track)?;
+    let source = format!("{} (track {})", args.file.display(), found.change.track_id);
+    let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.sim.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.sim.arm.arm(file.config().function)?, &args.watch)?;
-    let recorded = film_encounter(&encounter, args.watch.record_level.into())?;
-    let comparison = EncounterComparison::new(&encounter, &recorded, &simulated);
-    let foreword = comparison.markdown(&encounter, &simulated, args.rear.into());
+    let recorded = film_encounter(&found, args.watch.record_level.into())?;
+    let comparison = EncounterComparison::new(&found, &recorded, &simulated);
+    let foreword = comparison.markdown(&found, &simulated, args.rear.into());
     let films = [recorded.with_foreword(foreword), simulated].map(|film| film.with_plots_of_first(PROTAGONISTS));
     if let Some(path) = &args.watch.record {
         write_recording(path, &films)?;
@@ -97,7 +97,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     if let Some(path) = &args.output {
         write_file(path, |written| written.write_all(made_by(&args.file, &file).as_bytes()))?;
     }
-    let reenactment = Reenactment { encounter: &encounter, comparison: &comparison, films: &films, outcome: &outcome };
+    let reenactment = Reenactment { encounter: &found, comparison: &comparison, films: &films, outcome: &outcome };
     match args.format {
         Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
         Format::Human => out!("{reenactment}"),
@@ -107,9 +107,9 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
 
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
 pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result<RecordedEncounter, CliError> {
-    let encounter = choose(&smooth(&read_noting(path, read.options())?), track, CONTROL_STEP);
+    let found = choose(&smooth(&read_noting(path, read.options())?), track, CONTROL_STEP);
     let file = path.display();
-    encounter.map_err(|error| match error {
+    found.map_err(|error| match error {
         ChoiceError::NoLaneChange => {
             let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
             CliError::usage(format!("{file} has no lane change{of_track} to re-enact"))

@@ -34,8 +34,7 @@ pub(super) struct SampleArgs {
     /// can be re-enacted]
     #[arg(long, value_name = "TRACK", help_heading = heading::DATA)]
     lane_change: Option<u64>,
-    /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path
-    /// of keys in the scenario
+    /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario
     #[arg(long, value_name = "PARAMETER", help_heading = heading::METHOD)]
     vary: String,
     /// Its first value
@@ -73,23 +72,23 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
     protect(&inputs, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
-    let encounter = chosen(&args.file, &args.read, args.lane_change)?;
-    let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
-    let mut all = Sampled::new(&encounter);
+    let found = chosen(&args.file, &args.read, args.lane_change)?;
+    let source = format!("{} (track {})", args.file.display(), found.change.track_id);
+    let mut all = Sampled::new(&found);
     let (mut films, mut files): (Vec<_>, Vec<(String, ScenarioFile)>) = (Vec::new(), Vec::new());
     for (number, value) in variation.steps().enumerate() {
-        let step = sampled(&encounter, value, (Path::new(&source), &args.set.settings))?;
+        let step = sampled(&found, value, (Path::new(&source), &args.set.settings))?;
         if number == 0 {
-            all.runs.push(SampledRun::recorded(&encounter, &step));
+            all.runs.push(SampledRun::recorded(&found, &step));
         }
-        let done = run_step(&encounter, value, &step, args.seed).map_err(|error| match error {
+        let done = run_step(&found, value, &step, args.seed).map_err(|error| match error {
             StepError::Scenario(source) => CliError::Scenario(source),
             StepError::Film(source) => CliError::TrafficFilm(source),
             StepError::Run(source) => CliError::Sample { sample: number as u64, source },
         })?;
         films.extend(done.film);
         if let Some(cut_out_thw_s) = done.run.thw_opp1_at_crossing_s.filter(|_| args.transfer) {
-            let transferred = step.transferred(&encounter, cut_out_thw_s, Path::new(&source))?;
+            let transferred = step.transferred(&found, cut_out_thw_s, Path::new(&source))?;
             files.push((format!("transferred-{}.toml", number + 1), transferred));
         }
         files.push((format!("step-{}.toml", number + 1), step.file));

@@ -110,7 +110,7 @@ pub struct Evaluation {
     pub needed: Option<u64>,
 }
 
-/// Gathers the data of a gate, sample by sample.
+/// Gathers what a gate needs, sample by sample.
 #[derive(Clone, Debug)]
 pub struct Accumulator {
     expression: Expression,

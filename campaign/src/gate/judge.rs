@@ -53,8 +53,7 @@ struct Judged {
     function: Function,
     /// The parameters that are sampled beyond what trajectory data show, in words.
     extrapolations: Vec<String>,
-    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or
-    /// moved it otherwise than the baseline.
+    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or moved it otherwise than the baseline.
     acted: u64,
 }
 

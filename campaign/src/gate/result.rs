@@ -114,8 +114,7 @@ impl Evaluation {
     }
 }
 
-/// Returns a number of samples with its first two digits, rounded up. The share behind the number
-/// is not known more precisely.
+/// Returns a number of samples with its first two digits, rounded up: the rest of it rests on a share that is not known better.
 fn rounded_up(samples: u64) -> u64 {
     let step = samples.checked_ilog10().and_then(|digits| digits.checked_sub(1)).map_or(1, |digits| 10_u64.pow(digits));
     samples.div_ceil(step) * step

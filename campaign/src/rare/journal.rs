@@ -196,7 +196,7 @@ impl RareFolder {
     }
 }
 
-/// The journal of a campaign: its old lines, then the appended ones.
+/// The journal of a campaign: what it holds, then what is appended.
 #[derive(Debug)]
 pub struct RareJournal {
     path: PathBuf,

@@ -71,7 +71,7 @@ impl Nearness {
     fn score(&self, event: Event, record: &Record) -> Option<f64> {
         let tested = record.arms.len().checked_sub(1)?;
         let outcome = |index: usize| record.arms.get(index)?.result.as_ref().ok();
-        let (arm, other) = match event.quantity {
+        let (own, other) = match event.quantity {
             Quantity::Tested(_) => (tested, None),
             Quantity::Baseline(_) => (0, None),
             Quantity::Compared(comparison) => (if comparison.in_baseline { 0 } else { tested }, None),
@@ -79,7 +79,7 @@ impl Nearness {
             Quantity::Pair(PairFlag::Prevented) => (0, Some(tested)),
         };
         if let Some(guide) = self.guide {
-            return guide.0.of(outcome(arm)?).map(|value| guide.nearness(value));
+            return guide.0.of(outcome(own)?).map(|value| guide.nearness(value));
         }
         if let Some(excess) = value(event.quantity, record).and_then(|value| event.excess(value)) {
             return Some(excess);
@@ -89,7 +89,7 @@ impl Nearness {
             return None;
         }
         let struck = other.and_then(outcome).and_then(Outcome::ego_delta_v_mps).unwrap_or(0.0);
-        Some(-(smallest_gap_m(outcome(arm)?) + struck))
+        Some(-(smallest_gap_m(outcome(own)?) + struck))
     }
 }
 

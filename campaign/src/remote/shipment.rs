@@ -44,8 +44,7 @@ impl Shipment {
         let hosted = |arm: &&ControllerChoice| matches!(arm, ControllerChoice::Hosted(_));
         let mut files: Vec<ShippedFile> = Vec::new();
         for (name, path) in manifest.arms.iter().flat_map(named) {
-            // A program that was found by the search path, or has an absolute path, is a matter of
-            // each machine.
+            // A program that was found by the search path, or has an absolute path, is a matter of each machine.
             if is_within(&name) && Path::new(&name) == path && files.iter().all(|file| file.name != name) {
                 let fail = |source| RemoteError::File { path: path.clone(), source };
                 let is_executable = is_executable(&fs::metadata(&path).map_err(fail)?);

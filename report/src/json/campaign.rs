@@ -187,7 +187,7 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
     object
 }
 
-/// The reason for which the samples of a design have no interval and no test.
+/// Why the samples of a design have no interval and no test.
 const DEPENDENT: &str = "the samples of the designs sobol and grid are not independent";
 
 fn paired(pairs: &Pairs, inference: Inference) -> Value {

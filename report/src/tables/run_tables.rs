@@ -19,8 +19,7 @@ impl RunTables {
     /// Creates the writers of the files of a run in this arm, whose extensions give the formats.
     ///
     /// # Errors
-    /// [`WriteError`] if an extension is wrong, if a file cannot be created, or if scans are
-    /// requested of an arm without a LiDAR.
+    /// [`WriteError`] if an extension is wrong, if a file cannot be created, or if scans are requested of an arm without a LiDAR.
     pub fn new(
         (scenario, arm): (&Scenario, Option<&Arm>),
         trace: Option<&Path>,

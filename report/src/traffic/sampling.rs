@@ -62,7 +62,7 @@ pub struct SampledRun {
 
 /// The vehicles of one run whose headways are measured.
 struct Vehicles<'a> {
-    changer: &'a Trajectory,
+    own: &'a Trajectory,
     opp1: &'a Trajectory,
     opp2: Option<&'a Trajectory>,
 }
@@ -76,7 +76,7 @@ impl SampledRun {
         (tracks, outcome): (&[Trajectory], &Outcome),
     ) -> Self {
         let opp2 = step.opp2.map(|index| &tracks[index]);
-        let vehicles = Vehicles { changer: &tracks[step.lane_changer], opp1: &tracks[step.opp1], opp2 };
+        let vehicles = Vehicles { own: &tracks[step.lane_changer], opp1: &tracks[step.opp1], opp2 };
         let actors = &step.file.config().actors;
         let own_id = &actors[step.lane_changer].id;
         let collision = outcome.collisions.iter().find(|collision| collision.involves(own_id));
@@ -91,18 +91,16 @@ impl SampledRun {
     /// Evaluates the recorded lane change, with the vehicles of `step`.
     pub fn recorded(encounter: &RecordedEncounter, step: &SampledEncounter) -> Self {
         let track = |index: usize| &encounter.vehicles[index].trajectory;
-        let vehicles =
-            Vehicles { changer: track(REAR_INDEX), opp1: track(EGO_INDEX), opp2: step.recorded_opp2.map(track) };
+        let vehicles = Vehicles { own: track(REAR_INDEX), opp1: track(EGO_INDEX), opp2: step.recorded_opp2.map(track) };
         Self::measured("recorded".to_owned(), &vehicles, [encounter.home, encounter.target], step.lane_change_s)
     }
 
     fn measured(name: String, vehicles: &Vehicles<'_>, [home, target]: [Lane; 2], [start_s, end_s]: [f64; 2]) -> Self {
-        let changer = vehicles.changer;
-        let crossing = changer.points.iter().find(|point| point.lane == target).map(|point| point.time);
+        let own = vehicles.own;
+        let crossing = own.points.iter().find(|point| point.lane == target).map(|point| point.time);
         let is_before = |time_s: f64| crossing.is_none_or(|crossing| time_s < crossing.s());
-        let opp1 = headways(changer, vehicles.opp1, home, |time_s| time_s >= start_s && is_before(time_s));
-        let opp2 =
-            vehicles.opp2.map(|opp2| headways(changer, opp2, target, |time_s| time_s <= end_s)).unwrap_or_default();
+        let opp1 = headways(own, vehicles.opp1, home, |time_s| time_s >= start_s && is_before(time_s));
+        let opp2 = vehicles.opp2.map(|opp2| headways(own, opp2, target, |time_s| time_s <= end_s)).unwrap_or_default();
         let last_before = |series: &[(f64, f64)]| {
             let last = series.iter().rfind(|(time_s, _)| is_before(*time_s));
             last.map(|(_, thw_s)| *thw_s).filter(|_| crossing.is_some())
@@ -117,26 +115,26 @@ impl SampledRun {
             min_thw_opp1_s: smallest(&opp1),
             min_thw_opp2_s: smallest(&opp2),
             collision: None,
-            path: changer.points.iter().map(|point| (point.s_m, point.d_m)).collect(),
+            path: own.points.iter().map(|point| (point.s_m, point.d_m)).collect(),
             thw_s: [opp1, opp2],
         }
     }
 }
 
-/// Returns the time (s) and the time headway (s) of `changer` to `other` at each instant that
-/// counts, if `other` is entirely ahead in `lane`.
-fn headways(changer: &Trajectory, other: &Trajectory, lane: Lane, counts: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
-    let lengths_m = [changer.dimensions.length_m, other.dimensions.length_m];
+/// Returns the time (s) and the time headway (s) of `own` to `other` at each instant that counts, if `other` is entirely
+/// ahead in `lane`.
+fn headways(own: &Trajectory, other: &Trajectory, lane: Lane, counts: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
+    let lengths_m = [own.dimensions.length_m, other.dimensions.length_m];
     let at = |point: &TrajectoryPoint| {
         let ahead = other.at(point.time).filter(|ahead| ahead.lane == lane)?;
         let gap_m = bumper_gap_m(ahead.s_m - point.s_m, lengths_m[0], lengths_m[1]);
         let thw_s = time_headway_s(gap_m, point.speed_mps).ok().filter(|_| gap_m >= 0.0)?;
         Some((point.time.s(), thw_s))
     };
-    changer.points.iter().filter(|point| counts(point.time.s())).filter_map(at).collect()
+    own.points.iter().filter(|point| counts(point.time.s())).filter_map(at).collect()
 }
 
-/// The run of one step: its measurements, and a film of the lane change.
+/// The run of one step: what was measured, and a film of the lane change.
 #[derive(Clone, Debug)]
 pub struct StepRun {
     /// The measurements of the run.

@@ -10,12 +10,10 @@
 //!  operator  = "<=" | ">="
 //! ```
 //!
-//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is
-//! at least 1 s. `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in
-//! which the ego collides without the system, more than half are prevented with 95 % confidence.
-//! `lower` and `upper` are the exact one-sided bounds of a share.
-//! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s²
-//! in at most 5 % of the samples.
+//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is at least 1 s.
+//! `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in which the ego collides without the system,
+//! more than half are prevented with 95 % confidence. `lower` and `upper` are the exact one-sided bounds of a share.
+//! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s² in at most 5 % of the samples.
 
 use std::fmt;
 use std::str::FromStr;
@@ -258,8 +256,8 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
         _ => match name.strip_prefix('p').and_then(|percent| percent.parse::<f64>().ok()) {
             Some(percent) if (0.0..=100.0).contains(&percent) => Aggregate::Percentile(percent),
             _ => {
-                let names = "count, share, lower, upper, min, max, mean, sum, and p0 to p100";
-                return Err(format!("`{name}` is not an aggregate; there are {names}"));
+                let known = "count, share, lower, upper, min, max, mean, sum, and p0 to p100";
+                return Err(format!("`{name}` is not an aggregate; there are {known}"));
             }
         },
     })

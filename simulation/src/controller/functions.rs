@@ -36,7 +36,7 @@ impl Functions {
     /// Cruise control and emergency braking.
     pub const CRUISE_AND_AEB: Self = Self { follows: false, aeb: Some(true), mis: false };
 
-    /// The allowed lists of functions, in words.
+    /// What is allowed, in words.
     pub const ALLOWED: &'static str =
         "`acc` or `cruise`, then `+aeb` or `-aeb`, then `+mis`, as in `acc-aeb`, `acc+aeb` and `cruise+aeb`";
 
@@ -54,8 +54,8 @@ impl Functions {
                 .flat_map(move |aeb| [false, true].map(move |mis| Self { follows, aeb, mis }))
         });
         // Without a switch it is the controller `acc`.
-        let is_switched = |functions: &Self| !functions.follows || functions.aeb.is_some() || functions.mis;
-        all.filter(is_switched).find(|functions| functions.to_string() == text)
+        let is_switched = |of: &Self| !of.follows || of.aeb.is_some() || of.mis;
+        all.filter(is_switched).find(|of| of.to_string() == text)
     }
 
     /// Returns true if the arm has a margin increase system. It then needs a stack that has one.

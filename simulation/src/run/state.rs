@@ -102,15 +102,15 @@ impl<'a> Run<'a> {
         let settings = *settings_of(&scenario);
         let looks_back = arm.controller.looks_back(&settings);
         let mis_settings = *arm.controller.settings(&settings).mis().or(settings.mis()).unwrap_or(&MisSettings::PAPER);
-        let run_key = key;
+        let own = key;
         // Noise and drivers draw from these random numbers; the outcome names the run itself.
         let key = scenario
             .random_numbers
-            .map_or(run_key, |random_numbers| RunKey { seed: random_numbers.seed, sample: random_numbers.sample });
+            .map_or(own, |random_numbers| RunKey { seed: random_numbers.seed, sample: random_numbers.sample });
         let world_with = |ego: VehicleState| {
             let vehicles = scenario.actors.iter().enumerate().map(|(index, actor)| InitialVehicle {
                 id: actor.id.clone(),
-                vehicle: scenario.vehicle(index, run_key),
+                vehicle: scenario.vehicle(index, own),
                 state: if index == scenario.ego { ego } else { actor.start },
                 weave: weave(actor, &scenario.road, key),
                 has_ideal_actuators: index == scenario.ego && scenario.interventions.has_ideal_actuation,
@@ -127,7 +127,7 @@ impl<'a> Run<'a> {
         let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
         let humans = human_drivers(&scenario, key);
         let mut run = Self {
-            key: run_key,
+            key: own,
             perception: perception(&scenario, &arm, key, looks_back || is_observed)?,
             looks_back,
             looks: looks(&humans, scenario.actors.len()),

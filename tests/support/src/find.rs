@@ -71,8 +71,7 @@ pub fn python_with_rerun() -> Option<PathBuf> {
     found(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
 }
 
-/// Returns the interpreter of the Python environment in which a file lies, if it has these
-/// packages.
+/// Returns the interpreter of the Python environment in which a file lies, if it has these packages.
 fn python_around(file: &Path, packages: &str) -> Option<PathBuf> {
     let mut programs = file.ancestors().map(|folder| folder.join("bin/python")).filter(|path| path.is_file());
     programs.find(|python| {

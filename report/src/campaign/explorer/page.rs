@@ -51,8 +51,7 @@ struct FateStyle {
     colour: String,
 }
 
-/// Returns the page of a campaign. If the page is served, it asks the server for the chosen
-/// samples.
+/// Returns the page of a campaign. If it is served, it asks for the samples that are chosen.
 ///
 /// # Errors
 /// [`ReportError`] if the folder cannot be read.

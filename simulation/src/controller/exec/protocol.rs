@@ -152,7 +152,7 @@ pub struct Identity {
     pub version: Option<String>,
 }
 
-/// Checks the answer to the first message, and returns the statements of the process.
+/// Checks the answer to the first message, and returns what the process states about itself.
 pub(super) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
     let object = object(line)?;
     if object.get("type").and_then(Value::as_str) != Some("hello") {
