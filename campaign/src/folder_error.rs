@@ -64,7 +64,7 @@ pub enum FolderError {
     },
     /// Samples of the plan are missing in the journal.
     #[error(
-        "failed to use {}: it has {has} of the {planned} samples of its campaign, and a part of them says nothing about all; \
+        "failed to use {}: it has {has} of the {of} samples of its campaign, and a part of them says nothing about all; \
          resume it first",
         path.display()
     )]
@@ -74,7 +74,7 @@ pub enum FolderError {
         /// Number of samples that it has.
         has: u64,
         /// Number of samples of the plan.
-        planned: u64,
+        of: u64,
     },
     /// A file of the folder is damaged, or does not belong to the campaign.
     #[error("failed to read {}:{line}: {message}", path.display())]

@@ -68,14 +68,14 @@ pub enum ExecError {
         line: String,
     },
     /// The process answered another question than the one it was asked.
-    #[error("the process answered {line:?} for the control step at {answer} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
+    #[error("the process answered {line:?} for the control step at {found} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
     OtherStep {
         /// The beginning of the line.
         line: String,
         /// The time of the control step (ns).
         expected: i64,
         /// The time that the answer repeats.
-        answer: String,
+        found: String,
         /// Number of answers before, including the greeting.
         answered: u64,
     },
@@ -94,7 +94,7 @@ pub enum ExecError {
         reason: String,
     },
     /// A key is absent, or its value has the wrong type.
-    #[error("the process answered {line:?}: `{key}` must be {expected}, it is {answer}")]
+    #[error("the process answered {line:?}: `{key}` must be {expected}, it is {found}")]
     Key {
         /// The beginning of the line.
         line: String,
@@ -102,8 +102,8 @@ pub enum ExecError {
         key: &'static str,
         /// What is allowed.
         expected: &'static str,
-        /// The value of the answer.
-        answer: String,
+        /// What was found.
+        found: String,
     },
     /// The acceleration is not a finite number.
     #[error("the process asked for an acceleration of {value} m/s², which is not a finite number")]
@@ -112,12 +112,12 @@ pub enum ExecError {
         value: String,
     },
     /// The process uses another version of the protocol.
-    #[error("the process speaks version {answer} of the protocol, this is version {expected}")]
+    #[error("the process speaks version {found} of the protocol, this is version {own}")]
     Version {
         /// The version of the process.
-        answer: String,
+        found: String,
         /// The version of Closecall.
-        expected: u32,
+        own: u32,
     },
     /// The process exceeded its memory limit.
     #[error("the process holds more than the {limit_mib} MiB of memory allowed")]
