@@ -1,11 +1,11 @@
-//! Names the sources that the program is built from: the commit, its date, and whether they differ from it. Cargo runs it
-//! before it builds the package.
+//! Names the sources that the program is built from: the commit, its date, and whether they differ
+//! from it. Cargo runs it before it builds the package.
 
 #![expect(clippy::print_stdout, reason = "Cargo reads what it prints")]
 
 use std::process::Command;
 
-/// What the outcome of a sample follows from.
+/// The sources that determine the outcome of a sample.
 const SOURCES: [&str; 10] = [
     "traffic",
     "recorded",
@@ -27,7 +27,7 @@ fn main() {
     if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| std::path::Path::new(log).exists()) {
         println!("cargo::rerun-if-changed={log}");
     }
-    // An archive of the sources may lie in a repository of something else.
+    // An archive of the sources may lie in a repository of another project.
     let is_repository = git(&["ls-files", "--error-unmatch", "src/identify.rs"]).is_some();
     let commit = git(&["rev-parse", "--short=12", "HEAD"]).filter(|_| is_repository).unwrap_or_default();
     let date = git(&["show", "--no-patch", "--format=%cs", "HEAD"]).filter(|_| is_repository).unwrap_or_default();

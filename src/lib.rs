@@ -1,13 +1,14 @@
-//! Closecall: a closed-loop software-in-the-loop testbed for the *margin increase system* (MIS), an ADAS function for
-//! highways.
+//! Closecall: a closed-loop software-in-the-loop testbed for the *margin increase system* (MIS), an
+//! ADAS function for highways.
 //!
 //! ```text
 //!  trajectory data ─▶ lane changes ─▶ criticality ─▶ parameter distributions ─▶ logical scenario
 //!      ─▶ concrete scenario ─▶ [ world ─▶ measurements ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome ─▶ verdict
 //! ```
 //!
-//! This crate is the command line: it parses the arguments, calls the other crates, and prints the results. Each step
-//! of the way has a crate of its own. A crate imports only crates above it in this table.
+//! This crate is the command line: it parses the arguments, calls the other crates, and prints the
+//! results. Each step of the way has a crate of its own. A crate imports only crates above it in
+//! this table.
 //!
 //! | crate | holds |
 //! |---|---|

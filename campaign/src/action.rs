@@ -1,7 +1,7 @@
-//! What a reader of a text can do next.
+//! Actions that a user can take next, such as to run a sample again.
 //!
-//! A library knows what can be done, such as to run a sample again. The program that calls the
-//! library knows how its user asks for it, and passes a [`CommandFor`]. So no library names an
+//! A library knows the possible actions, such as to run a sample again. The program that calls the
+//! library knows how its user asks for them, and passes a [`CommandFor`]. So no library names an
 //! option of the command line.
 
 /// Returns the command by which the user of a program does something.
@@ -51,7 +51,7 @@ pub struct SavedSample<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Replay<'a> {
     /// The sample.
-    pub of: SavedSample<'a>,
+    pub sample: SavedSample<'a>,
     /// True if it runs in all arms of the campaign.
     pub is_paired: bool,
     /// The controller; `None` for the one under test.
@@ -64,8 +64,8 @@ pub struct Replay<'a> {
 
 impl<'a> Replay<'a> {
     /// Returns a plain run of a sample.
-    pub const fn new(of: SavedSample<'a>) -> Self {
-        Self { of, is_paired: false, controller: None, settings: &[], recording: None }
+    pub const fn new(sample: SavedSample<'a>) -> Self {
+        Self { sample, is_paired: false, controller: None, settings: &[], recording: None }
     }
 }
 

@@ -1,4 +1,5 @@
-//! Arguments of a command line: numbers, and paths with a known extension. A refusal says what is allowed.
+//! Arguments of a command line: numbers, and paths with a known extension. A refusal says what is
+//! allowed.
 
 use std::path::{Path, PathBuf};
 
@@ -130,7 +131,8 @@ pub fn scenario_name(text: &str) -> Result<String, String> {
     }
 }
 
-/// Returns the files of a campaign's folder. Its recordings, which can be made again, are not among them.
+/// Returns the files of a campaign's folder. Its recordings, which can be made again, are not among
+/// them.
 pub fn files_of_campaign(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect()

@@ -1,8 +1,9 @@
 //! Every pair of arms of a campaign, on the same samples.
 //!
-//! The gates judge the last arm against the first one. With references between them, each arm is also compared with each arm
-//! before it. The p-values of all pairs of one scenario are corrected for the number of pairs (Holm: see
-//! [`closecall_traffic::statistics::holm`]); the intervals hold for each pair alone.
+//! The gates judge the last arm against the first one. With references between them, each arm is
+//! also compared with each arm before it. The p-values of all pairs of one scenario are corrected
+//! for the number of pairs (Holm: see [`closecall_traffic::statistics::holm`]); the intervals hold
+//! for each pair alone.
 
 use closecall_traffic::statistics::holm;
 
@@ -16,15 +17,16 @@ pub struct ArmPair {
     pub baseline: usize,
     /// Index of the later arm.
     pub tested: usize,
-    /// What the later arm changes.
+    /// The changes by the later arm.
     pub pairs: Pairs,
 }
 
 impl ArmPair {
-    /// Returns all pairs of so many arms, without samples.
+    /// Returns all pairs of this number of arms, without samples.
     pub(crate) fn all(arms: usize) -> Vec<Self> {
-        let of = |baseline| (baseline + 1..arms).map(move |tested| Self { baseline, tested, pairs: Pairs::default() });
-        (0..arms).flat_map(of).collect()
+        let pairs_with =
+            |baseline| (baseline + 1..arms).map(move |tested| Self { baseline, tested, pairs: Pairs::default() });
+        (0..arms).flat_map(pairs_with).collect()
     }
 
     /// Adds the tallies of one sample, one for each arm.
@@ -42,15 +44,16 @@ pub struct PairResult<'a> {
     pub baseline: &'a str,
     /// Name of the later arm.
     pub tested: &'a str,
-    /// What the later arm changes.
+    /// The changes by the later arm.
     pub pairs: &'a Pairs,
     /// The 95 % interval of the share of samples that the later arm prevents.
     pub prevented_95: Option<[f64; 2]>,
     /// The 95 % interval of the share of samples that the later arm induces.
     pub induced_95: Option<[f64; 2]>,
-    /// Mid-p value of the McNemar test of *some vehicle collides*; `None` if the number of samples was not fixed in advance.
+    /// Mid-p value of the McNemar test of *some vehicle collides*; `None` if the number of samples
+    /// was not fixed in advance.
     pub mcnemar_p: Option<f64>,
-    /// The same, corrected for the number of pairs (Holm).
+    /// The mid-p value, corrected for the number of pairs (Holm).
     pub corrected_p: Option<f64>,
 }
 
@@ -90,9 +93,9 @@ mod tests {
         for tallies in [[true, false, false], [false, true, false], [true, true, false]] {
             all.iter_mut().for_each(|pair| pair.push(&tallies.map(collided)));
         }
-        let found = |pairs: &Pairs| (pairs.prevented, pairs.induced, pairs.both, pairs.neither);
+        let counts = |pairs: &Pairs| (pairs.prevented, pairs.induced, pairs.both, pairs.neither);
         assert_eq!(
-            all.iter().map(|pair| found(&pair.pairs)).collect::<Vec<_>>(),
+            all.iter().map(|pair| counts(&pair.pairs)).collect::<Vec<_>>(),
             [(1, 1, 1, 0), (2, 0, 0, 1), (2, 0, 0, 1)]
         );
         assert_eq!(ArmPair::all(1), []);

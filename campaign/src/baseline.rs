@@ -1,5 +1,5 @@
-//! The baseline of a repository: a small file with the results of a campaign, against which later campaigns are
-//! compared.
+//! The baseline of a repository: a small file with the results of a campaign, against which later
+//! campaigns are compared.
 //!
 //! ```text
 //!  campaign's folder ─▶ Baseline ─▶ baseline.json, committed with the scenarios
@@ -7,8 +7,9 @@
 //!  later campaign's folder ─▶ Baseline ──┴─▶ BaselineComparison: newly failing, fixed, margins that shrank
 //! ```
 //!
-//! The file holds counts, the numbers of the failing samples, and quantiles of the margins, so that it stays small and
-//! its changes can be reviewed. [`compare`](mod@crate::compare) compares two whole folders instead, bit for bit.
+//! The file holds counts, the numbers of the failing samples, and quantiles of the margins, so that
+//! it stays small and its changes can be reviewed. [`compare`](mod@crate::compare) compares two
+//! whole folders instead, bit for bit.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -26,7 +27,7 @@ use crate::record::ArmRecord;
 /// The version of the layout of a baseline file.
 pub const BASELINE_VERSION: u32 = 2;
 
-/// The results of a campaign, as far as a repository keeps them.
+/// The results of a campaign that a repository keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
@@ -42,7 +43,8 @@ pub struct Baseline {
     pub controller: String,
     /// The results of each scenario, by its name.
     pub scenarios: BTreeMap<String, ScenarioBaseline>,
-    /// BLAKE3 hash of all of the above, as JSON. It shows an edit; it does not keep anybody from writing another file.
+    /// BLAKE3 hash of all other fields, as JSON. The hash shows an edit. It does not prevent
+    /// anybody from writing another file.
     pub content_blake3: String,
 }
 
@@ -67,13 +69,13 @@ pub struct ScenarioBaseline {
 /// The reason for which a campaign cannot be compared with a baseline.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BaselineError {
-    /// The two have nothing in common that could be compared.
+    /// The campaign and the baseline did not run the same samples.
     #[error(
-        "failed to compare with the baseline: {what} is {baseline} in the baseline, {current} in the campaign; save a new baseline"
+        "failed to compare with the baseline: {subject} is {baseline} in the baseline, {current} in the campaign; save a new baseline"
     )]
     Different {
         /// What differs.
-        what: String,
+        subject: String,
         /// Its value in the baseline.
         baseline: String,
         /// Its value in the campaign.
@@ -117,7 +119,8 @@ impl Baseline {
     /// Reads a file that [`Baseline::write`] has written.
     ///
     /// # Errors
-    /// [`FolderError`] if the file cannot be read, is not a baseline of version [`BASELINE_VERSION`], or was edited.
+    /// [`FolderError`] if the file cannot be read, is not a baseline of version
+    /// [`BASELINE_VERSION`], or was edited.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         let text = read_text(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
         let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };
@@ -142,7 +145,8 @@ impl Baseline {
     /// Returns the hash of the content.
     fn hash(&self) -> String {
         let content = Self { content_blake3: String::new(), ..self.clone() };
-        // Numbers are written so that they read back to the bit. A value that cannot be written has no hash that a file could state.
+        // Numbers are written so that they read back to the bit. A value that cannot be written has
+        // no hash that a file could state.
         serde_json::to_vec(&content).map_or_else(|error| error.to_string(), |bytes| blake3::hash(&bytes).to_string())
     }
 
@@ -157,15 +161,15 @@ impl Baseline {
         })
     }
 
-    /// Compares a later campaign with this baseline. A margin regresses if one of its quantiles falls by more than the
-    /// share `tolerance` of its value, and by more than 0.01 (s or m).
+    /// Compares a later campaign with this baseline. A margin regresses if one of its quantiles
+    /// falls by more than the share `tolerance` of its value, and by more than 0.01 (s or m).
     ///
     /// # Errors
     /// [`BaselineError`] if the campaigns did not run the same samples.
     pub fn compare(&self, current: &Self, tolerance: f64) -> Result<BaselineComparison, BaselineError> {
-        let same = |what: &str, baseline: String, current: String| match baseline == current {
+        let same = |subject: &str, baseline: String, current: String| match baseline == current {
             true => Ok(()),
-            false => Err(BaselineError::Different { what: what.to_owned(), baseline, current }),
+            false => Err(BaselineError::Different { subject: subject.to_owned(), baseline, current }),
         };
         same("the version of the layout", self.schema_version.to_string(), current.schema_version.to_string())?;
         same("the seed", self.seed.to_string(), current.seed.to_string())?;
@@ -173,7 +177,7 @@ impl Baseline {
         let mut compared = Vec::new();
         for (name, before) in &self.scenarios {
             let missing = || BaselineError::Different {
-                what: format!("the scenario `{name}`"),
+                subject: format!("the scenario `{name}`"),
                 baseline: "included".to_owned(),
                 current: "missing".to_owned(),
             };
@@ -225,7 +229,7 @@ impl BaselineComparison {
         self.scenarios.iter().any(|scenario| !scenario.newly_failing.is_empty() || !scenario.margins.is_empty())
     }
 
-    /// Returns true if a sample that failed does not fail any more.
+    /// Returns true if a sample fails in the baseline and passes in the later campaign.
     pub fn has_fixed(&self) -> bool {
         self.scenarios.iter().any(|scenario| !scenario.fixed.is_empty())
     }
@@ -236,9 +240,9 @@ impl BaselineComparison {
 pub struct ScenarioBaselineComparison {
     /// The scenario's name.
     pub scenario: String,
-    /// Samples that fail, and did not in the baseline.
+    /// Samples that pass in the baseline and fail in the later campaign.
     pub newly_failing: Vec<u64>,
-    /// Samples that failed in the baseline, and do not any more.
+    /// Samples that fail in the baseline and pass in the later campaign.
     pub fixed: Vec<u64>,
     /// The quantiles of margins that fell by more than the tolerance.
     pub margins: Vec<MarginRegression>,
@@ -315,9 +319,12 @@ mod tests {
 
     #[test]
     fn newly_failing_and_fixed_samples_are_named() {
-        let found = baseline(&[2, 5], 4.0).compare(&baseline(&[5, 7], 4.0), 0.05).unwrap();
-        assert_eq!((&found.scenarios[0].newly_failing[..], &found.scenarios[0].fixed[..]), (&[7][..], &[2][..]));
-        assert!(found.is_regression() && found.has_fixed());
+        let comparison = baseline(&[2, 5], 4.0).compare(&baseline(&[5, 7], 4.0), 0.05).unwrap();
+        assert_eq!(
+            (&comparison.scenarios[0].newly_failing[..], &comparison.scenarios[0].fixed[..]),
+            (&[7][..], &[2][..])
+        );
+        assert!(comparison.is_regression() && comparison.has_fixed());
         assert!(!baseline(&[2], 4.0).compare(&baseline(&[2], 4.0), 0.0).unwrap().is_regression());
     }
 

@@ -15,7 +15,8 @@ pub struct WorkersError {
     pub source: std::io::Error,
 }
 
-/// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from it.
+/// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from
+/// it.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The folder cannot be used.
@@ -27,12 +28,14 @@ pub enum CampaignError {
     /// The worker threads could not be started.
     #[error(transparent)]
     Workers(#[from] WorkersError),
-    /// A worker process has found another controller, cannot read it, or is another version of this program.
+    /// A worker process has found another controller, cannot read it, or is another version of this
+    /// program.
     #[error("failed to go on: {reason}")]
     Refused {
         /// The reason.
         reason: String,
-        /// True if something is another one than at the start, false if the controller cannot be read.
+        /// True if something differs from the start of the campaign, false if the controller cannot
+        /// be read.
         has_changed: bool,
     },
     /// The samples cannot run on other machines.

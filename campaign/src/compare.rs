@@ -1,7 +1,8 @@
-//! Compares a campaign with an earlier one, sample by sample: new failures, fixed failures, and changes of the margins.
+//! Compares a campaign with an earlier one, sample by sample: new failures, fixed failures, and
+//! changes of the margins.
 //!
-//! Both campaigns ran the same samples, each in its own arm under test. If a sample passed and now fails, no statistics
-//! are needed to show it: the sample can be replayed from both folders.
+//! Both campaigns ran the same samples, each in its own arm under test. If a sample passed and now
+//! fails, no statistics are needed to show it: the sample can be replayed from both folders.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -62,7 +63,8 @@ pub struct MarginChange {
 pub struct SampleChange {
     /// The sample's number.
     pub sample: u64,
-    /// The margin in the later campaign minus that in the baseline, in the unit of the margin.
+    /// The margin in the later campaign minus the margin in the baseline, in the unit of the
+    /// margin.
     pub change: f64,
 }
 
@@ -83,8 +85,8 @@ impl MarginChange {
     }
 
     fn regressions(&self, tolerance: f64) -> Vec<MarginRegression> {
-        let of = |values: &[f64]| quantiles(&mut values.to_vec());
-        regressions(self.key, &of(&self.baseline), &of(&self.current), tolerance)
+        let quantiles_of = |values: &[f64]| quantiles(&mut values.to_vec());
+        regressions(self.key, &quantiles_of(&self.baseline), &quantiles_of(&self.current), tolerance)
     }
 
     fn push(&mut self, sample: u64, baseline: f64, current: f64) {
@@ -107,15 +109,15 @@ pub struct ScenarioComparison {
     pub samples: u64,
     /// Number of samples whose outcomes agree to the last bit, the controller's name aside.
     pub same: u64,
-    /// Samples in which the ego collides, and did not collide in the baseline.
+    /// Samples in which the ego collides in the later campaign and not in the baseline.
     pub newly_failing: Vec<u64>,
-    /// Samples in which the ego collided in the baseline, and does not collide any more.
+    /// Samples in which the ego collides in the baseline and not in the later campaign.
     pub fixed: Vec<u64>,
     /// Number of samples in which the ego collides in both campaigns.
     pub still_failing: u64,
-    /// Samples that end in an error, and did not in the baseline.
+    /// Samples that end in an error in the later campaign and not in the baseline.
     pub newly_in_error: Vec<u64>,
-    /// Samples that ended in an error in the baseline, and do not any more.
+    /// Samples that end in an error in the baseline and not in the later campaign.
     pub no_longer_in_error: Vec<u64>,
     /// The changes of the margins.
     pub margins: Vec<MarginChange>,
@@ -143,8 +145,8 @@ impl ScenarioComparison {
         }
     }
 
-    /// Returns the quantiles of margins that fall by more than the share `tolerance` of their value, and by more than 0.01
-    /// (s or m).
+    /// Returns the quantiles of margins that fall by more than the share `tolerance` of their
+    /// value, and by more than 0.01 (s or m).
     pub fn margin_regressions(&self, tolerance: f64) -> Vec<MarginRegression> {
         self.margins.iter().flat_map(|margin| margin.regressions(tolerance)).collect()
     }
@@ -193,7 +195,7 @@ fn is_same(baseline: &ArmRecord, current: &ArmRecord) -> bool {
 /// Whether a campaign is worse than an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regression {
-    /// It is not.
+    /// The campaign is not worse.
     None,
     /// Samples end in an error that had an outcome. This takes precedence over [`Self::Worse`].
     NewErrors,
@@ -202,12 +204,12 @@ pub enum Regression {
 }
 
 impl Regression {
-    /// Judges a comparison. Up to `max_newly_failing` samples may fail that passed, and a quantile of a margin may fall by the
-    /// share `tolerance`.
-    pub fn of(found: &[ScenarioComparison], max_newly_failing: u64, tolerance: f64) -> Self {
-        let newly_failing: usize = found.iter().map(|scenario| scenario.newly_failing.len()).sum();
-        let has_lost_margin = found.iter().any(|scenario| !scenario.margin_regressions(tolerance).is_empty());
-        if found.iter().any(|scenario| !scenario.newly_in_error.is_empty()) {
+    /// Judges a comparison. Up to `max_newly_failing` samples may newly fail. A quantile of a
+    /// margin may fall by the share `tolerance`.
+    pub fn of(scenarios: &[ScenarioComparison], max_newly_failing: u64, tolerance: f64) -> Self {
+        let newly_failing: usize = scenarios.iter().map(|scenario| scenario.newly_failing.len()).sum();
+        let has_lost_margin = scenarios.iter().any(|scenario| !scenario.margin_regressions(tolerance).is_empty());
+        if scenarios.iter().any(|scenario| !scenario.newly_in_error.is_empty()) {
             Self::NewErrors
         } else if newly_failing as u64 > max_newly_failing || has_lost_margin {
             Self::Worse
@@ -237,11 +239,11 @@ pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioCompar
         current: current.path().to_owned(),
         difference,
     };
-    let mut found: Vec<ScenarioComparison> = Vec::new();
+    let mut scenarios: Vec<ScenarioComparison> = Vec::new();
     let (mut earlier, mut later) = (baseline.complete_records()?, current.complete_records()?);
     loop {
         let (before, after) = match (earlier.next().transpose()?, later.next().transpose()?) {
-            (None, None) => return Ok(found),
+            (None, None) => return Ok(scenarios),
             (Some(before), Some(after)) => (before, after),
             (Some(more), None) => return Err(different(format!("only the first has {}", named(&more)))),
             (None, Some(more)) => return Err(different(format!("only the second has {}", named(&more)))),
@@ -259,10 +261,10 @@ pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioCompar
                 parameter,
             });
         }
-        if found.last().is_none_or(|last| last.scenario != before.scenario) {
-            found.push(ScenarioComparison::new(&before.scenario));
+        if scenarios.last().is_none_or(|last| last.scenario != before.scenario) {
+            scenarios.push(ScenarioComparison::new(&before.scenario));
         }
-        if let (Some(scenario), Some(old), Some(new)) = (found.last_mut(), before.arms.last(), after.arms.last()) {
+        if let (Some(scenario), Some(old), Some(new)) = (scenarios.last_mut(), before.arms.last(), after.arms.last()) {
             scenario.push(before.sample, old, new);
         }
     }
@@ -272,7 +274,8 @@ fn named(record: &Record) -> String {
     format!("sample {} of `{}`", record.sample, record.scenario)
 }
 
-/// Returns the first parameter whose values differ; `None` if all agree, or if a record has no outcome.
+/// Returns the first parameter whose values differ; `None` if all agree, or if a record has no
+/// outcome.
 fn differing_parameter(before: &Record, after: &Record) -> Option<String> {
     let parameters = |record: &Record| {
         record.arms.iter().find_map(|arm| arm.result.as_ref().ok().map(|outcome| outcome.parameters.clone()))

@@ -1,12 +1,13 @@
-//! Whether the controllers of a campaign stay the same while it runs: their files are hashed at the start and at the end, and looked at
-//! meanwhile.
+//! Checks that the controllers of a campaign stay the same while it runs. Their files are hashed at
+//! the start and at the end, and looked at in between.
 //!
 //! ```text
 //!  the command ─▶ files that it names ─▶ files beside them whose names stand in their text (imports)
 //!  its process ─▶ files that it has mapped or opened after its greeting
 //! ```
 //!
-//! Between the hashes, a file counts as looked at if its time of change, its length and its place on the disk are the same.
+//! Between the hashes, a file counts as unchanged if its time of change, its length and its place
+//! on the disk are the same.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -20,14 +21,17 @@ use crate::manifest::{Manifest, file_hash};
 
 /// Shortest time between two looks at the files.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// Largest number of files that are followed as imports. An assumption: more are no controller but a data set.
+/// Largest number of files that are followed as imports. An assumption: more are no controller but
+/// a data set.
 const MOST_IMPORTS: usize = 500;
-/// Longest text in which names of imports are looked for (bytes). An assumption: 100 times a long script.
+/// Longest text in which names of imports are looked for (bytes). An assumption: 100 times a long
+/// script.
 const MOST_TEXT_BYTES: u64 = 4 << 20;
-/// Largest file that is hashed because a process has it open or mapped (bytes), so that hashing takes less than a second.
+/// Largest file that is hashed because a process has it open or mapped (bytes), so that hashing
+/// takes less than a second.
 const MOST_OPEN_BYTES: u64 = 512 << 20;
 
-/// What is seen of a file without reading it.
+/// The state of a file that the system tells without a read.
 type Look = Option<(SystemTime, u64, u64)>;
 
 /// A file of a controller.
@@ -93,7 +97,8 @@ impl ControllerWatch {
         }
     }
 
-    /// Hashes the files again. Returns a message for each that is not what it was at the start, or was not meanwhile.
+    /// Hashes the files again. Returns a message for each file that differs from the start, or
+    /// differed in between.
     pub fn finish(mut self) -> Vec<String> {
         self.changed
             .extend(self.files.iter().filter(|(path, file)| hash(path) != file.hash).map(|(path, _)| path.clone()));
@@ -125,10 +130,10 @@ fn look(path: &Path) -> Look {
     Some((metadata.modified().ok()?, metadata.len(), place(&metadata)))
 }
 
-/// Returns the files beside the named ones, or in folders beside them, that a text among them seems to load: it holds their names as
-/// words, and they have its extension.
+/// Returns the files that a text among the named files seems to load. They lie beside it, or in
+/// folders beside it. The text holds their names as words, and they have its extension.
 fn imports(named: &[PathBuf]) -> BTreeSet<PathBuf> {
-    let mut found = BTreeSet::new();
+    let mut import_files = BTreeSet::new();
     let mut left: Vec<PathBuf> = named.to_vec();
     while let Some(path) = left.pop() {
         let (Some(folder), Some(extension)) = (path.parent(), path.extension()) else { continue };
@@ -149,15 +154,15 @@ fn imports(named: &[PathBuf]) -> BTreeSet<PathBuf> {
                 if file.extension() == Some(extension)
                     && file.is_file()
                     && !named.contains(&file)
-                    && found.len() < MOST_IMPORTS
-                    && found.insert(file.clone())
+                    && import_files.len() < MOST_IMPORTS
+                    && import_files.insert(file.clone())
                 {
                     left.push(file);
                 }
             }
         }
     }
-    found
+    import_files
 }
 
 /// Returns the content of a file if it is a text.

@@ -1,13 +1,15 @@
 //! Drift: whether new traffic still matches the distributions that a scenario was fitted to.
 //!
-//! Each quantity of the fitted file is compared with its values in new trajectory data by a two-sample Kolmogorov–Smirnov
-//! test ([`two_sample`]). The p-values are corrected for the number of tests ([`holm`]), so that the probability of any false
-//! alarm is at most [`LEVEL`].
+//! Each quantity of the fitted file is compared with its values in new trajectory data by a
+//! two-sample Kolmogorov–Smirnov test ([`two_sample`]). The p-values are corrected for the number
+//! of tests ([`holm`]), so that the probability of any false alarm is at most [`LEVEL`].
 //!
-//! A parameter is compared with its *quantity* in the range of its *cut*, on both sides: a scenario's headways from 0.5 to 0.9 s with
-//! the new headways from 0.5 to 0.9 s. Quantities that repeat another one are not tested: the width of the peak of lateral speed
-//! follows from the duration, and the critical headways are a part of all headways, if these are tested. Values of one recording are treated as independent. Vehicles that drive
-//! one behind the other are not quite, so that a platoon can look like drift.
+//! A parameter is compared with its *quantity* in the range of its *cut*, on both sides: a
+//! scenario's headways from 0.5 to 0.9 s with the new headways from 0.5 to 0.9 s. Quantities that
+//! repeat another one are not tested. The width of the peak of lateral speed follows from the
+//! duration. The critical headways are a part of all headways, if these are tested. Values of one
+//! recording are treated as independent. Vehicles that drive one behind the other are not quite
+//! independent, and a platoon can look like drift.
 
 use std::path::Path;
 
@@ -47,27 +49,31 @@ pub struct Fitted(Vec<FittedParameter>);
 struct FittedParameter {
     name: String,
     quantity: Quantity,
-    /// The range of values that were fitted: from the first number up to below the second. `None` for all.
+    /// The range of values that were fitted: from the first number up to below the second. `None`
+    /// for all.
     cut: Option<[f64; 2]>,
     summary: Summary,
 }
 
 impl FittedParameter {
-    /// Reads a parameter. Returns `None` if it has no quantiles that were fitted, or if its quantity is not tested.
+    /// Reads a parameter. Returns `None` if it has no quantiles that were fitted, or if its
+    /// quantity is not tested.
     ///
     /// # Errors
     /// The parameter names a quantity that does not exist.
     fn of(name: &str, config: &ParameterConfig) -> Result<Option<Self>, String> {
         let (Some(fitted), Some(empirical)) = (&config.fitted, &config.empirical) else { return Ok(None) };
         let named = fitted.quantity.as_deref();
-        let Some(found) = Quantity::ALL.into_iter().find(|quantity| quantity.name() == named.unwrap_or(name)) else {
+        let Some(named_quantity) = Quantity::ALL.into_iter().find(|quantity| quantity.name() == named.unwrap_or(name))
+        else {
             let names: Vec<&str> = Quantity::ALL.iter().map(|quantity| quantity.name()).collect();
             return match named {
                 Some(named) => Err(format!("`{name}.fitted.quantity` is `{named}`: allowed are {}", names.join(", "))),
                 None => Ok(None),
             };
         };
-        let (quantity, part) = found.part_of().map_or((found, None), |(whole, cut)| (whole, Some(cut)));
+        let (quantity, part) =
+            named_quantity.part_of().map_or((named_quantity, None), |(whole, cut)| (whole, Some(cut)));
         if !TESTED.contains(&quantity) {
             return Ok(None);
         }
@@ -83,7 +89,8 @@ impl FittedParameter {
 }
 
 impl Fitted {
-    /// Reads a file that `closecall traffic fit` wrote, or a scenario whose parameters come from one.
+    /// Reads a file that `closecall traffic fit` wrote, or a scenario whose parameters come from
+    /// one.
     ///
     /// # Errors
     /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.
@@ -102,12 +109,15 @@ impl Fitted {
         for (name, config) in &parameters.0 {
             all.extend(FittedParameter::of(name.as_str(), config)?);
         }
-        // In the order of the quantities, those without a cut and those with the name of their quantity first.
-        all.sort_by_key(|one| (one.quantity, one.cut.is_some(), one.name != one.quantity.name()));
+        // In the order of the quantities. Of one quantity, parameters without a cut come first, and
+        // of these the one with its name.
+        all.sort_by_key(|parameter| {
+            (parameter.quantity, parameter.cut.is_some(), parameter.name != parameter.quantity.name())
+        });
         let mut kept: Vec<FittedParameter> = Vec::new();
-        for one in all {
-            if !kept.iter().any(|other| one.is_part_of(other)) {
-                kept.push(one);
+        for parameter in all {
+            if !kept.iter().any(|other| parameter.is_part_of(other)) {
+                kept.push(parameter);
             }
         }
         let all = kept;
@@ -130,9 +140,9 @@ pub struct QuantityDrift {
     pub name: String,
     /// Name of the quantity.
     pub quantity: &'static str,
-    /// Smallest value of the quantity that is compared; `None` if all values are.
+    /// Smallest value of the quantity that is compared; `None` if all values are compared.
     pub cut_from: Option<f64>,
-    /// Value of the quantity from which on none is compared; `None` if all values are.
+    /// Upper end of the compared values, which is excluded; `None` if all values are compared.
     pub cut_to: Option<f64>,
     /// Number of fitted values.
     pub fitted_n: usize,
@@ -146,13 +156,15 @@ pub struct QuantityDrift {
     pub distance: Option<f64>,
     /// Probability of a larger distance without drift (-).
     pub p_value: Option<f64>,
-    /// The same, corrected for the number of tests (-).
+    /// The probability, corrected for the number of tests (-).
     pub corrected_p_value: Option<f64>,
-    /// Distance that is found with these numbers of values (-).
+    /// Distance from which on the test finds drift with these numbers of values (-).
     pub found_from: Option<f64>,
-    /// Number of new values with which the observed distance would be found; `None` if no number suffices.
+    /// Number of new values with which the test finds the observed distance; `None` if no number
+    /// suffices.
     pub needed: Option<u64>,
-    /// Number of new values with which a shift by 5 % would be found about every second time; `None` if no number suffices.
+    /// Number of new values with which the test finds a shift by 5 % about every second time;
+    /// `None` if no number suffices.
     pub needed_for_five_percent: Option<u64>,
 }
 
@@ -167,7 +179,7 @@ pub struct Drift {
     pub has_drifted: bool,
 }
 
-/// Compares trajectory data with fitted distributions. `seed` is that of the simulated distances.
+/// Compares trajectory data with fitted distributions. `seed` determines the simulated distances.
 pub fn drift(fitted: &Fitted, data_sets: &[TrajectoryData], seed: u64) -> Drift {
     let mut samples = Samples::default();
     for data in data_sets {
@@ -179,51 +191,54 @@ pub fn drift(fitted: &Fitted, data_sets: &[TrajectoryData], seed: u64) -> Drift 
     drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &p_value)
 }
 
-/// Returns the probability of a larger distance than that of sorted new values.
+/// Returns the probability of a distance larger than the distance of these sorted new values.
 type PValue<'a> = dyn Fn(&str, &Summary, &[f64]) -> f64 + 'a;
 
 fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PValue<'_>) -> Drift {
-    let sorted = |one: &FittedParameter| {
-        let mut values = values(one.quantity);
-        values.retain(|value| one.cut.is_none_or(|[from, to]| (from..to).contains(value)));
+    let sorted = |parameter: &FittedParameter| {
+        let mut values = values(parameter.quantity);
+        values.retain(|value| parameter.cut.is_none_or(|[from, to]| (from..to).contains(value)));
         values.sort_by(f64::total_cmp);
         values
     };
     let new: Vec<Vec<f64>> = fitted.0.iter().map(sorted).collect();
-    let compared = fitted.0.iter().zip(&new).map(|(one, new)| {
-        (new.len() >= MIN_VALUES).then(|| (one.summary.distance(new), p_value(&one.name, &one.summary, new)))
+    let compared = fitted.0.iter().zip(&new).map(|(parameter, new)| {
+        (new.len() >= MIN_VALUES)
+            .then(|| (parameter.summary.distance(new), p_value(&parameter.name, &parameter.summary, new)))
     });
     let compared: Vec<Option<(f64, f64)>> = compared.collect();
     let p_values: Vec<f64> = compared.iter().flatten().map(|(_, p_value)| *p_value).collect();
     let level = LEVEL / p_values.len().max(1) as f64;
     let mut corrected = holm::corrected(&p_values).into_iter();
     let mut quantities = Vec::new();
-    for ((one, new), found) in fitted.0.iter().zip(&new).zip(&compared) {
-        let summary = &one.summary;
+    for ((parameter, new), test) in fitted.0.iter().zip(&new).zip(&compared) {
+        let summary = &parameter.summary;
         let shift = summary.distance_of_shift(|value| value * (1.0 + STATED_SHIFT));
         let needed = |distance| two_sample::needed(level, summary.n(), distance);
         quantities.push(QuantityDrift {
-            name: one.name.clone(),
-            quantity: one.quantity.name(),
-            cut_from: one.cut.map(|[from, _]| from),
-            cut_to: one.cut.map(|[_, to]| to),
+            name: parameter.name.clone(),
+            quantity: parameter.quantity.name(),
+            cut_from: parameter.cut.map(|[from, _]| from),
+            cut_to: parameter.cut.map(|[_, to]| to),
             fitted_n: summary.n(),
             fitted_median: summary.median(),
             n: new.len(),
             median: (!new.is_empty()).then(|| quantile(new, 0.5)),
-            distance: found.map(|(distance, _)| distance),
-            p_value: found.map(|(_, p_value)| p_value),
-            corrected_p_value: found.and_then(|_| corrected.next()),
-            found_from: found.map(|_| two_sample::critical_distance(level, summary.n(), new.len())),
-            needed: found.and_then(|(distance, _)| needed(distance)),
+            distance: test.map(|(distance, _)| distance),
+            p_value: test.map(|(_, p_value)| p_value),
+            corrected_p_value: test.and_then(|_| corrected.next()),
+            found_from: test.map(|_| two_sample::critical_distance(level, summary.n(), new.len())),
+            needed: test.and_then(|(distance, _)| needed(distance)),
             needed_for_five_percent: needed(shift),
         });
     }
-    let has_drifted = quantities.iter().filter_map(|one| one.corrected_p_value).any(|p_value| p_value < LEVEL);
+    let has_drifted =
+        quantities.iter().filter_map(|parameter| parameter.corrected_p_value).any(|p_value| p_value < LEVEL);
     Drift { quantities, is_tested: !p_values.is_empty(), has_drifted }
 }
 
-/// Returns the random stream of one parameter, so that a further one does not change the others.
+/// Returns the random stream of one parameter. A further parameter does not change the streams of
+/// the others.
 fn stream(seed: u64, name: &str) -> Stream {
     let mut hasher = blake3::Hasher::new_derive_key("closecall 2026 simulated distances of drift v1");
     hasher.update(&seed.to_le_bytes());
@@ -240,8 +255,8 @@ mod tests {
 
     use super::*;
 
-    /// Number of fitted values of each quantity, and the log-normal distribution that they come from: median and standard
-    /// deviation of the logarithm, close to those of the library's fitted file.
+    /// Number of fitted values of each quantity, and the log-normal distribution that they come
+    /// from: median and standard deviation of the logarithm, close to the library's fitted file.
     const TRUTH: [(Quantity, usize, [f64; 2]); 6] = [
         (Quantity::CutOutThw, 40, [0.76, 0.58]),
         (Quantity::LaneChangeDuration, 30, [4.7, 0.38]),
@@ -258,8 +273,9 @@ mod tests {
         values
     }
 
-    /// The share of 1,000 resamplings that are called drifted. In each, values are drawn and reduced to the quantiles of a
-    /// fitted file, and `n` new values of each quantity are drawn and changed by `shift`.
+    /// The share of 1,000 resamplings that are called drifted. In each, values are drawn and
+    /// reduced to the quantiles of a fitted file, and `n` new values of each quantity are drawn and
+    /// changed by `shift`.
     fn share_called_drifted(n: usize, shift: impl Fn(Quantity, f64) -> f64 + Sync) -> f64 {
         let summary = |values: &[f64]| {
             let levels = 11.min(values.len());
@@ -272,8 +288,8 @@ mod tests {
             (quantity.name(), any.simulated(n, &mut stream(0, quantity.name())))
         });
         let p_value = |name: &str, summary: &Summary, new: &[f64]| {
-            let (_, known) = simulated.iter().find(|(known, _)| *known == name).unwrap();
-            two_sample::p_value(summary.distance(new), known)
+            let (_, distances) = simulated.iter().find(|(quantity, _)| *quantity == name).unwrap();
+            two_sample::p_value(summary.distance(new), distances)
         };
         let is_called = |index: &u64| {
             let mut rng = Stream::seed_from_u64(*index);
@@ -286,7 +302,7 @@ mod tests {
                 let values = drawn(n, truth, &mut rng);
                 (quantity, values.into_iter().map(|value| shift(quantity, value)).collect::<Vec<f64>>())
             });
-            let values = |quantity| new.iter().find(|(known, _)| *known == quantity).unwrap().1.clone();
+            let values = |wanted| new.iter().find(|(quantity, _)| *quantity == wanted).unwrap().1.clone();
             drift_of(&fitted, values, &p_value).has_drifted
         };
         (0..1_000_u64).into_par_iter().filter(is_called).count() as f64 / 1_000.0
@@ -306,18 +322,19 @@ mod tests {
         let faster = |quantity, value: f64| if is_speed(quantity) { 1.05 * value } else { value };
         let is_headway = |quantity| matches!(quantity, Quantity::CutOutThw | Quantity::FrontThw);
         let closer = |quantity, value: f64| if is_headway(quantity) { value - 0.1 } else { value };
-        let found = [50, 200, 800].map(|n| {
+        let shares = [50, 200, 800].map(|n| {
             [
                 share_called_drifted(n, |_, value| value),
                 share_called_drifted(n, faster),
                 share_called_drifted(n, closer),
             ]
         });
-        let pairs = found.iter().flatten().zip(DOCUMENTED.iter().flatten());
-        assert!(pairs.into_iter().all(|(found, documented)| (found - documented).abs() < 0.02), "{found:?}");
+        let pairs = shares.iter().flatten().zip(DOCUMENTED.iter().flatten());
+        assert!(pairs.into_iter().all(|(share, documented)| (share - documented).abs() < 0.02), "{shares:?}");
     }
 
-    /// The table of docs/evidence/statistics.md: 50, 200 and 800 new values; no drift, 5 % faster, 0.1 s closer.
+    /// The table of docs/evidence/statistics.md: 50, 200 and 800 new values; no drift, 5 % faster,
+    /// 0.1 s closer.
     const DOCUMENTED: [[f64; 3]; 3] = [[0.046, 0.184, 0.104], [0.048, 0.452, 0.216], [0.043, 0.711, 0.394]];
 
     #[test]
@@ -335,13 +352,14 @@ mod tests {
     fn a_cut_parameter_is_compared_with_the_values_within_its_cut() {
         let text = include_str!("../../scenarios/library/rear-vehicle-is-followed.toml");
         let fitted = Fitted::parse(text).unwrap();
-        // The headway of the follower repeats the front headway; the log-normal headway at the crossing has no quantiles.
-        let names: Vec<&str> = fitted.0.iter().map(|one| one.name.as_str()).collect();
+        // The headway of the follower repeats the front headway; the log-normal headway at the
+        // crossing has no quantiles.
+        let names: Vec<&str> = fitted.0.iter().map(|parameter| parameter.name.as_str()).collect();
         assert_eq!(names, ["lane-change-duration-s", "front-thw-s"]);
         assert_eq!((fitted.0[1].quantity, fitted.0[1].cut), (Quantity::FrontThw, Some([0.5, 0.9])));
         let headways = || (0..300).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>();
         let values = |quantity| if quantity == Quantity::FrontThw { headways() } else { Vec::new() };
-        let found = drift_of(&fitted, values, &|_, summary, new| summary.distance(new));
-        assert_eq!(found.quantities[1].n, 40, "of 300 headways, those from 0.5 up to below 0.9 s");
+        let drift = drift_of(&fitted, values, &|_, summary, new| summary.distance(new));
+        assert_eq!(drift.quantities[1].n, 40, "of 300 headways, those from 0.5 up to below 0.9 s");
     }
 }

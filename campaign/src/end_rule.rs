@@ -1,6 +1,8 @@
-//! Rules that end a campaign before its last sample: at the first failing sample, or after too many errors.
+//! Rules that end a campaign before its last sample: at the first failing sample, or after too many
+//! errors.
 //!
-//! Such a campaign has no verdict. Its journal is complete up to its end, and the campaign can be resumed.
+//! Such a campaign has no verdict. Its journal is complete up to its end, and the campaign can be
+//! resumed.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -17,8 +19,9 @@ use crate::summary::Summary;
 /// When a campaign ends before its last sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EndRule {
-    /// True if the first failing sample ends the campaign: the ego collides under the controller under test, or a
-    /// controller ends in an error. So does a gate that fails whatever the remaining samples are.
+    /// True if the first failing sample ends the campaign: the ego collides under the controller
+    /// under test, or a controller ends in an error. So does a gate that fails whatever the
+    /// remaining samples are.
     pub fail_fast: bool,
     /// Largest number of samples that may end in an error; `None` for any number.
     pub max_errors: Option<u64>,
@@ -65,7 +68,7 @@ impl fmt::Display for EarlyEnd {
     }
 }
 
-/// A campaign that has ended early, for those who started it.
+/// A campaign that has ended early, as its user sees it.
 #[derive(Clone, Debug)]
 pub struct EndedEarly<'a> {
     /// Why it ended, in words.
@@ -78,15 +81,15 @@ pub struct EndedEarly<'a> {
     pub all: u64,
     /// Samples that ended in an error.
     pub errors: u64,
-    /// Why they did: the counts with their failures.
+    /// Why these samples ended in an error: the counts with their failures.
     pub summary: &'a Summary,
-    /// What is kept of the campaign; `None` if it has no folder.
+    /// The kept part of the campaign; `None` if it has no folder.
     pub kept: Option<Kept<'a>>,
     /// The commands to go on.
     pub command_for: CommandFor,
 }
 
-/// What is kept of a campaign that has ended early.
+/// The kept part of a campaign that has ended early.
 #[derive(Clone, Debug)]
 pub struct Kept<'a> {
     /// Its folder.
@@ -127,8 +130,8 @@ impl fmt::Display for EndedEarly<'_> {
         };
         if let Some(EarlyEnd::Failure { scenario, sample, .. }) = self.ending {
             let folder = folder.display().to_string();
-            let of = SavedSample { folder: &folder, sample: *sample, scenario: Some(scenario) };
-            let replay = Replay { recording: Some("failure.rrd"), ..Replay::new(of) };
+            let saved_sample = SavedSample { folder: &folder, sample: *sample, scenario: Some(scenario) };
+            let replay = Replay { recording: Some("failure.rrd"), ..Replay::new(saved_sample) };
             writeln!(f, "look:   {}", (self.command_for)(&Action::Replay(replay)))?;
         }
         writeln!(f, "resume: {resume}")
@@ -177,7 +180,7 @@ impl EndMonitor {
         ControlFlow::Break(End::Campaign)
     }
 
-    /// Returns what has ended the campaign early, or `None` if nothing has.
+    /// Returns the reason for which the campaign ended early, or `None` if it did not.
     pub fn into_ending(self) -> Option<EarlyEnd> {
         self.ending
     }

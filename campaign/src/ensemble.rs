@@ -1,15 +1,17 @@
-//! The verdict of a campaign over a driver ensemble: the median member and the worst member of each scenario.
+//! The verdict of a campaign over a driver ensemble: the median member and the worst member of each
+//! scenario.
 //!
-//! Each entry SCENARIO@MEMBER is a scenario of its own, with gates of its own. The verdict here is a statement about the
-//! members of one scenario together: which share of the baseline's collisions is prevented, in which share of the samples
-//! a collision is induced, and how much harm changes. The members are no sample of drivers: no weights are assumed. Of an
-//! even number of members, the less favourable of the two in the middle is the median, so that the median is always a
-//! member.
+//! Each entry SCENARIO@MEMBER is a scenario of its own, with gates of its own. The verdict here is
+//! a statement about the members of one scenario together: which share of the baseline's collisions
+//! is prevented, in which share of the samples a collision is induced, and how much harm changes.
+//! The members are no sample of drivers: no weights are assumed. Of an even number of members, the
+//! less favourable of the two in the middle is the median, so that the median is always a member.
 //!
-//! The member that looks worst is chosen by the data, so its own 95 % interval covers the worst share in fewer than 95 %
-//! of repetitions. The intervals of median and worst come from intervals that hold for all m members at once (Bonferroni:
-//! each with 1 - 0.05/m). If all of them hold, the worst share lies between the worst of their lower and the worst of
-//! their upper bounds, and likewise the median.
+//! The member that looks worst is chosen by the data, so its own 95 % interval covers the worst
+//! share in fewer than 95 % of repetitions. The intervals of median and worst come from intervals
+//! that hold for all m members at once (Bonferroni: each with 1 - 0.05/m). If all of them hold, the
+//! worst share lies between the worst of their lower and the worst of their upper bounds, and
+//! likewise the median.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +22,7 @@ use crate::summary::{Counts, Summary};
 /// The sign between the names of scenario and member.
 const SEPARATOR: char = '@';
 
-/// What is compared between members.
+/// A quantity that is compared between members.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Share of the baseline's collisions of the ego that the system prevents (-).
@@ -59,7 +61,7 @@ impl Quantity {
         !matches!(self, Self::HarmChange)
     }
 
-    /// Returns what one entry shows; `None` if the quantity is not defined.
+    /// Returns the value of one entry; `None` if the quantity is not defined.
     fn of(self, counts: &Counts, tested: usize) -> Option<Observed> {
         let share = |hits: u64, samples: u64| {
             (samples > 0)
@@ -82,8 +84,8 @@ impl Quantity {
         }
     }
 
-    /// Returns the interval of the value at a rank, the most favourable first, from intervals that hold at once: both bounds
-    /// are those at the same rank.
+    /// Returns the interval of the value at a rank, the most favourable first. `intervals` hold at
+    /// once, so both bounds are the bounds at the same rank.
     fn interval_of_rank(self, intervals: &[[f64; 2]], rank: usize) -> Option<[f64; 2]> {
         let bound = |side: usize| {
             let mut bounds: Vec<f64> = intervals.iter().map(|interval| interval[side]).collect();
@@ -99,7 +101,7 @@ impl Quantity {
     }
 }
 
-/// What one entry shows.
+/// The observed value of one entry.
 #[derive(Clone, Copy, Debug)]
 struct Observed {
     /// The value of the quantity.
@@ -108,7 +110,8 @@ struct Observed {
     hits_of_samples: Option<[u64; 2]>,
 }
 
-/// Share of repetitions in which the interval of the median or the worst member covers the true value, at least (-).
+/// Share of repetitions in which the interval of the median or the worst member covers the true
+/// value, at least (-).
 const COVERAGE: f64 = 0.95;
 
 /// The value of one member.
@@ -118,8 +121,8 @@ pub struct MemberValue {
     pub member: String,
     /// The value.
     pub value: f64,
-    /// The 95 % interval of a share: of the member alone in [`Spread::values`], simultaneous over the members in
-    /// [`Spread::median`] and [`Spread::worst`]. `None` if no bound is valid.
+    /// The 95 % interval of a share: of the member alone in [`Spread::values`], simultaneous over
+    /// the members in [`Spread::median`] and [`Spread::worst`]. `None` if no bound is valid.
     pub interval_95: Option<[f64; 2]>,
 }
 
@@ -134,7 +137,8 @@ pub struct Spread {
     pub worst: MemberValue,
     /// The values of all members, the most favourable first.
     pub values: Vec<MemberValue>,
-    /// Members for which the quantity is not defined: nothing collides without the system, say.
+    /// Members for which the quantity is not defined, for example because nothing collides without
+    /// the system.
     pub undefined: Vec<String>,
 }
 
@@ -151,8 +155,9 @@ pub struct EnsembleVerdict {
     pub spreads: Vec<Spread>,
 }
 
-/// Returns the verdict over the ensemble of the arm under test, for each scenario that was run as entries SCENARIO@MEMBER.
-/// `without_effect` names pairs of scenario and member that were not run because the member changes nothing.
+/// Returns the verdict over the ensemble of the arm under test, for each scenario that was run as
+/// entries SCENARIO@MEMBER. `without_effect` names pairs of scenario and member that were not run
+/// because the member changes nothing.
 pub fn verdicts(summary: &Summary, without_effect: &[(String, String)]) -> Vec<EnsembleVerdict> {
     verdicts_of_arm(summary, without_effect, summary.controllers.len().saturating_sub(1))
 }
@@ -174,7 +179,7 @@ pub fn verdicts_of_arm(summary: &Summary, without_effect: &[(String, String)], t
         members: entries.iter().map(|(member, _)| (*member).to_owned()).collect(),
         without_effect: without_effect
             .iter()
-            .filter(|(of, _)| of == scenario)
+            .filter(|(name, _)| name == scenario)
             .map(|(_, member)| member.clone())
             .collect(),
         spreads: quantities
@@ -270,8 +275,8 @@ mod tests {
         assert!(interval[0] < 0.6 && 0.6 < interval[1] && verdict.spreads[2].worst.interval_95.is_none());
     }
 
-    /// Twelve alike members: the one that looks worst is so by chance. Its own interval would miss the true share in every
-    /// second repetition.
+    /// Twelve alike members: the one that looks worst is so by chance. Its own interval would miss
+    /// the true share in every second repetition.
     #[test]
     fn the_interval_of_the_worst_member_covers_the_worst_share() {
         const MEMBERS: usize = 12;

@@ -22,7 +22,8 @@ pub use super::stop::End;
 
 pub use super::campaign_error::CampaignError;
 
-/// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order of their numbers.
+/// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order
+/// of their numbers.
 #[derive(Clone)]
 pub struct Campaign {
     /// The scenarios with their samples and arms.
@@ -31,38 +32,40 @@ pub struct Campaign {
     pub partition: Option<Partition>,
     /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
-    /// What runs the samples, if the threads of this process do not.
+    /// The runner of the samples, if the threads of this process do not run them.
     pub remote: Option<Arc<dyn SampleRunner>>,
     /// True if samples of the journal that ended in an error are run again.
     pub retry_errors: bool,
-    /// True if the campaign goes on without its folder when results can no longer be written, as on a full disk, and still
-    /// counts every sample. Else it ends there.
+    /// True if the campaign goes on without its folder when results cannot be written, for example
+    /// on a full disk. It then still counts every sample. If false, it ends there.
     pub goes_on_without_folder: bool,
     /// A request from outside to start no further samples.
     pub stop: StopFlag,
 }
 
-/// What was found in the journal of a campaign that goes on.
+/// The state of the journal of a campaign that goes on.
 #[derive(Debug, Default)]
 pub struct ResumeReport {
     /// The line at which the journal was cut off: it and everything after it was damaged.
     pub torn: Option<TornLine>,
-    /// Damaged lines before intact ones. Their samples were run again, and all other lines were kept.
+    /// Damaged lines before intact ones. Their samples were run again, and all other lines were
+    /// kept.
     pub damaged: Vec<TornLine>,
     /// Number of samples that had ended in an error, and were run again.
     pub retried: u64,
     /// Number of lines that repeated the line before them, and were removed.
     pub doubled: u64,
-    /// Number of samples that were added to a scenario before the next one, because the campaign has grown.
+    /// Number of samples that were added to a scenario before the next one, because the campaign
+    /// has grown.
     pub added: u64,
     /// Why the last records are not in the folder, if the campaign went on without it.
     pub lost: Option<WriteError>,
 }
 
 impl ResumeReport {
-    /// Returns what was found as messages for human readers.
+    /// Returns these facts as messages for human readers.
     pub fn messages(&self) -> Vec<String> {
         let damaged = self.damaged.iter().map(|TornLine { line, reason }| {
             format!("line {line} of the journal was damaged ({reason}): its sample was run again")
@@ -156,14 +159,16 @@ impl Campaign {
         self.works.iter().all(|work| work.samples(self.partition).next().is_none())
     }
 
-    /// Runs the samples that the folder's journal does not hold yet; all samples if there is no folder.
+    /// Runs the samples that the folder's journal does not hold yet; all samples if there is no
+    /// folder.
     ///
-    /// `on_record` receives every record in the order of the plan, those of the journal first. If it breaks, the
-    /// scenario or the campaign ends after that record.
+    /// `on_record` receives every record in the order of the plan, the records of the journal
+    /// first. If it breaks, the scenario or the campaign ends after that record.
     ///
-    /// If [`Self::stop`] is set, no further sample starts, and the campaign ends with the samples that are done.
+    /// If [`Self::stop`] is set, no further sample starts, and the campaign ends with the samples
+    /// that are done.
     ///
-    /// Returns what was found in the journal.
+    /// Returns the state of the journal.
     ///
     /// # Errors
     /// [`CampaignError`] if the folder cannot be read or written, or no threads can be started.
@@ -176,7 +181,8 @@ impl Campaign {
             folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
         let mut report = ResumeReport { torn: None, damaged, retried, doubled, added, lost: None };
         if let Some(folder) = folder.filter(|folder| self.stop.is_set() && folder.journal_path().exists()) {
-            // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
+            // Damaged lines may be left: the journal is read, but not opened for appending, which
+            // would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
                 let Some((work, _)) = key_of(self, &record) else { break };
                 if on_record(NextRecord { work, record: &record, is_new: false, spent: SpentTime::default() })
@@ -276,7 +282,8 @@ impl Campaign {
         Ok(())
     }
 
-    /// Runs samples of one scenario, which is given with its index, on this machine or on others. See [`Workers::run`].
+    /// Runs samples of one scenario, which is given with its index, on this machine or on others.
+    /// See [`Workers::run`].
     pub(super) fn run_samples(
         &self,
         (number, work): (usize, &Arc<Work>),
@@ -299,9 +306,9 @@ impl Campaign {
 /// The files of a running campaign, if it has any.
 struct KeptFiles {
     files: Option<ResumedFiles>,
-    /// True if the campaign goes on when they can no longer be written.
+    /// True if the campaign goes on when the files cannot be written.
     may_be_lost: bool,
-    /// Why they can no longer be written.
+    /// Why the files cannot be written.
     lost: Option<WriteError>,
 }
 

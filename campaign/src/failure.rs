@@ -12,13 +12,13 @@ use super::saved_error::SavedError;
 /// The kind of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureKind {
-    /// What was asked for does not exist or contradicts itself.
+    /// A requested thing does not exist or contradicts itself.
     Usage,
     /// A file cannot be used as it is.
     InvalidInput,
     /// A sample has no outcome.
     Sample,
-    /// What runs is not what the campaign began with.
+    /// The program, a file or a controller differs from the start of the campaign.
     Validity,
     /// A file or folder cannot be read or written.
     Io,

@@ -1,7 +1,9 @@
-//! Why samples have no outcome: the first message of each kind of failure, with its count and a sample to run again.
+//! Why samples have no outcome: the first message of each kind of failure, with its count and a
+//! sample to run again.
 //!
-//! Two failures are of one kind if they have the same controller, the same name, and the same message apart from its numbers: the
-//! times and process numbers in messages differ from sample to sample. The list is bounded, whatever the controllers write.
+//! Two failures are of one kind if they have the same controller, the same name, and the same
+//! message apart from its numbers: the times and process numbers in messages differ from sample to
+//! sample. The list is bounded, whatever the controllers write.
 
 use std::fmt;
 
@@ -23,14 +25,14 @@ pub struct FailureKindCount {
     pub kind: String,
     /// Number of samples that failed so.
     pub samples: u64,
-    /// The first of them.
+    /// The first of these samples.
     pub first_sample: u64,
-    /// The message of the first.
+    /// The message of the first failure.
     pub first_message: String,
 }
 
 impl FailureKindCount {
-    /// Returns the message of the first in one line.
+    /// Returns the message of the first failure in one line.
     fn line(&self) -> String {
         let mut words = self.first_message.split_whitespace().collect::<Vec<_>>().join(" ");
         if let Some((end, _)) = words.char_indices().nth(LINE_CHARS) {
@@ -41,7 +43,8 @@ impl FailureKindCount {
     }
 }
 
-/// Writes the count, the controller, the sample and its message: `50 × exec (controller), first in sample 0: the process ended`.
+/// Writes the count, the controller, the sample and its message:
+/// `50 × exec (controller), first in sample 0: the process ended`.
 impl fmt::Display for FailureKindCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { controller, kind, samples, first_sample, .. } = self;
@@ -60,11 +63,12 @@ impl Failures {
     pub fn push(&mut self, record: &Record) {
         for arm in &record.arms {
             let Err(failure) = &arm.result else { continue };
-            let is_alike = |one: &&mut FailureKindCount| one.controller == arm.controller && one.kind == failure.kind;
-            let is_same = |one: &FailureKindCount| shape(&one.first_message).eq(shape(&failure.message));
+            let is_alike =
+                |count: &&mut FailureKindCount| count.controller == arm.controller && count.kind == failure.kind;
+            let is_same = |count: &FailureKindCount| shape(&count.first_message).eq(shape(&failure.message));
             let is_full = self.kinds.len() >= MOST_KINDS;
             let mut alike = self.kinds.iter_mut().filter(is_alike);
-            if let Some(kind) = alike.find(|one| is_full || is_same(one)) {
+            if let Some(kind) = alike.find(|count| is_full || is_same(count)) {
                 kind.samples += 1;
                 continue;
             }
@@ -120,9 +124,9 @@ mod tests {
         failures.push(&failed(3, "late at 2.04 s"));
         failures.push(&failed(4, "late at 12.4 s"));
         failures.push(&failed(7, "no such file"));
-        let found: Vec<String> = failures.iter().map(ToString::to_string).collect();
+        let lines: Vec<String> = failures.iter().map(ToString::to_string).collect();
         assert_eq!(
-            found,
+            lines,
             [
                 "2 × exec (controller), first in sample 3: late at 2.04 s",
                 "1 × exec (controller), first in sample 7: no such file"

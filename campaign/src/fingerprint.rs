@@ -1,8 +1,10 @@
-//! What identifies a controller that runs as a process: the files that its command names, and what it states about
-//! itself. A campaign keeps it, so that a changed controller is noticed when the campaign is resumed or replayed.
+//! The identity of a controller that runs as a process: the files that its command names, and its
+//! own statements. A campaign keeps the identity, and a changed controller is noticed when the
+//! campaign is resumed or replayed.
 //!
-//! Files that the command does not name, such as the modules that a script imports, are not covered. A controller that
-//! has such files states a `version` in its first answer, or names them in its command.
+//! Files that the command does not name, such as the modules that a script imports, are not
+//! covered. A controller that has such files states a `version` in its first answer, or names them
+//! in its command.
 
 use std::path::{Path, PathBuf};
 
@@ -34,16 +36,18 @@ pub struct Fingerprint {
     pub command: String,
     /// The files that the command names, in its order. The program is among them if it is found.
     pub files: Vec<FileHash>,
-    /// What the process states about itself in its first answer.
+    /// The statements of the process in its first answer.
     pub identity: Identity,
-    /// The files that the process has mapped or opened after its greeting. They differ from machine to machine.
+    /// The files that the process has mapped or opened after its greeting. They differ from machine
+    /// to machine.
     #[serde(skip)]
     open_files: Vec<PathBuf>,
 }
 
 impl Fingerprint {
-    /// Returns the fingerprint of a controller that runs in the given folder, or in that of this program. The process is
-    /// started once and greeted with the values of `scenario`. A process that cannot be greeted has no identity.
+    /// Returns the fingerprint of a controller that runs in the given folder, or in the folder of
+    /// this program. The process is started once and greeted with the values of `scenario`. A
+    /// process that cannot be greeted has no identity.
     pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
         let hash = |(name, path): (String, PathBuf)| {
             // A file that cannot be read has no hash: it differs from one that can.
@@ -90,7 +94,8 @@ impl Fingerprint {
         }
     }
 
-    /// Returns one message for each difference. `self` is the fingerprint of the earlier controller.
+    /// Returns one message for each difference. `self` is the fingerprint of the earlier
+    /// controller.
     pub fn differences(&self, now: &Self) -> Vec<String> {
         let hash_in = |files: &[FileHash], name: &str| {
             files.iter().find(|file| file.name == name).map(|file| file.blake3.clone())
@@ -126,8 +131,8 @@ impl Fingerprint {
 
 /// Returns one message for each difference between controllers with the same command.
 pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<String> {
-    let same = |one: &Fingerprint| here.iter().find(|other| other.command == one.command);
-    there.iter().filter_map(|one| Some(one.differences(same(one)?))).flatten().collect()
+    let same = |earlier: &Fingerprint| here.iter().find(|other| other.command == earlier.command);
+    there.iter().filter_map(|earlier| Some(earlier.differences(same(earlier)?))).flatten().collect()
 }
 
 /// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows
@@ -141,7 +146,7 @@ pub fn named_files(settings: &ExecSettings, folder: Option<&Path>) -> Vec<(Strin
             let in_folder = || folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
             let path = if index == 0 && !name.contains('/') { in_search_path(name) } else { Some(in_folder()) };
             if let Some(path) = path.filter(|path| path.is_file())
-                && !files.iter().any(|(known, _)| known == name)
+                && !files.iter().any(|(file, _)| file == name)
             {
                 files.push((name.to_owned(), path));
             }
@@ -180,11 +185,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let script = folder.path().join("a.py");
         std::fs::write(&script, "1").unwrap();
-        let of = || Fingerprint::of(&settings("sh a.py"), Some(folder.path()), None);
-        let before = of();
-        assert_eq!(before.differences(&of()), Vec::<String>::new());
+        let fingerprint = || Fingerprint::of(&settings("sh a.py"), Some(folder.path()), None);
+        let before = fingerprint();
+        assert_eq!(before.differences(&fingerprint()), Vec::<String>::new());
         std::fs::write(&script, "2").unwrap();
-        let mut now = of();
+        let mut now = fingerprint();
         now.identity.version = Some("2".to_owned());
         let differences = before.differences(&now);
         assert!(differences[0].starts_with("the controller's file a.py has changed: BLAKE3 "), "{differences:?}");

@@ -1,4 +1,5 @@
-//! The folder of a campaign. It is set up before the first sample runs, and an interrupted campaign resumes from it.
+//! The folder of a campaign. It is set up before the first sample runs, and an interrupted campaign
+//! resumes from it.
 //!
 //! ```text
 //!  manifest.json      how the campaign was made: everything that a replay needs
@@ -48,7 +49,7 @@ pub const RECORDINGS: &str = "recordings";
 /// The page of the recordings, in their folder.
 pub const RECORDINGS_PAGE: &str = "index.html";
 
-/// All files of a campaign's folder, without those of the recordings.
+/// All files of a campaign's folder, without its recordings.
 pub(crate) const FILES: [&str; 13] = [
     MANIFEST,
     JOURNAL,
@@ -123,11 +124,13 @@ impl Folder {
         Self { path: path.to_owned() }
     }
 
-    /// Locks a folder for the campaign of `manifest`. Creates the folder and writes the manifest if the folder does not
-    /// exist or is empty. With `resume`, also accepts a folder that already holds the same campaign, or the first samples of it.
+    /// Locks a folder for the campaign of `manifest`. Creates the folder and writes the manifest if
+    /// the folder does not exist or is empty. With `resume`, also accepts a folder that already
+    /// holds the same campaign, or the first samples of it.
     ///
     /// # Errors
-    /// [`FolderError`] if the folder cannot be written, holds something else, or is locked by another program.
+    /// [`FolderError`] if the folder cannot be written, holds something else, or is locked by
+    /// another program.
     pub fn lock(path: &Path, manifest: &Manifest, resume: bool) -> Result<LockedFolder, FolderError> {
         let folder = Self::open(path);
         fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
@@ -174,8 +177,8 @@ impl Folder {
         Ok(true)
     }
 
-    /// Returns true if the folder has a file of this name. If the system cannot tell, that is an error: a file
-    /// that is taken for missing would be overwritten.
+    /// Returns true if the folder has a file of this name. If the system cannot tell, that is an
+    /// error: a file that is taken for missing would be overwritten.
     pub(crate) fn has(&self, name: &str) -> Result<bool, FolderError> {
         let path = self.file(name);
         path.try_exists().map_err(|source| FolderError::Read { path, source })
@@ -224,12 +227,14 @@ impl Folder {
     /// Reads the manifest, which says how the campaign was made.
     ///
     /// # Errors
-    /// [`FolderError`] if there is no manifest, or if its layout has another version than this program's.
+    /// [`FolderError`] if there is no manifest, or if its layout has another version than this
+    /// program's.
     pub fn manifest(&self) -> Result<Manifest, FolderError> {
         Ok(self.manifest_with_hash()?.0)
     }
 
-    /// Remembers that this user's program has written the manifest: the folder is the user's own from now on.
+    /// Remembers that this user's program has written the manifest: the folder is the user's own
+    /// from now on.
     ///
     /// # Errors
     /// [`FolderError`] if the manifest cannot be read, or the user's state folder not be written.
@@ -261,11 +266,13 @@ impl Folder {
         }
     }
 
-    /// Returns the records of the journal in their order. An unfinished last line is skipped, as a killed program leaves it.
+    /// Returns the records of the journal in their order. An unfinished last line is skipped, as a
+    /// killed program leaves it.
     ///
     /// # Errors
-    /// [`FolderError`] if the manifest cannot be read or the journal cannot be opened. An item of the iterator is an error if its line
-    /// is damaged, cannot be read, or is not the next one of the manifest's plan.
+    /// [`FolderError`] if the manifest cannot be read or the journal cannot be opened. An item of
+    /// the iterator is an error if its line is damaged, cannot be read, or is not the next one of
+    /// the manifest's plan.
     pub fn records(&self) -> Result<Records, FolderError> {
         let path = self.file(JOURNAL);
         let plan = self.plan()?;
@@ -273,10 +280,12 @@ impl Folder {
         Ok(Records { path, plan, entries, line: 0, is_over: false, must_be_complete: false })
     }
 
-    /// Returns the records of a journal that must be complete. A part of the samples says nothing about all of them.
+    /// Returns the records of a journal that must be complete. A part of the samples says nothing
+    /// about all of them.
     ///
     /// # Errors
-    /// As [`Self::records`]. The last item of the iterator is [`FolderError::Incomplete`] if samples of the plan are missing.
+    /// As [`Self::records`]. The last item of the iterator is [`FolderError::Incomplete`] if
+    /// samples of the plan are missing.
     pub fn complete_records(&self) -> Result<Records, FolderError> {
         Ok(Records { must_be_complete: true, ..self.records()? })
     }
@@ -320,7 +329,8 @@ impl Folder {
     }
 }
 
-/// The records of a journal, each checked against the plan of the manifest. See [`Folder::records`].
+/// The records of a journal, each checked against the plan of the manifest. See
+/// [`Folder::records`].
 pub struct Records {
     path: PathBuf,
     plan: JournalPlan,
@@ -374,14 +384,14 @@ impl LockedFolder {
         self.folder.file(WALL_TIMES)
     }
 
-    /// Hands each existing record to `check`, and opens the journal for appending behind the last one. A torn
-    /// line is cut off together with everything after it: those samples run again.
+    /// Hands each existing record to `check`, and opens the journal for appending behind the last
+    /// one. A torn line is cut off together with everything after it: those samples run again.
     ///
     /// `check` returns an error, in words, if the record is not the next one in the plan.
     ///
     /// # Errors
-    /// [`FolderError::Content`] if `check` refuses a record; the journal is then unchanged. Other [`FolderError`]s if a file cannot be
-    /// read or written.
+    /// [`FolderError::Content`] if `check` refuses a record; the journal is then unchanged. Other
+    /// [`FolderError`]s if a file cannot be read or written.
     pub fn resume(&self, mut check: impl FnMut(&Record) -> Result<(), String>) -> Result<ResumedFiles, FolderError> {
         let path = self.folder.file(JOURNAL);
         let (mut kept_bytes, mut kept_records, mut torn) = (0, 0_u64, None);

@@ -76,7 +76,7 @@ pub enum FolderError {
     Foreign {
         /// The path.
         path: PathBuf,
-        /// What is there.
+        /// The content of the path.
         reason: String,
     },
     /// Another program has locked the folder.

@@ -1,4 +1,5 @@
-//! Whether a record belongs to its sample: scenario, seed, sample, arms and parameters must equal the plan.
+//! Whether a record belongs to its sample: scenario, seed, sample, arms and parameters must equal
+//! the plan.
 //!
 //! ```text
 //!  plan ─▶ scenario, sample, names of the arms, seed, drawn values
@@ -6,8 +7,8 @@
 //!  line ─▶ record: scenario, sample, arms ─▶ outcome of each arm: scenario, seed, sample, controller, parameters
 //! ```
 //!
-//! A checksum shows that a line is whole, not that it is the right one. So a record is checked wherever it arrives: from a worker
-//! process, from another machine, and from a journal.
+//! A checksum shows that a line is whole, not that it is the right one. So a record is checked
+//! wherever it arrives: from a worker process, from another machine, and from a journal.
 
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::outcome::Outcome;
@@ -16,7 +17,7 @@ use closecall_traffic::Parameters;
 use crate::record::{ArmRecord, Record};
 use crate::sampling::Sampling;
 
-/// What the records of one scenario must be.
+/// The properties that the records of one scenario must have.
 #[derive(Clone, Copy)]
 pub(crate) struct Identity<'a, Names> {
     pub(crate) file: &'a ScenarioFile,
@@ -44,7 +45,8 @@ impl<'a, Names: Iterator<Item = &'a str> + Clone> Identity<'_, Names> {
         record.arms.iter().try_for_each(|arm| self.check_arm(arm, sample, &mut drawn))
     }
 
-    /// Checks that the outcome of an arm, if there is one, belongs to the sample. `drawn` keeps the values of the sample from arm to arm.
+    /// Checks that the outcome of an arm, if there is one, belongs to the sample. `drawn` keeps the
+    /// values of the sample from arm to arm.
     ///
     /// # Errors
     /// What differs, in words.

@@ -19,7 +19,7 @@ pub fn of_trajectories(paths: &[PathBuf]) -> Vec<PathBuf> {
     paths.iter().flat_map(|path| input_files(path)).collect()
 }
 
-/// Returns the files that a controller names: those of its command, or its library.
+/// Returns the files that a controller names: the files of its command, or its library.
 pub fn of_controller(controller: &ControllerChoice) -> Vec<PathBuf> {
     let files = controller.exec().map(|settings| named_files(settings, None)).unwrap_or_default();
     let native = controller.native().map(|settings| PathBuf::from(&settings.path));

@@ -1,4 +1,4 @@
-//! Whether the folder of a campaign is whole: `closecall check DIR`.
+//! Checks that the folder of a campaign is whole: `closecall check DIR`.
 //!
 //! | what is looked at | problem | repair |
 //! |---|---|---|
@@ -7,7 +7,8 @@
 //! | `journal.jsonl` | a record of another sample, another order | a new campaign |
 //! | files made from the journal | missing | `--resume` |
 //!
-//! The commands that read a folder make the same checks of its records: see [`Folder::records`](crate::folder::Folder::records).
+//! The commands that read a folder make the same checks of its records: see
+//! [`Folder::records`](crate::folder::Folder::records).
 
 use serde::Serialize;
 
@@ -24,20 +25,20 @@ pub struct Problem {
     pub line: Option<usize>,
     /// What is wrong.
     pub message: String,
-    /// What repairs it.
+    /// The repair of the problem.
     pub repair: String,
 }
 
-/// What is known of a folder.
+/// The state of a folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Integrity {
-    /// Number of records that are those of their samples.
+    /// Number of records that belong to their samples.
     pub records: u64,
-    /// Number of records that the plan has beyond these.
+    /// Number of records of the plan that are missing.
     pub missing: u64,
-    /// What is wrong.
+    /// The problems.
     pub problems: Vec<Problem>,
-    /// The repair of what a campaign writes again that is resumed.
+    /// The repair of files that a campaign writes again if it is resumed.
     #[serde(skip)]
     resumption: String,
 }
@@ -79,7 +80,7 @@ impl Integrity {
         self.problems.push(Problem { file: file.to_owned(), line, message, repair });
     }
 
-    /// Adds a problem that a campaign repairs if it is resumed.
+    /// Adds a problem that a resumed campaign repairs.
     pub fn add_resumable(&mut self, file: &str, line: Option<usize>, message: String) {
         self.add(file, line, message, self.resumption.clone());
     }
@@ -114,8 +115,8 @@ impl Integrity {
         }
         self.missing = plan.missing();
         if self.missing > 0 {
-            let of = self.records + self.missing;
-            self.add_resumable(JOURNAL, None, format!("it has {} of the {of} samples", self.records));
+            let planned = self.records + self.missing;
+            self.add_resumable(JOURNAL, None, format!("it has {} of the {planned} samples", self.records));
         }
         Ok(())
     }

@@ -42,8 +42,8 @@ fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Starts the thread that receives the signals. `announce` is called with the first signal if it stops a campaign, `exit` with
-/// one that ends the program.
+/// Starts the thread that receives the signals. `announce` is called with the first signal if it
+/// stops a campaign, `exit` with one that ends the program.
 pub fn watch(announce: fn(Signal), exit: fn(Signal)) {
     // A file that grows beyond the limit of the user (`ulimit -f`) is then an error of its write.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());

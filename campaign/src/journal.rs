@@ -1,15 +1,16 @@
-//! The journal of a campaign: a file to which the record of each sample is appended as one line, in the order of the
-//! plan.
+//! The journal of a campaign: a file to which the record of each sample is appended as one line, in
+//! the order of the plan.
 //!
 //! ```text
 //!  5f1c09a2b7d34e68 {"scenario":"low-thw-overtake","sample":0,"arms":[…]}
 //!  └ checksum of the record          └ the record, as JSON
 //! ```
 //!
-//! Each line is handed to the operating system in one write. A program that is killed therefore leaves at most the last
-//! line incomplete. Once a second the journal is synchronised to the disk, so that a machine that fails loses about one
-//! second of results. The checksum reveals an incomplete or damaged line. The
-//! samples of such lines run again, and the same samples give the same lines.
+//! Each line is handed to the operating system in one write. A program that is killed therefore
+//! leaves at most the last line incomplete. Once a second the journal is synchronised to the disk,
+//! so that a machine that fails loses about one second of results. The checksum reveals an
+//! incomplete or damaged line. The samples of such lines run again, and the same samples give the
+//! same lines.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -26,7 +27,8 @@ const SYNC_EVERY: Duration = Duration::from_secs(1);
 /// Length of a line's checksum (hexadecimal digits): the first 64 bits of the BLAKE3 hash.
 const CHECKSUM_DIGITS: usize = 16;
 
-/// Longest line that is a record (bytes). An assumption: 50 times the line of three arms with 10,000 parameters each.
+/// Longest line that is a record (bytes). An assumption: 50 times the line of three arms with
+/// 10,000 parameters each.
 const MOST_LINE_BYTES: u64 = 64 << 20;
 
 /// A journal that is open for appending.
@@ -38,7 +40,8 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens a journal for appending, and cuts it to its first `keep` bytes. Creates the file if there is none.
+    /// Opens a journal for appending, and cuts it to its first `keep` bytes. Creates the file if
+    /// there is none.
     ///
     /// # Errors
     /// [`WriteError`] if the file cannot be created or cut.
@@ -55,8 +58,8 @@ impl Journal {
     /// Appends one record.
     ///
     /// # Errors
-    /// [`WriteError`] if the line cannot be written completely. The file may then end with a part of the line, which
-    /// [`read`] recognises.
+    /// [`WriteError`] if the line cannot be written completely. The file may then end with a part
+    /// of the line, which [`read`] recognises.
     pub fn append(&mut self, record: &Record) -> Result<(), WriteError> {
         let line = line(record).map_err(|source| WriteError::new(&self.path, source))?;
         self.file.write_all(&line).map_err(|source| WriteError::new(&self.path, source))?;
@@ -111,8 +114,8 @@ pub enum Entry {
 /// Returns the entries of a journal in their order. The first torn entry is the last one returned.
 ///
 /// # Errors
-/// The error of the operating system if the file cannot be opened. An item of the iterator is an error if the file
-/// cannot be read further.
+/// The error of the operating system if the file cannot be opened. An item of the iterator is an
+/// error if the file cannot be read further.
 pub fn read(path: &Path) -> io::Result<Entries> {
     let file = input::open_in_folder(path, OpenOptions::new().read(true))?;
     Ok(Entries { reader: BufReader::new(file), end: 0, line: 0, is_over: false, buffer: Vec::new() })
@@ -163,8 +166,9 @@ impl Entries {
     }
 }
 
-/// Reads a line. Of a line that is too long, as a damaged disk leaves it, no more than [`MOST_LINE_BYTES`] are kept, without its end.
-/// Returns its length (bytes), 0 at the end of the file.
+/// Reads a line. Of a line that is too long, as a damaged disk leaves it, no more than
+/// [`MOST_LINE_BYTES`] are kept, without its end. Returns its length (bytes), 0 at the end of the
+/// file.
 pub(crate) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<u64> {
     line.clear();
     let mut read = reader.by_ref().take(MOST_LINE_BYTES).read_until(b'\n', line)? as u64;
@@ -228,8 +232,8 @@ mod tests {
         for cut in 0..=whole.len() {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let complete = ends.iter().filter(|&&end| end <= cut).count();
-            let (found, tail, kept) = samples(&path);
-            assert_eq!(found, (0..complete as u64).collect::<Vec<_>>(), "cut at {cut}");
+            let (numbers, tail, kept) = samples(&path);
+            assert_eq!(numbers, (0..complete as u64).collect::<Vec<_>>(), "cut at {cut}");
             assert_eq!(tail, (complete == 0 && cut > 0 || complete > 0 && cut > ends[complete - 1]).then_some(true));
             let mut journal = Journal::open(&path, kept).unwrap();
             (complete as u64..3).for_each(|sample| journal.append(&record(sample)).unwrap());
@@ -247,9 +251,9 @@ mod tests {
             let mut changed = whole.clone();
             changed[index] ^= 1;
             std::fs::write(&path, &changed).unwrap();
-            let (found, tail, _) = samples(&path);
-            assert!(found.len() < 3 && tail.is_some(), "byte {index}");
-            assert_eq!(found.is_empty(), index < second, "byte {index}");
+            let (numbers, tail, _) = samples(&path);
+            assert!(numbers.len() < 3 && tail.is_some(), "byte {index}");
+            assert_eq!(numbers.is_empty(), index < second, "byte {index}");
         }
     }
 

@@ -1,4 +1,5 @@
-//! The plan of a campaign as its journal must follow it: which record comes next, and how many are missing.
+//! The plan of a campaign as its journal must follow it: which record comes next, and how many are
+//! missing.
 
 use std::path::Path;
 
@@ -105,8 +106,8 @@ impl JournalPlan {
         }
     }
 
-    /// Returns the number of records that the plan has beyond those checked so far. The outcomes may determine the number of samples:
-    /// then there may be none.
+    /// Returns the number of records that the plan has beyond those checked so far. The outcomes
+    /// may determine the number of samples: then there may be none.
     pub(crate) fn missing(&self) -> u64 {
         if self.inference == Inference::Sequential && self.last.is_some() {
             return 0;

@@ -8,21 +8,25 @@ use closecall_traffic::statistics::{interval, mcnemar, sequence};
 /// Share of repetitions in which a reported interval covers the true probability, at least.
 const COVERAGE: f64 = 0.95;
 
-/// The rule that determines the number of samples. It decides which bounds of a probability are valid.
+/// The rule that determines the number of samples. It decides which bounds of a probability are
+/// valid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Inference {
     /// The number is fixed in advance: exact intervals (Clopper–Pearson).
     #[default]
     FixedSamples,
-    /// The number follows from the outcomes or the clock: a confidence sequence, valid for every stopping rule.
+    /// The number follows from the outcomes or the clock: a confidence sequence, valid for every
+    /// stopping rule.
     Sequential,
-    /// The samples are points of a design, Sobol or grid: they are not independent, and no bound of a probability is valid.
+    /// The samples are points of a design, Sobol or grid: they are not independent, and no bound of
+    /// a probability is valid.
     Design,
 }
 
-/// Independent samples: what every binomial bound needs. There is no other way to a bound than through this type, and only [`Inference::independent`] makes it:
-/// the points of a design and the weighted runs of a rare event have none.
+/// Independent samples, which every binomial bound needs. Only this type leads to a bound, and only
+/// [`Inference::independent`] makes it. The points of a design and the weighted runs of a rare
+/// event are not independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Independent {
     /// True if the number of samples depends on the outcomes or the clock.
@@ -46,7 +50,8 @@ impl Independent {
         }
     }
 
-    /// Returns the two-sided interval that covers the probability in a share `coverage` of repetitions.
+    /// Returns the two-sided interval that covers the probability in a share `coverage` of
+    /// repetitions.
     pub fn interval(self, hits: u64, samples: u64, coverage: f64) -> [f64; 2] {
         match self.is_sequential {
             false => interval::clopper_pearson(hits, samples, coverage),
@@ -75,8 +80,8 @@ impl Inference {
         Some(self.independent()?.lower_bound(hits, samples, confidence))
     }
 
-    /// Returns the two-sided interval that covers the probability in a share `coverage` of repetitions; `None` if no bound
-    /// is valid.
+    /// Returns the two-sided interval that covers the probability in a share `coverage` of
+    /// repetitions; `None` if no bound is valid.
     pub fn interval(self, hits: u64, samples: u64, coverage: f64) -> Option<[f64; 2]> {
         Some(self.independent()?.interval(hits, samples, coverage))
     }
@@ -101,22 +106,26 @@ impl Inference {
 pub struct ArmCounts {
     /// Samples with an outcome.
     pub outcomes: u64,
-    /// Samples in which the ego collides, as judged: if the validity checks flip a verdict, the one that speaks worse for
-    /// the system under test.
+    /// Samples in which the ego collides, as judged: if the validity checks flip a verdict, the
+    /// verdict that is worse for the system under test counts.
     pub collisions: u64,
-    /// Samples in which two bumpers meet too slowly for a collision. No such contact is among the collisions.
+    /// Samples in which two bumpers meet too slowly for a collision. No such contact is among the
+    /// collisions.
     pub touches: u64,
-    /// Samples in which the vehicle behind brakes harder than 3 m/s² before the lead vehicle brakes.
+    /// Samples in which the vehicle behind brakes harder than 3 m/s² before the lead vehicle
+    /// brakes.
     pub imposed: u64,
     /// Samples that ended in an error.
     pub errors: u64,
-    /// Samples with an outcome only because they were run again after their process had crashed or hung (`--retry-crashed`).
+    /// Samples with an outcome only because they were run again after their process had crashed or
+    /// hung (`--retry-crashed`).
     pub flaky: u64,
     /// Samples in which the margin increase system engages.
     pub engagements: u64,
     /// Engagements whose goal is in reach.
     pub goals_in_reach: u64,
-    /// Samples in which the margin increase system is not available for some time, because sensors have failed.
+    /// Samples in which the margin increase system is not available for some time, because sensors
+    /// have failed.
     pub unavailable: u64,
     /// Largest speed deficit of the ego to the lead vehicle in any sample (m/s).
     pub max_speed_deficit_mps: f64,
@@ -128,7 +137,8 @@ pub struct ArmCounts {
     pub harm: f64,
     /// Samples whose cost is known.
     pub costed: u64,
-    /// Sums of the time lost (s), of the largest speed deficit (m/s), and of the hardest braking of the vehicle behind (m/s²).
+    /// Sums of the time lost (s), of the largest speed deficit (m/s), and of the hardest braking of
+    /// the vehicle behind (m/s²).
     pub cost: [f64; 3],
 }
 
@@ -137,7 +147,8 @@ pub struct ArmCounts {
 pub struct Tally {
     /// Whether the ego collides, as judged; `None` if the sample ended in an error.
     pub collided: Option<bool>,
-    /// Whether it has an outcome only because it was run again after its process had crashed or hung.
+    /// Whether it has an outcome only because it was run again after its process had crashed or
+    /// hung.
     pub flaky: bool,
     /// Whether two vehicles other than the ego collide with each other.
     pub others_collided: bool,
@@ -147,7 +158,7 @@ pub struct Tally {
     pub imposed: bool,
     /// Whether the margin increase system engages.
     pub engaged: bool,
-    /// Whether its goal is in reach when it engages.
+    /// Whether the system's goal is in reach when the system engages.
     pub goal_in_reach: bool,
     /// Whether the margin increase system is not available for some time.
     pub unavailable: bool,
@@ -157,9 +168,10 @@ pub struct Tally {
     pub jerk_mps3: f64,
     /// Largest change of the ego's velocity (m/s).
     pub delta_v_mps: f64,
-    /// Harm of all collisions, those of the ego and those of others.
+    /// Harm of all collisions, of the ego and of others.
     pub harm: f64,
-    /// Time lost (s), largest speed deficit (m/s), and hardest braking of the vehicle behind (m/s²); `None` in a journal without them.
+    /// Time lost (s), largest speed deficit (m/s), and hardest braking of the vehicle behind
+    /// (m/s²); `None` in a journal without them.
     pub cost: Option<[f64; 3]>,
 }
 
@@ -212,23 +224,26 @@ impl ArmCounts {
         self.cost.iter_mut().zip(cost).for_each(|(sum, value)| *sum += value);
     }
 
-    /// Returns the means of time lost (s), largest speed deficit (m/s) and hardest braking of the vehicle behind (m/s²); `None` of no samples.
+    /// Returns the means of time lost (s), largest speed deficit (m/s) and hardest braking of the
+    /// vehicle behind (m/s²); `None` of no samples.
     pub fn mean_cost(&self) -> Option<[f64; 3]> {
         (self.costed > 0).then(|| self.cost.map(|sum| sum / self.costed as f64))
     }
 
-    /// Returns the share of the samples with a known cost in which the vehicle behind brakes harder than 3 m/s² before the lead vehicle brakes; `None` of no
-    /// samples.
+    /// Returns the share of the samples with a known cost in which the vehicle behind brakes harder
+    /// than 3 m/s² before the lead vehicle brakes; `None` of no samples.
     pub fn imposed_share(&self) -> Option<f64> {
         (self.costed > 0).then(|| self.imposed as f64 / self.costed as f64)
     }
 
-    /// Returns the share of the samples with an outcome in which the ego collides; `None` of no samples.
+    /// Returns the share of the samples with an outcome in which the ego collides; `None` of no
+    /// samples.
     pub fn collision_rate(&self) -> Option<f64> {
         self.share(self.collisions)
     }
 
-    /// Returns the share of the samples with an outcome in which the system engages; `None` of no samples.
+    /// Returns the share of the samples with an outcome in which the system engages; `None` of no
+    /// samples.
     pub fn engagement_rate(&self) -> Option<f64> {
         self.share(self.engagements)
     }
@@ -237,21 +252,24 @@ impl ArmCounts {
         (self.outcomes > 0).then(|| count as f64 / self.outcomes as f64)
     }
 
-    /// Returns the 95 % interval of the probability of a collision, given the sampled scenario; `None` if no bound is valid.
+    /// Returns the 95 % interval of the probability of a collision, given the sampled scenario;
+    /// `None` if no bound is valid.
     pub fn interval_95(&self, inference: Inference) -> Option<[f64; 2]> {
         inference.interval_95(self.collisions, self.outcomes)
     }
 }
 
-/// What the system under test changes in one sample.
+/// The change by the system under test in one sample.
 ///
-/// A collision between other vehicles (the rear vehicle runs into the lead vehicle, say) counts against the system: such a
-/// sample is not prevented, and it is induced if nothing collides without the system.
+/// A collision between other vehicles (the rear vehicle runs into the lead vehicle, say) counts
+/// against the system: such a sample is not prevented, and it is induced if nothing collides
+/// without the system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairFate {
     /// The ego collides without the system, and no vehicle collides with it.
     Prevented,
-    /// With the system the ego collides, or other vehicles do; without it the ego does not, or no vehicle does.
+    /// With the system the ego collides, or other vehicles do; without it the ego does not, or no
+    /// vehicle does.
     Induced,
     /// The ego collides without the system, and the ego or other vehicles collide with it.
     Both,
@@ -284,9 +302,9 @@ pub struct Pairs {
     pub both: u64,
     /// Samples of [`PairFate::Neither`].
     pub neither: u64,
-    /// Of `induced`, those in which only vehicles other than the ego collide with the system.
+    /// Samples of `induced` in which only vehicles other than the ego collide with the system.
     pub induced_of_others: u64,
-    /// Of `both`, those in which only vehicles other than the ego collide with the system.
+    /// Samples of `both` in which only vehicles other than the ego collide with the system.
     pub both_of_others: u64,
     /// Samples in which some vehicle collides in the baseline, and none in the arm under test.
     pub any_prevented: u64,
@@ -346,11 +364,14 @@ impl Pairs {
         self.induced_harm += other.induced_harm;
     }
 
-    /// Returns the probability of a split at least as uneven if the arms are alike (McNemar test, two-sided, mid-p). It is valid only for a number of samples
-    /// that is fixed in advance; `None` otherwise.
+    /// Returns the probability of a split at least as uneven if the arms are alike (McNemar test,
+    /// two-sided, mid-p). It is valid only for a number of samples that is fixed in advance; `None`
+    /// otherwise.
     ///
-    /// The event is that some vehicle collides. *Prevented* and *induced* are not alike in the two arms: a collision of others alone in the tested arm is
-    /// held against the system, and one in the baseline not. If others collide in some samples, alike arms then induce more than they prevent.
+    /// The event is that some vehicle collides. *Prevented* and *induced* treat the two arms
+    /// differently: a collision of others alone counts against the system in the tested arm, and
+    /// does not count in the baseline. If others collide in some samples, alike arms then induce
+    /// more than they prevent.
     pub fn mcnemar_p(&self, inference: Inference) -> Option<f64> {
         (inference == Inference::FixedSamples).then(|| mcnemar::mid_p(self.any_prevented, self.any_induced))
     }
@@ -396,7 +417,8 @@ mod tests {
         let others = Tally { collided: Some(false), others_collided: true, ..Tally::default() };
         let none = Tally { collided: Some(false), ..Tally::default() };
         let mut pairs = Pairs::default();
-        // Alike arms: as many samples in which others collide with the system alone as without it alone.
+        // Alike arms: as many samples in which others collide with the system alone as without it
+        // alone.
         for _ in 0..20 {
             pairs.push(&none, &others);
             pairs.push(&others, &none);

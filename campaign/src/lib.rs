@@ -1,4 +1,5 @@
-//! Campaigns: many samples of one or more scenarios, run with one or two controllers, counted, and judged.
+//! Campaigns: many samples of one or more scenarios, run with one or two controllers, counted, and
+//! judged.
 //!
 //! ```text
 //!  scenario files ─▶ plan ─▶ workers ─▶ records in the order of the plan ─▶ counts ─▶ gates ─▶ verdict
@@ -6,14 +7,14 @@
 //!                     └──────── resume ◀────────────────┘
 //! ```
 //!
-//! - A *sample* is one concrete scenario, drawn from the distributions of a scenario file. Its number, the seed, and
-//!   the sampling design determine it.
-//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in several arms: the baseline first,
-//!   the arm under test last, and references between them.
+//! - A *sample* is one concrete scenario, drawn from the distributions of a scenario file. Its
+//!   number, the seed, and the sampling design determine it.
+//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in several
+//!   arms: the baseline first, the arm under test last, and references between them.
 //! - A *record* is the result of one sample in all arms: one line of the [`journal`].
 //!
-//! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
-//! not the frequency of collisions on a road.
+//! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that
+//! end in a collision, not the frequency of collisions on a road.
 
 pub mod action;
 pub mod arguments;

@@ -1,7 +1,7 @@
 //! A lock that keeps a second program out of a campaign's folder.
 //!
-//! The operating system releases the lock when the program ends, even if the program is killed. A stale lock cannot
-//! exist.
+//! The operating system releases the lock when the program ends, even if the program is killed. A
+//! stale lock cannot exist.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -27,8 +27,8 @@ impl Lock {
     /// Locks a folder.
     ///
     /// # Errors
-    /// [`FolderError::Busy`] if another program holds the lock, [`FolderError::Write`] if the lock file cannot be
-    /// written.
+    /// [`FolderError::Busy`] if another program holds the lock, [`FolderError::Write`] if the lock
+    /// file cannot be written.
     pub fn acquire(folder: &Path) -> Result<Self, FolderError> {
         for _ in 0..ATTEMPTS {
             let lock = Self::acquire_file(folder)?;
@@ -49,7 +49,8 @@ impl Lock {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
                 let mut holder = String::new();
-                // The holder's process id is a courtesy: the folder is locked even if the id cannot be read.
+                // The holder's process id is a courtesy: the folder is locked even if the id cannot
+                // be read.
                 drop(file.read_to_string(&mut holder));
                 return Err(FolderError::Busy { path: folder.to_owned(), holder: holder.trim().to_owned() });
             }
@@ -60,8 +61,8 @@ impl Lock {
         Ok(Self { file })
     }
 
-    /// Returns true if the lock file is still the one in the folder. Between its opening and its lock, another program may have
-    /// moved the folder, and have put another one in its place.
+    /// Returns true if the lock file is still the one in the folder. Between its opening and its
+    /// lock, another program may have moved the folder, and have put another one in its place.
     #[cfg(unix)]
     fn is_in(&self, folder: &Path) -> bool {
         use std::os::unix::fs::MetadataExt as _;
@@ -77,7 +78,8 @@ impl Lock {
         self.file.metadata().is_ok() && folder.join(LOCK).exists()
     }
 
-    /// Returns true if `name` is the name of the lock file, which stays in the folder after the lock is released.
+    /// Returns true if `name` is the name of the lock file, which stays in the folder after the
+    /// lock is released.
     pub(crate) fn is_file_name(name: &std::ffi::OsStr) -> bool {
         name == LOCK
     }

@@ -1,4 +1,5 @@
-//! The manifest of a campaign's folder: everything that determines the outcomes and that a replay needs.
+//! The manifest of a campaign's folder: everything that determines the outcomes and that a replay
+//! needs.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -29,18 +30,21 @@ const BUILD_DIGITS: usize = 16;
 /// The file that holds this program, if it is not the executable.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// The commit that this program is built from, if it is known and the sources do not differ from it.
+/// The commit that this program is built from, if it is known and the sources do not differ from
+/// it.
 static COMMIT: OnceLock<&'static str> = OnceLock::new();
 
 /// Number of parts of the executable that are hashed at the same time.
 const HASH_PARTS: u64 = 8;
 
-/// Returns the version of this program: the release and what tells two builds of it apart, `0.1.0+0a1b2c3d4e5f`.
+/// Returns the version of this program: the release and what tells two builds of it apart,
+/// `0.1.0+0a1b2c3d4e5f`.
 ///
-/// That is the commit: what is built twice from one commit, such as the command and the Python package, computes the
-/// same outcomes. If the sources differ from the commit, or have none, it is the identifier of the executable, which the
-/// linker computes from its content (`readelf -n`: the build ID). An executable without one is hashed, which takes longer
-/// than a short campaign.
+/// The commit tells builds apart. Two builds of one commit, such as the command and the Python
+/// package, compute the same outcomes. If the sources differ from the commit, or have none, the
+/// identifier of the executable tells builds apart. The linker computes it from the content of the
+/// executable (`readelf -n`: the build ID). An executable without an identifier is hashed, which
+/// takes longer than a short campaign.
 pub fn version() -> String {
     let release = env!("CARGO_PKG_VERSION");
     if let Some(commit) = COMMIT.get() {
@@ -62,13 +66,14 @@ pub fn set_commit(commit: &'static str) {
     COMMIT.get_or_init(|| commit);
 }
 
-/// Sets the file that holds this program, if it is not the executable: the library that an interpreter has loaded.
+/// Sets the file that holds this program, if it is not the executable: the library that an
+/// interpreter has loaded.
 pub fn set_program(library: PathBuf) {
     PROGRAM.get_or_init(|| library);
 }
 
-/// Returns the identifier that the linker wrote into an executable, or `None` if there is none of at least
-/// [`BUILD_DIGITS`] digits.
+/// Returns the identifier that the linker wrote into an executable, or `None` if there is none of
+/// at least [`BUILD_DIGITS`] digits.
 fn build_id(path: &Path) -> Option<Vec<u8>> {
     let file = ReadCache::new(File::open(path).ok()?);
     let executable = object::File::parse(&file).ok()?;
@@ -84,8 +89,8 @@ pub(crate) fn file_hash(path: &Path) -> io::Result<blake3::Hash> {
     Ok(hasher.finalize())
 }
 
-/// Returns the BLAKE3 hash of the hashes of [`HASH_PARTS`] parts of a file of equal length, without loading the file into
-/// memory.
+/// Returns the BLAKE3 hash of the hashes of [`HASH_PARTS`] parts of a file of equal length, without
+/// loading the file into memory.
 fn parts_hash(path: &Path) -> io::Result<blake3::Hash> {
     let length = path.metadata()?.len().div_ceil(HASH_PARTS);
     let part_hash = |part: u64| -> io::Result<blake3::Hash> {
@@ -146,13 +151,14 @@ pub struct Manifest {
     pub sampling: Sampling,
     /// The part of the samples that this folder is for; `None` for all of them.
     pub partition: Option<Partition>,
-    /// The controllers: the baseline first if there are several, the one under test last, references between them.
+    /// The controllers: the baseline first if there are several, the one under test last,
+    /// references between them.
     pub arms: Vec<ControllerChoice>,
-    /// The sensors; those of each scenario if `None`.
+    /// The sensors; `None` for the sensors of each scenario.
     pub sensors: Option<SensorMode>,
     /// The samples that are checked for validity.
     pub checks: CheckPlan,
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
     /// The networks that the sensors use.
     pub models: Vec<ManifestModel>,
@@ -161,13 +167,15 @@ pub struct Manifest {
     /// How often a sample runs again in a new process after its worker process has crashed or hung.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub retry_crashed: u32,
-    /// What identifies the controllers that run as processes.
+    /// The identities of the controllers that run as processes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub controllers: Vec<Fingerprint>,
-    /// The folder in which the program ran, to which paths in the command of a controller are relative.
+    /// The folder in which the program ran, to which paths in the command of a controller are
+    /// relative.
     #[serde(default)]
     pub working_folder: Option<PathBuf>,
-    /// Scenarios and members of a driver ensemble that were not run, because the member changes nothing in the scenario.
+    /// Scenarios and members of a driver ensemble that were not run, because the member changes
+    /// nothing in the scenario.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without_effect: Vec<(String, String)>,
     /// True if the campaign has chosen its folder itself, so that a later one may take its place.
@@ -188,26 +196,31 @@ const INCIDENTAL: [&str; 4] = ["command", "working_folder", "replaceable", "cont
 const INCIDENTAL_OF_SCENARIO: [&str; 2] = ["path", "settings"];
 
 impl Manifest {
-    /// Returns one message for each difference between the two manifests that can affect outcomes. If there is none,
-    /// the outcomes of both campaigns agree to the last bit.
+    /// Returns one message for each difference between the two manifests that can affect outcomes.
+    /// If there is none, the outcomes of both campaigns agree to the last bit.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let mut differences = Vec::new();
         match (serde_json::to_value(self), serde_json::to_value(other)) {
             (Ok(there), Ok(here)) => compare("", &there, &here, &mut differences),
-            // Every manifest can be written as JSON; if one could not, the two could not be known to agree.
+            // Every manifest can be written as JSON; if one could not, the two could not be known
+            // to agree.
             _ => differences.push("the manifest cannot be compared".to_owned()),
         }
         differences.extend(fingerprint::differences(&self.controllers, &other.controllers));
         differences
     }
 
-    /// Returns true if `other` is the same campaign with more samples: it begins with the same samples.
+    /// Returns true if `other` is the same campaign with more samples: it begins with the same
+    /// samples.
     pub fn grows_to(&self, other: &Self) -> bool {
-        let (one, more) = (self.sampling, other.sampling);
+        let (sampling, more) = (self.sampling, other.sampling);
         let is_fixed = self.inference == Inference::FixedSamples;
-        let grown = Self { sampling: Sampling { samples: more.samples, ..one }, ..self.clone() };
+        let grown = Self { sampling: Sampling { samples: more.samples, ..sampling }, ..self.clone() };
         // The points of a grid depend on their number.
-        is_fixed && one.design != Design::Grid && one.samples < more.samples && grown.differences(other).is_empty()
+        is_fixed
+            && sampling.design != Design::Grid
+            && sampling.samples < more.samples
+            && grown.differences(other).is_empty()
     }
 
     /// Returns the settings: `--set` applies to every scenario.
@@ -216,8 +229,9 @@ impl Manifest {
         texts.iter().filter_map(|text| text.parse().ok()).collect()
     }
 
-    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, whether it named a folder, the working
-    /// folder, the paths of the scenario files, the partition, and the build of the program. It is the same for a campaign that ran in one go,
+    /// Returns the manifest as JSON without the parts that do not affect the outcomes: the command
+    /// line, whether it named a folder, the working folder, the paths of the scenario files, the
+    /// partition, and the build of the program. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {
         let mut whole = self.whole();
@@ -241,13 +255,14 @@ impl Manifest {
         blake3::hash(self.determining_json().unwrap_or_default().as_bytes()).to_string()
     }
 
-    /// Returns the folder in which the controllers of the campaign run, or `None` if it no longer exists.
+    /// Returns the folder in which the controllers of the campaign run, or `None` if it does not
+    /// exist.
     pub fn controller_folder(&self) -> Option<&Path> {
         self.working_folder.as_deref().filter(|folder| folder.is_dir())
     }
 
-    /// Returns one message for each difference between the controllers of the campaign and those that its commands start
-    /// now.
+    /// Returns one message for each difference between the controllers of the campaign and those
+    /// that its commands start now.
     ///
     /// Only the controllers of the arms with these names are started.
     pub fn changed_controllers(&self, scenario: &Scenario, names: &[&str]) -> Vec<String> {
@@ -285,26 +300,26 @@ impl Manifest {
 fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>) {
     let within = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
     match (there, here) {
-        (Value::Object(one), Value::Object(other)) => {
-            let names = one.keys().chain(other.keys().filter(|name| !one.contains_key(*name)));
+        (Value::Object(there), Value::Object(here)) => {
+            let names = there.keys().chain(here.keys().filter(|name| !there.contains_key(*name)));
             let incidental: &[&str] = match key.split_once('.') {
                 None if key.is_empty() => &INCIDENTAL,
                 Some(("scenarios", _)) => &INCIDENTAL_OF_SCENARIO,
                 _ => &[],
             };
             for name in names.filter(|name| !incidental.contains(&name.as_str())) {
-                let part = |of: &serde_json::Map<String, Value>| of.get(name).cloned().unwrap_or(Value::Null);
-                compare(&within(name), &part(one), &part(other), differences);
+                let part = |object: &serde_json::Map<String, Value>| object.get(name).cloned().unwrap_or(Value::Null);
+                compare(&within(name), &part(there), &part(here), differences);
             }
         }
-        (Value::Array(one), Value::Array(other)) if one.len() == other.len() => {
-            for (index, (there, here)) in one.iter().zip(other).enumerate() {
+        (Value::Array(there), Value::Array(here)) if there.len() == here.len() => {
+            for (index, (there, here)) in there.iter().zip(here).enumerate() {
                 let name = there.get("name").and_then(Value::as_str).map_or_else(|| index.to_string(), str::to_owned);
                 compare(&within(&name), there, here, differences);
             }
         }
-        (Value::String(one), Value::String(other)) if one.contains('\n') || other.contains('\n') => {
-            if let Some(line) = first_difference(one, other) {
+        (Value::String(there), Value::String(here)) if there.contains('\n') || here.contains('\n') => {
+            if let Some(line) = first_difference(there, here) {
                 differences.push(format!("{key}: {line}"));
             }
         }
@@ -329,11 +344,11 @@ fn shortened(text: &str) -> String {
 
 /// Returns the first line in which two texts differ, in words.
 fn first_difference(there: &str, here: &str) -> Option<String> {
-    let (mut one, mut other) = (there.lines(), here.lines());
+    let (mut there_lines, mut here_lines) = (there.lines(), here.lines());
     let mut line = 0;
     loop {
         line += 1;
-        match (one.next(), other.next()) {
+        match (there_lines.next(), here_lines.next()) {
             (None, None) => return (there != here).then(|| "the ends of the texts differ".to_owned()),
             (there, here) if there == here => {}
             (there, here) => {

@@ -23,10 +23,11 @@ pub(crate) const MARGINS: [Margin; 5] = [
     Margin { key: "min_ttc_rear_s", value: |margins| margins.min_ttc_rear_s },
 ];
 
-/// The probabilities of the quantiles that are compared. Small quantiles describe the runs closest to a collision.
+/// The probabilities of the quantiles that are compared. Small quantiles describe the runs closest
+/// to a collision.
 const PROBABILITIES: [(&str, f64); 4] = [("min", 0.0), ("p01", 0.01), ("p05", 0.05), ("p50", 0.5)];
 
-/// A change of a margin up to this much is no regression (s or m): it is below what a report shows.
+/// A change of a margin up to this much is no regression (s or m): no report shows it.
 const SMALLEST_CHANGE: f64 = 0.01;
 
 /// Quantiles of a margin, by name (s or m).
@@ -54,8 +55,8 @@ pub(crate) fn quantiles(values: &mut [f64]) -> Quantiles {
     }
 }
 
-/// Returns the quantiles of `margin` that fall by more than the share `tolerance` of their value, and by more than 0.01
-/// (s or m).
+/// Returns the quantiles of `margin` that fall by more than the share `tolerance` of their value,
+/// and by more than 0.01 (s or m).
 pub(crate) fn regressions(
     margin: &str,
     baseline: &Quantiles,

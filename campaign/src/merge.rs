@@ -1,4 +1,5 @@
-//! Merges the parts of a campaign. The merged journal equals that of one machine that ran the whole campaign.
+//! Merges the parts of a campaign. The merged journal equals the journal of one machine that ran
+//! the whole campaign.
 
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
@@ -48,22 +49,22 @@ pub enum MergeError {
         part: Partition,
     },
     /// Parts are missing.
-    #[error("failed to merge: {} of {of} missing: {}", if parts.len() == 1 { "a part" } else { "parts" }, parts.join(", "))]
+    #[error("failed to merge: {} of {count} missing: {}", if parts.len() == 1 { "a part" } else { "parts" }, parts.join(", "))]
     Missing {
         /// Number of parts of the campaign.
-        of: u64,
+        count: u64,
         /// The missing parts.
         parts: Vec<String>,
     },
     /// A part has not run to its end.
-    #[error("failed to merge: {} has {has} of its {of} samples; resume it first", path.display())]
+    #[error("failed to merge: {} has {has} of its {planned} samples; resume it first", path.display())]
     Incomplete {
         /// The folder.
         path: PathBuf,
         /// Number of samples that it holds.
         has: u64,
         /// Number of samples that it should hold.
-        of: u64,
+        planned: u64,
     },
     /// A part holds a sample that belongs to another part, or that is not in the order of the plan.
     #[error("failed to merge: {} holds sample {sample} of `{scenario}` out of order", path.display())]
@@ -100,7 +101,8 @@ impl Parts {
     /// Opens the folders of all parts of a campaign, in any order.
     ///
     /// # Errors
-    /// [`MergeError`] if a folder cannot be read, or if a part is of another campaign, duplicate, or missing.
+    /// [`MergeError`] if a folder cannot be read, or if a part is of another campaign, duplicate,
+    /// or missing.
     pub fn open(paths: &[PathBuf]) -> Result<Self, MergeError> {
         let mut folders: Vec<(Partition, Folder)> = Vec::with_capacity(paths.len());
         let mut whole: Option<Manifest> = None;
@@ -125,12 +127,13 @@ impl Parts {
             folders.push((part, folder));
         }
         folders.sort_by_key(|(part, _)| *part);
-        let of = folders.first().map_or(1, |(part, _)| part.count());
-        let is_given = |part: u64| folders.iter().any(|(given, _)| given.part() == part);
-        let parts: Vec<String> = (1..=of).filter(|&part| !is_given(part)).map(|part| format!("{part}/{of}")).collect();
+        let count = folders.first().map_or(1, |(part, _)| part.count());
+        let is_given = |part: u64| folders.iter().any(|(folder, _)| folder.part() == part);
+        let parts: Vec<String> =
+            (1..=count).filter(|&part| !is_given(part)).map(|part| format!("{part}/{count}")).collect();
         match (parts.is_empty(), whole) {
             (true, Some(manifest)) => Ok(Self { folders, manifest }),
-            _ => Err(MergeError::Missing { of, parts }),
+            _ => Err(MergeError::Missing { count, parts }),
         }
     }
 
@@ -139,8 +142,8 @@ impl Parts {
         &self.manifest
     }
 
-    /// Checks that every part holds exactly its samples of the campaign, in the order of the plan. `works` are the
-    /// scenarios of the campaign.
+    /// Checks that every part holds exactly its samples of the campaign, in the order of the plan.
+    /// `works` are the scenarios of the campaign.
     ///
     /// # Errors
     /// [`MergeError`] if a part lacks a sample, or holds another one.
@@ -161,17 +164,19 @@ impl Parts {
             }
             let missing = plan_of_part.count() as u64;
             if missing > 0 {
-                return Err(MergeError::Incomplete { path: folder.path().to_owned(), has, of: has + missing });
+                return Err(MergeError::Incomplete { path: folder.path().to_owned(), has, planned: has + missing });
             }
         }
         Ok(())
     }
 
-    /// Writes the whole campaign into a new folder. Call [`Self::check`] first. With `resume`, the folder may hold what an
-    /// interrupted merge of the same campaign has left, which is written anew.
+    /// Writes the whole campaign into a new folder. Call [`Self::check`] first. With `resume`, the
+    /// folder may hold what an interrupted merge of the same campaign has left, which is written
+    /// anew.
     ///
     /// # Errors
-    /// [`MergeError`] if a part cannot be read, or if the new folder cannot be written or is not new.
+    /// [`MergeError`] if a part cannot be read, or if the new folder cannot be written or is not
+    /// new.
     pub fn merge(
         &self,
         works: &[Arc<Work>],

@@ -1,8 +1,8 @@
 //! Parts of a campaign that is divided among several machines.
 //!
-//! A hash of the sample's number determines the part to which the sample belongs. Neighbouring samples of a grid or a
-//! sequence, which may all be slow or all fail, are thereby spread over the machines. Nothing else determines the part,
-//! so that all machines agree.
+//! A hash of the sample's number determines the part to which the sample belongs. Neighbouring
+//! samples of a grid or a sequence, which may all be slow or all fail, are thereby spread over the
+//! machines. Nothing else determines the part, so that all machines agree.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ const MAX_PARTS: u64 = 10_000;
 #[serde(try_from = "String", into = "String")]
 pub struct Partition {
     part: u64,
-    of: u64,
+    count: u64,
 }
 
 /// A text that does not name a part of a campaign.
@@ -35,19 +35,20 @@ impl Partition {
 
     /// Returns the number of parts of the campaign.
     pub const fn count(self) -> u64 {
-        self.of
+        self.count
     }
 
     /// Returns true if the sample belongs to this part.
     pub const fn contains(self, sample: u64) -> bool {
-        split_mix(sample) % self.of == self.part - 1
+        split_mix(sample) % self.count == self.part - 1
     }
 }
 
-/// Returns the hash of a number by the mixing function of SplitMix64. Neighbouring numbers have unrelated hashes.
+/// Returns the hash of a number by the mixing function of SplitMix64. Neighbouring numbers have
+/// unrelated hashes.
 ///
-/// Source: G. L. Steele et al., *Fast splittable pseudorandom number generators*, OOPSLA 2014, in the form of S.
-/// Vigna's reference implementation.
+/// Source: G. L. Steele et al., *Fast splittable pseudorandom number generators*, OOPSLA 2014, in
+/// the form of S. Vigna's reference implementation.
 pub const fn split_mix(number: u64) -> u64 {
     let z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -60,10 +61,10 @@ impl FromStr for Partition {
 
     fn from_str(word: &str) -> Result<Self, PartitionError> {
         let fail = || PartitionError { word: word.to_owned() };
-        let (part, of) = word.split_once('/').ok_or_else(fail)?;
+        let (part, count) = word.split_once('/').ok_or_else(fail)?;
         let number = |text: &str| text.parse::<u64>().map_err(|_| fail());
-        let (part, of) = (number(part)?, number(of)?);
-        if (1..=of).contains(&part) && of <= MAX_PARTS { Ok(Self { part, of }) } else { Err(fail()) }
+        let (part, count) = (number(part)?, number(count)?);
+        if (1..=count).contains(&part) && count <= MAX_PARTS { Ok(Self { part, count }) } else { Err(fail()) }
     }
 }
 
@@ -82,7 +83,7 @@ impl From<Partition> for String {
 
 impl fmt::Display for Partition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.part, self.of)
+        write!(f, "{}/{}", self.part, self.count)
     }
 }
 
@@ -92,15 +93,15 @@ mod tests {
 
     #[test]
     fn every_sample_belongs_to_exactly_one_part_and_parts_are_of_similar_size() {
-        for of in [1, 2, 3, 7] {
-            let parts: Vec<Partition> = (1..=of).map(|part| format!("{part}/{of}").parse().unwrap()).collect();
+        for count in [1, 2, 3, 7] {
+            let parts: Vec<Partition> = (1..=count).map(|part| format!("{part}/{count}").parse().unwrap()).collect();
             let mut sizes = vec![0_u64; parts.len()];
             for sample in 0..10_000 {
                 let holders: Vec<usize> = (0..parts.len()).filter(|&index| parts[index].contains(sample)).collect();
-                assert_eq!(holders.len(), 1, "sample {sample} of {of} parts");
+                assert_eq!(holders.len(), 1, "sample {sample} of {count} parts");
                 sizes[holders[0]] += 1;
             }
-            let even = 10_000.0 / of as f64;
+            let even = 10_000.0 / count as f64;
             // Six standard deviations of a binomial count.
             assert!(sizes.iter().all(|&size| (size as f64 - even).abs() < 6.0 * even.sqrt()), "{sizes:?}");
         }

@@ -37,28 +37,31 @@ pub struct Plan {
     scenarios: Vec<ScenarioFile>,
     sampling: Sampling,
     controllers: Vec<ControllerChoice>,
-    /// The sensors; those of each scenario if `None`.
+    /// The sensors; `None` for the sensors of each scenario.
     pub sensors: Option<SensorMode>,
     /// The part of the samples that is run; all of them if `None`.
     pub partition: Option<Partition>,
-    /// Which samples are checked for validity.
+    /// The samples that are checked for validity.
     pub checks: CheckPlan,
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
     /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
     /// How often a sample runs again in a new process after its worker process has crashed or hung.
     pub retry_crashed: u32,
-    /// Scenarios and members of a driver ensemble that are not run, because the member changes nothing in the scenario.
+    /// Scenarios and members of a driver ensemble that are not run, because the member changes
+    /// nothing in the scenario.
     pub without_effect: Vec<(String, String)>,
 }
 
 impl Plan {
-    /// Returns a plan that runs each sample of each scenario once for each controller. The last controller is the one
-    /// under test. If there are several, the first is the baseline, and those between are references.
+    /// Returns a plan that runs each sample of each scenario once for each controller. The last
+    /// controller is the one under test. If there are several, the first is the baseline, and those
+    /// between are references.
     ///
     /// # Errors
-    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, a scenario no system for one that is tested, or a variable of an FMU has no counterpart.
+    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, a scenario
+    /// no system for one that is tested, or a variable of an FMU has no counterpart.
     pub fn new(
         scenarios: Vec<ScenarioFile>,
         sampling: Sampling,
@@ -115,10 +118,11 @@ impl Plan {
         })
     }
 
-    /// Uses these sensors instead of those of each scenario, if any are given.
+    /// Uses these sensors instead of the sensors of each scenario, if any are given.
     ///
     /// # Errors
-    /// [`ScenarioError`] if a fault of a scenario could not act in this mode: the campaign would test nothing, and pass.
+    /// [`ScenarioError`] if a fault of a scenario could not act in this mode: the campaign would
+    /// test nothing, and pass.
     pub fn use_sensors(&mut self, sensors: Option<SensorMode>) -> Result<(), ScenarioError> {
         if let Some(mode) = sensors {
             self.scenarios.iter().try_for_each(|file| file.check_faults_in(mode))?;
@@ -183,7 +187,8 @@ impl Plan {
         Ok(std::iter::once(classifier).chain(models).collect())
     }
 
-    /// Returns what identifies the controllers that run as processes in the given folder, or in that of this program.
+    /// Returns what identifies the controllers that run as processes in the given folder, or in the
+    /// folder of this program.
     fn fingerprints(&self, folder: Option<&Path>) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
         let fingerprint = |choice| Fingerprint::of_choice(choice, folder, nominal.as_ref());
@@ -198,7 +203,8 @@ impl Plan {
         self.manifest_in(command, None)
     }
 
-    /// Does the same as [`Self::manifest`] for controllers that run in another folder than this program.
+    /// Does the same as [`Self::manifest`] for controllers that run in another folder than this
+    /// program.
     pub(crate) fn manifest_in(&self, command: Vec<String>, folder: Option<&Path>) -> Result<Manifest, FolderError> {
         let scenario = |file: &ScenarioFile| ManifestScenario {
             name: file.config().name.clone(),
@@ -247,7 +253,8 @@ pub fn check_mis(file: &ScenarioFile, controllers: &[ControllerChoice]) -> Resul
     }
 }
 
-/// Refuses arms whose functions are the same in a scenario, and settings of an arm that change nothing: two arms would have one outcome.
+/// Refuses arms whose functions are the same in a scenario, and settings of an arm that change
+/// nothing: two arms would have one outcome.
 ///
 /// # Errors
 /// [`PlanError::SameStack`] or [`PlanError::NoEffect`] with the first such arms.

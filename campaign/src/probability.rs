@@ -1,4 +1,5 @@
-//! The gate on the probability of a collision: is it surely low enough, surely too high, or not known yet?
+//! The gate on the probability of a collision: it is low enough, too high, or undecided, each with
+//! a confidence.
 //!
 //! ```text
 //!     lower bound       upper bound
@@ -6,10 +7,12 @@
 //!    allowed below: FAIL      allowed above: PASS      allowed in between: INCONCLUSIVE
 //! ```
 //!
-//! Each scenario is judged alone: a mixture would hide one bad scenario behind many good ones. That all pass wrongly is no
-//! likelier than that one does (intersection–union test: R. L. Berger, *Multiparameter hypothesis testing and acceptance
-//! sampling*, Technometrics 24 (1982) 295–300), so that passing needs no correction for their number; that some one
-//! *fails* wrongly is likelier, so that its share of error is divided by their number (Bonferroni).
+//! Each scenario is judged alone: a mixture would hide one bad scenario behind many good ones. The
+//! probability that all scenarios pass wrongly is no larger than for one of them
+//! (intersection–union test: R. L. Berger, *Multiparameter hypothesis testing and acceptance
+//! sampling*, Technometrics 24 (1982) 295–300). Passing therefore needs no correction for the
+//! number of scenarios. The probability that some scenario *fails* wrongly grows with their number,
+//! so the error of failing is divided by it (Bonferroni).
 
 use serde::Serialize;
 
@@ -20,38 +23,39 @@ pub use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::needed;
 use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
 
-/// The collision probability that is allowed, and how sure one wants to be of keeping it.
+/// The largest collision probability that is allowed, and the confidence in the answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbabilityGate {
     max: f64,
     confidence: f64,
 }
 
-/// Limits of a gate that make no sense.
+/// Limits that no gate can have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GateError {
-    /// No probability that could be shown.
+    /// The probability is not between 0 and 1.
     #[error("{value} is no probability that could be shown: a number above 0 and below 1 is needed")]
     Probability {
-        /// The value found.
+        /// The given value.
         value: f64,
     },
-    /// No confidence.
+    /// The confidence is not between ½ and 1.
     #[error("{value} is no confidence: a number above 0.5 and below 1 is needed")]
     Confidence {
-        /// The value found.
+        /// The given value.
         value: f64,
     },
 }
 
 impl ProbabilityGate {
-    /// Confidence unless another is asked for (-).
+    /// Default confidence (-).
     pub const CONFIDENCE: f64 = 0.95;
 
-    /// A gate at `max`, between 0 and 1, with a confidence between ½ and 1.
+    /// Returns a gate with the largest probability `max`, between 0 and 1, and a confidence between
+    /// ½ and 1.
     ///
     /// # Errors
-    /// [`GateError`] where either is not.
+    /// [`GateError`] if one of them is out of range.
     pub fn new(max: f64, confidence: f64) -> Result<Self, GateError> {
         if !(max > 0.0 && max < 1.0) {
             return Err(GateError::Probability { value: max });
@@ -62,17 +66,17 @@ impl ProbabilityGate {
         Ok(Self { max, confidence })
     }
 
-    /// The probability that is allowed.
+    /// Returns the largest probability that is allowed.
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// How sure one wants to be.
+    /// Returns the confidence.
     pub fn confidence(&self) -> f64 {
         self.confidence
     }
 
-    /// Judges the counts of one scenario of `scenarios`.
+    /// Judges the counts of one of `scenarios` scenarios.
     pub fn judge(&self, counts: &ArmCounts, scenarios: usize, inference: Inference) -> Finding {
         let (hits, samples) = (counts.collisions, counts.outcomes);
         let upper_bound = inference.upper_bound(hits, samples, self.confidence);
@@ -99,75 +103,78 @@ impl ProbabilityGate {
         Finding { answer, max, confidence, lower_bound, upper_bound, missing }
     }
 
-    /// True where samples that are looked at on the way say already whether one scenario of `scenarios` keeps the gate: as
-    /// [`Self::judge`] answers by confidence sequences, without working out the bounds.
+    /// Returns true if the samples so far decide the gate for one of `scenarios` scenarios. Answers
+    /// as [`Self::judge`] does with confidence sequences, without the bounds.
     pub fn is_settled(&self, counts: &ArmCounts, scenarios: usize) -> bool {
         let (hits, samples) = (counts.collisions, counts.outcomes);
         is_certain(evidence_below(hits, samples, self.max), self.confidence)
             || is_certain(evidence_above(hits, samples, self.max), self.confidence_to_fail(scenarios))
     }
 
-    /// How sure one has to be that one of `scenarios` fails, so that all together fail wrongly no more often than asked.
+    /// Returns the confidence with which one of `scenarios` scenarios has to fail, so that all
+    /// together fail wrongly no more often than allowed.
     fn confidence_to_fail(&self, scenarios: usize) -> f64 {
         1.0 - (1.0 - self.confidence) / scenarios.max(1) as f64
     }
 
-    /// How many samples more the upper bound needs.
+    /// Returns how many more samples the upper bound needs.
     fn missing(&self, hits: u64, samples: u64, inference: Inference) -> Missing {
-        // Whether the upper bound is low enough, without working it out.
+        // Whether the upper bound is low enough, without computing the bound.
         let passes = |hits, samples| match inference {
             Inference::FixedSamples => at_most(hits, samples, self.max) <= 1.0 - self.confidence,
             Inference::Sequential => is_certain(evidence_below(hits, samples, self.max), self.confidence),
             Inference::Design => false,
         };
         let more = |total: Option<u64>| total.map(|total| total.saturating_sub(samples));
-        // At a rate that is not below what is allowed no number is enough: there is nothing to look for.
+        // No number of samples is enough if the rate is not below the allowed probability.
         let is_low = hits as f64 / (samples as f64) < self.max || samples == 0;
         let at_rate = is_low.then(|| needed::samples_at_rate(hits, samples, passes)).flatten();
         Missing { without_collisions: more(needed::min_samples(hits, passes)), at_observed_rate: more(at_rate) }
     }
 }
 
-/// What the samples say about the probability.
+/// The statement of the samples about the probability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
-    /// It is surely as low as allowed.
+    /// The probability is at most the allowed one.
     Below,
-    /// It is surely higher than allowed.
+    /// The probability is at least the allowed one.
     Above,
-    /// They do not say.
+    /// The samples do not decide.
     Open,
 }
 
 /// The answer with its bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What the samples say.
+    /// The statement of the samples.
     pub answer: Answer,
-    /// The probability that is allowed.
+    /// The largest probability that is allowed.
     pub max: f64,
-    /// How sure one wants to be.
+    /// The confidence.
     pub confidence: f64,
     /// One-sided lower bound of the probability.
     pub lower_bound: f64,
     /// One-sided upper bound of the probability.
     pub upper_bound: f64,
-    /// How many samples more are needed, where they do not say; `None` also if no number of samples of this design says it.
+    /// How many more samples are needed if the samples do not decide; `None` also if no number of
+    /// samples of this design decides.
     pub missing: Option<Missing>,
 }
 
-/// Samples that are needed beyond those there are; absent where more than a hundred million would be.
+/// Numbers of further samples; `None` if more than a hundred million would be needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Missing {
-    /// Where none of them ends in a collision: the least that can be needed.
+    /// The number if none of them ends in a collision: the smallest possible.
     pub without_collisions: Option<u64>,
-    /// Where collisions go on at the observed rate; absent, too, where the bound is then never met.
+    /// The number if collisions go on at the observed rate; `None` also if the bound is then never
+    /// met.
     pub at_observed_rate: Option<u64>,
 }
 
 impl Finding {
-    /// The finding in a sentence.
+    /// Returns the finding as a sentence.
     pub fn sentence(&self, counts: &ArmCounts) -> String {
         let (confidence, allowed) = (percent(self.confidence), percent(self.max));
         let (hits, samples) = (counts.collisions, counts.outcomes);

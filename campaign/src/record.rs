@@ -1,4 +1,4 @@
-//! The record of one sample: what the journal of a campaign keeps.
+//! The record of one sample in the journal of a campaign.
 
 use closecall_scenarios::outcome::{IMPOSED_BRAKING_MPS2, Outcome};
 use closecall_simulation::SampleError;
@@ -23,7 +23,8 @@ impl From<SampleError> for SampleFailure {
     }
 }
 
-/// What happened before the run of a sample that has been run again because its process crashed or hung.
+/// What happened before the run of a sample that has been run again because its process crashed or
+/// hung.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Flaky {
     /// Number of runs that crashed or hung.
@@ -42,7 +43,7 @@ pub struct ArmRecord {
     /// The findings of the validity checks; `None` if this sample was not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checks: Option<ArmChecks>,
-    /// The crashes before this outcome, if it is that of a repeated run (`--retry-crashed`).
+    /// The crashes before this outcome, if a repeated run has it (`--retry-crashed`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flaky: Option<Flaky>,
 }
@@ -55,12 +56,14 @@ impl ArmRecord {
 }
 
 impl ArmRecord {
-    /// Returns true if there is no outcome, or a check of the outcome took too long: another run may be complete.
+    /// Returns true if there is no outcome, or a check of the outcome took too long: another run
+    /// may be complete.
     pub fn is_incomplete(&self) -> bool {
         self.result.is_err() || self.checks.as_ref().is_some_and(|checks| checks.not_checked.is_some())
     }
 
-    /// Returns what this arm contributes to the counts, before the validity checks are taken into account.
+    /// Returns the contribution of this arm to the counts, before the validity checks are taken
+    /// into account.
     pub fn tally(&self) -> Tally {
         match &self.result {
             Ok(outcome) => {
@@ -95,7 +98,8 @@ pub struct Record {
     pub scenario: String,
     /// The sample's number.
     pub sample: u64,
-    /// The arms: the baseline first if there are several, the arm under test last, references between them.
+    /// The arms: the baseline first if there are several, the arm under test last, references
+    /// between them.
     pub arms: Vec<ArmRecord>,
 }
 
@@ -105,10 +109,10 @@ impl Record {
         self.arms.iter().filter_map(|arm| arm.checks.as_ref()).any(|checks| !checks.broken.is_empty())
     }
 
-    /// Returns what each arm contributes to the counts that are judged.
+    /// Returns the contribution of each arm to the judged counts.
     ///
-    /// If halving the time step flips a verdict, the worse case for the system under test counts: the arm under test
-    /// counts as collided, the baseline and the references as not collided.
+    /// If halving the time step flips a verdict, the worse case for the system under test counts:
+    /// the arm under test counts as collided, the baseline and the references as not collided.
     pub fn tallies(&self) -> Vec<Tally> {
         let tested = self.arms.len().saturating_sub(1);
         let judged = |(index, arm): (usize, &ArmRecord)| {

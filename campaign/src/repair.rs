@@ -1,6 +1,7 @@
-//! Repairs the journal of a campaign before it is resumed: the samples of damaged lines, and on request those that ended
-//! in an error, are run again, and their lines are put in their places. All other lines are kept. The same holds for the samples that a
-//! scenario lacks before the next one begins, because the campaign has grown.
+//! Repairs the journal of a campaign before it is resumed. The samples of damaged lines are run
+//! again, and on request the samples that ended in an error. Their new lines replace the old ones,
+//! and all other lines are kept. If the campaign has grown, the samples that a scenario lacks
+//! before the next one begins are run, too.
 //!
 //! The journal is replaced in one step. A program that is killed meanwhile leaves the old one.
 
@@ -22,7 +23,7 @@ use super::record::{ArmRecord, Record};
 use super::wall_times;
 use super::workers::Finished;
 
-/// What has been repaired.
+/// The result of a repair.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Repair {
     /// The damaged lines whose samples were run again.
@@ -47,7 +48,8 @@ struct Redo {
     damaged: Vec<TornLine>,
 }
 
-/// Repairs the journal of a folder. If the campaign is stopped meanwhile, parts that are not complete stay as they are.
+/// Repairs the journal of a folder. If the campaign is stopped meanwhile, parts that are not
+/// complete stay as they are.
 pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repair, CampaignError> {
     let path = folder.journal_path();
     let read_error = |source| FolderError::Read { path: path.clone(), source };
@@ -85,8 +87,8 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
     })
 }
 
-/// Returns the parts of the journal that are to be replaced, in their order. Damaged lines behind the last intact one are
-/// left out: they are cut off when the journal is opened.
+/// Returns the parts of the journal that are to be replaced, in their order. Damaged lines behind
+/// the last intact one are left out: they are cut off when the journal is opened.
 fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
     let mut reader = BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?);
     let (mut redos, mut damaged, mut buffer, mut before) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -134,8 +136,9 @@ pub(super) fn key_of(campaign: &Campaign, record: &Record) -> Option<Key> {
     Some((work, record.sample))
 }
 
-/// Returns the samples between two others in the order of the plan; from the first sample on if `after` is `None`.
-/// Returns `None` if the plan does not determine them, because the outcomes ended a scenario.
+/// Returns the samples between two others in the order of the plan; from the first sample on if
+/// `after` is `None`. Returns `None` if the plan does not determine them, because the outcomes
+/// ended a scenario.
 fn between(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<Key>> {
     let first = after.map_or(0, |(work, _)| work);
     if first != before.0 && campaign.inference == Inference::Sequential {
@@ -150,7 +153,8 @@ fn between(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<K
     Some(keys)
 }
 
-/// Returns the last samples of a scenario that are missing before the first one of the next scenario; `None` if there are none.
+/// Returns the last samples of a scenario that are missing before the first one of the next
+/// scenario; `None` if there are none.
 fn grown(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<Key>> {
     let last = after?;
     let samples = between(campaign, after, before).filter(|samples| !samples.is_empty())?;

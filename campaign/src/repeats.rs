@@ -1,7 +1,8 @@
 //! Samples that are no new evidence: they repeat an earlier one.
 //!
-//! The bounds of probabilities hold for samples that are drawn independently. A sample that repeats the parameters of an earlier one, or its outcome in every
-//! arm, shows the same encounter once more. Three hundred such samples are one sample.
+//! The bounds of probabilities hold for samples that are drawn independently. A sample that repeats
+//! the parameters of an earlier one, or its outcome in every arm, shows the same encounter once
+//! more. Three hundred such samples are one sample.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -12,8 +13,8 @@ use closecall_traffic::{Measured, Parameters, Value};
 
 use super::record::Record;
 
-/// Smallest spread of a parameter that varies, as a share of its values (-): an assumption; 1e-4 to 1e-2 are plausible. No measurement of traffic tells a
-/// thousandth apart.
+/// Smallest spread of a parameter that varies, as a share of its values (-): an assumption; 1e-4 to
+/// 1e-2 are plausible. No measurement of traffic tells a thousandth apart.
 const LEAST_SPREAD: f64 = 1e-3;
 /// The quantiles between which the spread of a parameter is taken.
 const SPREAD: [f64; 2] = [0.05, 0.95];
@@ -30,10 +31,10 @@ fn spreads(entry: &SpaceEntry) -> bool {
     }
 }
 
-/// By what samples repeat each other.
+/// The feature by which samples repeat each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Same {
-    /// By their parameters, of which there are finitely many.
+    /// By their parameters, which have finitely many values.
     Parameters,
     /// By their outcomes in every arm.
     Outcome,
@@ -45,7 +46,7 @@ pub(crate) struct Repeats {
     /// By what samples repeat each other; `None` if every one counts, because no parameter varies.
     by: Option<Same>,
     /// Whether some vehicle has collided in the arm under test in a sample of this key.
-    seen: HashMap<u64, bool>,
+    collided: HashMap<u64, bool>,
 }
 
 impl Repeats {
@@ -55,11 +56,11 @@ impl Repeats {
             Variation::Discrete => Some(Same::Parameters),
             Variation::Continuous => Some(Same::Outcome),
         };
-        Self { by, seen: HashMap::new() }
+        Self { by, collided: HashMap::new() }
     }
 
-    /// Returns true if a sample counts: it is new, it ended in an error, or it is the first one of its kind in which vehicles collide. A collision is thus
-    /// never left out.
+    /// Returns true if a sample counts: it is new, it ended in an error, or it is the first one of
+    /// its kind in which vehicles collide. A collision is thus never left out.
     pub(crate) fn counts(&mut self, record: &Record) -> bool {
         let Some(by) = self.by else { return true };
         let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
@@ -73,9 +74,9 @@ impl Repeats {
             Same::Parameters => key(&tested.parameters).hash(&mut hasher),
             Same::Outcome => outcomes.iter().for_each(|outcome| hash(outcome, &mut hasher)),
         }
-        match self.seen.entry(hasher.finish()) {
-            std::collections::hash_map::Entry::Occupied(mut seen) => {
-                let collided = seen.get_mut();
+        match self.collided.entry(hasher.finish()) {
+            std::collections::hash_map::Entry::Occupied(mut entry) => {
+                let collided = entry.get_mut();
                 !std::mem::replace(collided, *collided || collides) && collides
             }
             std::collections::hash_map::Entry::Vacant(vacant) => {
@@ -92,7 +93,8 @@ fn key(parameters: &Parameters) -> String {
 
 /// Adds what happened in a run, and not why: neither its parameters nor its number.
 fn hash(outcome: &Outcome, hasher: &mut DefaultHasher) {
-    // To the bit: a coarser comparison would leave out samples of a scenario in which one parameter varies, and shift its shares.
+    // To the bit: a coarser comparison would leave out samples of a scenario in which one parameter
+    // varies, and shift its shares.
     let measured = |value: Measured| value.map(f64::to_bits).map_err(|absent| absent.to_string());
     outcome.duration.hash(hasher);
     for collision in outcome.collisions.iter().chain(&outcome.touches) {
@@ -123,7 +125,8 @@ mod tests {
 
     use closecall_scenarios::{ScenarioFile, library};
 
-    /// Returns whether the parameters of a scenario vary enough if the only one that is sampled lies between these bounds.
+    /// Returns whether the parameters of a scenario vary enough if the only one that is sampled
+    /// lies between these bounds.
     fn is_varied_between(min: f64, max: f64) -> bool {
         let text = library::text("paper-figure").unwrap();
         let sampled = format!("[parameters]\nfilm = {{ uniform = {{ min = {min:?}, max = {max:?} }} }}\n\n[[actor]]");

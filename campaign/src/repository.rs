@@ -1,5 +1,5 @@
-//! The files of a repository of scenarios: a commented scenario, its schema for editors, the project file, CI jobs for GitHub and
-//! GitLab, and the list of what Git leaves alone.
+//! The files of a repository of scenarios: a commented scenario, its schema for editors, the
+//! project file, CI jobs for GitHub and GitLab, and the list of what Git leaves alone.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -13,7 +13,7 @@ const SCENARIO: &str = include_str!("repository/scenario.toml");
 const PROJECT: &str = include_str!("repository/closecall.toml");
 const GITHUB: &str = include_str!("../../docs/how-to/ci/github.yml");
 const GITLAB: &str = include_str!("../../docs/how-to/ci/gitlab.yml");
-/// What Git leaves alone: the results of campaigns.
+/// The files that Git ignores: the results of campaigns.
 const IGNORED: &str = "/closecall-results/\n/closecall-results.previous/\n";
 
 /// The schema of scenario files in a repository.
@@ -24,7 +24,7 @@ const TEMPLATE_NAME: &str = "NAME";
 /// The name of the first scenario of a repository.
 const FIRST_SCENARIO: &str = "late-overtake";
 
-/// Where a CI job finds Closecall.
+/// The source of Closecall for a CI job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Installation<'a> {
     /// The Git URL.
@@ -33,8 +33,9 @@ pub struct Installation<'a> {
     pub rev: &'a str,
 }
 
-/// Returns the commented template of a scenario, with the name `name`. Below a `repository` that has a schema, it begins with the
-/// line by which editors (Taplo, Even Better TOML in VS Code) find the schema.
+/// Returns the commented template of a scenario, with the name `name`. Below a `repository` that
+/// has a schema, it begins with the line by which editors (Taplo, Even Better TOML in VS Code) find
+/// the schema.
 pub fn scenario_template(name: &str, repository: Option<&Path>) -> String {
     let text = SCENARIO.replace(&format!("name = \"{TEMPLATE_NAME}\""), &format!("name = \"{name}\""));
     let has_schema = repository.is_some_and(|folder| folder.join(SCHEMA).is_file());
@@ -46,16 +47,16 @@ fn schema_line() -> String {
     format!("#:schema ../{SCHEMA}\n\n")
 }
 
-/// Returns the file of a new scenario: in the folder of scenarios if the working folder is a repository, else in the
-/// working folder itself.
+/// Returns the file of a new scenario: in the folder of scenarios if the working folder is a
+/// repository, else in the working folder itself.
 pub fn scenario_path(name: &str) -> PathBuf {
     let file = PathBuf::from(format!("{name}.toml"));
     let is_repository = Path::new(PROJECT_FILE).is_file() && Path::new(SCENARIOS).is_dir();
     if is_repository { Path::new(SCENARIOS).join(file) } else { file }
 }
 
-/// Returns the files of a repository in `folder`, each with its text. A scenario is among them only if the folder has
-/// none yet.
+/// Returns the files of a repository in `folder`, each with its text. A scenario is among them only
+/// if the folder has none yet.
 pub fn repository_files(folder: &Path, installation: Installation<'_>) -> Vec<(PathBuf, String)> {
     let installed = |text: &str| text.replace("@URL@", installation.url).replace("@REV@", installation.rev);
     let scenarios = folder.join(SCENARIOS);
@@ -78,7 +79,8 @@ fn has_scenario(folder: &Path) -> bool {
     entries.flatten().any(|entry| entry.path().extension().is_some_and(|extension| extension == "toml"))
 }
 
-/// Writes a file that does not exist yet, and its folder. Returns false if the file exists: it is then unchanged.
+/// Writes a file that does not exist yet, and its folder. Returns false if the file exists: it is
+/// then unchanged.
 ///
 /// # Errors
 /// [`WriteError`] if the folder or the file cannot be written.

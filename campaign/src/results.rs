@@ -5,14 +5,16 @@
 //!  closecall-results.previous   the one before it
 //! ```
 //!
-//! A new campaign takes the place of the last one, whose folder becomes the previous one. A folder is moved or removed only if a
-//! campaign has made it here on its own account, which its manifest says, and if it holds no other file than those of a
-//! campaign. Everything else at one of the two paths is refused and stays as it is: a file, a symbolic link, a folder with other
-//! files, the folder of a campaign that somebody has put there.
+//! A new campaign takes the place of the last one, whose folder becomes the previous one. A folder
+//! is moved or removed only if its manifest says that a campaign has made it here on its own
+//! account, and if it holds only files of a campaign. Everything else at one of the two paths is
+//! refused and stays: a file, a symbolic link, a folder with other files, the folder of a campaign
+//! that the user has put there.
 //!
-//! Two campaigns that start in one working folder at the same time do not meet: the lock of the folder at `closecall-results`
-//! also guards the previous one, and a folder is moved while its lock is held. Files are removed one by one, the manifest last.
-//! A program that is killed meanwhile leaves a folder that the next campaign still recognises.
+//! Two campaigns that start in one working folder at the same time do not meet: the lock of the
+//! folder at `closecall-results` also guards the previous one, and a folder is moved while its lock
+//! is held. Files are removed one by one, the manifest last. A program that is killed meanwhile
+//! leaves a folder that the next campaign still recognises.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -37,7 +39,8 @@ const ATTEMPTS: usize = 5;
 /// Largest number of files that a message names.
 const NAMED_FILES: usize = 3;
 
-/// The folder of a campaign that keeps its results where no option says, and what it has taken the place of.
+/// The folder of a campaign that keeps its results in the default place, and the results that it
+/// replaces.
 #[derive(Debug)]
 pub struct Taken {
     /// The folder, locked for the campaign.
@@ -57,7 +60,7 @@ pub struct Moved {
     pub has_removed: bool,
 }
 
-/// What is at a path where results belong.
+/// The state of a path for results.
 enum Place {
     /// Nothing.
     Free,
@@ -71,25 +74,27 @@ enum Place {
 struct Kept {
     /// The command line of the campaign.
     command: Vec<String>,
-    /// True if the campaign has come to its end: the report is the last file but one that it writes.
+    /// True if the campaign has come to its end: the report is the last file but one that it
+    /// writes.
     is_finished: bool,
     /// The names of its scenarios, by which recordings are named.
     scenarios: Vec<String>,
 }
 
-/// Creates the folder of the results in `folder`, the working folder, for the campaign of `manifest`. Earlier results become the
-/// previous ones.
+/// Creates the folder of the results in `folder`, the working folder, for the campaign of
+/// `manifest`. Earlier results become the previous ones.
 ///
 /// # Errors
-/// [`FolderError::Foreign`] if something is at one of the two paths that no campaign has put there, [`FolderError::Busy`] if
-/// another campaign runs there, other [`FolderError`]s if a folder cannot be read or written.
+/// [`FolderError::Foreign`] if something is at one of the two paths that no campaign has put there,
+/// [`FolderError::Busy`] if another campaign runs there, other [`FolderError`]s if a folder cannot
+/// be read or written.
 pub fn take(folder: &Path, manifest: &Manifest) -> Result<Taken, FolderError> {
     let [path, previous] = [RESULTS, PREVIOUS].map(|name| folder.join(name));
     let mut moved = None;
     let mut taken = Err(FolderError::Busy { path: path.clone(), holder: "several start at the same time".to_owned() });
     for _ in 0..ATTEMPTS {
         if let Place::Results(_) = inspect(&path, true)? {
-            // What is in the way is found before anything is written, be it a lock.
+            // An obstacle, even a lock, is found before anything is written.
             inspect(&previous, true)?;
             moved = set_aside(&path, &previous)?.or(moved);
         }
@@ -102,8 +107,8 @@ pub fn take(folder: &Path, manifest: &Manifest) -> Result<Taken, FolderError> {
     Ok(Taken { locked: taken?, moved })
 }
 
-/// Locks the folder of the results in `folder`, the working folder, to resume the campaign of `manifest`. The folder is created
-/// if there is none.
+/// Locks the folder of the results in `folder`, the working folder, to resume the campaign of
+/// `manifest`. The folder is created if there is none.
 ///
 /// # Errors
 /// [`FolderError`] as of [`take`], and if the folder holds another campaign.
@@ -128,7 +133,7 @@ pub fn check_inputs(folder: &Path, inputs: &[PathBuf]) -> Result<(), FolderError
     Ok(())
 }
 
-/// Makes the results at `path` the previous ones. Returns `None` if there are none any more.
+/// Makes the results at `path` the previous ones. Returns `None` if there are none.
 fn set_aside(path: &Path, previous: &Path) -> Result<Option<Moved>, FolderError> {
     let lock = Lock::acquire(path)?;
     let Place::Results(kept) = inspect(path, true)? else { return Ok(None) };
@@ -180,8 +185,8 @@ fn remove_files(folder: &Path, is_chosen: impl Fn(&OsStr) -> bool) -> Result<(),
     Ok(())
 }
 
-/// Says what is at a path where results belong, without changing it. If the results are to be replaced, they must be those of a
-/// campaign whose command line named no folder.
+/// Determines the state of a path for results, without changing it. Results that are to be replaced
+/// must belong to a campaign whose command line named no folder.
 fn inspect(path: &Path, is_replaced: bool) -> Result<Place, FolderError> {
     let read = |source| FolderError::Read { path: path.to_owned(), source };
     let kind = match fs::symlink_metadata(path) {
@@ -204,7 +209,7 @@ fn inspect(path: &Path, is_replaced: bool) -> Result<Place, FolderError> {
         return Err(foreign(path, "it holds other files, and no results of a campaign"));
     }
     let text = fs::read(&manifest).map_err(|source| FolderError::Read { path: manifest.clone(), source })?;
-    let Some(kept) = kept(&text, path) else { return Err(foreign(path, "its manifest is not that of a campaign")) };
+    let Some(kept) = kept(&text, path) else { return Err(foreign(path, "its manifest does not belong to a campaign")) };
     if is_replaced && !is_replaceable(&text) {
         return Err(foreign(path, "it holds a campaign whose command line named its folder"));
     }
@@ -218,7 +223,8 @@ fn inspect(path: &Path, is_replaced: bool) -> Result<Place, FolderError> {
     Ok(Place::Results(kept))
 }
 
-/// Returns what the manifest of a campaign says, of whatever version of this program; `None` if it is not one.
+/// Returns the statements of a campaign's manifest, written by any version of this program; `None`
+/// if it is no manifest.
 fn kept(text: &[u8], path: &Path) -> Option<Kept> {
     let manifest: Value = serde_json::from_slice(text).ok()?;
     manifest.get("manifest_version")?.as_u64()?;
@@ -226,7 +232,7 @@ fn kept(text: &[u8], path: &Path) -> Option<Kept> {
     let words = manifest.get("command")?.as_array()?.iter();
     let command = words.map(|word| word.as_str().map(str::to_owned)).collect::<Option<_>>()?;
     let names = manifest.get("scenarios")?.as_array()?.iter();
-    let scenarios = names.map(|one| one.get("name")?.as_str().map(str::to_owned)).collect::<Option<_>>()?;
+    let scenarios = names.map(|scenario| scenario.get("name")?.as_str().map(str::to_owned)).collect::<Option<_>>()?;
     Some(Kept { command, is_finished: is_file(&path.join(REPORT)), scenarios })
 }
 
@@ -236,7 +242,7 @@ fn is_replaceable(text: &[u8]) -> bool {
     manifest.is_some_and(|manifest| manifest.get("replaceable") == Some(&Value::Bool(true)))
 }
 
-/// Returns what a folder holds beside the files of a campaign, by the paths below it.
+/// Returns the content of a folder beside the files of a campaign, by the paths below it.
 fn other_files(path: &Path, kept: &Kept) -> Result<Vec<String>, FolderError> {
     let is_recording = |name: &OsStr| {
         name == RECORDINGS_PAGE || is_temporary(name) || name.to_str().is_some_and(|name| kept.has_recording(name))
@@ -266,7 +272,7 @@ impl Kept {
     }
 }
 
-/// Returns the names of what a folder holds.
+/// Returns the names in a folder.
 fn names(folder: &Path) -> Result<Vec<std::ffi::OsString>, FolderError> {
     let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     entries.map_err(|source: io::Error| FolderError::Read { path: folder.to_owned(), source })

@@ -1,4 +1,5 @@
-//! Studies of several trajectory files, how much noise and offset the criteria for lane changes tolerate, on all processors.
+//! Studies how much noise and offset the criteria for lane changes tolerate, over several
+//! trajectory files and on all processors.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +18,8 @@ pub enum RobustnessError {
     Mixed,
 }
 
-/// Studies trajectory files. Returns the result of each file, and that of all together; `None` if there are no files.
+/// Studies trajectory files. Returns the result of each file, and the result of all files together;
+/// `None` if there are no files.
 ///
 /// # Errors
 /// [`RobustnessError`] if a file cannot be used, or if the files cannot be studied together.
@@ -32,13 +34,13 @@ pub fn robustness(
         let cases = Study::cases(setup);
         // The results are in the order of the cases for any number of threads.
         let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
-        let one = study.robustness(setup, &results);
-        let fits = all.as_mut().is_none_or(|all| all.add(&one));
+        let result = study.robustness(setup, &results);
+        let fits = all.as_mut().is_none_or(|all| all.add(&result));
         if !fits {
             return Err(RobustnessError::Mixed);
         }
-        all.get_or_insert_with(|| one.clone());
-        each.push(one);
+        all.get_or_insert_with(|| result.clone());
+        each.push(result);
     }
     Ok(all.map(|all| (each, all)))
 }

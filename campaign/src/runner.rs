@@ -1,4 +1,5 @@
-//! Runs one sample in one arm. A panic, for example of the controller, becomes an error of that sample.
+//! Runs one sample in one arm. A panic, for example of the controller, becomes an error of that
+//! sample.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,19 +19,21 @@ use super::workers::Samples;
 
 pub use super::sampling::Sampling;
 
-/// A scenario with all that its runs need: how its samples are drawn, and the arms in which each sample runs.
+/// A scenario with all that its runs need: how its samples are drawn, and the arms in which each
+/// sample runs.
 #[derive(Clone)]
 pub struct Work {
     /// The scenario.
     pub file: ScenarioFile,
     /// How its samples are drawn.
     pub sampling: Sampling,
-    /// The arms: the baseline first if there are several, the arm under test last, references between them.
+    /// The arms: the baseline first if there are several, the arm under test last, references
+    /// between them.
     pub arms: Vec<Arm>,
     /// The samples that are checked for validity.
     pub checks: CheckPlan,
-    /// How often a sample runs again in a new process after its worker process has crashed or hung. Its record then says that it is
-    /// flaky.
+    /// How often a sample runs again in a new process after its worker process has crashed or hung.
+    /// Its record then says that it is flaky.
     pub retry_crashed: u32,
 }
 
@@ -44,18 +47,20 @@ impl fmt::Debug for Work {
 }
 
 impl Work {
-    /// Returns what the records of the scenario with its arms must be.
+    /// Returns the properties that the records of the scenario with its arms must have.
     pub(crate) fn identity(&self) -> Identity<'_, impl Iterator<Item = &str> + Clone> {
         let arms = self.arms.iter().map(|arm| arm.controller.name());
         Identity { file: &self.file, sampling: self.sampling, arms }
     }
 
-    /// Returns the number of samples of the design. A grid may have another number than was requested.
+    /// Returns the number of samples of the design. A grid may have another number than was
+    /// requested.
     pub fn count(&self) -> u64 {
         self.file.space().samples(self.sampling.design, self.sampling.samples)
     }
 
-    /// Returns the numbers of the samples in a part of the campaign, or of all samples, in ascending order.
+    /// Returns the numbers of the samples in a part of the campaign, or of all samples, in
+    /// ascending order.
     pub fn samples(&self, part: Option<Partition>) -> impl Iterator<Item = u64> + use<> {
         (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.contains(sample)))
     }
@@ -70,7 +75,8 @@ impl Samples for Work {
         &self.arms
     }
 
-    /// Runs one sample in one arm, in a worker process if its controller is isolated, and checks it if the plan of the checks includes it.
+    /// Runs one sample in one arm, in a worker process if its controller is isolated, and checks it
+    /// if the plan of the checks includes it.
     fn run(&self, sample: u64, index: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let arm = &self.arms[index];
         if arm.controller.isolated().is_some() {
@@ -83,7 +89,8 @@ impl Samples for Work {
 }
 
 impl Work {
-    /// Runs one sample in one arm in this thread. `on_outcome` gets what is known before the checks, if there are any.
+    /// Runs one sample in one arm in this thread. `on_outcome` gets the result before the checks,
+    /// if there are any.
     fn run_here(&self, sample: u64, arm: &Arm, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
@@ -148,7 +155,7 @@ pub fn run_guarded(
     guarded(|| simulate(scenario, key, arm, observer))
 }
 
-/// Runs what may panic. A panic is returned as an error of the sample.
+/// Runs code that may panic. A panic is returned as an error of the sample.
 ///
 /// # Errors
 /// The error of `run`, or [`SampleError::Panic`].

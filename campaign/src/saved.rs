@@ -23,7 +23,8 @@ pub struct SavedCampaign {
 }
 
 impl SavedCampaign {
-    /// Opens the folder of a campaign. The code that it names runs only if the folder is the user's own, or is trusted.
+    /// Opens the folder of a campaign. The code that it names runs only if the folder is the user's
+    /// own, or is trusted.
     ///
     /// # Errors
     /// [`FolderError`] if there is no manifest, or it cannot be read.
@@ -34,7 +35,8 @@ impl SavedCampaign {
         Ok(Self { folder, manifest, is_trusted })
     }
 
-    /// Reads the manifest of a folder that this program has just written, or that is read and not run.
+    /// Reads the manifest of a folder that this program has just written, or that is read and not
+    /// run.
     ///
     /// # Errors
     /// [`FolderError`] if there is no manifest, or it cannot be read.
@@ -48,7 +50,8 @@ impl SavedCampaign {
         self.is_trusted = true;
     }
 
-    /// Returns the commands, libraries and FMUs that do not run, because the folder is not the user's own and not trusted.
+    /// Returns the commands, libraries and FMUs that do not run, because the folder is not the
+    /// user's own and not trusted.
     pub fn not_trusted(&self) -> Vec<String> {
         if self.is_trusted {
             return Vec::new();
@@ -69,8 +72,8 @@ impl SavedCampaign {
         Err(SavedError::NotTrusted { path: self.folder.path().to_owned(), commands })
     }
 
-    /// Gives the processes of the controllers other limits: the time limit of each answer (ms), and the memory (MiB). `None` leaves a limit
-    /// as the campaign had it.
+    /// Gives the processes of the controllers other limits: the time limit of each answer (ms), and
+    /// the memory (MiB). `None` leaves a limit as the campaign had it.
     pub fn limit(&mut self, timeout_ms: Option<u64>, memory_mib: Option<u64>) {
         for arm in &mut self.manifest.arms {
             *arm = arm.limited(timeout_ms, memory_mib);
@@ -104,19 +107,20 @@ impl SavedCampaign {
         Ok(self.manifest.arms())
     }
 
-    /// Returns the arm of the named controller, or the arm under test. A controller that is named by its whole command, as in
-    /// `exec:COMMAND`, is the caller's and not the folder's: it runs in the working folder if the folder is not trusted.
+    /// Returns the arm of the named controller, or the arm under test. A controller that is named
+    /// by its whole command, as in `exec:COMMAND`, is the caller's and not the folder's: it runs in
+    /// the working folder if the folder is not trusted.
     ///
     /// # Errors
-    /// [`SavedError::UnknownArm`] if the campaign was not run with that controller, [`SavedError::NotTrusted`] if the folder names it and
-    /// is not trusted.
+    /// [`SavedError::UnknownArm`] if the campaign was not run with that controller,
+    /// [`SavedError::NotTrusted`] if the folder names it and is not trusted.
     pub fn arm(&self, name: Option<&str>) -> Result<Arm, SavedError> {
         let (controllers, names) = (&self.manifest.arms, self.manifest.arm_names());
         let is_meant =
             |index: &usize| name.is_none_or(|name| names[*index] == name || controllers[*index].to_string() == name);
         let Some(index) = (0..controllers.len()).rev().find(is_meant) else {
-            let known = controllers.iter().map(ToString::to_string).collect();
-            return Err(SavedError::UnknownArm { name: name.unwrap_or_default().to_owned(), known });
+            let names = controllers.iter().map(ToString::to_string).collect();
+            return Err(SavedError::UnknownArm { name: name.unwrap_or_default().to_owned(), names });
         };
         let controller = &controllers[index];
         if self.is_trusted || !controller.has_limits() {
@@ -130,7 +134,8 @@ impl SavedCampaign {
         Ok(self.manifest.arms().swap_remove(index))
     }
 
-    /// Returns the concrete scenario of one sample. `scenario` may be left out if the campaign has only one.
+    /// Returns the concrete scenario of one sample. `scenario` may be left out if the campaign has
+    /// only one.
     ///
     /// # Errors
     /// [`SavedError`] if the campaign has no such scenario or sample.
@@ -141,8 +146,8 @@ impl SavedCampaign {
     /// Returns the concrete scenario of one sample with further settings.
     ///
     /// # Errors
-    /// [`SavedError`] if the campaign has no such scenario or sample, a setting does not fit, or a fault that it sets cannot act with
-    /// the sensors of the campaign.
+    /// [`SavedError`] if the campaign has no such scenario or sample, a setting does not fit, or a
+    /// fault that it sets cannot act with the sensors of the campaign.
     pub fn sample_with(
         &self,
         scenario: Option<&str>,
@@ -163,7 +168,8 @@ impl SavedCampaign {
         Ok((scenario, RunKey { seed: sampling.seed, sample }))
     }
 
-    /// Returns a scenario of the campaign with the campaign's settings. `scenario` may be left out if there is only one.
+    /// Returns a scenario of the campaign with the campaign's settings. `scenario` may be left out
+    /// if there is only one.
     ///
     /// # Errors
     /// [`SavedError`] if the campaign has no such scenario, or it cannot be used.
@@ -173,14 +179,14 @@ impl SavedCampaign {
 
     fn choose(&self, name: Option<&str>) -> Result<&ManifestScenario, SavedError> {
         let scenarios = &self.manifest.scenarios;
-        let known = || scenarios.iter().map(|scenario| scenario.name.clone()).collect();
+        let names = || scenarios.iter().map(|scenario| scenario.name.clone()).collect();
         match (name, &scenarios[..]) {
             (None, [only]) => Ok(only),
-            (None, _) => Err(SavedError::ScenarioNotNamed { known: known() }),
+            (None, _) => Err(SavedError::ScenarioNotNamed { names: names() }),
             (Some(name), scenarios) => scenarios
                 .iter()
                 .find(|scenario| scenario.name == name)
-                .ok_or_else(|| SavedError::UnknownScenario { name: name.to_owned(), known: known() }),
+                .ok_or_else(|| SavedError::UnknownScenario { name: name.to_owned(), names: names() }),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Why a saved campaign cannot provide what was requested.
+//! Why a saved campaign cannot fulfil a request.
 
 use std::path::PathBuf;
 
@@ -17,18 +17,18 @@ pub enum SavedError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The campaign has several scenarios, and none was named.
-    #[error("the campaign has several scenarios; name one of {}", known.join(", "))]
+    #[error("the campaign has several scenarios; name one of {}", names.join(", "))]
     ScenarioNotNamed {
         /// The names to choose from.
-        known: Vec<String>,
+        names: Vec<String>,
     },
     /// The campaign has no scenario of that name.
-    #[error("the campaign has no scenario `{name}`, only {}", known.join(", "))]
+    #[error("the campaign has no scenario `{name}`, only {}", names.join(", "))]
     UnknownScenario {
         /// The requested name.
         name: String,
         /// The names to choose from.
-        known: Vec<String>,
+        names: Vec<String>,
     },
     /// The campaign has no sample with that number.
     #[error("there is no sample {sample}: the campaign has samples 0 to {last}")]
@@ -39,12 +39,12 @@ pub enum SavedError {
         last: u64,
     },
     /// The campaign was not run with that controller.
-    #[error("the campaign was not run with `{name}`, only with {}", known.join(", "))]
+    #[error("the campaign was not run with `{name}`, only with {}", names.join(", "))]
     UnknownArm {
         /// The requested name.
         name: String,
         /// The names to choose from.
-        known: Vec<String>,
+        names: Vec<String>,
     },
     /// The folder was written on another machine or by another user, and names code that would run.
     #[error(
@@ -64,7 +64,7 @@ pub enum SavedError {
     Sample {
         /// The sample.
         sample: u64,
-        /// Why it has no concrete scenario.
+        /// The reason for which the sample has no concrete scenario.
         source: SampleError,
     },
 }

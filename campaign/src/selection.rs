@@ -4,19 +4,21 @@
 //!  worst:5,failures:20,random:3
 //! ```
 //!
-//! - *worst*: the samples with the hardest collisions of the ego, then those with the smallest time headways, without
-//!   uneventful ones, in which no vehicle collides and no moment of the encounter is reached (*random* may draw these);
-//! - *failures*: the first samples in which the ego collided. Those that the system induced, in which the ego of the
-//!   baseline did not collide, precede all others;
+//! - *worst*: the samples with the hardest collisions of the ego, then those with the smallest time
+//!   headways, without uneventful ones, in which no vehicle collides and no moment of the encounter
+//!   is reached (*random* may draw these);
+//! - *failures*: the first samples in which the ego collided. Those that the system induced, in
+//!   which the ego of the baseline did not collide, precede all others;
 //! - *random*: samples drawn at random, which show the usual case.
 //!
-//! All of this refers to the arm under test, and the counts are for each scenario. A count alone is the count of
-//! failures. A sample that is selected for several reasons is recorded once.
+//! All of this refers to the arm under test, and the counts are for each scenario. A count alone is
+//! the count of failures. A sample that is selected for several reasons is recorded once.
 //!
-//! The word `each-kind` stands for at most three samples of the whole campaign: the worst collision that the system
-//! prevented, the worst that it induced, and the worst that happens in both arms. The measure is the harm
-//! ([`closecall_scenarios::harm`]) in the arm that collides: the baseline for a prevented collision, else the arm under test.
-//! If no sample is of any of the three kinds, as in a campaign with one controller, the worst sample as above stands for them.
+//! The word `each-kind` stands for at most three samples of the whole campaign: the worst collision
+//! that the system prevented, the worst that it induced, and the worst that happens in both arms.
+//! The measure is the harm ([`closecall_scenarios::harm`]) in the arm that collides: the baseline
+//! for a prevented collision, else the arm under test. If no sample is of any of the three kinds,
+//! as in a campaign with one controller, the worst sample as above stands for them.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -95,7 +97,8 @@ impl std::fmt::Display for Selection {
 pub struct Chosen {
     /// The sample's number.
     pub sample: u64,
-    /// The kinds for which it was selected: `worst`, `failure`, `random`, and the words of [`Kind`].
+    /// The kinds for which it was selected: `worst`, `failure`, `random`, and the words of
+    /// [`Kind`].
     pub reasons: Vec<&'static str>,
 }
 
@@ -108,7 +111,8 @@ pub enum Kind {
     Induced,
     /// There is a collision in both arms.
     Both,
-    /// No sample is of any of these kinds: the sample with the hardest collision, else with the smallest time headway.
+    /// No sample is of any of these kinds: the sample with the hardest collision, else with the
+    /// smallest time headway.
     Any,
 }
 
@@ -137,22 +141,24 @@ pub struct KindChooser {
 const KINDS: [Kind; 3] = [Kind::Prevented, Kind::Induced, Kind::Both];
 
 impl KindChooser {
-    /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be recorded.
+    /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be
+    /// recorded.
     ///
-    /// The kind is that of the runs themselves, which a recording shows, whatever the validity checks say of them.
+    /// The runs themselves, which a recording shows, determine the kind. The validity checks do not
+    /// change it.
     pub fn push(&mut self, record: &Record) {
         let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
         let (Some(outcomes), Some(tested)) = (outcomes, record.arms.last()) else { return };
         let tested = tested.tally();
         if let [baseline, _, ..] = &record.arms[..] {
             let baseline = baseline.tally();
-            let found = match PairFate::of(&baseline, &tested) {
+            let candidate = match PairFate::of(&baseline, &tested) {
                 Some(PairFate::Prevented) => Some((0, baseline.harm)),
                 Some(PairFate::Induced) => Some((1, tested.harm)),
                 Some(PairFate::Both) => Some((2, tested.harm)),
                 Some(PairFate::Neither) | None => None,
             };
-            if let Some((kind, harm)) = found
+            if let Some((kind, harm)) = candidate
                 && self.worst[kind].as_ref().is_none_or(|(worst, ..)| harm > *worst)
             {
                 self.worst[kind] = Some((harm, record.scenario.clone(), record.sample));
@@ -166,13 +172,15 @@ impl KindChooser {
         }
     }
 
-    /// Returns the worst sample of each kind: its scenario and its number. Of two equal samples the earlier one is the worse.
+    /// Returns the worst sample of each kind: its scenario and its number. Of two equal samples the
+    /// earlier one is the worse.
     pub fn choose(&self) -> Vec<(Kind, &str, u64)> {
         let kinds = KINDS.into_iter().zip(&self.worst);
-        let found = kinds.filter_map(|(kind, worst)| worst.as_ref().map(|(_, name, sample)| (kind, &**name, *sample)));
-        let found: Vec<_> = found.collect();
-        if !found.is_empty() {
-            return found;
+        let samples =
+            kinds.filter_map(|(kind, worst)| worst.as_ref().map(|(_, name, sample)| (kind, &**name, *sample)));
+        let samples: Vec<_> = samples.collect();
+        if !samples.is_empty() {
+            return samples;
         }
         self.any.iter().map(|(severity, name)| (Kind::Any, &**name, severity.sample)).collect()
     }
@@ -182,7 +190,8 @@ impl KindChooser {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Severity {
     sample: u64,
-    /// Change of the ego's velocity in its hardest collision (m/s); `None` if the ego did not collide.
+    /// Change of the ego's velocity in its hardest collision (m/s); `None` if the ego did not
+    /// collide.
     delta_v_mps: Option<f64>,
     /// Smallest time headway in front of and behind the ego (s).
     thw_s: f64,
@@ -192,13 +201,14 @@ struct Severity {
     is_eventful: bool,
 }
 
-/// Selects samples of one scenario, whose records are passed to it one by one. Its memory grows with the selection, not with the samples.
+/// Selects samples of one scenario, whose records are passed to it one by one. Its memory grows
+/// with the selection, not with the samples.
 #[derive(Debug)]
 pub struct Chooser {
     selection: Selection,
     /// The worst samples, the worst first.
     worst: Vec<Severity>,
-    /// The first samples in which the ego collided: those that the system induced, and the others.
+    /// The first samples in which the ego collided: induced collisions, and the others.
     induced: Vec<u64>,
     others: Vec<u64>,
     samples: SpacedNumbers,
@@ -211,7 +221,8 @@ impl Chooser {
         Self { selection, worst, induced, others, samples: SpacedNumbers::default() }
     }
 
-    /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be recorded.
+    /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be
+    /// recorded.
     pub fn push(&mut self, record: &Record) {
         let has_failed = record.arms.iter().any(|arm| arm.result.is_err());
         if let (false, Some(ArmRecord { result: Ok(outcome), .. })) = (has_failed, record.arms.last()) {
@@ -238,13 +249,13 @@ impl Chooser {
         }
     }
 
-    /// Returns the selected samples: the worst first, then the failures and the random ones, each in the order of their
-    /// numbers. `seed` and `ego` key the random stream.
+    /// Returns the selected samples: the worst first, then the failures and the random ones, each
+    /// in the order of their numbers. `seed` and `ego` key the random stream.
     pub fn choose(&self, seed: u64, ego: &ActorId) -> Vec<Chosen> {
         let mut chosen: Vec<Chosen> = Vec::new();
         let mut add = |sample: u64, reason: &'static str| match chosen.iter_mut().find(|chosen| chosen.sample == sample)
         {
-            Some(known) => known.reasons.push(reason),
+            Some(sample_entry) => sample_entry.reasons.push(reason),
             None => chosen.push(Chosen { sample, reasons: vec![reason] }),
         };
         self.worst.iter().for_each(|severity| add(severity.sample, "worst"));
@@ -294,13 +305,14 @@ impl SpacedNumbers {
 
     fn at(&self, mut index: usize) -> Option<u64> {
         self.runs.iter().find_map(|run| {
-            let found = (index < run.len).then(|| run.at(index));
+            let number = (index < run.len).then(|| run.at(index));
             index = index.wrapping_sub(run.len);
-            found
+            number
         })
     }
 
-    /// Draws numbers without replacement; all of them if there are not as many. Each drawn one changes places with the last one that is left.
+    /// Draws numbers without replacement; all of them if there are not as many. Each drawn one
+    /// changes places with the last one that is left.
     fn draw(&self, most: usize, rng: &mut impl RngExt) -> Vec<u64> {
         let mut moved = BTreeMap::new();
         let number = |draw: usize| {
@@ -327,7 +339,8 @@ fn severity(sample: u64, outcome: &Outcome) -> Severity {
     Severity { sample, delta_v_mps: outcome.ego_delta_v_mps(), thw_s, is_safe_in_baseline: false, is_eventful }
 }
 
-/// Compares by the change of velocity, then by the time headway. Of two equal samples the earlier one is the worse.
+/// Compares by the change of velocity, then by the time headway. Of two equal samples the earlier
+/// one is the worse.
 fn compare(a: &Severity, b: &Severity) -> std::cmp::Ordering {
     measure(a, b).then(b.sample.cmp(&a.sample))
 }

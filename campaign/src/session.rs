@@ -1,5 +1,6 @@
-//! A command that another program calls in its own process, such as a Python program. It prints nothing: its output and
-//! its messages are kept for the caller. It receives no signal: its caller stops it.
+//! A command that another program calls in its own process, such as a Python program. It prints
+//! nothing: its output and its messages are kept for the caller. It receives no signal: its caller
+//! stops it.
 //!
 //! A command runs in one thread, and looks up its session there.
 
@@ -21,7 +22,7 @@ pub struct Session {
     pub samples: Arc<[AtomicU64; 2]>,
 }
 
-/// What a command has printed.
+/// The output of a command.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Printed {
     /// The text of standard output.
@@ -43,8 +44,8 @@ thread_local! {
 }
 
 impl Session {
-    /// Runs a command in this thread, and returns its result and what it has printed. The first of the arguments is the
-    /// program's name.
+    /// Runs a command in this thread, and returns its result and its output. The first of the
+    /// arguments is the program's name.
     pub fn run<T>(&self, arguments: &[OsString], command: impl FnOnce() -> T) -> (T, Printed) {
         RUNNING.set(Running { arguments: texts(arguments), session: Some(self.clone()), printed: Printed::default() });
         let result = command();

@@ -61,15 +61,15 @@ impl StopMonitor {
         Self { rule, started: Instant::now(), current: None }
     }
 
-    /// Returns `Break` if the scenario with index `scenario` ends here. `counts` are those of its samples so far, in
-    /// the arm under test.
+    /// Returns `Break` if the scenario with index `scenario` ends here. `counts` are the counts of
+    /// its samples so far, in the arm under test.
     pub fn observe(&mut self, scenario: usize, counts: &ArmCounts) -> ControlFlow<End> {
         let is_certain = self.rule.until_certain.is_some_and(|gate| gate.is_settled(counts, self.rule.scenarios));
         if is_certain || self.is_late(scenario) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
     }
 
-    /// Returns true if the scenario's time is over. When a scenario begins, the time left is divided evenly among the
-    /// scenarios still to run.
+    /// Returns true if the scenario's time is over. When a scenario begins, the time left is
+    /// divided evenly among the scenarios still to run.
     fn is_late(&mut self, scenario: usize) -> bool {
         let Some(budget) = self.rule.time_budget else { return false };
         let now = Instant::now();

@@ -20,7 +20,8 @@ pub struct Counts {
     pub arms: Vec<ArmCounts>,
     /// Pairs of baseline and tested arm: the first and the last one.
     pub pairs: Pairs,
-    /// Why the tested arm did not prevent the collision in the samples of [`Pairs::both`], the most frequent reason first.
+    /// Why the tested arm did not prevent the collision in the samples of [`Pairs::both`], the most
+    /// frequent reason first.
     pub not_prevented: Vec<(Hindrance, u64)>,
     /// What became of the goal in the tested arm, the most frequent case first.
     pub goals: Vec<(Goal, u64)>,
@@ -30,13 +31,15 @@ pub struct Counts {
     pub samples: u64,
     /// Samples in which a validity check made a difference that it must not make.
     pub invalid: u64,
-    /// What the validity checks found.
+    /// The findings of the validity checks.
     pub checks: CheckCounts,
     /// Simulated time of all runs (s).
     pub simulated_s: f64,
-    /// Samples that repeat the parameters or the outcome of an earlier one. They count in `invalid`, `checks` and `simulated_s` only.
+    /// Samples that repeat the parameters or the outcome of an earlier one. They count in
+    /// `invalid`, `checks` and `simulated_s` only.
     pub repeated: u64,
-    /// Why samples have no outcome. The total of all scenarios has none: a sample is one of a scenario.
+    /// Why samples have no outcome. The total of all scenarios has none: a sample is one of a
+    /// scenario.
     pub failures: Failures,
 }
 
@@ -103,7 +106,8 @@ impl Counts {
         self.repeated += other.repeated;
     }
 
-    /// Returns the number of samples, in any arm, that have an outcome only because they were run again.
+    /// Returns the number of samples, in any arm, that have an outcome only because they were run
+    /// again.
     pub fn flaky(&self) -> u64 {
         self.arms.iter().map(|arm| arm.flaky).sum()
     }
@@ -114,11 +118,12 @@ impl Counts {
     }
 }
 
-/// Adds to a tally, whose most frequent entry stays the first. Equally frequent ones are in the order in which they came.
-fn count<T: PartialEq>(tally: &mut Vec<(T, u64)>, of: T, times: u64) {
-    match tally.iter_mut().find(|(other, _)| *other == of) {
+/// Adds to a tally, whose most frequent entry stays the first. Equally frequent ones are in the
+/// order in which they came.
+fn count<T: PartialEq>(tally: &mut Vec<(T, u64)>, entry: T, times: u64) {
+    match tally.iter_mut().find(|(other, _)| *other == entry) {
         Some((_, sum)) => *sum += times,
-        None => tally.push((of, times)),
+        None => tally.push((entry, times)),
     }
     tally.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
 }
@@ -130,17 +135,17 @@ pub struct Summary {
     pub controllers: Vec<String>,
     /// The counts of each scenario, by name.
     pub scenarios: Vec<(String, Counts)>,
-    /// What determines the numbers of samples.
+    /// The rule that determines the numbers of samples.
     pub inference: Inference,
     /// True if the validity checks were switched off.
     pub is_unchecked: bool,
-    /// Which samples of each scenario are new evidence.
+    /// The samples of each scenario that are new evidence.
     repeats: Vec<Repeats>,
 }
 
 impl Summary {
-    /// Returns a summary without samples. `controllers` are the names of the arms, the one under test last; `scenarios`
-    /// are the names of the scenarios in the order of the plan.
+    /// Returns a summary without samples. `controllers` are the names of the arms, the one under
+    /// test last; `scenarios` are the names of the scenarios in the order of the plan.
     pub fn new(controllers: Vec<String>, scenarios: impl IntoIterator<Item = String>) -> Self {
         let arms = controllers.len();
         let scenarios: Vec<_> = scenarios.into_iter().map(|name| (name, Counts::new(arms))).collect();
@@ -148,7 +153,7 @@ impl Summary {
         Self { controllers, scenarios, inference: Inference::default(), is_unchecked: false, repeats }
     }
 
-    /// Returns a summary without samples of what is run.
+    /// Returns a summary without samples of these scenarios.
     pub fn of(works: &[Arc<Work>]) -> Self {
         let name = |arm: &Arm| arm.controller.name().to_owned();
         let controllers = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());
@@ -177,7 +182,8 @@ impl Summary {
         self.scenarios.iter().find(|(name, _)| name == scenario)?.1.arms.last()
     }
 
-    /// Returns the counts of all scenarios together. They are sums: scenarios are never pooled into one sample.
+    /// Returns the counts of all scenarios together. They are sums: scenarios are never pooled into
+    /// one sample.
     pub fn total(&self) -> Counts {
         let mut total = Counts::new(self.controllers.len());
         for (_, counts) in &self.scenarios {
@@ -193,12 +199,12 @@ impl Summary {
 
     /// Returns the kinds of failure as JSON, each with the name of its scenario.
     pub fn failures_json(&self) -> serde_json::Value {
-        let of = |(scenario, failure): (&str, &FailureKindCount)| {
+        let to_json = |(scenario, failure): (&str, &FailureKindCount)| {
             let mut object = serde_json::json!(failure);
             object["scenario"] = serde_json::json!(scenario);
             object
         };
-        self.failures().map(of).collect()
+        self.failures().map(to_json).collect()
     }
 
     /// Returns true if a baseline stands beside the arm under test.
@@ -211,8 +217,8 @@ impl Summary {
         self.controllers.len() > 2
     }
 
-    /// Returns the mean over the scenarios of an arm's collision rate, each scenario with the same weight; `None` if a scenario
-    /// has no outcome.
+    /// Returns the mean over the scenarios of an arm's collision rate, each scenario with the same
+    /// weight; `None` if a scenario has no outcome.
     pub fn mean_collision_rate(&self, arm: usize) -> Option<f64> {
         let rates: Option<Vec<f64>> =
             self.scenarios.iter().map(|(_, counts)| counts.arms.get(arm)?.collision_rate()).collect();

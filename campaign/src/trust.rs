@@ -1,8 +1,10 @@
-//! Whether a campaign's folder is the user's own, so that the commands and libraries that it names may run unasked.
+//! Whether a campaign's folder is the user's own, so that the commands and libraries that it names
+//! may run unasked.
 //!
-//! A folder is the user's own if this program wrote its manifest for this user on this machine. The hashes of these manifests stand
-//! in `closecall/manifests` below the user's state folder (`XDG_STATE_HOME`, else `~/.local/state`), as direnv and Git's
-//! `safe.directory` keep what is trusted. Whoever copies a manifest unchanged can only name what this user has run before.
+//! A folder is the user's own if this program wrote its manifest for this user on this machine.
+//! `closecall/manifests` below the user's state folder (`XDG_STATE_HOME`, else `~/.local/state`)
+//! has the hashes of these manifests, as direnv and Git's `safe.directory` keep a list of trusted
+//! folders. A copy of an unchanged manifest can name only commands that this user has run before.
 
 use std::env;
 use std::fs::{self, OpenOptions};
@@ -11,7 +13,8 @@ use std::path::PathBuf;
 
 use closecall_traffic::input;
 
-/// Length of the file from which on its older half is forgotten (bytes): some 16,000 campaigns. An assumption.
+/// Length of the file from which on its older half is forgotten (bytes): some 16,000 campaigns. An
+/// assumption.
 const MOST_BYTES: u64 = 1 << 20;
 
 /// Returns the file of the hashes, or `None` if the user has no state folder.

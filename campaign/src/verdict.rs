@@ -1,4 +1,4 @@
-//! The verdict of a campaign: what its gates, requirements, expectations and validity checks come to.
+//! The verdict of a campaign, from its gates, requirements, expectations and validity checks.
 //!
 //! | finding | decision | verdict | exit code |
 //! |---|---|---|---|
@@ -26,8 +26,9 @@ use super::probability::{Answer, Finding};
 use super::summary::Summary;
 use super::validity::CheckCounts;
 
-/// Share of the outcomes in which the system under test may not be available for some time, and the campaign still says what the
-/// system does (-). An assumption: with more, the usual run is one in which the system cannot act as it was built to.
+/// Share of the outcomes in which the system under test may not be available for some time, and the
+/// campaign still says what the system does (-). An assumption: with more, the usual run is one in
+/// which the system cannot act as it was built to.
 const MAX_UNAVAILABLE_SHARE: f64 = 0.5;
 
 /// The answer of a campaign.
@@ -42,10 +43,11 @@ pub enum Verdict {
     /// The samples do not decide a gate.
     #[serde(rename = "INCONCLUSIVE")]
     Inconclusive,
-    /// No gate and no requirement was checked, or the system under test was not available or never acted.
+    /// No gate and no requirement was checked, or the system under test was not available or never
+    /// acted.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
-    /// A setting of the command line weakened what a scenario is judged by.
+    /// A setting of the command line weakened the criteria of a scenario.
     #[serde(rename = "OVERRIDDEN")]
     Overridden,
     /// Some sample ended in an error.
@@ -77,7 +79,8 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The finding that decides a judgement. If several hold, the first of [`Decision::PRECEDENCE`] decides.
+/// The finding that decides a judgement. If several hold, the first of [`Decision::PRECEDENCE`]
+/// decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
     /// Every gate that was checked is met.
@@ -88,7 +91,7 @@ pub enum Decision {
     Inconclusive,
     /// Nothing was checked, or the system under test was not there to be tested.
     NotJudged,
-    /// A setting weakened what a scenario is judged by.
+    /// A setting weakened the criteria of a scenario.
     Overridden,
     /// Some sample ended in an error.
     SampleError,
@@ -133,9 +136,10 @@ pub struct Judgement {
     pub gates: Vec<GateResult>,
     /// How each requirement fares in each scenario that names it.
     pub requirements: Vec<RequirementResult>,
-    /// Whether what the scenarios expect of their runs happened.
+    /// Whether the expectations of the scenarios happened.
     pub expectations: Vec<ExpectationResult>,
-    /// What the samples of each scenario say about the probability of a collision, if that was asked.
+    /// What the samples of each scenario say about the probability of a collision, if that was
+    /// asked.
     pub probabilities: Vec<(String, Finding)>,
     /// What the samples of each scenario cover, if the scenario states what is to be covered.
     pub coverage: Vec<(String, Vec<CoverageResult>)>,
@@ -163,7 +167,7 @@ impl Judgement {
     }
 }
 
-/// What a campaign may have and still be believed.
+/// The limits within which a campaign is believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
     /// Share of checked verdicts that may flip at half the time step.
@@ -187,7 +191,8 @@ impl From<&GateSet> for Allowed {
 /// The number of flaky samples, and the gate on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct FlakyGate {
-    /// Samples with an outcome only because they were run again after their process had crashed or hung.
+    /// Samples with an outcome only because they were run again after their process had crashed or
+    /// hung.
     pub flaky: u64,
     /// Most such samples.
     pub max: u64,
@@ -224,10 +229,10 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     judge_samples(summary, judge, &mut findings);
     judge_action(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
-        let what = weakened.join("; ");
+        let weakenings = weakened.join("; ");
         findings.add(
             Decision::Overridden,
-            format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {what}"),
+            format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {weakenings}"),
         );
     }
     let probabilities = judge_probabilities(summary, judge, &mut findings);
@@ -257,22 +262,23 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         Decision::first_of(&findings.decisions).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
-            let what = match gates.is_empty() {
+            let missing = match gates.is_empty() {
                 true => "no gate was set and no requirement was checked: set a gate, or measure without a verdict",
                 false => "no gate and no requirement is decided",
             };
-            findings.add(Decision::NotJudged, what.to_owned());
+            findings.add(Decision::NotJudged, missing.to_owned());
         }
         Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)
     };
-    // Last: it decides nothing, and the first reason that is no gate is the sentence of the verdict.
+    // Last: it decides nothing, and the first reason that is no gate is the sentence of the
+    // verdict.
     judge_extrapolation(judge, &mut findings);
     let coverage = judge.coverage().map(|(name, results)| (name.to_owned(), results)).collect();
     Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, coverage, flaky }
 }
 
-/// Returns the subjects of the gates that somebody set and that no scenario decides: there is no sample in which they have a
-/// value. A gate that says nothing does not pass.
+/// Returns the subjects of the gates that somebody set and that no scenario decides: there is no
+/// sample in which they have a value. A gate that says nothing does not pass.
 fn undecidable(gates: &[GateResult]) -> BTreeSet<String> {
     let set = || gates.iter().filter(|gate| !matches!(gate.source, GateSource::Requirement(_)));
     let subjects = |gate: &GateResult| gate.expression.subject();
@@ -281,8 +287,8 @@ fn undecidable(gates: &[GateResult]) -> BTreeSet<String> {
     set().map(subjects).filter(|subject| !decided.contains(subject)).collect()
 }
 
-/// Returns true if the gates say something: a gate that somebody set is decided, or every check of every requirement is. A
-/// requirement that is checked in part is not checked.
+/// Returns true if the gates say something: a gate that somebody set is decided, or every check of
+/// every requirement is. A requirement that is checked in part is not checked.
 fn is_judged(gates: &[GateResult]) -> bool {
     let is_check = |gate: &&GateResult| matches!(gate.source, GateSource::Requirement(_));
     let (checks, set): (Vec<&GateResult>, Vec<&GateResult>) = gates.iter().partition(is_check);
@@ -346,15 +352,17 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
     expectations
 }
 
-/// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on assumptions.
+/// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on
+/// assumptions.
 fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
     for (name, parameters) in judge.extrapolations() {
         findings.note(format!("{name}: extrapolates beyond recorded traffic: {}", parameters.join("; ")));
     }
 }
 
-/// Says in how many samples the system under test was not available for some time. If those are more than
-/// [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it engages before its sensors fail.
+/// States in how many samples the system under test was not available for some time. If their share
+/// exceeds [`MAX_UNAVAILABLE_SHARE`], the samples do not decide about the system, even if it
+/// engages before its sensors fail.
 fn judge_availability(summary: &Summary, findings: &mut Findings) {
     for (name, counts) in &summary.scenarios {
         let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
@@ -365,7 +373,7 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
         );
         if tested.unavailable as f64 > MAX_UNAVAILABLE_SHARE * tested.outcomes as f64 {
             let reason = format!(
-                "{sentence}, more than {}, so that they do not decide what it does (it engaged in {})",
+                "{sentence}, more than {}, and they do not decide what it does (it engaged in {})",
                 percent(MAX_UNAVAILABLE_SHARE),
                 samples(tested.engagements)
             );
@@ -376,11 +384,11 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
     }
 }
 
-/// A system that never acted was not tested by a scenario that asks what it prevents.
+/// A system that never acted was not tested by a scenario that asks for prevented collisions.
 fn judge_action(judge: &Judge, findings: &mut Findings) {
     for (name, missing, count) in judge.without_action() {
         let reason = format!(
-            "{name}: the system under test never {missing} in {}, so that they do not decide what it does",
+            "{name}: the system under test never {missing} in {}, and they do not decide what it does",
             samples(count)
         );
         findings.add(Decision::NotJudged, reason);

@@ -1,7 +1,9 @@
-//! The wall time of each sample: a file beside the journal, with one line of JSON per sample, in the same order.
+//! The wall time of each sample: a file beside the journal, with one line of JSON per sample, in
+//! the same order.
 //!
-//! Wall times differ from run to run. They therefore have a file of their own, apart from those that are reproducible.
-//! No result depends on them, so their lines are buffered: a program that is killed may lose the last ones.
+//! Wall times differ from run to run. They therefore have a file of their own, apart from those
+//! that are reproducible. No result depends on them, so their lines are buffered: a program that is
+//! killed may lose the last ones.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -41,8 +43,8 @@ pub struct WallTimes {
 }
 
 impl WallTimes {
-    /// Opens the file for appending, and cuts it to the samples before `index` in the journal. Creates the file if
-    /// there is none.
+    /// Opens the file for appending, and cuts it to the samples before `index` in the journal.
+    /// Creates the file if there is none.
     ///
     /// # Errors
     /// [`WriteError`] if the file cannot be created or cut.
@@ -128,9 +130,9 @@ fn lines(mut reader: impl BufRead) -> impl Iterator<Item = (WallTime, u64)> {
 /// The wall times of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpentTime {
-    /// That of the runs (s).
+    /// Wall time of the runs (s).
     pub runs_s: f64,
-    /// That of their validity checks (s).
+    /// Wall time of the validity checks (s).
     pub checks_s: f64,
 }
 
@@ -142,7 +144,8 @@ impl AddAssign for SpentTime {
 }
 
 impl SpentTime {
-    /// Returns what share of the time the validity checks have taken, in brackets; nothing if there were none.
+    /// Returns what share of the time the validity checks have taken, in brackets; nothing if there
+    /// were none.
     pub fn check_share(self) -> String {
         let Self { runs_s, checks_s } = self;
         let share = 100.0 * checks_s / (runs_s + checks_s);

@@ -1,4 +1,5 @@
-//! Runs samples on several threads, returns their results in order, and gives up runs that exceed their time limit.
+//! Runs samples on several threads, returns their results in order, and gives up runs that exceed
+//! their time limit.
 //!
 //! ```text
 //!  sample numbers ─▶ window ─▶ jobs ─▶ worker ─▶ results ─▶ reorder ─▶ caller
@@ -6,11 +7,11 @@
 //!                   watch: a worker that exceeds the time limit is abandoned and replaced
 //! ```
 //!
-//! A run starts only if it is at most one window ahead of the last result returned. The window bounds the results that
-//! wait in memory, and the runs that a killed program has to repeat.
+//! A run starts only if it is at most one window ahead of the last result returned. The window
+//! bounds the results that wait in memory, and the runs that a killed program has to repeat.
 //!
-//! A thread cannot be ended from outside. A worker that exceeds the time limit goes on until its run or the program
-//! ends, and its result is discarded.
+//! A thread cannot be ended from outside. A worker that exceeds the time limit goes on until its
+//! run or the program ends, and its result is discarded.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -30,7 +31,8 @@ pub use super::campaign_error::WorkersError;
 
 /// Number of runs, for each worker, that may be ahead of the last result returned.
 const WINDOW_PER_WORKER: usize = 128;
-/// Time that running samples have to end after a stop was requested. Those that take longer are run again on resuming.
+/// Time that running samples have to end after a stop was requested. Those that take longer are run
+/// again on resuming.
 const STOP_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval at which the time limit of running samples is checked.
 const WATCH_EVERY: Duration = Duration::from_millis(50);
@@ -80,18 +82,20 @@ pub(crate) trait Samples: Send + Sync + 'static {
     fn scenario(&self) -> &str;
     /// Returns the arms in which each sample runs.
     fn arms(&self) -> &[Arm];
-    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it any more. `on_outcome` gets the run
-    /// before its validity checks, if it is checked in this process.
+    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it.
+    /// `on_outcome` gets the run before its validity checks, if it is checked in this process.
     fn run(&self, sample: u64, arm: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun;
 }
 
 /// Runs the samples of a campaign elsewhere than on threads of this process.
 pub trait SampleRunner: Send + Sync {
-    /// Runs the given samples of the scenario `work`, which is given with its index in the campaign, and passes each result
-    /// to `on_finished` in the order of `samples`, as [`Workers::run`] does.
+    /// Runs the given samples of the scenario `work`, which is given with its index in the
+    /// campaign, and passes each result to `on_finished` in the order of `samples`, as
+    /// [`Workers::run`] does.
     ///
     /// # Errors
-    /// The error of `on_finished`, or another [`CampaignError`]. No further result is passed on then.
+    /// The error of `on_finished`, or another [`CampaignError`]. No further result is passed on
+    /// then.
     fn run(
         &self,
         work: (usize, &Arc<Work>),
@@ -105,9 +109,9 @@ pub trait SampleRunner: Send + Sync {
 pub type OnFinished<'a> = dyn FnMut(Finished) -> Result<ControlFlow<()>, CampaignError> + 'a;
 
 impl Workers {
-    /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when
-    /// `on_finished` breaks. If `stop` is set, no further sample starts, and those that run are given a few seconds,
-    /// or none if it is abandoned.
+    /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`.
+    /// Stops when `on_finished` breaks. If `stop` is set, no further sample starts, and those that
+    /// run are given a few seconds, or none if it is abandoned.
     ///
     /// # Errors
     /// The error of `on_finished`, or [`WorkersError`]. No further result is passed on then.
@@ -150,8 +154,8 @@ struct Done {
     run: ArmRun,
 }
 
-/// The job of a worker. Whichever empties the slot reports the job: the worker that has finished it, or the watch that has found it
-/// late.
+/// The job of a worker. Whichever empties the slot reports the job: the worker that has finished
+/// it, or the watch that has found it late.
 type Slot = Arc<Mutex<Option<Running>>>;
 
 /// A job that a worker runs.
@@ -162,12 +166,14 @@ struct Running {
     outcome: Option<ArmRun>,
 }
 
-/// Locks a mutex, poisoned or not: panics of the simulation are caught inside the run, when no lock is held.
+/// Locks a mutex, poisoned or not: panics of the simulation are caught inside the run, when no lock
+/// is held.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Threads that run samples, with the worker processes that each of them has. They end when this value is dropped.
+/// Threads that run samples, with the worker processes that each of them has. They end when this
+/// value is dropped.
 pub(crate) struct WorkerPool<S> {
     workers: Workers,
     work: Arc<S>,
@@ -202,10 +208,11 @@ impl<S: Samples> WorkerPool<S> {
         Ok(pool)
     }
 
-    /// Does the same as [`Workers::run`]. A pool that has not passed on all results is not used again.
+    /// Does the same as [`Workers::run`]. A pool that has not passed on all results is not used
+    /// again.
     ///
     /// # Errors
-    /// Those of [`Workers::run`].
+    /// The errors of [`Workers::run`].
     pub(crate) fn run<E: From<WorkersError>>(
         &mut self,
         samples: impl Iterator<Item = u64>,
@@ -281,7 +288,8 @@ impl<S: Samples> WorkerPool<S> {
         Ok(slot)
     }
 
-    /// Returns true if another run may be submitted. `returned` is the number of runs whose results have been returned.
+    /// Returns true if another run may be submitted. `returned` is the number of runs whose results
+    /// have been returned.
     fn has_room(&self, returned: u64) -> bool {
         let window = WINDOW_PER_WORKER * self.workers.jobs.get();
         self.submitted - returned < window as u64
@@ -298,8 +306,8 @@ impl<S: Samples> WorkerPool<S> {
         self.submitted += 1;
     }
 
-    /// Waits until a run has finished or the interval of the watch is over. Returns the finished and the abandoned
-    /// runs.
+    /// Waits until a run has finished or the interval of the watch is over. Returns the finished
+    /// and the abandoned runs.
     fn wait(&mut self) -> Result<Vec<Done>, WorkersError> {
         let mut done = Vec::new();
         match self.results.recv_timeout(WATCH_EVERY) {
@@ -342,7 +350,8 @@ impl<S: Samples> WorkerPool<S> {
     }
 }
 
-/// Puts finished runs into the order in which they were submitted, and joins the arms of each sample.
+/// Puts finished runs into the order in which they were submitted, and joins the arms of each
+/// sample.
 struct Reorder {
     arms: usize,
     /// Index of the next run to return.

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 /// Probabilities of the quantiles over the calibrated pairs (-).
 const PROBABILITIES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
-/// What others report, for comparison.
+/// Published results, for comparison.
 const LITERATURE: &str = "Kesting and Treiber, Transportation Research Record 2088 (2008): relative errors of 11 to 29 % for several \
                           models. Zhu et al., Transportation Research Part C 93 (2018) 425-445: of five models the \
                           Intelligent Driver Model follows best, Wiedemann 99 is harder to calibrate";
@@ -128,8 +128,8 @@ pub fn json(calibration: &Calibration, data: &FollowingData) -> Value {
     })
 }
 
-/// Returns a member of a driver ensemble with the pooled parameters, as the text of its file. It leaves headway and desired
-/// speed to the scenario: they are those of the recorded traffic.
+/// Returns a member of a driver ensemble with the pooled parameters, as the text of its file. It
+/// leaves headway and desired speed to the scenario, which has the values of the recorded traffic.
 pub fn member(calibration: &Calibration, data: &FollowingData, command: &str) -> String {
     let model = calibration.model.name();
     let files: Vec<String> = data

@@ -1,10 +1,10 @@
-//! The date of today, which the standards of other tools ask for in the header of a file.
+//! The date of today, for the headers of files of other tools' standards.
 
 use std::time::SystemTime;
 
 const SECONDS_PER_DAY: u64 = 86_400;
 
-/// Returns the date (UTC) as `2026-01-31`, or the first day of 1970 if the clock stands before it.
+/// Returns the date (UTC) as `2026-01-31`, or the first day of 1970 if the clock is before it.
 pub(crate) fn today() -> String {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let [year, month, day] = date_of(since.as_secs() / SECONDS_PER_DAY);

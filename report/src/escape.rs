@@ -2,7 +2,7 @@
 
 use closecall_traffic::shown::shown;
 
-/// Escapes `text` for use between tags and in double-quoted attributes, without control characters of others.
+/// Escapes `text` for use between tags and in double-quoted attributes, without control characters.
 pub(crate) fn escaped(text: &str) -> String {
     shown(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,4 +1,5 @@
-//! The progress of a long command as lines of text, for a standard error that is no terminal, such as the log of a CI job.
+//! The progress of a long command as lines of text, for a standard error that is no terminal, such
+//! as the log of a CI job.
 
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -14,7 +15,8 @@ pub struct Heartbeat {
 }
 
 impl Heartbeat {
-    /// Starts to `print` lines. `progress` returns the number of samples that are done, and that of all samples.
+    /// Starts to `print` lines. `progress` returns the number of finished samples, and the number
+    /// of all samples.
     pub fn start(progress: impl Fn() -> [u64; 2] + Send + 'static, print: impl Fn(&str) + Send + 'static) -> Self {
         Self::every(INTERVAL, progress, print)
     }
@@ -54,7 +56,7 @@ pub fn rate_text(rate: f64) -> String {
     }
 }
 
-/// Returns a time in the unit that gives it two digits, up to a year: nobody waits for longer.
+/// Returns a time in the unit that gives it two digits, up to a year.
 pub fn duration_text(seconds: f64) -> String {
     const UNITS: [(f64, &str); 3] = [(86_400.0, "days"), (3_600.0, "h"), (60.0, "min")];
     if !(seconds < 365.0 * 86_400.0) {

@@ -1,5 +1,5 @@
-//! The output files of a run and of a campaign: pictures and recordings to view, tables to evaluate, and reports that a
-//! CI gate reads.
+//! The output files of a run and of a campaign: pictures and recordings to view, tables to
+//! evaluate, and reports that a CI gate reads.
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
@@ -8,10 +8,10 @@
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
 //! * [`perception`]: studies of perception as text, JSON, Parquet and a page
-//! * [`page`], [`table`]: what all pages and all Parquet tables share
+//! * [`page`], [`table`]: the common parts of all pages and of all Parquet tables
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
 //! * [`tables`]: the tables of one run: its trace, and the points of its LiDARs
-//! * [`traffic`]: texts and charts of what was found in trajectory data
+//! * [`traffic`]: texts and charts of results from trajectory data
 //!
 //! This crate is the only one that uses rerun, plotters and plotly.
 

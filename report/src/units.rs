@@ -1,6 +1,6 @@
 //! Units of measurement, read from the suffixes of names.
 
-/// The suffixes of names with the units that they stand for. A suffix that ends in another one precedes it.
+/// The suffixes of names with their units. A suffix that ends in another one precedes it.
 const UNITS: [(&str, &str); 14] = [
     ("mm-per-h", "mm/h"),
     ("m-per-h", "m/h"),
@@ -18,8 +18,8 @@ const UNITS: [(&str, &str); 14] = [
     ("s", "s"),
 ];
 
-/// Returns the unit that the suffix of a name stands for, or `None` if there is none. The parts of the name may be
-/// joined by `-` or `_`.
+/// Returns the unit that the suffix of a name stands for, or `None` if there is none. The parts of
+/// the name may be joined by `-` or `_`.
 pub(crate) fn unit_of(name: &str) -> Option<&'static str> {
     split(name).1
 }
@@ -34,14 +34,14 @@ pub(crate) fn labelled(name: &str) -> String {
 
 /// Splits a name into its stem and the unit of its suffix.
 fn split(name: &str) -> (&str, Option<&'static str>) {
-    let found = UNITS.iter().find_map(|(suffix, unit)| {
+    let parts = UNITS.iter().find_map(|(suffix, unit)| {
         // Suffixes contain hyphens; names of columns have underscores instead.
         let stem = name.len().checked_sub(suffix.len() + 1)?;
         let tail = name.get(stem..)?;
         let is_joined = tail.starts_with(['-', '_']);
         (is_joined && tail[1..].replace('_', "-") == *suffix).then(|| (&name[..stem], Some(*unit)))
     });
-    found.unwrap_or((name, None))
+    parts.unwrap_or((name, None))
 }
 
 #[cfg(test)]

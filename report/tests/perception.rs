@@ -1,4 +1,5 @@
-//! A small study: what must hold of any sensor that looks by light, and that the result does not depend on the threads.
+//! A small study. Some relations must hold for any optical sensor, and the result does not depend
+//! on the threads.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -27,8 +28,8 @@ fn of_lidar(runs: u64) -> Study {
 }
 
 fn figures<'a>(study: &'a Study, name: &str) -> &'a Figures {
-    let found = study.cases.iter().find(|(case, _)| case.name.starts_with(name));
-    &found.unwrap_or_else(|| panic!("no case {name}")).1
+    let case = study.cases.iter().find(|(case, _)| case.name.starts_with(name));
+    &case.unwrap_or_else(|| panic!("no case {name}")).1
 }
 
 #[test]
@@ -45,11 +46,12 @@ fn detection_falls_with_distance_darker_paint_rain_and_fog() {
     falls(&["usual", "fog, visibility 200", "fog, visibility 100"]);
     falls(&["truck", "usual", "motorcycle"]);
     falls(&["car 25 m behind, 1.9 m aside", "car 25 m behind, in line"]);
-    for (case, of) in study.cases.iter().filter(|(case, _)| !matches!(case.factor, "fault" | "traffic")) {
-        let shares: Vec<f64> = of.curve.iter().map(|point| point.confirmed.value).collect();
+    for (case, figures) in study.cases.iter().filter(|(case, _)| !matches!(case.factor, "fault" | "traffic")) {
+        let shares: Vec<f64> = figures.curve.iter().map(|point| point.confirmed.value).collect();
         assert!(shares.windows(2).all(|pair| pair[0] >= pair[1] - 0.26), "{}: {shares:?}", case.name);
         assert!(
-            shares[0] > 0.99 && of.curve.iter().all(|point| point.confirmed.interval_95[0] <= point.confirmed.value)
+            shares[0] > 0.99
+                && figures.curve.iter().all(|point| point.confirmed.interval_95[0] <= point.confirmed.value)
         );
     }
 }
@@ -58,16 +60,16 @@ fn detection_falls_with_distance_darker_paint_rain_and_fog() {
 fn faults_show_where_they_act() {
     let study = of_lidar(4);
     let usual = figures(&study, "usual");
-    let of = |name: &str| figures(&study, &format!("fault: {name}"));
+    let fault = |name: &str| figures(&study, &format!("fault: {name}"));
     let rmse = |figures: &Figures, index: usize| figures.errors.unwrap()[index].rmse.value;
-    assert!(rmse(of("lidar-misaligned"), 1) > 5.0 * rmse(usual, 1));
-    assert!(rmse(of("lidar-clock-offset"), 0) > 3.0 * rmse(usual, 0));
-    assert!(rmse(of("lidar-noisy"), 0) > 3.0 * rmse(usual, 0));
-    assert!(of("lidar-dirty").range_m.value < usual.range_m.value - 10.0);
-    assert!(of("lidar-dead").unavailable.value > 0.3 && usual.unavailable.value == 0.0);
-    assert!(of("lidar-dead").confirmed_after_s.is_none() && usual.confirms.value == 1.0);
-    assert!(of("lidar-late").confirmed_after_s.unwrap().value > usual.confirmed_after_s.unwrap().value + 0.15);
-    assert!(of("lidar-misaligned").nees.unwrap().value > 10.0);
+    assert!(rmse(fault("lidar-misaligned"), 1) > 5.0 * rmse(usual, 1));
+    assert!(rmse(fault("lidar-clock-offset"), 0) > 3.0 * rmse(usual, 0));
+    assert!(rmse(fault("lidar-noisy"), 0) > 3.0 * rmse(usual, 0));
+    assert!(fault("lidar-dirty").range_m.value < usual.range_m.value - 10.0);
+    assert!(fault("lidar-dead").unavailable.value > 0.3 && usual.unavailable.value == 0.0);
+    assert!(fault("lidar-dead").confirmed_after_s.is_none() && usual.confirms.value == 1.0);
+    assert!(fault("lidar-late").confirmed_after_s.unwrap().value > usual.confirmed_after_s.unwrap().value + 0.15);
+    assert!(fault("lidar-misaligned").nees.unwrap().value > 10.0);
 }
 
 #[test]
@@ -117,11 +119,11 @@ fn one_thread_and_several_give_the_same_bits() {
 #[test]
 fn true_tracks_are_refused_and_the_files_of_two_configurations_are_written() {
     assert!(study(&[], SensorMode::GroundTruth, 1).unwrap_err().to_string().contains("ground-truth"));
-    let one = study(&[], SensorMode::Object, 2).unwrap();
+    let study_without_truth = study(&[], SensorMode::Object, 2).unwrap();
     let other = study(&["sensors.rear-object.range-m=60"], SensorMode::Object, 2).unwrap();
-    assert!(figures(&other, "usual").range_m.value < figures(&one, "usual").range_m.value - 30.0);
+    assert!(figures(&other, "usual").range_m.value < figures(&study_without_truth, "usual").range_m.value - 30.0);
     let folder = tempfile::tempdir().unwrap();
-    let studies = Studies(vec![one, other]);
+    let studies = Studies(vec![study_without_truth, other]);
     let paths = studies.write(folder.path()).unwrap();
     assert_eq!(paths.len(), 5);
     let page = std::fs::read_to_string(&paths[0]).unwrap();
@@ -134,10 +136,10 @@ fn rows(path: &Path) -> Vec<Vec<(String, Field)>> {
     let reader = SerializedFileReader::new(std::fs::File::open(path).unwrap()).unwrap();
     let row =
         |row: parquet::record::Row| row.get_column_iter().map(|(name, field)| (name.clone(), field.clone())).collect();
-    reader.get_row_iter(None).unwrap().map(|found| row(found.unwrap())).collect()
+    reader.get_row_iter(None).unwrap().map(|result| row(result.unwrap())).collect()
 }
 
-/// Fails if a number of a Parquet file is not that of the JSON; an absent one is `null` in both.
+/// Fails if a number of a Parquet file differs from the JSON; an absent one is `null` in both.
 fn assert_same(row: &[(String, Field)], name: &str, json: &Value) {
     let (_, field) = row.iter().find(|(column, _)| column == name).unwrap_or_else(|| panic!("no column {name}"));
     match (field, json) {
@@ -223,7 +225,8 @@ fn the_study_has_the_light_and_the_weather_of_its_scenario() {
     assert!(range_m(&foggy, "paint 0.8") < 0.8 * range_m(&clear, "paint 0.8"));
 }
 
-/// Opens a page without a window. Returns the document after its scripts have run, and what the browser has reported on its console.
+/// Opens a page without a window. Returns the document after its scripts have run, and the messages
+/// of the browser's console.
 fn opened(browser: &str, page: &Path, profile: &Path) -> (String, Vec<String>) {
     let quiet = [
         "--no-first-run",
@@ -252,10 +255,10 @@ fn a_browser_draws_the_curves_of_every_chart_of_the_page() {
         && path.getBoundingClientRect().width > 0).length).join(' ');</script>";
     let Some(browser) = browser() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let one = study(&[], SensorMode::Object, 3).unwrap();
-    let factors: std::collections::BTreeSet<&str> = one.cases.iter().map(|(case, _)| case.factor).collect();
+    let charted = study(&[], SensorMode::Object, 3).unwrap();
+    let factors: std::collections::BTreeSet<&str> = charted.cases.iter().map(|(case, _)| case.factor).collect();
     let groups = factors.len() - 1;
-    let paths = Studies(vec![one]).write(folder.path()).unwrap();
+    let paths = Studies(vec![charted]).write(folder.path()).unwrap();
     let page = std::fs::read_to_string(&paths[0]).unwrap();
     let open = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -266,7 +269,8 @@ fn a_browser_draws_the_curves_of_every_chart_of_the_page() {
     assert!(console.is_empty(), "{console:?}");
     let title = document.split("<title>").nth(1).unwrap().split("</title>").next().unwrap();
     let drawn: Vec<usize> = title.split(' ').map(|count| count.parse().unwrap()).collect();
-    // A chart of the probability and nine of errors for each group of cases, each with the usual case and another one.
+    // A chart of the probability and nine charts of errors for each group of cases, each with the
+    // standard case and another one.
     assert_eq!((drawn.len() % 10, page.matches("<figure>").count()), (0, drawn.len()), "{drawn:?}");
     assert!(drawn.len() >= 10 * groups && drawn.iter().all(|curves| *curves >= 2), "{drawn:?}");
     assert_eq!(drawn.iter().sum::<usize>(), page.matches("class=\"curve\"").count());

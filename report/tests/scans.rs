@@ -62,8 +62,8 @@ fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
             let (layers, rate_hz) = if is_rear { (16, 25) } else { (64, 10) };
             assert_eq!(beam.value(row), of_column.value(row) * layers + layer.value(row));
             assert!((0.0..=1.0).contains(&time_s.value(row)) && offset_ns.value(row) < 1_000_000_000 / rate_hz);
-            // The error of a range is below five standard deviations at the threshold, which the files of the two kinds state;
-            // droplets and faults there are none.
+            // The error of a range is below five standard deviations at the threshold, which the
+            // files of the two kinds state. There are no droplets and no faults.
             let five_sd_m = if is_rear { 0.5 } else { 1.2 };
             assert!(
                 (range_m.value(row) - true_range_m.value(row)).abs() < five_sd_m,

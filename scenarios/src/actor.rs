@@ -21,16 +21,17 @@ pub struct Actor {
     pub lane_keeping: Option<LaneKeeping>,
     /// How the desired speed of its driver varies, or `None` if it is constant.
     pub speed_keeping: Option<SpeedKeeping>,
-    /// What happens to it.
+    /// The vehicle's events.
     pub events: Vec<Event>,
     /// The fleet that its look is drawn from in each run; see [`Scenario::vehicle`].
     pub(crate) fleet: Option<FleetOf>,
 }
 
-/// Returns the index of the actor `id` among all of them. `key` is the key of the scenario file that names it.
+/// Returns the index of the actor `id` among all of them. `key` is the key of the scenario file
+/// that names it.
 pub(super) fn find_actor(ids: &[&ActorId], id: &ActorId, key: &str) -> Result<usize, ConfigError> {
-    ids.iter().position(|known| *known == id).ok_or_else(|| {
-        let known = ids.iter().map(|id| format!("`{id}`")).collect::<Vec<_>>().join(", ");
-        ConfigError::new(key, Problem::UnknownActor { value: id.to_string(), known })
+    ids.iter().position(|actor| *actor == id).ok_or_else(|| {
+        let names = ids.iter().map(|id| format!("`{id}`")).collect::<Vec<_>>().join(", ");
+        ConfigError::new(key, Problem::UnknownActor { value: id.to_string(), known: names })
     })
 }

@@ -1,4 +1,4 @@
-//! Modes of the sensors that a caller asks for instead of those of the file.
+//! Modes of the sensors that a caller asks for instead of the modes of the file.
 
 use closecall_sensors::SensorMode;
 use closecall_traffic::Check;

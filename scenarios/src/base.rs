@@ -1,8 +1,9 @@
 //! Scenarios that say only how they differ from a scenario of the library.
 //!
-//! A file whose first key is `base` names a scenario of the library. Its own keys replace those of the base: tables are merged
-//! key by key, lists and lists of tables are replaced as a whole. What the base is judged
-//! by (`requirements`, `checks`, `gate`) does not carry over, and neither does a parameter that no value uses any more. The result is one text, on which all later steps work, so that a
+//! A file whose first key is `base` names a scenario of the library. Its own keys replace the keys
+//! of the base: tables are merged key by key, lists and lists of tables are replaced as a whole.
+//! The criteria of the base (`requirements`, `checks`, `gate`) do not carry over, and neither does
+//! a parameter that no value uses. The result is one text, on which all later steps work, and a
 //! campaign's folder keeps the whole scenario.
 
 use toml_edit::{DocumentMut, Item, TableLike};
@@ -14,7 +15,8 @@ use super::{ScenarioError, library};
 const PARAMETERS: &str = "parameters";
 /// The key that names the base.
 const BASE: &str = "base";
-/// What a scenario is judged by. It does not carry over from the base: another question needs its own answer.
+/// What a scenario is judged by. It does not carry over from the base: another question needs its
+/// own answer.
 const JUDGED_BY: [&str; 3] = ["requirements", "checks", "gate"];
 
 /// Returns the text of the whole scenario: the text itself if it names no base.
@@ -30,11 +32,11 @@ pub(super) fn expand(text: &str) -> Result<Option<String>, String> {
     let Some(base) = document.remove(BASE) else { return Ok(None) };
     let name = base.as_str().unwrap_or_default();
     let Some(text) = library::plain_text(name) else {
-        let known: Vec<&str> = library::plain_names().collect();
+        let names: Vec<&str> = library::plain_names().collect();
         return Err(format!(
             "`{BASE}` is {}, but one of the library is needed: {}",
             base.to_string().trim(),
-            known.join(", ")
+            names.join(", ")
         ));
     };
     let mut whole = text.parse::<DocumentMut>().map_err(|error| error.to_string())?;
@@ -46,12 +48,13 @@ pub(super) fn expand(text: &str) -> Result<Option<String>, String> {
     Ok(Some(whole.to_string()))
 }
 
-/// Removes the parameters of the base that no value uses any more. Those of the own text stay, so that its reader refuses them.
-fn remove_unused(whole: &mut DocumentMut, own: &DocumentMut) {
+/// Removes the parameters of the base that no value uses. Unused parameters of `file` stay: the
+/// reader refuses them.
+fn remove_unused(whole: &mut DocumentMut, file: &DocumentMut) {
     let Ok(document) = toml::from_str::<toml::Table>(&whole.to_string()) else { return };
     let used = used_parameters(&document);
-    let own = own.get(PARAMETERS).and_then(Item::as_table_like);
-    let is_own = |name: &str| own.is_some_and(|own| own.contains_key(name));
+    let file = file.get(PARAMETERS).and_then(Item::as_table_like);
+    let is_own = |name: &str| file.is_some_and(|file| file.contains_key(name));
     let Some(parameters) = whole.get_mut(PARAMETERS).and_then(Item::as_table_like_mut) else { return };
     let names: Vec<String> = parameters.iter().map(|(name, _)| name.to_owned()).collect();
     for name in names.iter().filter(|name| !used.contains(&name.as_str()) && !is_own(name)) {
@@ -59,14 +62,14 @@ fn remove_unused(whole: &mut DocumentMut, own: &DocumentMut) {
     }
 }
 
-/// Returns the error of the whole text as one of the text that names the base: with the line of the same words there, or that of the
-/// key `base` if the words are the base's.
+/// Returns the error of the whole text as an error of the text that names the base. Its line is the
+/// line with the same words there, or the line of the key `base` if the words are the base's.
 pub(super) fn located(error: ScenarioError, whole: &str, text: &str) -> ScenarioError {
     let line_of = |line: usize| {
         let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
-        let is_same = |found: &str| found.trim() == words;
-        let own = text.lines().position(is_same).filter(|_| !words.is_empty());
-        own.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
+        let is_same = |line: &str| line.trim() == words;
+        let own_line = text.lines().position(is_same).filter(|_| !words.is_empty());
+        own_line.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
     };
     match error {
         ScenarioError::Syntax { path, line, message } => ScenarioError::Syntax { path, line: line_of(line), message },
@@ -77,7 +80,7 @@ pub(super) fn located(error: ScenarioError, whole: &str, text: &str) -> Scenario
     }
 }
 
-/// Replaces the values of `target` by those of `source`, and merges tables.
+/// Replaces the values of `target` by the values of `source`, and merges tables.
 fn merge(target: &mut dyn TableLike, source: &dyn TableLike) {
     for (key, item) in source.iter() {
         let both = target.get_mut(key).and_then(Item::as_table_like_mut).zip(item.as_table_like());
@@ -103,21 +106,21 @@ mod tests {
     #[test]
     fn a_file_with_a_base_has_its_keys_but_for_its_own() {
         let text = "base = \"low-thw-overtake\"\nname = \"own\"\nsensors.mode = \"object\"\n[[fault.rear-object]]\ndead = true\n";
-        let own = parse(text).unwrap();
+        let derived = parse(text).unwrap();
         let base = parse(super::library::text("low-thw-overtake").unwrap()).unwrap();
-        assert_eq!(own.config().name, "own");
-        assert_eq!(own.config().actors, base.config().actors);
-        assert_eq!(own.config().fault.rear_object.len(), 1);
-        assert_ne!(own.config().sensors.mode, base.config().sensors.mode);
-        assert_eq!(own.config().sensors.tracker, base.config().sensors.tracker);
+        assert_eq!(derived.config().name, "own");
+        assert_eq!(derived.config().actors, base.config().actors);
+        assert_eq!(derived.config().fault.rear_object.len(), 1);
+        assert_ne!(derived.config().sensors.mode, base.config().sensors.mode);
+        assert_eq!(derived.config().sensors.tracker, base.config().sensors.tracker);
     }
 
     #[test]
     fn a_parameter_of_the_base_that_is_not_used_any_more_goes_and_an_own_one_is_refused() {
         let whole = super::library::text("overtake-without-brake").unwrap();
         let actors = &whole[whole.find("[[actor]]").unwrap()..whole.find("[sensors]").unwrap()];
-        let own = parse(&format!("base = \"low-thw-overtake\"\nname = \"own\"\n{actors}")).unwrap();
-        let names: Vec<String> = own.space().iter().map(|(name, _)| name.to_string()).collect();
+        let derived = parse(&format!("base = \"low-thw-overtake\"\nname = \"own\"\n{actors}")).unwrap();
+        let names: Vec<String> = derived.space().iter().map(|(name, _)| name.to_string()).collect();
         assert!(!names.contains(&"brake-phase".to_owned()) && names.contains(&"closing-mps".to_owned()), "{names:?}");
         let unused = "base = \"low-thw-overtake\"\nname = \"own\"\ntags = [\"$x\"]\nparameters.x = { uniform = { min = 0, max = 1 } }\n";
         let error = parse(unused).unwrap().refuse_unused().unwrap_err().to_string();

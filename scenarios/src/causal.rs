@@ -1,5 +1,5 @@
-//! What happened in a run, in one sentence: who struck whom, how long after which cause, what the margin increase system (MIS) did
-//! and why, and which faults held.
+//! The events of a run in one sentence: who struck whom, how long after which cause, the actions of
+//! the margin increase system (MIS) with their reasons, and the faults that held.
 //!
 //! ```text
 //!  R struck E from behind at 9.2 m/s (ΔV R 5.1, E 5.1 m/s) at 13.50 s, 4.5 s after F braked; the MIS stayed off: passing lane
@@ -17,7 +17,8 @@ use closecall_traffic::{ActorId, Time};
 use super::Scenario;
 use crate::outcome::{Collision, MisSummary, Moment, Outcome};
 
-/// The letters of the vehicles of an encounter: E is the ego, F the lead vehicle, R the rear vehicle. Any other vehicle has its name.
+/// The letters of the vehicles of an encounter: E is the ego, F the lead vehicle, R the rear
+/// vehicle. Any other vehicle has its name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VehicleLetters {
     lead: Option<ActorId>,
@@ -25,8 +26,8 @@ pub struct VehicleLetters {
 }
 
 impl VehicleLetters {
-    /// Returns the letters of a scenario: by convention the first vehicle besides the ego is the lead vehicle, and the second the
-    /// rear vehicle.
+    /// Returns the letters of a scenario: by convention the first vehicle besides the ego is the
+    /// lead vehicle, and the second the rear vehicle.
     pub fn of(scenario: &Scenario) -> Self {
         let mut others = scenario.actors.iter().enumerate().filter(|(index, _)| *index != scenario.ego);
         let mut next = || others.next().map(|(_, actor)| actor.id.clone());
@@ -47,7 +48,7 @@ impl VehicleLetters {
 /// The sentence about a run.
 #[derive(Clone, Copy, Debug)]
 pub struct CausalSentence<'a> {
-    /// What the run left behind.
+    /// The outcome of the run.
     pub outcome: &'a Outcome,
     /// The letters of its vehicles.
     pub letters: &'a VehicleLetters,
@@ -69,32 +70,32 @@ impl CausalSentence<'_> {
 
     /// Returns who struck whom: *R struck E*.
     pub fn who(&self, collision: &Collision) -> String {
-        let [one, other] = collision.roles().map(|role| self.letter(&collision.between[role]));
-        format!("{one} struck {other}")
+        let [striking, struck] = collision.roles().map(|role| self.letter(&collision.between[role]));
+        format!("{striking} struck {struck}")
     }
 
     /// Returns who struck whom on which side, and how fast: *R struck E from behind at 9.2 m/s*.
     pub fn struck(&self, collision: &Collision) -> String {
         let [striking, struck] = collision.roles();
         let [own_side, side] = [striking, struck].map(|role| collision.struck_side[role]);
-        let [one, other] = [striking, struck].map(|role| self.letter(&collision.between[role]));
+        let [striking_name, struck_name] = [striking, struck].map(|role| self.letter(&collision.between[role]));
         let how = match (own_side, side) {
-            (BoxSide::Front, BoxSide::Rear) => format!("struck {other} from behind"),
-            (BoxSide::Front, BoxSide::Front) => format!("struck {other} head-on"),
-            (BoxSide::Rear, BoxSide::Front) => format!("rolled back into the front of {other}"),
-            (_, BoxSide::Left) => format!("struck {other} on its left side"),
-            (_, BoxSide::Right) => format!("struck {other} on its right side"),
-            (_, BoxSide::Front) => format!("struck the front of {other}"),
-            (_, BoxSide::Rear) => format!("struck the rear of {other}"),
+            (BoxSide::Front, BoxSide::Rear) => format!("struck {struck_name} from behind"),
+            (BoxSide::Front, BoxSide::Front) => format!("struck {struck_name} head-on"),
+            (BoxSide::Rear, BoxSide::Front) => format!("rolled back into the front of {struck_name}"),
+            (_, BoxSide::Left) => format!("struck {struck_name} on its left side"),
+            (_, BoxSide::Right) => format!("struck {struck_name} on its right side"),
+            (_, BoxSide::Front) => format!("struck the front of {struck_name}"),
+            (_, BoxSide::Rear) => format!("struck the rear of {struck_name}"),
         };
-        format!("{one} {how} at {:.1} m/s", collision.relative_speed_mps)
+        format!("{striking_name} {how} at {:.1} m/s", collision.relative_speed_mps)
     }
 
     /// Returns the change of velocity of each vehicle: *ΔV R 5.1, E 5.1 m/s*.
     pub fn delta_v(&self, collision: &Collision) -> String {
         let texts = collision.roles().map(|role| (self.letter(&collision.between[role]), collision.delta_v_mps[role]));
-        let [(one, one_mps), (other, other_mps)] = texts;
-        format!("ΔV {one} {one_mps:.1}, {other} {other_mps:.1} m/s")
+        let [(striking, striking_mps), (struck, struck_mps)] = texts;
+        format!("ΔV {striking} {striking_mps:.1}, {struck} {struck_mps:.1} m/s")
     }
 
     /// Returns how long before the collision the lead vehicle began to brake.
@@ -107,7 +108,7 @@ impl CausalSentence<'_> {
         }
     }
 
-    /// Returns what the MIS did and why; nothing if the controller has none.
+    /// Returns the actions of the MIS with their reasons; nothing if the controller has none.
     fn mis(&self) -> Option<String> {
         let mis = self.outcome.mis.as_ref().ok()?;
         let gone = mis.unavailable.map_or_else(String::new, |gone| {
@@ -120,7 +121,7 @@ impl CausalSentence<'_> {
         Some(format!("{did}{gone}"))
     }
 
-    /// Returns how long before or after the braking the MIS engaged, and what it could do.
+    /// Returns how long before or after the braking the MIS engaged, and how much it could do.
     fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
         let when = self.outcome.moment(Moment::FrontBrakes).map_or_else(String::new, |time| {
             let before_s = time.s() - engaged_at_s;
@@ -148,7 +149,8 @@ impl CausalSentence<'_> {
     }
 }
 
-/// Returns the sentence about a run of a scenario, in which the command line may have set the mode of the sensors.
+/// Returns the sentence about a run of a scenario, in which the command line may have set the mode
+/// of the sensors.
 pub fn causal_sentence(scenario: &Scenario, sensors: Option<SensorMode>, outcome: &Outcome) -> String {
     let faults = sensors.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode)).stated_faults();
     let letters = VehicleLetters::of(scenario);

@@ -45,7 +45,7 @@ pub struct Scenario {
     pub parameters: Parameters,
     /// Step of the vehicle dynamics and the human drivers. The control step is a multiple of it.
     pub physics_step: Time,
-    /// The sample whose random numbers every run uses; `None` for those of the run itself.
+    /// The sample whose random numbers every run uses; `None` if each run uses its own.
     pub random_numbers: Option<RandomNumbersConfig>,
     /// Stages that are replaced by the truth, and injected faults.
     pub interventions: Interventions,
@@ -59,7 +59,8 @@ impl Scenario {
         &self.actors[self.ego].id
     }
 
-    /// Returns the vehicle of the actor with this index as it looks in a run: with what is drawn from its fleet, if it names one.
+    /// Returns the look of the actor with this index in a run. If the actor names a fleet, its look
+    /// is drawn from the fleet.
     pub fn vehicle(&self, actor: usize, key: RunKey) -> Vehicle {
         let key = self.random_numbers.map_or(key, |of| RunKey { seed: of.seed, sample: of.sample });
         let Actor { id, vehicle, fleet, .. } = &self.actors[actor];
@@ -104,8 +105,8 @@ impl Check for ScenarioConfig {
     }
 }
 
-/// Longest name of a scenario (bytes): `NAME-SAMPLE.rrd` and the name of a temporary file beside it fit into 255 bytes, which file systems
-/// allow.
+/// Longest name of a scenario (bytes): `NAME-SAMPLE.rrd` and the name of a temporary file beside it
+/// fit into 255 bytes, which file systems allow.
 const MOST_NAME_BYTES: usize = 120;
 
 impl ScenarioConfig {
@@ -121,7 +122,7 @@ impl ScenarioConfig {
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
         if self.name.len() > MOST_NAME_BYTES {
-            let allowed = format!("names of at most {MOST_NAME_BYTES} characters, of which files are named");
+            let allowed = format!("names of at most {MOST_NAME_BYTES} characters, which also name files");
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
         self.check_requirements()?;
@@ -135,7 +136,8 @@ impl ScenarioConfig {
         self.check_event_names()
     }
 
-    /// Checks that event names are unique across all actors, since logs and reports identify events by name.
+    /// Checks that event names are unique across all actors, since logs and reports identify events
+    /// by name.
     fn check_event_names(&self) -> Result<(), ConfigError> {
         let mut names = Vec::new();
         for (index, actor) in self.actors.iter().enumerate() {
@@ -169,7 +171,8 @@ impl ScenarioConfig {
         Ok(())
     }
 
-    /// Checks the criteria beyond their syntax: every check belongs to a requirement, and shares are from 0 to 1.
+    /// Checks the criteria beyond their syntax: every check belongs to a requirement, and shares
+    /// are from 0 to 1.
     fn check_criteria(&self) -> Result<(), ConfigError> {
         for mark in self.checks.keys() {
             if !self.requirements.contains(mark) {
@@ -292,7 +295,8 @@ impl ActorConfig {
     }
 }
 
-/// Rejects weaving that needs more lateral acceleration at the initial speed than drivers use on this road.
+/// Rejects weaving that needs more lateral acceleration at the initial speed than drivers use on
+/// this road.
 fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
     let largest_mps2 = keeping.map_or(0.0, |keeping| 3.0 * keeping.lateral_acceleration_sd_mps2(speed_mps));
     let grip_mps2 = lateral_grip_mps2(friction);

@@ -25,7 +25,8 @@ pub const SCHEMA_VERSION: u32 = 1;
 pub struct ScenarioConfig {
     /// Version of the file format: 1.
     pub schema_version: u32,
-    /// Name: lower-case letters, digits and hyphens. A campaign over a driver ensemble names its entries SCENARIO@MEMBER.
+    /// Name: lower-case letters, digits and hyphens. A campaign over a driver ensemble names its
+    /// entries SCENARIO@MEMBER.
     pub name: String,
     /// Description of the scenario, for readers.
     #[serde(default)]
@@ -33,28 +34,32 @@ pub struct ScenarioConfig {
     /// Tags by which scenarios are selected and grouped.
     #[serde(default)]
     pub tags: Vec<String>,
-    /// Identifiers of the requirements that the scenario tests, such as `MIS-1`. Reports state which of them are met.
+    /// Identifiers of the requirements that the scenario tests, such as `MIS-1`. Reports state
+    /// which of them are met.
     #[serde(default)]
     pub requirements: Vec<String>,
-    /// The function of the ego stack that the scenario judges. A campaign that names no controller runs it, and with a baseline the stack without it. Default:
-    /// mis.
+    /// The function of the ego stack that the scenario judges. A campaign that names no controller
+    /// runs it, and with a baseline the stack without it. Default: mis.
     #[serde(default, skip_serializing_if = "is_default")]
     pub function: Function,
-    /// The criteria that check each requirement, by its mark: `MIS-2 = ["upper(induced) <= 0.02"]`. They are judged in every
-    /// campaign, whatever its gates; a requirement without criteria is not checked.
+    /// The criteria that check each requirement, by its mark: `MIS-2 = ["upper(induced) <= 0.02"]`.
+    /// They are judged in every campaign, whatever its gates; a requirement without criteria is not
+    /// checked.
     #[serde(default)]
     pub checks: BTreeMap<String, Vec<Expression>>,
     /// The gates of campaigns with this scenario.
     #[serde(default)]
     pub gate: GateConfig,
-    /// What must happen in a run for it to count, such as `lead_braked`. A campaign in which it happens too seldom is invalid.
+    /// What must happen in a run for it to count, such as `lead_braked`. A campaign in which it
+    /// happens too seldom is invalid.
     #[serde(default)]
     pub expects: Vec<FlagName>,
-    /// Least share of the samples in which everything that is expected must happen (-). Default: 0.95.
+    /// Least share of the samples in which everything that is expected must happen (-). Default:
+    /// 0.95.
     #[serde(default = "default_expects_share")]
     pub expects_share: f64,
-    /// What settings of the command line weakened: checks, requirements, expectations. `--set` writes it, and a campaign with such a scenario does not
-    /// pass.
+    /// What settings of the command line weakened: checks, requirements, expectations. `--set`
+    /// writes it, and a campaign with such a scenario does not pass.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overridden: Vec<String>,
     /// What the samples should cover: bins of parameters, measures and attributes of the operational design domain, and crosses of
@@ -80,8 +85,8 @@ pub struct ScenarioConfig {
     /// The ego's sensors.
     #[serde(default)]
     pub sensors: SensorsConfig,
-    /// The sample whose random numbers every run uses, instead of those of its own seed and number. For cases that were made
-    /// from a sample.
+    /// The sample whose random numbers every run uses, instead of those of its own seed and number.
+    /// For cases that were made from a sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub random_numbers: Option<RandomNumbersConfig>,
     /// What a controller from outside needs to know of the scenario. Default: nothing.
@@ -194,19 +199,21 @@ pub struct AbsoluteStartConfig {
     pub speed_mps: Num,
 }
 
-/// A position and a speed relative to another actor. Give exactly one of `gap-m`, `thw-s` and `settled`, and exactly one of
-/// `speed-mps` and `closing-mps`.
+/// A position and a speed relative to another actor. Give exactly one of `gap-m`, `thw-s` and
+/// `settled`, and exactly one of `speed-mps` and `closing-mps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RelativeStartConfig {
     /// The other actor.
     pub of: ActorId,
-    /// Gap between the two vehicles, bumper to bumper (m). It is negative if they overlap lengthwise in different lanes.
+    /// Gap between the two vehicles, bumper to bumper (m). It is negative if they overlap
+    /// lengthwise in different lanes.
     pub gap_m: Option<Num>,
     /// Time headway between the two vehicles (s), with the speed of the vehicle that is behind.
     pub thw_s: Option<Num>,
-    /// `true`: the gap at which the driver of this actor follows in equilibrium, cc0 + cc1·v + cc2/2 or s₀ + T·v. The actor is
-    /// behind, and its driver follows by Wiedemann 99 or the Intelligent Driver Model.
+    /// `true`: the gap at which the driver of this actor follows in equilibrium, cc0 + cc1·v +
+    /// cc2/2 or s₀ + T·v. The actor is behind, and its driver follows by Wiedemann 99 or the
+    /// Intelligent Driver Model.
     pub settled: Option<bool>,
     /// Speed (m/s).
     pub speed_mps: Option<Num>,

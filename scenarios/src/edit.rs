@@ -1,7 +1,7 @@
 //! Changes single values of a scenario from the command line: `--set key=value`.
 //!
-//! A setting changes the text of the scenario. All later steps (checking, hashing, the campaign's manifest, replay) thus
-//! work on one text and need no special case.
+//! A setting changes the text of the scenario. All later steps (checking, hashing, the campaign's
+//! manifest, replay) thus work on one text and need no special case.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,8 +11,9 @@ use toml_edit::{ArrayOfTables, DocumentMut, Formatted, InlineTable, Item, TableL
 
 /// One `key=value` from the command line.
 ///
-/// The key is a path of keys joined by dots. An actor is identified by its id or by its index, from 0 (`actor.rear.…`,
-/// `actor.2.…`). A key without a dot that is the name of a parameter fixes that parameter: `brake-mps2=6`.
+/// The key is a path of keys joined by dots. An actor is identified by its id or by its index, from
+/// 0 (`actor.rear.…`, `actor.2.…`). A key without a dot that is the name of a parameter fixes that
+/// parameter: `brake-mps2=6`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     key: Vec<String>,
@@ -40,14 +41,14 @@ pub enum SettingError {
         value: String,
     },
     /// The scenario has no such key.
-    #[error("`{key}` leads nowhere: there is no {part}, only {known}{}", hint(part.trim_matches('`'), known))]
+    #[error("`{key}` leads nowhere: there is no {part}, only {names}{}", hint(part.trim_matches('`'), names))]
     NoSuchKey {
         /// The whole key.
         key: String,
         /// The part that was not found.
         part: String,
         /// The keys that exist there.
-        known: String,
+        names: String,
     },
 }
 
@@ -103,13 +104,14 @@ impl Setting {
         let mut table: &mut dyn TableLike = document.as_table_mut();
         let mut parents = parents.iter();
         while let Some(part) = parents.next() {
-            // Below the first level, a table that the file leaves out is created. Its content is checked like the rest.
+            // Below the first level, a table that the file leaves out is created. Its content is
+            // checked like the rest.
             let is_optional = *part != self.key[0] || OPTIONAL_TABLES.contains(&part.as_str());
             if !table.contains_key(part) && is_optional {
                 table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
             }
-            let known = keys(table);
-            let item = table.get_mut(part).ok_or_else(|| self.no_such_key(&format!("`{part}`"), known))?;
+            let names = keys(table);
+            let item = table.get_mut(part).ok_or_else(|| self.no_such_key(&format!("`{part}`"), names))?;
             table = match item {
                 Item::ArrayOfTables(tables) => self.element(part, tables, parents.next())?,
                 item => item
@@ -124,7 +126,8 @@ impl Setting {
         Ok(())
     }
 
-    /// Returns the element of an array of tables that the next part of the key identifies, by its id or by its index.
+    /// Returns the element of an array of tables that the next part of the key identifies, by its
+    /// id or by its index.
     fn element<'a>(
         &self,
         array: &str,
@@ -146,8 +149,8 @@ impl Setting {
         }
     }
 
-    fn no_such_key(&self, part: &str, known: String) -> SettingError {
-        SettingError::NoSuchKey { key: self.key.join("."), part: part.to_owned(), known }
+    fn no_such_key(&self, part: &str, names: String) -> SettingError {
+        SettingError::NoSuchKey { key: self.key.join("."), part: part.to_owned(), names }
     }
 
     /// Returns the value as TOML. A text that is not valid TOML becomes a string.

@@ -28,17 +28,19 @@ pub struct EventConfig {
 pub enum TriggerConfig {
     /// At a time after the start (s).
     AtS(Num),
-    /// At a time that depends on the start values only, so that it is the same whatever the ego does.
+    /// At a time that depends on the start values only, so that it is the same whatever the ego
+    /// does.
     NominalEncounter(NominalEncounterConfig),
-    /// When the time headway of the actor `from` to the actor `to`, ahead of it in its lane, falls below a value.
+    /// When the time headway of the actor `from` to the actor `to`, ahead of it in its lane, falls
+    /// below a value.
     ThwBelow(ThwBelowConfig),
     /// When an actor starts to change lanes in order to overtake.
     CutOutStarted(CutOutStartedConfig),
 }
 
-/// A time relative to the nominal encounter of two actors, which would both keep their start speeds. Phase 0 is the time at
-/// which `from` would arrive 100 m behind `to`, or the start of the run if it starts closer. Phase 1 is 6 s after the time
-/// at which `from` would reach `to`.
+/// A time relative to the nominal encounter of two actors, which would both keep their start
+/// speeds. Phase 0 is the time at which `from` would arrive 100 m behind `to`, or the start of the
+/// run if it starts closer. Phase 1 is 6 s after the time at which `from` would reach `to`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct NominalEncounterConfig {
@@ -164,7 +166,8 @@ const AFTER_ENCOUNTER_S: f64 = 6.0;
 /// Closing speed above which there is a nominal encounter (m/s).
 const SLOWEST_APPROACH_MPS: f64 = 0.1;
 
-/// The actors at the start of a run, to which a trigger may refer. All slices are in the order of the actors.
+/// The actors at the start of a run, to which a trigger may refer. All slices are in the order of
+/// the actors.
 pub(super) struct Start<'a> {
     pub(super) ids: &'a [&'a ActorId],
     pub(super) vehicles: &'a [Vehicle],
@@ -267,7 +270,8 @@ impl Effect {
         }
     }
 
-    /// Checks that an actor with this driver, which starts in lane `start` of `lanes`, can change lanes.
+    /// Checks that an actor with this driver, which starts in lane `start` of `lanes`, can change
+    /// lanes.
     pub(super) fn check_lane_change(
         self,
         (driver, start): (&DriverConfig, Lane),

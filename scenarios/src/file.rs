@@ -20,11 +20,13 @@ use super::{Scenario, ScenarioConfig, base, lidar_file, locate, overridden, reco
 /// Number of random samples that `check` checks in addition to the nominal values and the bounds.
 const CHECKED_SAMPLES: u64 = 64;
 
-/// Largest size of a scenario file (bytes). A scenario with minutes of recorded speeds has about 1 MiB.
+/// Largest size of a scenario file (bytes). A scenario with minutes of recorded speeds has about 1
+/// MiB.
 const MAX_FILE_BYTES: u64 = 64 << 20;
 
-/// Largest number of parameters. Each is checked at its bounds with the values of all others, so that time grows with the square of their
-/// number. An assumption: 30 times as many as any scenario of the library has.
+/// Largest number of parameters. Each is checked at its bounds with the values of all others, and
+/// the time grows with the square of their number. An assumption: 30 times as many as any scenario
+/// of the library has.
 const MOST_PARAMETERS: u64 = 1_000;
 
 /// A scenario file that cannot be used. No run has been started.
@@ -43,7 +45,8 @@ pub enum ScenarioError {
     Unknown {
         /// The name.
         name: String,
-        /// The end of the message, which names a similar scenario of the library; empty if there is none.
+        /// The end of the message, which names a similar scenario of the library; empty if there is
+        /// none.
         suggestion: String,
     },
     /// The file is not UTF-8 text.
@@ -90,7 +93,8 @@ pub enum ScenarioError {
         /// The parameter values for which the check failed; empty if there are no parameters.
         at: String,
     },
-    /// A parameter is sampled, and no value of the scenario uses it: its samples would differ in nothing that a run could show.
+    /// A parameter is sampled, and no value of the scenario uses it: its samples would differ in
+    /// nothing that a run could show.
     #[error("failed to check {}{}: unused parameter: `{name}` is sampled, but no value uses it: write \"${name}\" where its value belongs, or remove it", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     UnusedParameter {
         /// The file.
@@ -152,8 +156,8 @@ impl ScenarioFile {
     /// Reads a file, applies `settings` to it, and checks its keys.
     ///
     /// # Errors
-    /// [`ScenarioError`] if the file cannot be read or parsed, if a setting cannot be applied, or if a distribution is
-    /// invalid.
+    /// [`ScenarioError`] if the file cannot be read or parsed, if a setting cannot be applied, or
+    /// if a distribution is invalid.
     pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
         let bytes = read_bounded(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
         if bytes.len() as u64 > MAX_FILE_BYTES {
@@ -166,8 +170,8 @@ impl ScenarioFile {
         Self::parse(path, &text, settings)
     }
 
-    /// Parses the text of a scenario file, applies `settings` to it, and checks its keys. `path` appears in error messages,
-    /// and trajectory files are found relative to its folder.
+    /// Parses the text of a scenario file, applies `settings` to it, and checks its keys. `path`
+    /// appears in error messages, and trajectory files are found relative to its folder.
     ///
     /// # Errors
     /// [`ScenarioError`], as for [`Self::load`].
@@ -208,7 +212,8 @@ impl ScenarioFile {
                 at: String::new(),
             });
         }
-        // A setting may replace the only use of a parameter. Only a parameter that the file itself does not use is a mistake.
+        // A setting may replace the only use of a parameter. Only a parameter that the file itself
+        // does not use is a mistake.
         let unused = unused_parameter(&config, text);
         let mut text = text.to_owned();
         if !settings.is_empty() {
@@ -253,7 +258,8 @@ impl ScenarioFile {
         })
     }
 
-    /// Returns the same file with another text, whose keys are checked. Settings and trajectory files stay as they are.
+    /// Returns the same file with another text, whose keys are checked. Settings and trajectory
+    /// files stay as they are.
     ///
     /// # Errors
     /// [`ScenarioError`] if the text is not a scenario, or if a distribution is invalid.
@@ -297,13 +303,15 @@ impl ScenarioFile {
         &self.space
     }
 
-    /// Returns whether some sample may have this pipeline of the rear camera: the file names it, or a parameter can.
+    /// Returns whether some sample may have this pipeline of the rear camera: the file names it, or
+    /// a parameter can.
     pub fn may_have_pipeline(&self, pipeline: Pipeline) -> bool {
         let choice = &self.config.sensors.rear_camera.pipeline;
         self.space.extremes().any(|parameters| parameters.word(choice, "pipeline") == Ok(pipeline))
     }
 
-    /// Returns whether some sample may have this mode of the sensors, unless a command asks for the mode `asked`.
+    /// Returns whether some sample may have this mode of the sensors, unless a command asks for the
+    /// mode `asked`.
     pub fn may_have_mode(&self, mode: SensorMode, asked: Option<SensorMode>) -> bool {
         let choice = &self.config.sensors.mode;
         asked.map_or_else(
@@ -312,7 +320,8 @@ impl ScenarioFile {
         )
     }
 
-    /// Refuses a file with a parameter that no value uses. The text of a saved campaign may have one, if a setting has replaced its only use.
+    /// Refuses a file with a parameter that no value uses. The text of a saved campaign may have
+    /// one, if a setting has replaced its only use.
     ///
     /// # Errors
     /// [`ScenarioError::UnusedParameter`] for the first such parameter.
@@ -339,7 +348,7 @@ impl ScenarioFile {
         self.concrete_at(parameters, &[])
     }
 
-    /// Does what [`Self::concrete`] does. The message of an error has the values of `named`, too.
+    /// Works like [`Self::concrete`]. The message of an error has the values of `named`, too.
     fn concrete_at(&self, parameters: &Parameters, named: &[String]) -> Result<Scenario, ScenarioError> {
         self.config.check(parameters).map_err(|source| {
             let near = match parameters_near(&self.text, &source.path) {
@@ -357,8 +366,8 @@ impl ScenarioFile {
         ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at }
     }
 
-    /// Checks the scenario with the median of every parameter, with each parameter at each of its bounds, and with 64
-    /// random samples.
+    /// Checks the scenario with the median of every parameter, with each parameter at each of its
+    /// bounds, and with 64 random samples.
     ///
     /// # Errors
     /// [`ScenarioError::Value`] for the first of these scenarios that is not valid.
@@ -383,9 +392,10 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Returns the names of the parameters that a value uses, or else those of the nearest table around it that uses some. The whole
-/// file does not count: its parameters would hide the one that matters. Returns `None` for a value that is not in the file but
-/// follows from others, which may use any parameter.
+/// Returns the names of the parameters that a value uses, or else the parameters of the nearest
+/// table around it that uses some. The whole file does not count: its parameters would hide the one
+/// that matters. Returns `None` for a value that is not in the file but follows from others, which
+/// may use any parameter.
 fn parameters_near(text: &str, path: &KeyPath) -> Option<Vec<String>> {
     let root = toml::Value::Table(toml::from_str::<toml::Table>(text).ok()?);
     let mut around = vec![&root];
@@ -434,7 +444,7 @@ fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, Scenar
     Ok(document.to_string())
 }
 
-/// Returns the text with the list of what its settings weakened.
+/// Returns the text with the list of the demands that its settings weakened.
 fn with_overridden(text: &str, weakened: &[String]) -> String {
     let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
     document.insert(overridden::KEY, toml_edit::value(toml_edit::Array::from_iter(weakened)));
@@ -497,12 +507,12 @@ fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
     }
 }
 
-/// Returns the known word that the message's first word resembles, as the end of the message. The message is serde's:
-/// "unknown field `x`, expected one of `a`, `b`".
+/// Returns the known word that the message's first word resembles, as the end of the message. The
+/// message is serde's: "unknown field `x`, expected one of `a`, `b`".
 fn suggestion(message: &str) -> String {
     let is_unknown_word = message.starts_with("unknown field ") || message.starts_with("unknown variant ");
     match (message.split('`').nth(1), message.split_once("expected ")) {
-        (Some(word), Some((_, known))) if is_unknown_word => hint(word, known),
+        (Some(word), Some((_, names))) if is_unknown_word => hint(word, names),
         _ => String::new(),
     }
 }
@@ -516,16 +526,17 @@ fn without_rust_types(message: &str) -> String {
         ("f64", "a number"),
         ("a sequence", "a list"),
     ];
-    let Some((found, expected)) = message.split_once("expected ") else { return message.to_owned() };
+    let Some((beginning, expected)) = message.split_once("expected ") else { return message.to_owned() };
     let plain = WORDS.iter().find(|(rust, _)| expected.trim_end() == *rust).map(|(_, plain)| *plain);
     match plain {
-        Some(plain) => format!("{found}expected {plain}"),
-        None if expected.starts_with("struct ") => format!("{found}expected a table of keys"),
+        Some(plain) => format!("{beginning}expected {plain}"),
+        None if expected.starts_with("struct ") => format!("{beginning}expected a table of keys"),
         None => message.to_owned(),
     }
 }
 
-/// Returns the key at a byte offset, or the last key before it on its line, for messages that have only a position.
+/// Returns the key at a byte offset, or the last key before it on its line, for messages that have
+/// only a position.
 fn key_at(text: &str, offset: usize) -> Option<String> {
     let offset = offset.min(text.len());
     let start = text[..offset].rfind(['\n', '{', ',']).map_or(0, |delimiter| delimiter + 1);

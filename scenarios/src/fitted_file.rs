@@ -1,8 +1,11 @@
-//! Fitted distributions in place of those of a scenario: a file that `closecall traffic fit` wrote, or one of the same form.
+//! Fitted distributions that replace the distributions of a scenario: a file that
+//! `closecall traffic fit` wrote, or a file of the same form.
 //!
-//! A parameter takes the distribution of the entry that was fitted to the same values: to the same quantity in the same range. Without
-//! one, it takes the entry of its name. A log-normal distribution that the scenario cuts takes the log-normal form of the file, and
-//! keeps its cut. The replacement is a [`Setting`], so that manifests, recordings and JSON state it, with the hash of the file.
+//! A parameter takes the distribution of the entry that was fitted to the same values: to the same
+//! quantity in the same range. Without one, it takes the entry of its name. A log-normal
+//! distribution that the scenario cuts takes the log-normal form of the file, and keeps its cut.
+//! The replacement is a [`Setting`], so that manifests, recordings and JSON state it, with the hash
+//! of the file.
 
 use std::path::{Path, PathBuf};
 
@@ -69,21 +72,22 @@ impl FittedFile {
     /// Returns the settings that give the parameters of a scenario the distributions of this file.
     ///
     /// # Errors
-    /// [`ScenarioError`] if an entry of the file is neither a parameter of the scenario nor a quantity of `traffic fit`, or if no
-    /// parameter takes a distribution.
+    /// [`ScenarioError`] if an entry of the file is neither a parameter of the scenario nor a
+    /// quantity of `traffic fit`, or if no parameter takes a distribution.
     pub fn settings(&self, scenario: &ScenarioFile) -> Result<Vec<Setting>, ScenarioError> {
-        let own = &scenario.config().parameters.0;
-        let allowed = || own.keys().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        let parameters = &scenario.config().parameters.0;
+        let allowed = || parameters.keys().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let name = &scenario.config().name;
         let refuse = |message: String| ScenarioError::Syntax { path: self.path.clone(), line: 1, message };
         let is_known = |entry: &str| {
-            own.keys().any(|known| known.as_str() == entry) || Quantity::ALL.iter().any(|known| known.name() == entry)
+            parameters.keys().any(|parameter| parameter.as_str() == entry)
+                || Quantity::ALL.iter().any(|quantity| quantity.name() == entry)
         };
         if let Some(unknown) = self.parameters.0.keys().find(|entry| !is_known(entry.as_str())) {
             return Err(refuse(format!("`{unknown}` is no parameter of {name}: allowed are {}", allowed())));
         }
         let mut settings = Vec::new();
-        for (parameter, config) in own {
+        for (parameter, config) in parameters {
             if let Some(replacement) = self.replacement(parameter.as_str(), config) {
                 let value = toml::Value::try_from(&replacement).map_err(|error| refuse(error.to_string()))?;
                 let setting = format!("parameters.{parameter}={value}").parse::<Setting>();
@@ -100,7 +104,7 @@ impl FittedFile {
     fn replacement(&self, name: &str, config: &ParameterConfig) -> Option<ParameterConfig> {
         let wanted = FittedTo::of(name, config);
         let same = |(entry, other): &(&_, &ParameterConfig)| FittedTo::of(as_str(entry), other) == wanted;
-        let (entry, found) = self
+        let (entry, entry_config) = self
             .parameters
             .0
             .iter()
@@ -114,10 +118,10 @@ impl FittedFile {
                 let log_normal = super::parameters::LogNormalConfig { min: cut.min, max: cut.max, ..log_normal };
                 (ParameterConfig { log_normal: Some(log_normal), ..form.clone() }, ", with the cut of the scenario")
             }
-            _ => (found.clone(), ""),
+            _ => (entry_config.clone(), ""),
         };
         if let Some(fitted) = &mut taken.fitted {
-            let FittedTo { quantity, cut } = FittedTo::of(entry.as_str(), found);
+            let FittedTo { quantity, cut } = FittedTo::of(entry.as_str(), entry_config);
             (fitted.quantity, fitted.cut) = (Some(quantity.to_owned()), cut);
         }
         // The correlations of the file are with its other entries, which the scenario may not have.
@@ -154,13 +158,13 @@ mod tests {
         let text = library::text("low-thw-overtake").unwrap();
         let file = ScenarioFile::parse(Path::new("a.toml"), text, &settings).unwrap();
         let config =
-            |name: &str| file.config().parameters.0.iter().find(|(known, _)| known.as_str() == name).unwrap().1;
+            |name: &str| file.config().parameters.0.iter().find(|(parameter, _)| parameter.as_str() == name).unwrap().1;
         let [before, after] = [headline().config().clone(), file.config().clone()].map(|config| config.parameters);
         for name in ["front-thw-s", "lane-change-duration-s"] {
-            let of = |all: &ParametersConfig| {
-                all.0.iter().find(|(known, _)| known.as_str() == name).unwrap().1.empirical.clone().unwrap()
+            let quantiles = |all: &ParametersConfig| {
+                all.0.iter().find(|(parameter, _)| parameter.as_str() == name).unwrap().1.empirical.clone().unwrap()
             };
-            assert_eq!(of(&before), of(&after), "{name}: the library was fitted to the same file");
+            assert_eq!(quantiles(&before), quantiles(&after), "{name}: the library was fitted to the same file");
         }
         // The cut of the headway at the crossing is a choice of the scenario.
         let cut_out = config("cut-out-thw-s");

@@ -1,13 +1,13 @@
-//! Fleets: how the vehicles on a road look. A vehicle that names a fleet draws its paint, colour, body shape and plate anew in each
-//! sample.
+//! Fleets: how the vehicles on a road look. A vehicle that names a fleet draws its paint, colour,
+//! body shape and plate anew in each sample.
 //!
 //! ```text
 //!  library/fleets/NAME.toml ─▶ Fleet ─(seed, sample, name of the actor)─▶ paint, colour, shape, height, plate
 //! ```
 //!
-//! What is drawn decides what sensors perceive, and nothing else: length, width and mass stay as they are, so that neither
-//! positions nor contacts depend on it. It comes from a random stream of its own, and so changes no other number of a sample.
-//! What the scenario file gives for a vehicle is kept.
+//! The drawn look decides the sensors' view, and nothing else: length, width and mass stay, and
+//! neither positions nor contacts depend on the look. The look comes from a separate random stream,
+//! and changes no other number of a sample. Values of the scenario file for a vehicle are kept.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -28,7 +28,7 @@ const MIN_SOURCE_LEN: usize = 20;
 /// The texts of the fleets.
 const TEXTS: [&str; 1] = [include_str!("../library/fleets/germany.toml")];
 
-/// The fleets that ship. A test reads each of them, so that none is left out here.
+/// The fleets that ship. A test reads each of them, and none is left out here.
 static FLEETS: LazyLock<Vec<Fleet>> =
     LazyLock::new(|| TEXTS.iter().filter_map(|text| Fleet::parse(text).ok()).collect());
 
@@ -157,7 +157,7 @@ impl Fleet {
     /// Parses and checks the text of a fleet.
     ///
     /// # Errors
-    /// A message that names the key and what is allowed.
+    /// A message that names the key and the allowed values.
     fn parse(text: &str) -> Result<Self, String> {
         let fleet: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         let shares = [fleet.plates.clean, fleet.plates.dirty, fleet.plates.none];

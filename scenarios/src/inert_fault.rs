@@ -9,13 +9,15 @@ use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Proble
 use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
 use super::intervention::FaultConfig;
 
-/// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, those of a front radar that a
-/// LiDAR replaces and of a front LiDAR that does not exist, blocked sectors outside of the field of view, mirror images without guard rails,
-/// glare of a source that does not shine into the camera, and entries that begin when the run has ended.
+/// Refuses faults that cannot act: faults of sensors that do not exist in the mode of the scenario,
+/// of a front radar that a LiDAR replaces, and of a front LiDAR that does not exist, blocked
+/// sectors outside of the field of view, mirror images without guard rails, glare of a source that
+/// does not shine into the camera, and entries that begin after the end of the run.
 ///
-/// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes, and so is one with
-/// faults both of the LiDAR and of the radar that look ahead. A mode that the
-/// command line gives is checked by [`ScenarioFile::check_faults_in`](crate::ScenarioFile::check_faults_in).
+/// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant
+/// for both modes, and so is one with faults both of the LiDAR and of the radar that look ahead. A
+/// mode that the command line gives is checked by
+/// [`ScenarioFile::check_faults_in`](crate::ScenarioFile::check_faults_in).
 pub(super) fn refuse(
     fault: &FaultConfig,
     (sensors, road, environment): (&Sensors, &Road, &Environment),
@@ -40,12 +42,12 @@ pub(super) fn refuse(
         }
         Ok(())
     };
-    refuse_late("rear-lidar", &mut fault.rear_lidar.iter().map(|of| &of.from_s))?;
-    refuse_late("front-lidar", &mut fault.front_lidar.iter().map(|of| &of.from_s))?;
-    refuse_late("rear-camera", &mut fault.rear_camera.iter().map(|of| &of.from_s))?;
-    refuse_late("front-radar", &mut fault.front_radar.iter().map(|of| &of.from_s))?;
-    refuse_late("surround", &mut fault.surround.iter().map(|of| &of.from_s))?;
-    refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))?;
+    refuse_late("rear-lidar", &mut fault.rear_lidar.iter().map(|entry| &entry.from_s))?;
+    refuse_late("front-lidar", &mut fault.front_lidar.iter().map(|entry| &entry.from_s))?;
+    refuse_late("rear-camera", &mut fault.rear_camera.iter().map(|entry| &entry.from_s))?;
+    refuse_late("front-radar", &mut fault.front_radar.iter().map(|entry| &entry.from_s))?;
+    refuse_late("surround", &mut fault.surround.iter().map(|entry| &entry.from_s))?;
+    refuse_late("rear-object", &mut fault.rear_object.iter().map(|entry| &entry.from_s))?;
     refuse_of_objects(fault, sensors, parameters)?;
     match &fault.odometry {
         Some(odometry) => refuse_of_map(odometry, (sensors, road), duration_s, parameters),
@@ -53,9 +55,10 @@ pub(super) fn refuse(
     }
 }
 
-/// Refuses names that no LiDAR has, blocked sectors outside of the field of view of a LiDAR, and mirror images without guard rails.
+/// Refuses names that no LiDAR has, blocked sectors outside of the field of view of a LiDAR, and
+/// mirror images without guard rails.
 fn refuse_of_lidars(
-    (of, entries): (&str, &[LidarFaultConfig]),
+    (sensor, entries): (&str, &[LidarFaultConfig]),
     lidars: &[Lidar],
     road: &Road,
     parameters: &Parameters,
@@ -65,18 +68,18 @@ fn refuse_of_lidars(
         let half_deg = lidars.iter().filter(is_meant).map(Lidar::half_field_deg).fold(f64::INFINITY, f64::min);
         if !half_deg.is_finite() {
             let names: Vec<&str> = lidars.iter().map(Lidar::name).collect();
-            let rule = format!("no such LiDAR is called that, but `{}`", names.join("`, `"));
+            let rule = format!("no such LiDAR has this name, only `{}`", names.join("`, `"));
             let problem = Problem::Contradiction { other: "sensors", rule };
-            return Err(at(of, index, ConfigError::new("sensor", problem)));
+            return Err(at(sensor, index, ConfigError::new("sensor", problem)));
         }
         for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
             let within = Range::closed(-half_deg, half_deg);
-            parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at(of, index, error))?;
+            parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at(sensor, index, error))?;
         }
         let share = parameters.number_or(entry.rail_ghosts.as_ref(), "rail-ghosts", Range::closed(0.0, 1.0), 0.0);
-        if share.map_err(|error| at(of, index, error))? > 0.0 && !road.has_guard_rails() {
+        if share.map_err(|error| at(sensor, index, error))? > 0.0 && !road.has_guard_rails() {
             let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
-            return Err(at(of, index, error));
+            return Err(at(sensor, index, error));
         }
     }
     Ok(())
@@ -141,14 +144,14 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
             has_front_lidar && sensors.full_model().front_lidar.is_none(),
             "front-lidar",
             "sensors.front-lidar",
-            "no LiDAR looks ahead: the radar's faults are those of `fault.front-radar`",
+            "no LiDAR looks ahead: the radar's faults belong to `fault.front-radar`",
         ),
         (has_front_lidar && mode != SensorMode::Full && !is_front_for_both, "front-lidar", MODE, full_only),
         (
             has_front_radar && sensors.full_model().front_lidar.is_some() && !is_front_for_both,
             "front-radar",
             "sensors.front-lidar",
-            "in mode `full`, a LiDAR looks ahead in place of the radar: its faults are those of `fault.front-lidar`",
+            "in mode `full`, a LiDAR looks ahead in place of the radar: its faults belong to `fault.front-lidar`",
         ),
         (
             has_camera && camera_is_off,
@@ -178,7 +181,7 @@ mod tests {
 
     use crate::{ScenarioFile, library};
 
-    /// Returns what the check says of the shipped scenario with these keys added.
+    /// Returns the answer of the check to the shipped scenario with these keys added.
     fn check(keys: &str) -> Result<(), String> {
         let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{keys}");
         let file = ScenarioFile::parse(&library::path("own"), &text, &[]).map_err(|error| error.to_string())?;

@@ -7,19 +7,20 @@ use closecall_traffic::{ConfigError, Num, Parameters, Range, Road};
 use super::inert_fault::{at, contradiction};
 use super::intervention::FaultConfig;
 
-/// Refuses blocked sectors outside of the field of view of a sensor, and noise of a speed that the sensor does not measure.
+/// Refuses blocked sectors outside of the field of view of a sensor, and noise of a speed that the
+/// sensor does not measure.
 pub(super) fn refuse_of_objects(
     fault: &FaultConfig,
     sensors: &Sensors,
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     let model = sensors.full_model();
-    let of: [(&str, &[ObjectFaultConfig], &ObjectSensorModel, &'static str); 3] = [
+    let sensors_with_faults: [(&str, &[ObjectFaultConfig], &ObjectSensorModel, &'static str); 3] = [
         ("front-radar", &fault.front_radar, &model.front_radar, "sensors.front-radar.speed-sd-mps"),
         ("surround", &fault.surround, &model.surround, "sensors.surround.speed-sd-mps"),
         ("rear-object", &fault.rear_object, sensors.rear_object(), "sensors.rear-object.speed-sd-mps"),
     ];
-    for (key, entries, model, speed_key) in of {
+    for (key, entries, model, speed_key) in sensors_with_faults {
         let half_deg = model.half_angle_deg().unwrap_or(180.0);
         let within = Range::closed(-half_deg, half_deg);
         for (index, entry) in entries.iter().enumerate() {
@@ -37,8 +38,8 @@ pub(super) fn refuse_of_objects(
     Ok(())
 }
 
-/// Refuses errors of the map that begin when the run has ended, that no sensor could show, that make a road which the models do not
-/// cover, and guard rails that are missing where none stand.
+/// Refuses errors of the map that begin after the end of the run, that no sensor could show, or
+/// that make a road which the models do not cover, and missing guard rails on a road without any.
 pub(super) fn refuse_of_map(
     odometry: &OdometryErrorConfig,
     (sensors, road): (&Sensors, &Road),
@@ -80,7 +81,7 @@ pub(super) fn refuse_of_map(
 mod tests {
     use crate::{ScenarioFile, library};
 
-    /// Returns what the check says of the shipped scenario with these keys added.
+    /// Returns the answer of the check to the shipped scenario with these keys added.
     fn check(keys: &str) -> Result<(), String> {
         let mode = if keys.contains("sensors.mode") { "" } else { "sensors.mode = \"object\"\n" };
         let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{mode}{keys}");

@@ -1,12 +1,14 @@
-//! Interventions in a scenario: stages of the chain from sensors to drivers that are replaced by the truth, and injected faults.
+//! Interventions in a scenario: stages of the chain from sensors to drivers that are replaced by
+//! the truth, and injected faults.
 //!
 //! ```text
 //!  points ─▶ clusters ─▶ class ─▶ tracks ─▶ timing ─▶ (controller) ─▶ actuation ─▶ rear reaction ─▶ lead braking
 //! ```
 //!
-//! A run in which one stage is ideal and all else is as before shows whether that stage has caused a failure. An injected
-//! fault is the opposite: it causes failures of a known cause. Both are values of the scenario, so that `--set ideal.class=true`
-//! repeats such a run. Neither changes the sampled values or the random numbers of other stages.
+//! A run in which one stage is ideal and all else is as before shows whether that stage has caused
+//! a failure. An injected fault is the opposite: it causes failures of a known cause. Both are
+//! values of the scenario, so that `--set ideal.class=true` repeats such a run. Neither changes the
+//! sampled values or the random numbers of other stages.
 
 use closecall_controllers::{CheckedDriver, EgoState, ReactionChange};
 use closecall_sensors::Alterations;
@@ -19,7 +21,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Actor, Effect};
 
-/// Longest additional latency and longest additional reaction time (s): those that the models have memory for.
+/// Longest additional latency and longest additional reaction time (s): those that the models have
+/// memory for.
 const MAX_LATENCY_S: f64 = 0.4;
 const MAX_REACTION_S: f64 = 3.0;
 
@@ -58,13 +61,16 @@ impl MisState {
     }
 }
 
-/// Stages that are replaced by the truth. A stage that the sensors of the run do not have changes nothing.
+/// Stages that are replaced by the truth. A stage that the sensors of the run do not have changes
+/// nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct IdealConfig {
-    /// The rear LiDAR measures every vehicle in its line of sight, without noise, losses or weather. Sensor mode `full`.
+    /// The rear LiDAR measures every vehicle in its line of sight, without noise, losses or
+    /// weather. Sensor mode `full`.
     pub points: bool,
-    /// The points of each vehicle form one cluster, whose box is that of the vehicle. Sensor mode `full`.
+    /// The points of each vehicle form one cluster, whose box is that of the vehicle. Sensor mode
+    /// `full`.
     pub clusters: bool,
     /// The class of every vehicle behind the ego is known.
     pub class: bool,
@@ -86,16 +92,18 @@ pub struct IdealConfig {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct FaultConfig {
-    /// Additional latency of all sensors (s): 0, or 0.04 to 0.4, rounded to the nearest control step of 0.04 s: 0.1 s is three steps,
-    /// 0.12 s. No sensor is later than 0.4 s.
+    /// Additional latency of all sensors (s): 0, or 0.04 to 0.4, rounded to the nearest control
+    /// step of 0.04 s: 0.1 s is three steps, 0.12 s. No sensor is later than 0.4 s.
     pub delay_s: Option<Num>,
     /// Every vehicle behind the ego is classified as background.
     pub class_background: bool,
-    /// Additional reaction time of drivers who start behind the ego (s). No driver needs more than 3 s.
+    /// Additional reaction time of drivers who start behind the ego (s). No driver needs more than
+    /// 3 s.
     pub rear_reaction_s: Option<Num>,
     /// Faults of the rear LiDAR, at most four: sensor mode `full`.
     pub rear_lidar: Vec<LidarFaultConfig>,
-    /// Faults of the LiDAR that looks ahead, at most four: sensor mode `full` with `sensors.front-lidar`.
+    /// Faults of the LiDAR that looks ahead, at most four: sensor mode `full` with
+    /// `sensors.front-lidar`.
     pub front_lidar: Vec<LidarFaultConfig>,
     /// Faults of the rear camera, at most four: sensor mode `full`.
     pub rear_camera: Vec<CameraFaultConfig>,
@@ -103,7 +111,8 @@ pub struct FaultConfig {
     pub front_radar: Vec<ObjectFaultConfig>,
     /// Faults of the surround sensors, at most four.
     pub surround: Vec<ObjectFaultConfig>,
-    /// Faults of the object-level sensor that replaces LiDAR and camera in mode `object`, at most four.
+    /// Faults of the object-level sensor that replaces LiDAR and camera in mode `object`, at most
+    /// four.
     pub rear_object: Vec<ObjectFaultConfig>,
     /// Errors of the ego's odometry and map. The ego does not know them. Default: none.
     pub odometry: Option<OdometryErrorConfig>,

@@ -5,8 +5,9 @@
 //!          text, checked keys                         numbers, checked ranges
 //! ```
 //!
-//! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled. The parameter values of
-//! one sample turn it into a *concrete* scenario, [`Scenario`], which is valid by construction.
+//! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled.
+//! The parameter values of one sample turn it into a *concrete* scenario, [`Scenario`], which is
+//! valid by construction.
 //!
 //! * [`parameters`], [`sampling`]: the distributions of the parameters, and the designs that draw from them
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall

@@ -44,10 +44,12 @@ const LIBRARY: [(&str, &str); 17] = embedded![
 const TRAFFIC: [(&str, &str); 4] =
     embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic", "trucks-alongside"];
 
-/// The scenarios of the folder `as-recorded`: the headline with the distributions of the recordings, uncut.
+/// The scenarios of the folder `as-recorded`: the headline with the distributions of the
+/// recordings, uncut.
 const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtake-as-recorded"];
 
-/// The scenarios of the folders `aeb` and `acc` of the library: those that judge emergency braking and adaptive cruise control.
+/// The scenarios of the folders `aeb` and `acc` of the library, which judge emergency braking and
+/// adaptive cruise control.
 const AEB: [(&str, &str); 2] = embedded!["aeb": "aeb-lead-brakes", "aeb-lead-brakes-gently"];
 const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehicle-ahead"];
 
@@ -145,7 +147,8 @@ static EXPANDED_FAULTS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     FAULTS.iter().map(|(name, text)| (*name, whole(text))).collect()
 });
 
-/// Returns all scenarios: those with surrounding traffic, those of other functions, and those with faults last.
+/// Returns all scenarios: first the ones with surrounding traffic, then other functions, and
+/// scenarios with faults last.
 fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
     plain().chain(EXPANDED_FAULTS.iter().map(|(name, text)| (*name, text.as_str())))
 }
@@ -160,24 +163,26 @@ pub(super) fn plain_names() -> impl Iterator<Item = &'static str> {
     plain().map(|(name, _)| name)
 }
 
-/// Returns the text of a scenario that can be a base, or `None` if the library has none of that name.
+/// Returns the text of a scenario that can be a base, or `None` if the library has none of that
+/// name.
 pub(super) fn plain_text(name: &str) -> Option<&'static str> {
-    plain().find(|(known, _)| *known == name).map(|(_, text)| text)
+    plain().find(|(scenario, _)| *scenario == name).map(|(_, text)| text)
 }
 
-/// A name that is not that of a scenario of the library.
+/// A name that no scenario of the library has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the library has no scenario `{name}`, only {known}{}", suggestion(name))]
+#[error("the library has no scenario `{name}`, only {names}{}", suggestion(name))]
 pub struct UnknownScenario {
     /// The name.
     pub name: String,
     /// The names of the library, separated by commas.
-    pub known: String,
+    pub names: String,
 }
 
-/// Returns the end of a message that suggests a name of the library, or an empty text if none is similar.
+/// Returns the end of a message that suggests a name of the library, or an empty text if none is
+/// similar.
 pub(crate) fn suggestion(name: &str) -> String {
-    nearest(name, names()).map(|known| format!("; did you mean `{known}`?")).unwrap_or_default()
+    nearest(name, names()).map(|candidate| format!("; did you mean `{candidate}`?")).unwrap_or_default()
 }
 
 /// A scenario of the library, as a list of the library describes it.
@@ -221,8 +226,8 @@ impl LibraryEntry {
     }
 }
 
-/// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic and then those with faults
-/// last.
+/// Returns the names of the scenarios in alphabetical order: first the plain ones, then the ones
+/// with surrounding traffic, and the ones with faults last.
 pub fn names() -> impl Iterator<Item = &'static str> {
     plain_names().chain(FAULTS.into_iter().map(|(name, _)| name))
 }
@@ -230,10 +235,11 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
     // Without the scenarios with faults, which are put together from their bases, if possible.
-    plain_text(name).or_else(|| all().find(|(known, _)| *known == name).map(|(_, text)| text))
+    plain_text(name).or_else(|| all().find(|(scenario, _)| *scenario == name).map(|(_, text)| text))
 }
 
-/// Returns the path by which messages and manifests name a scenario of the library. No such file is read.
+/// Returns the path by which messages and manifests name a scenario of the library. No such file is
+/// read.
 pub fn path(name: &str) -> PathBuf {
     PathBuf::from(format!("library/{name}.toml"))
 }
@@ -252,7 +258,7 @@ pub fn entries() -> Result<Vec<LibraryEntry>, ScenarioError> {
 /// [`UnknownScenario`] if the library has no scenario `from`.
 pub fn copy_of(from: &str, name: &str) -> Result<String, UnknownScenario> {
     let text = text(from)
-        .ok_or_else(|| UnknownScenario { name: from.to_owned(), known: names().collect::<Vec<_>>().join(", ") })?;
+        .ok_or_else(|| UnknownScenario { name: from.to_owned(), names: names().collect::<Vec<_>>().join(", ") })?;
     Ok(text.replace(&format!("name = \"{from}\""), &format!("name = \"{name}\"")))
 }
 

@@ -1,7 +1,7 @@
-//! LiDARs whose scan pattern is a file of its own. It is read together with the scenario file.
+//! LiDARs whose scan pattern is a separate file. It is read together with the scenario file.
 //!
-//! The contents of the file replace `pattern-file` in the text of the scenario. All later steps (checking, hashing, a campaign's
-//! manifest, replay) do not need the file.
+//! The contents of the file replace `pattern-file` in the text of the scenario. All later steps
+//! (checking, hashing, a campaign's manifest, replay) do not need the file.
 
 use std::path::Path;
 
@@ -19,7 +19,8 @@ const KEYS: [&str; 2] = ["pattern-file", "pattern"];
 /// the scenario file.
 ///
 /// # Errors
-/// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong key.
+/// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong
+/// key.
 pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, ScenarioError> {
     let mut document: Option<DocumentMut> = None;
     for ((key, index), lidar) in lidars(config) {
@@ -51,7 +52,7 @@ pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Re
     Ok(document.map(|document| document.to_string()))
 }
 
-/// Returns the LiDARs of a scenario with their keys, and their indices if the key is that of a list.
+/// Returns the LiDARs of a scenario with their keys. A LiDAR of a list has its index, too.
 fn lidars(config: &mut ScenarioConfig) -> impl Iterator<Item = ((&'static str, Option<usize>), &mut LidarConfig)> {
     let front = config.sensors.front_lidar.as_mut().map(|lidar| (("front-lidar", None), lidar));
     let further = config.sensors.additional_rear_lidars.iter_mut().enumerate();
@@ -112,7 +113,7 @@ mod tests {
         assert_eq!(lidar.pattern_file, None);
         assert_eq!(lidar.pattern, Some(LidarKindConfig::parse(LidarModel::Os1With64.file()).unwrap()));
         file.check().unwrap();
-        // The text needs the file no longer.
+        // The text alone suffices, without the file.
         let again = ScenarioFile::parse(Path::new("elsewhere.toml"), file.text(), &[]).unwrap();
         assert_eq!(again.config(), file.config());
     }

@@ -3,8 +3,8 @@
 use closecall_traffic::{KeyPath, Segment};
 use toml_edit::{Document, Item, Table, TableLike, Value};
 
-/// Returns the line, counted from 1, of the deepest part of `path` that the text contains. Returns `None` if the text
-/// contains no part of it.
+/// Returns the line, counted from 1, of the deepest part of `path` that the text contains. Returns
+/// `None` if the text contains no part of it.
 pub(super) fn line_of(text: &str, path: &KeyPath) -> Option<usize> {
     let document = Document::parse(text).ok()?;
     let mut node = Node::Item(document.as_item());
@@ -30,7 +30,8 @@ enum Node<'a> {
 }
 
 impl<'a> Node<'a> {
-    /// Returns the node that `segment` identifies below this one, and its byte offset if it is known.
+    /// Returns the node that `segment` identifies below this one, and its byte offset if it is
+    /// known.
     fn descend(&self, segment: &Segment) -> Option<(Self, Option<usize>)> {
         match segment {
             Segment::Key(key) => {

@@ -1,5 +1,5 @@
-//! Makes a logical scenario from a recorded approach: the encounter of the published method with the recorded vehicles, road and
-//! speeds, whose parameters vary around what was recorded.
+//! Makes a logical scenario from a recorded approach: the encounter of the published method with
+//! the recorded vehicles, road and speeds, whose parameters vary around the recorded values.
 //!
 //! ```text
 //!   target ─────────────────────────────────╭────────▶
@@ -15,8 +15,8 @@
 //! | `brake-mps2` | braking of car drivers in crashes and near-crashes, as `low-thw-overtake` has it for the rear driver, up to [`HARDEST_LEAD_BRAKING_MPS2`] |
 //! | `brake-phase`, `reaction-s`, `hardest-braking-mps2`, `evasive-lateral-mps2` | as in `low-thw-overtake` |
 //!
-//! The lead vehicle keeps the speed of the ego until it brakes. Other vehicles of the recording are left out, so that the passing
-//! lane is free.
+//! The lead vehicle keeps the speed of the ego until it brakes. Other vehicles of the recording are
+//! left out, so that the passing lane is free.
 
 use std::path::Path;
 
@@ -42,26 +42,31 @@ use crate::coverage::CoverageConfig;
 
 /// The scenario of the library from which the drivers are taken.
 const HEADLINE: &str = "low-thw-overtake";
-/// Time for which the rear vehicle approaches before it would cross the marking (s): an assumption; 5 to 20 are plausible.
-/// Windows of recordings seldom show the whole approach.
+/// Time for which the rear vehicle approaches before it would cross the marking (s): an assumption;
+/// 5 to 20 are plausible. Windows of recordings seldom show the whole approach.
 const APPROACH_S: f64 = 10.0;
-/// Longest gap at the start (m): that of `low-thw-overtake`, beyond the 100 m at which the system engages.
+/// Longest gap at the start (m): the gap of `low-thw-overtake`, beyond the 100 m at which the
+/// system engages.
 const LONGEST_GAP_M: f64 = 120.0;
 /// Shortest gap at the start (m): an assumption; 2 to 10 are plausible.
 const SHORTEST_GAP_M: f64 = 5.0;
-/// Hardest braking of the lead vehicle (m/s²): full braking of a car on a dry road, as in `low-thw-overtake`.
+/// Hardest braking of the lead vehicle (m/s²): full braking of a car on a dry road, as in
+/// `low-thw-overtake`.
 const HARDEST_LEAD_BRAKING_MPS2: f64 = 8.0;
-/// Largest cc1 (s): below the critical headway of 0.9 s, since a driver who keeps more never comes close.
+/// Largest cc1 (s): below the critical headway of 0.9 s, since a driver who keeps more never comes
+/// close.
 const LARGEST_CC1_S: f64 = 0.85;
 /// Gap at standstill of Wiedemann's model (m): its published default.
 const STANDSTILL_GAP_M: f64 = 1.5;
-/// Number of standard deviations at which a distribution around a recorded value is cut (-), as in `fit`.
+/// Number of standard deviations at which a distribution around a recorded value is cut (-), as in
+/// `fit`.
 const CUT_SDS: f64 = 3.0;
 /// Smallest standard deviation of a distribution: the resolution of the file.
 const SMALLEST_SD: f64 = 0.001;
 /// Position of the ego at the start (m): room for the vehicles behind.
 const EGO_S_M: f64 = 500.0;
-/// Time after the nominal approach until the run ends at the latest (s): an assumption; 10 to 40 are plausible.
+/// Time after the nominal approach until the run ends at the latest (s): an assumption; 10 to 40
+/// are plausible.
 const AFTERWARDS_S: f64 = 20.0;
 /// Number of quantiles of an empirical distribution, as in `fit`.
 const QUANTILES: usize = 11;
@@ -81,7 +86,8 @@ pub struct Spreads {
     pub durations_s: Vec<f64>,
 }
 
-/// Returns the logical scenario of an approach. `name` is its name; the path appears in error messages.
+/// Returns the logical scenario of an approach. `name` is its name; the path appears in error
+/// messages.
 ///
 /// # Errors
 /// [`ScenarioError`] if the recorded values do not result in a valid scenario.
@@ -101,8 +107,8 @@ pub fn logical(
 fn parameters(approach: &Approach, spreads: &Spreads, headline: &ParametersConfig) -> Result<ParametersConfig, String> {
     let values = &approach.values;
     let taken = |name: &str| {
-        let found = headline.0.iter().find(|(known, _)| known.as_str() == name);
-        found.map(|(_, config)| config.clone()).ok_or_else(|| format!("`{HEADLINE}` has no parameter `{name}`"))
+        let entry = headline.0.iter().find(|(parameter, _)| parameter.as_str() == name);
+        entry.map(|(_, config)| config.clone()).ok_or_else(|| format!("`{HEADLINE}` has no parameter `{name}`"))
     };
     let around = |value: f64, variation: Variation, bounds| {
         around(value, variation, (bounds, approach.rear.track_id, &spreads.source))
@@ -159,13 +165,13 @@ fn around(value: f64, variation: Variation, (bounds, track, source): ([f64; 2], 
         Variation::Fitted { n, .. } => ParameterConfig {
             fitted: Some(FittedConfig { n: n as u64, source: source.to_owned(), ..FittedConfig::default() }),
             note: Some(format!(
-                "the mean is what was recorded of track {track}; sd is the bandwidth of all (Silverman's rule)"
+                "the mean is the recorded value of track {track}; sd is the bandwidth of all (Silverman's rule)"
             )),
             ..base
         },
         Variation::Assumed { share } => ParameterConfig {
             assumed: Some(format!(
-                "the mean is what was recorded of track {track}; the recording has too few values to fit a spread, {:.0} % is an assumption",
+                "the mean is the recorded value of track {track}; the recording has too few values to fit a spread, {:.0} % is an assumption",
                 100.0 * share
             )),
             ..base
@@ -186,7 +192,8 @@ fn empirical(values: &[f64], bounds: [f64; 2], source: &str) -> ParameterConfig 
     }
 }
 
-/// Returns the gap at standstill of the rear driver (m): at most half of the gap with which it was recorded at the crossing.
+/// Returns the gap at standstill of the rear driver (m): at most half of the gap with which it was
+/// recorded at the crossing.
 fn standstill_gap_m(approach: &Approach) -> f64 {
     STANDSTILL_GAP_M.min(0.5 * approach.values.crossing_thw_s * approach.values.ego_mps)
 }
@@ -197,10 +204,10 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
     let crossing_gap_m = values.crossing_thw_s * values.ego_mps;
     let gap_m = (crossing_gap_m + APPROACH_S * values.closing_mps).clamp(SHORTEST_GAP_M, LONGEST_GAP_M);
     let highest = |name: &str| {
-        let of = parameters.0.iter().find(|(known, _)| known.as_str() == name);
-        of.and_then(|(_, config)| Some(config.truncated_normal?.max)).unwrap_or_default()
+        let entry = parameters.0.iter().find(|(parameter, _)| parameter.as_str() == name);
+        entry.and_then(|(_, config)| Some(config.truncated_normal?.max)).unwrap_or_default()
     };
-    let slowest_mps = parameters.0.iter().find(|(known, _)| known.as_str() == "closing-mps");
+    let slowest_mps = parameters.0.iter().find(|(parameter, _)| parameter.as_str() == "closing-mps");
     let slowest_mps = slowest_mps.and_then(|(_, config)| Some(config.truncated_normal?.min)).unwrap_or(1.0);
     let (ego, rear, lead) = (&approach.ego, &approach.rear, approach.lead.as_ref());
     Ok(ScenarioConfig {
@@ -285,9 +292,9 @@ fn id(name: &str) -> Result<ActorId, String> {
     ActorId::new(name).map_err(|error| error.to_string())
 }
 
-fn relative(of: &str) -> Result<RelativeStartConfig, String> {
+fn relative(reference: &str) -> Result<RelativeStartConfig, String> {
     Ok(RelativeStartConfig {
-        of: id(of)?,
+        of: id(reference)?,
         gap_m: None,
         thw_s: None,
         speed_mps: None,

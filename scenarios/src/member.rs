@@ -1,4 +1,5 @@
-//! Members of a driver ensemble: small files that say how one kind of human drives, applied to any scenario.
+//! Members of a driver ensemble: small files that say how one kind of human drives, applied to any
+//! scenario.
 //!
 //! ```text
 //!  low-thw-overtake.toml ─┐
@@ -6,10 +7,11 @@
 //!  distracted.toml       ─┘
 //! ```
 //!
-//! A member sets keys of the driver tables `overtaker`, `wiedemann99` and `idm`, each with its source. Every human driver of
-//! these kinds takes part in the encounter and gets the values; a `prescribed` driver follows a list of times, and is no
-//! member's. A value may be a distribution, which is then a parameter of the scenario. The result is an
-//! ordinary scenario: all later steps (checking, hashing, the manifest of a campaign, replay) work on its text.
+//! A member sets keys of the driver tables `overtaker`, `wiedemann99` and `idm`, each with its
+//! source. Every human driver of these kinds takes part in the encounter and gets the values; a
+//! `prescribed` driver follows a list of times, and is no member's. A value may be a distribution,
+//! which is then a parameter of the scenario. The result is an ordinary scenario: all later steps
+//! (checking, hashing, the manifest of a campaign, replay) work on its text.
 
 mod apply;
 mod config;

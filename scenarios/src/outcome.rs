@@ -1,4 +1,4 @@
-//! The result of one run: collisions, margins, and what the margin increase system (MIS) did.
+//! The result of one run: collisions, margins, and the actions of the margin increase system (MIS).
 
 use closecall_controllers::Reason;
 use closecall_traffic::geometry::BoxSide;
@@ -6,7 +6,7 @@ pub use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, ActorId, Measured, Parameters, Time};
 use serde::{Deserialize, Serialize};
 
-/// Which of two vehicles closed the gap between them.
+/// The vehicle of two that closed the gap between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClosedBy {
@@ -18,9 +18,10 @@ pub enum ClosedBy {
     Both,
 }
 
-/// Returns the larger of two values. NaN counts as larger than every number, so that it never looks safe.
-pub fn worse(one: f64, other: f64) -> f64 {
-    if one.is_nan() || one >= other { one } else { other }
+/// Returns the larger of two values. NaN counts as larger than every number, because it must never
+/// look safe.
+pub fn worse(first: f64, second: f64) -> f64 {
+    if first.is_nan() || first >= second { first } else { second }
 }
 
 /// Phase of the encounter of the ego with a rear vehicle.
@@ -38,13 +39,16 @@ pub enum Phase {
     After,
 }
 
-/// Relative speed below which two bumpers that meet touch, and do not collide (m/s): 1.5 mph. Up to it a car must withstand a pendulum of its own mass at the
-/// corners of its bumpers, with lamps, doors and brakes intact (49 CFR 581.5 and 581.7). It is an assumption that nobody calls such a contact an accident: 0.1
-/// to the 1.12 m/s of the other impacts of that standard (2.5 mph) are plausible.
+/// Relative speed below which two bumpers that meet touch, and do not collide (m/s): 1.5 mph. Up to
+/// it a car must withstand a pendulum of its own mass at the corners of its bumpers, with lamps,
+/// doors and brakes intact (49 CFR 581.5 and 581.7). It is an assumption that nobody calls such a
+/// contact an accident: 0.1 to the 1.12 m/s of the other impacts of that standard (2.5 mph) are
+/// plausible.
 pub const TOUCH_MPS: f64 = 0.670_56;
 
-/// Deceleration above which a vehicle behind brakes unduly hard (m/s²): a lane change is critical if a vehicle that approaches from behind must brake harder
-/// (UN Regulation 79, paragraph 5.6.4.7; UN Regulation 157 has the same criterion for its lane changes).
+/// Deceleration above which a vehicle behind brakes unduly hard (m/s²): a lane change is critical
+/// if a vehicle that approaches from behind must brake harder (UN Regulation 79, paragraph 5.6.4.7;
+/// UN Regulation 157 has the same criterion for its lane changes).
 pub const IMPOSED_BRAKING_MPS2: f64 = 3.0;
 
 /// The first contact of two vehicles.
@@ -56,13 +60,14 @@ pub struct Collision {
     pub between: [ActorId; 2],
     /// The side of each vehicle that was struck, in the order of `between`.
     pub struck_side: [BoxSide; 2],
-    /// Which of the two vehicles closed the gap.
+    /// The vehicle that closed the gap.
     pub closed_by: ClosedBy,
     /// Phase of the encounter in which it happened.
     pub phase: Phase,
     /// Magnitude of the relative velocity at the first contact (m/s).
     pub relative_speed_mps: f64,
-    /// Magnitude of each vehicle's change of velocity through the impact (m/s), in the order of `between`.
+    /// Magnitude of each vehicle's change of velocity through the impact (m/s), in the order of
+    /// `between`.
     pub delta_v_mps: [f64; 2],
 }
 
@@ -72,8 +77,8 @@ impl Collision {
         self.between.contains(actor)
     }
 
-    /// Returns the indices of the striking and of the struck vehicle in `between`. If both moved towards each other, the vehicle
-    /// whose front was struck is the striking one.
+    /// Returns the indices of the striking and of the struck vehicle in `between`. If both moved
+    /// towards each other, the vehicle whose front was struck is the striking one.
     pub fn roles(&self) -> [usize; 2] {
         match self.closed_by {
             ClosedBy::First => [0, 1],
@@ -83,25 +88,28 @@ impl Collision {
         }
     }
 
-    /// Returns the change of velocity of `actor` (m/s), or `None` if it is not one of the two vehicles.
+    /// Returns the change of velocity of `actor` (m/s), or `None` if it is not one of the two
+    /// vehicles.
     pub fn delta_v_of(&self, actor: &ActorId) -> Option<f64> {
         let index = self.between.iter().position(|id| id == actor)?;
         Some(self.delta_v_mps[index])
     }
 }
 
-/// A moment of the encounter in which a rear vehicle R approaches the ego E from behind while the ego follows a lead
-/// vehicle F.
+/// A moment of the encounter in which a rear vehicle R approaches the ego E from behind while the
+/// ego follows a lead vehicle F.
 ///
-/// The letters follow the paper's figure: (a) is the hazard without the system, and (e) the rear vehicle about 5 m behind the
-/// ego. (b) to (d) lead from the one to the other. Two further moments have no letter.
+/// The letters follow the paper's figure: (a) is the hazard without the system, and (e) the rear
+/// vehicle about 5 m behind the ego. (b) to (d) lead from the one to the other. Two further moments
+/// have no letter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Moment {
-    /// (a) The lead vehicle brakes, and the ego brakes hard while the rear vehicle is near, in the ego's lane: the hazard that
-    /// the system is meant to remove.
+    /// (a) The lead vehicle brakes, and the ego brakes hard while the rear vehicle is near, in the
+    /// ego's lane: the hazard that the system is meant to remove.
     Hazard,
-    /// (b) The rear vehicle is within 100 m of the ego, in the ego's lane, and approaches at 10 km/h or more.
+    /// (b) The rear vehicle is within 100 m of the ego, in the ego's lane, and approaches at 10
+    /// km/h or more.
     RearNear,
     /// (c) The rear vehicle starts to change lanes in order to overtake.
     CutOut,
@@ -111,7 +119,8 @@ pub enum Moment {
     CriticalDistance,
     /// The centre of the rear vehicle has left the ego's lane.
     Crossed,
-    /// The rear vehicle has passed the ego: the overtaking is concluded, and the ego is free to brake.
+    /// The rear vehicle has passed the ego: the overtaking is concluded, and the ego is free to
+    /// brake.
     Concluded,
 }
 
@@ -127,7 +136,8 @@ impl Moment {
         Self::Concluded,
     ];
 
-    /// Returns the moment's letter in the paper's figure; `None` if the figure does not have the moment.
+    /// Returns the moment's letter in the paper's figure; `None` if the figure does not have the
+    /// moment.
     pub const fn letter(self) -> Option<char> {
         match self {
             Self::Hazard => Some('a'),
@@ -163,11 +173,12 @@ impl Moment {
 pub struct ReachedMoment {
     /// The moment.
     pub moment: Moment,
-    /// Time of the first control step at which the moment's condition held; the cut-out has the time of a physics step.
+    /// Time of the first control step at which the moment's condition held; the cut-out has the
+    /// time of a physics step.
     pub time: Time,
 }
 
-/// Why a run ended.
+/// The reason for the end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EndReason {
@@ -196,23 +207,26 @@ pub struct Margins {
     pub max_deceleration_mps2: f64,
     /// Largest jerk of the ego, as a magnitude, before its first collision (m/s³).
     pub max_jerk_mps3: f64,
-    /// Largest amount by which the ego was slower than the vehicle ahead, or than its own speed at the start if there is
-    /// no vehicle ahead (m/s). It is the cost of a margin: it shows unnecessary braking, even if the braking avoids
-    /// collisions.
+    /// Largest amount by which the ego was slower than the vehicle ahead, or than its own speed at
+    /// the start if there is no vehicle ahead (m/s). It is the cost of a margin: it shows
+    /// unnecessary braking, even if the braking avoids collisions.
     pub max_speed_deficit_mps: f64,
 }
 
-/// What the ego costs itself and the vehicle behind it, from the true states, until its lead vehicle brakes for the first time or the ego collides.
+/// The cost for the ego and for the vehicle behind it, from the true states, until its lead vehicle
+/// brakes for the first time or the ego collides.
 ///
-/// No controller reports any of it, so that every controller is measured alike.
+/// No controller reports any of it: every controller is measured alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Largest amount by which the ego was slower than the vehicle ahead, or than its own speed at the start, before a vehicle behind had met the
-    /// conditions for engaging (m/s).
+    /// Largest amount by which the ego was slower than the vehicle ahead, or than its own speed at
+    /// the start, before a vehicle behind had met the conditions for engaging (m/s).
     pub unprompted_deficit_mps: f64,
-    /// The same after a vehicle behind had met them (m/s): what a system does for which the vehicle behind is the reason.
+    /// The same after a vehicle behind had met the conditions (m/s): the vehicle behind is the
+    /// reason for this part.
     pub prompted_deficit_mps: f64,
-    /// Largest time by which the ego was late (s): behind where it would have been at the speed of the vehicle ahead, or at its own speed at the start.
+    /// Largest time by which the ego was late (s), compared with the speed of the vehicle ahead, or
+    /// with its own speed at the start.
     pub time_lost_s: f64,
     /// Largest deceleration of the vehicle behind the ego in its lane (m/s²); 0 if there was none.
     pub imposed_braking_mps2: f64,
@@ -229,10 +243,12 @@ pub struct ReasonSpan {
     pub until_s: f64,
 }
 
-/// Returns the reason that held longest in the interval, in sum. Of reasons that held equally long it is the earliest.
+/// Returns the reason with the longest total time in the interval. If several reasons held equally
+/// long, returns the first.
 ///
-/// Emergency braking hides the condition that is missing beneath it, and therefore counts only if there is no other
-/// reason. In an interval without duration it is the last reason until then. `None` if there is no reason until its end.
+/// Emergency braking hides the condition that is missing beneath it, and therefore counts only if
+/// there is no other reason. In an interval without duration it is the last reason until then.
+/// `None` if there is no reason until its end.
 pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Option<Reason> {
     let is_braking = |span: &ReasonSpan| matches!(span.reason, Reason::BrakingRequired | Reason::BrakingDone);
     let mut held: Vec<(Reason, f64)> = Vec::new();
@@ -253,7 +269,7 @@ pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Opti
         .or_else(|| before().next_back().map(|span| span.reason))
 }
 
-/// What the margin increase system (MIS) did in a run.
+/// The actions of the margin increase system (MIS) in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
     /// Time of its first engagement (s).
@@ -264,18 +280,21 @@ pub struct MisSummary {
     pub thw_front_at_engagement_s: Measured,
     /// Front time headway of the ego when the rear vehicle was at the critical distance (s).
     pub thw_front_at_critical_s: Measured,
-    /// Mean deceleration of the ego from the engagement until the rear vehicle is at the critical distance, or until the
-    /// release (m/s²).
+    /// Mean deceleration of the ego from the engagement until the rear vehicle is at the critical
+    /// distance, or until the release (m/s²).
     pub mean_deceleration_mps2: Measured,
-    /// Whether the planned headway was within reach at the engagement. `None` if it never engaged or stated no plan.
+    /// Whether the planned headway was within reach at the engagement. `None` if it never engaged
+    /// or stated no plan.
     pub goal_in_reach: Option<bool>,
-    /// The reason for the engagement or, if it never engaged, the reason that held longest in `decided_s`.
+    /// The reason for the engagement or, if it never engaged, the reason that held longest in
+    /// `decided_s`.
     pub reason: Reason,
     /// All reasons that it gave, in order of time.
     #[serde(default)]
     pub reasons: Vec<ReasonSpan>,
-    /// From the time at which the vehicle behind met the conditions on distance and speed until the hazard, or until it had
-    /// left the lane, or until the end (s). `None` if no vehicle behind met them.
+    /// From the time at which the vehicle behind met the conditions on distance and speed until the
+    /// hazard, or until it had left the lane, or until the end (s). `None` if no vehicle behind met
+    /// them.
     #[serde(default)]
     pub decided_s: Option<[f64; 2]>,
     /// When and why it was not available. `None` if it was available all the time.
@@ -283,25 +302,29 @@ pub struct MisSummary {
     pub unavailable: Option<Unavailability>,
 }
 
-/// What the method promises, from the true states, in every arm.
+/// The method's promise, from the true states, in every arm.
 ///
-/// The promise: when the vehicle behind is at the critical distance, the front time headway has grown by 2 s, and the ego
-/// does not brake hard while that vehicle leaves the lane.
+/// The promise: when the vehicle behind is at the critical distance, the front time headway has
+/// grown by 2 s, and the ego does not brake hard while that vehicle leaves the lane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
-    /// Whether the ego could reach the goal when a vehicle behind was near for the first time: braking within its limit, with
-    /// everybody else at constant speed. `None` if no vehicle behind was near, or none was ahead.
+    /// Whether the ego could reach the goal when a vehicle behind was near for the first time:
+    /// braking within its limit, with everybody else at constant speed. `None` if no vehicle behind
+    /// was near, or none was ahead.
     pub in_reach: Option<bool>,
-    /// Front time headway when the vehicle behind is at the critical distance, minus the smallest one until it was near (s).
+    /// Front time headway when the vehicle behind is at the critical distance, minus the smallest
+    /// one until it was near (s).
     pub thw_raised_s: Measured,
-    /// Hardest braking of the ego from 2 s before until 2 s after the vehicle behind crosses the marking (m/s²).
+    /// Hardest braking of the ego from 2 s before until 2 s after the vehicle behind crosses the
+    /// marking (m/s²).
     pub crossing_braking_mps2: Measured,
 }
 
 /// The ego and the vehicle ahead, until the ego collides.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ahead {
-    /// Smallest time to collision with the vehicle ahead, in the lane or in the path, from the true states (s).
+    /// Smallest time to collision with the vehicle ahead, in the lane or in the path, from the true
+    /// states (s).
     pub min_ttc_front_s: Measured,
     /// Time at which the controller says for the first time that it brakes in an emergency (s).
     pub emergency_braking_at_s: Measured,
@@ -318,8 +341,8 @@ pub struct Unavailability {
     pub reason: Reason,
 }
 
-/// The result of one run. A collision is a result, not an error. A run that cannot be completed has no outcome but a
-/// `closecall_simulation::SampleError`.
+/// The result of one run. A collision is a result, not an error. A run that cannot be completed has
+/// no outcome but a `closecall_simulation::SampleError`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The scenario's name.
@@ -334,14 +357,15 @@ pub struct Outcome {
     pub ego: ActorId,
     /// The sampled parameter values.
     pub parameters: Parameters,
-    /// Why the run ended.
+    /// The reason for the end of the run.
     pub end: EndReason,
     /// Simulated duration of the run.
     pub duration: Time,
     /// The first contact of every pair of vehicles that collided, in order of time.
     pub collisions: Vec<Collision>,
-    /// The first touch of every pair of vehicles whose bumpers met at less than [`TOUCH_MPS`], in order of time. No collision is among them: if the pair
-    /// meets again and faster, that is its collision.
+    /// The first touch of every pair of vehicles whose bumpers met at less than [`TOUCH_MPS`], in
+    /// order of time. No collision is among them: if the pair meets again and faster, that is its
+    /// collision.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub touches: Vec<Collision>,
     /// The moments of the encounter that were reached before the ego collided, in order of time.
@@ -351,7 +375,8 @@ pub struct Outcome {
     pub margins: Margins,
     /// What the margin increase system did, or the reason why there is no summary of it.
     pub mis: Result<MisSummary, Absent>,
-    /// What the ego cost itself and the vehicle behind it. `None` in a journal that was written without it.
+    /// The cost for the ego and for the vehicle behind it. `None` in a journal that was written
+    /// without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
     /// What became of the method's promise. `None` in a journal that was written without it.
@@ -366,7 +391,7 @@ impl Outcome {
     /// Returns whether two outcomes are equal to the last bit, including the signs of zeros.
     pub fn has_same_bits(&self, other: &Self) -> bool {
         // serde_json writes floats so that they read back exactly, so equal text means equal bits.
-        matches!((serde_json::to_string(self), serde_json::to_string(other)), (Ok(one), Ok(two)) if one == two)
+        matches!((serde_json::to_string(self), serde_json::to_string(other)), (Ok(first), Ok(second)) if first == second)
     }
 
     /// Returns the time at which `moment` was reached, or `None` if it was not.
@@ -379,7 +404,8 @@ impl Outcome {
         self.collisions.iter().filter(|collision| collision.involves(&self.ego))
     }
 
-    /// Returns the ego's largest change of velocity in a collision (m/s), or `None` if it did not collide.
+    /// Returns the ego's largest change of velocity in a collision (m/s), or `None` if it did not
+    /// collide.
     pub fn ego_delta_v_mps(&self) -> Option<f64> {
         self.ego_collisions().filter_map(|collision| collision.delta_v_of(&self.ego)).reduce(worse)
     }

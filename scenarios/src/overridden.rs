@@ -1,13 +1,14 @@
-//! Settings of the command line that weaken what a scenario is judged by.
+//! Settings of the command line that weaken the criteria of a scenario.
 //!
-//! `--set` may change every value. If it removes a check, moves its bound to the easier side, or asks for less to happen, the scenario that is judged
-//! is not the one that the file states. The text then names what was weakened, under the key `overridden`, so that a saved campaign, a part of it and a
-//! replay know it as well.
+//! `--set` may change every value. If it removes a check, moves its bound to the easier side, or
+//! asks for less to happen, the judged scenario differs from the scenario of the file. The text
+//! then names the weakened demands, under the key `overridden`, and a saved campaign, a part of it
+//! and a replay know them as well.
 
 use super::ScenarioConfig;
 use crate::criteria::{Aggregate, Expression, Operator};
 
-/// The key of the text that names what was weakened.
+/// The key of the text that names the weakened demands.
 pub(super) const KEY: &str = "overridden";
 
 /// Returns what `after` demands less than `before`.
@@ -72,8 +73,8 @@ mod tests {
             ("expects-share=0.1", "expects-share 0.95"),
             ("parameters.closing-mps.observed.max=14", "observed range of closing-mps"),
         ] {
-            let found = overridden(&[setting]);
-            assert!(found.iter().any(|what| what.starts_with(part)), "{setting}: {found:?}");
+            let weakenings = overridden(&[setting]);
+            assert!(weakenings.iter().any(|weakening| weakening.starts_with(part)), "{setting}: {weakenings:?}");
         }
     }
 

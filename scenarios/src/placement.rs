@@ -24,14 +24,16 @@ pub(super) struct Actors<'a> {
 /// Returns the state of every actor at time zero, in the order of the actors.
 ///
 /// # Errors
-/// [`ConfigError`] if a value is out of range, if positions depend on each other in a cycle, or if vehicles overlap.
+/// [`ConfigError`] if a value is out of range, if positions depend on each other in a cycle, or if
+/// vehicles overlap.
 pub(super) fn initial_states(
     Actors { actors, vehicles, drivers }: Actors<'_>,
     road: &Road,
     parameters: &Parameters,
 ) -> Result<Vec<VehicleState>, ConfigError> {
     let mut placed: Vec<Option<VehicleState>> = vec![None; actors.len()];
-    // Each round places the actors whose reference has been placed. A round that places no actor has found a cycle.
+    // Each round places the actors whose reference has been placed. A round that places no actor
+    // has found a cycle.
     while placed.iter().any(Option::is_none) {
         let before = placed.iter().flatten().count();
         for (index, actor) in actors.iter().enumerate() {
@@ -56,7 +58,7 @@ fn at(index: usize, error: ConfigError) -> ConfigError {
 /// Returns the error that the position of an actor depends on itself.
 fn cycle_error(actors: &[ActorConfig], placed: &[Option<VehicleState>]) -> ConfigError {
     let index = placed.iter().position(Option::is_none).unwrap_or_default();
-    let rule = format!("where `{}` starts depends on where it starts itself", actors[index].id);
+    let rule = format!("the start of `{}` depends on itself", actors[index].id);
     let key = match actors[index].start {
         StartConfig::Ahead(_) => "ahead",
         _ => "behind",
@@ -88,7 +90,8 @@ fn reject_overlaps(
     Ok(())
 }
 
-/// The data from which the state of an actor is computed. All slices are in the order of the actors.
+/// The data from which the state of an actor is computed. All slices are in the order of the
+/// actors.
 struct Placement<'a> {
     actors: &'a [ActorConfig],
     vehicles: &'a [Vehicle],
@@ -116,7 +119,8 @@ impl Placement<'_> {
         }
     }
 
-    /// Returns the state of an actor relative to its reference. `direction` is 1 if the actor is ahead, -1 if it is behind.
+    /// Returns the state of an actor relative to its reference. `direction` is 1 if the actor is
+    /// ahead, -1 if it is behind.
     fn relative(
         &self,
         index: usize,
@@ -148,16 +152,17 @@ impl Placement<'_> {
                 }
             }
         };
-        let [own, other] = [index, other].map(|index| self.vehicles[index].dimensions.length_m);
+        let [length_m, other_length_m] = [index, other].map(|index| self.vehicles[index].dimensions.length_m);
         let d_m = match start.lane {
             Some(lane) => self.lane_centre_m(lane)?,
             None => reference.d_m,
         };
-        let s_m = reference.s_m + direction * (gap_m + touching_distance_m(own, other));
+        let s_m = reference.s_m + direction * (gap_m + touching_distance_m(length_m, other_length_m));
         Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
     }
 
-    /// Returns the gap at which the driver of an actor behind its reference follows in equilibrium at `speed_mps` (m).
+    /// Returns the gap at which the driver of an actor behind its reference follows in equilibrium
+    /// at `speed_mps` (m).
     fn settled_gap_m(
         &self,
         index: usize,
@@ -168,8 +173,8 @@ impl Placement<'_> {
         let refuse = |other: &'static str, rule: &str| {
             ConfigError::new("settled", Problem::Contradiction { other, rule: rule.to_owned() })
         };
-        for (other, given) in [("gap-m", &start.gap_m), ("thw-s", &start.thw_s)] {
-            if given.is_some() {
+        for (other, key_value) in [("gap-m", &start.gap_m), ("thw-s", &start.thw_s)] {
+            if key_value.is_some() {
                 return Err(refuse(other, "only one of them may be given"));
             }
         }
@@ -213,7 +218,8 @@ enum Given<'a> {
     Second(&'a Num),
 }
 
-/// Returns the value of the only alternative that is given. `needed` describes the two in the error if none is.
+/// Returns the value of the only alternative that is given. `needed` describes the two in the error
+/// if none is.
 fn exactly_one<'a>(
     first: Alternative<'a>,
     second: Alternative<'a>,

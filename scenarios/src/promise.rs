@@ -7,8 +7,9 @@
 //!      └ too fast       └ too late         └ hazard first
 //! ```
 //!
-//! R is the vehicle behind the ego, F the one ahead. The system cannot know when F brakes. The promise is *due* if the goal
-//! was in reach when R was near, and F did not brake before R was at the critical distance.
+//! R is the vehicle behind the ego, F the one ahead. The system cannot know when F brakes. The
+//! promise is *due* if the goal was in reach when R was near, and F did not brake before R was at
+//! the critical distance.
 
 use std::fmt;
 
@@ -19,26 +20,29 @@ use crate::outcome::{Moment, Outcome};
 /// Front time headway that the system has to gain (s) (the method's figure).
 pub const GOAL_GAIN_S: f64 = 2.0;
 
-/// Largest shortfall with which the goal counts as reached (s): that of the plan, and one control step of rounding.
+/// Largest shortfall with which the goal counts as reached (s): the shortfall of the plan, and one
+/// control step of rounding.
 pub const SHORTFALL_S: f64 = 0.1;
 const _: () = assert!(GOAL_TOLERANCE_S < SHORTFALL_S);
 
-/// Braking of the ego around the crossing above which it counts as hard (m/s²): an assumption, above the comfort limit of
-/// 1 m/s² with its overshoot; 1.2 to 3 are plausible.
+/// Braking of the ego around the crossing above which it counts as hard (m/s²): an assumption,
+/// above the comfort limit of 1 m/s² with its overshoot; 1.2 to 3 are plausible.
 pub const HARD_BRAKING_MPS2: f64 = 1.5;
 
-/// What became of the goal.
+/// The result for the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Goal {
     /// The headway has grown by the goal.
     Reached,
-    /// The rear vehicle was too fast for the goal when it was near: out of reach within the braking limit.
+    /// The rear vehicle was too fast for the goal when it was near: out of reach within the braking
+    /// limit.
     TooFast,
-    /// The goal was in reach when the rear vehicle was near, but not any more when the system engaged.
+    /// The goal was in reach when the rear vehicle came near, but not when the system engaged.
     TooLate,
     /// The lead vehicle braked before the rear vehicle was at the critical distance.
     HazardFirst,
-    /// The goal was in reach, and nothing happened ahead, but the system stopped short: it released, or somebody changed speed.
+    /// The goal was in reach, and nothing happened ahead, but the system stopped short: it
+    /// released, or another vehicle changed speed.
     CutShort,
 }
 
@@ -57,8 +61,9 @@ impl Goal {
         }
     }
 
-    /// Returns what became of the goal in a run. `None` if no vehicle behind was near, or if it neither came to the critical
-    /// distance nor was anticipated by a braking lead vehicle: then nothing was promised.
+    /// Returns what became of the goal in a run. `None` if no vehicle behind was near, or if it
+    /// neither came to the critical distance nor was anticipated by a braking lead vehicle: then
+    /// nothing was promised.
     pub fn of(outcome: &Outcome) -> Option<Self> {
         let promise = outcome.promise?;
         let in_reach = promise.in_reach?;
@@ -81,8 +86,8 @@ impl Goal {
     }
 }
 
-/// Returns whether the goal was due: in reach when the rear vehicle was near, which then came to the critical distance before
-/// the lead vehicle braked.
+/// Returns whether the goal was due: in reach when the rear vehicle was near, which then came to
+/// the critical distance before the lead vehicle braked.
 pub fn is_due(outcome: &Outcome) -> Option<bool> {
     let in_reach = outcome.promise?.in_reach == Some(true);
     let critical = outcome.moment(Moment::CriticalDistance);
@@ -93,11 +98,11 @@ pub fn is_due(outcome: &Outcome) -> Option<bool> {
 /// Why the system under test did not prevent a collision, in one word of a tally.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Hindrance {
-    /// It never engaged.
+    /// The system never engaged.
     NotEngaged(Reason),
-    /// It engaged, with this effect.
+    /// The system engaged, with this effect.
     Engaged(Goal),
-    /// It engaged, and nothing was promised.
+    /// The system engaged, and nothing was promised.
     NothingPromised,
 }
 

@@ -1,7 +1,9 @@
-//! Drivers that follow a vehicle of recorded traffic. The vehicle's track is read together with the scenario file.
+//! Drivers that follow a vehicle of recorded traffic. The vehicle's track is read together with the
+//! scenario file.
 //!
-//! The times and speeds of the track replace `recorded` in the text of the scenario. All later steps (checking, hashing, a
-//! campaign's manifest, replay) work on an ordinary speed profile and do not need the trajectory file.
+//! The times and speeds of the track replace `recorded` in the text of the scenario. All later
+//! steps (checking, hashing, a campaign's manifest, replay) work on an ordinary speed profile and
+//! do not need the trajectory file.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +14,7 @@ use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 use super::ScenarioConfig;
 
-/// Why a recorded speed profile cannot be used.
+/// The reason for which a recorded speed profile cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum RecordedError {
     /// The trajectory file cannot be read.
@@ -20,11 +22,11 @@ pub(super) enum RecordedError {
     TrajectoryData {
         /// The actor.
         actor: String,
-        /// What is wrong with the trajectory file.
+        /// The fault of the trajectory file.
         message: String,
     },
     /// The trajectory file has no such track.
-    #[error("`{actor}` follows track {track_id} of {file}, which has {known}")]
+    #[error("`{actor}` follows track {track_id} of {file}, which has {tracks}")]
     NoSuchTrack {
         /// The actor.
         actor: String,
@@ -33,7 +35,7 @@ pub(super) enum RecordedError {
         /// The trajectory file.
         file: String,
         /// The tracks that the file has.
-        known: String,
+        tracks: String,
     },
     /// The actor is written in a form in which the text cannot be changed.
     #[error("`{actor}` follows a trajectory file, which needs actors written as [[actor]] and `driver` as a table")]
@@ -102,8 +104,8 @@ fn read_track(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result
         let (first, last) = first_and_last_id.unwrap_or((trajectory.track_id, trajectory.track_id));
         first_and_last_id = Some((first.min(trajectory.track_id), last.max(trajectory.track_id)));
     }
-    let known = first_and_last_id
+    let tracks = first_and_last_id
         .map_or_else(|| "no tracks".to_owned(), |(first, last)| format!("{tracks} tracks from {first} to {last}"));
     let (track_id, file) = (recorded.track_id, recorded.file.clone());
-    Err(RecordedError::NoSuchTrack { actor: actor.to_owned(), track_id, file, known })
+    Err(RecordedError::NoSuchTrack { actor: actor.to_owned(), track_id, file, tracks })
 }

@@ -1,10 +1,11 @@
-//! Values of recorded traffic as they stand in a scenario file.
+//! Values of recorded traffic with the digits of a scenario file.
 
 use closecall_traffic::{Num, Trajectory};
 
 /// Number of rounding steps per unit of a value in the file.
 const STEPS_PER_UNIT: f64 = 1_000.0;
-/// Lower limit of recorded speeds, if a speed is used as a divisor, a desired speed or a speed limit (m/s).
+/// Lower limit of recorded speeds, if a speed is used as a divisor, a desired speed or a speed
+/// limit (m/s).
 pub(super) const MIN_SPEED_MPS: f64 = 1.0;
 /// Smallest difference of two values in the file.
 pub(super) const ROUNDING_STEP: f64 = 1.0 / STEPS_PER_UNIT;

@@ -1,5 +1,5 @@
-//! Makes a scenario from a recorded encounter. Every vehicle starts at its recorded position and speed, in the middle of its
-//! lane; the ego is driven by the ego stack.
+//! Makes a scenario from a recorded encounter. Every vehicle starts at its recorded position and
+//! speed, in the middle of its lane; the ego is driven by the ego stack.
 //!
 //! | vehicle | driver |
 //! |---|---|
@@ -12,7 +12,8 @@
 //! All other vehicles are left out:
 //!
 //! * vehicles in the ego's lane: those behind would drive into the ego when it brakes
-//! * vehicles that change lanes, since the gaps that they changed into are elsewhere in the simulation
+//! * vehicles that change lanes, since the gaps that they changed into are elsewhere in the
+//!   simulation
 //! * vehicles that appear after the start
 //! * vehicles that would overlap with another one in the middle of a lane
 
@@ -41,7 +42,8 @@ use super::{ScenarioError, ScenarioFile, Setting};
 /// The driver of the rear vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RearDriver {
-    /// A human driver model that reacts to the ego, follows as closely as recorded, and cuts out at the recorded headway.
+    /// A human driver model that reacts to the ego, follows as closely as recorded, and cuts out at
+    /// the recorded headway.
     #[default]
     Model,
     /// The recorded speeds and the recorded lane change, whatever the ego does.
@@ -50,13 +52,13 @@ pub enum RearDriver {
 
 /// The names of the ego, the lead vehicle and the rear vehicle as actors.
 const NAMES: [&str; 3] = ["ego", "front", "rear"];
-/// The human drivers' reaction time (s): the mean for unexpected but common events, such as the brake lights of the vehicle
-/// ahead (Green, Transportation Human Factors 2 (2000) 195–216).
+/// The human drivers' reaction time (s): the mean for unexpected but common events, such as the
+/// brake lights of the vehicle ahead (Green, Transportation Human Factors 2 (2000) 195–216).
 pub(super) const REACTION_S: f64 = 1.25;
 /// Gap at standstill of Wiedemann's model (m): its published default.
 const STANDSTILL_GAP_M: f64 = 1.5;
-/// Ratio of the rear driver's following headway to its smallest recorded headway. It is below 1, so that the driver reaches
-/// the headway at which it cuts out.
+/// Ratio of the rear driver's following headway to its smallest recorded headway. It is below 1,
+/// and the driver reaches the headway at which it cuts out.
 pub(super) const FOLLOWING_SHARE: f64 = 0.9;
 /// Smallest and largest time gap of the adaptive cruise control (s).
 const MIN_TIME_GAP_S: f64 = 0.2;
@@ -67,14 +69,14 @@ pub(super) const MAX_LANE_CHANGE_S: f64 = 20.0;
 /// Smallest gap between two vehicles that start in the same lane (m).
 const MIN_START_GAP_M: f64 = 0.5;
 
-/// Returns the name of a vehicle as an actor: `ego`, `front`, `rear`, or its track. `index` is its index in the encounter's
-/// list of vehicles.
+/// Returns the name of a vehicle as an actor: `ego`, `front`, `rear`, or its track. `index` is its
+/// index in the encounter's list of vehicles.
 pub fn actor_name(index: usize, vehicle: &Trajectory) -> String {
     NAMES.get(index).map_or_else(|| format!("track-{}", vehicle.track_id), |name| (*name).to_owned())
 }
 
-/// Returns the scenario of an encounter, with the settings applied. The last argument holds the path that names the source in
-/// error messages, and the settings.
+/// Returns the scenario of an encounter, with the settings applied. The last argument holds the
+/// path that names the source in error messages, and the settings.
 ///
 /// # Errors
 /// [`ScenarioError`] if the recorded values or the settings do not result in a valid scenario.
@@ -205,23 +207,26 @@ pub(super) fn actor(
     })
 }
 
-/// Returns the point of a vehicle at the start of the encounter, or `None` if the vehicle appears later.
+/// Returns the point of a vehicle at the start of the encounter, or `None` if the vehicle appears
+/// later.
 pub(super) fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
     vehicle.points.first().filter(|point| point.time == Time::ZERO)
 }
 
-/// Returns whether a vehicle that starts at `start` keeps a gap to `other`, if both start in the same lane.
+/// Returns whether a vehicle that starts at `start` keeps a gap to `other`, if both start in the
+/// same lane.
 pub(super) fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
     let touching_m = touching_distance_m(other.dimensions.length_m, vehicle.trajectory.dimensions.length_m);
     start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > touching_m + MIN_START_GAP_M)
 }
 
-/// Returns the ego stack. Its time gap is the median time headway recorded before the rear vehicle crosses the lane marking,
-/// its set speed the highest recorded speed.
+/// Returns the ego stack. Its time gap is the median time headway recorded before the rear vehicle
+/// crosses the lane marking, its set speed the highest recorded speed.
 fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
     let [ego, front, _] = encounter.ego_lead_rear();
-    let mut headways_s: Vec<f64> =
-        gaps(ego, front, encounter.crossing).filter_map(|own| time_headway_s(own.gap_m, own.speed_mps).ok()).collect();
+    let mut headways_s: Vec<f64> = gaps(ego, front, encounter.crossing)
+        .filter_map(|ego_state| time_headway_s(ego_state.gap_m, ego_state.speed_mps).ok())
+        .collect();
     headways_s.sort_by(f64::total_cmp);
     let median_s = headways_s.get(headways_s.len() / 2).copied().unwrap_or(MAX_TIME_GAP_S);
     DriverConfig::EgoStack(EgoStackConfig {
@@ -236,15 +241,16 @@ fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
     })
 }
 
-/// Returns the rear vehicle's driver as a human driver model that follows the ego as closely as recorded, and as fast.
+/// Returns the rear vehicle's driver as a human driver model that follows the ego as closely as
+/// recorded, and as fast.
 fn overtaking_driver(encounter: &RecordedEncounter) -> DriverConfig {
     let [ego, _, rear] = encounter.ego_lead_rear();
     let cut_out_thw_s = encounter.crossing_thw_s;
     let start_mps = start_of(rear).map_or(MIN_SPEED_MPS, |start| start.speed_mps.max(MIN_SPEED_MPS));
     let cc0_m = STANDSTILL_GAP_M.min(0.5 * cut_out_thw_s * start_mps);
     let closest_s = gaps(rear, ego, encounter.crossing)
-        .filter(|own| own.speed_mps >= MIN_SPEED_MPS)
-        .map(|own| (own.gap_m - cc0_m) / own.speed_mps)
+        .filter(|rear_state| rear_state.speed_mps >= MIN_SPEED_MPS)
+        .map(|rear_state| (rear_state.gap_m - cc0_m) / rear_state.speed_mps)
         .fold(cut_out_thw_s - cc0_m / start_mps, f64::min);
     DriverConfig::Overtaker(OvertakerConfig {
         cut_out_thw_s: rounded(cut_out_thw_s),
@@ -270,17 +276,19 @@ struct GapAndSpeed {
     speed_mps: f64,
 }
 
-/// Returns the gap of a vehicle to the vehicle `ahead`, and its speed, at each of its points before `until`.
-fn gaps(own: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item = GapAndSpeed> {
-    let half_lengths_m = 0.5 * (own.dimensions.length_m + ahead.dimensions.length_m);
-    let before = own.points.iter().take_while(move |point| point.time < until);
+/// Returns the gap of a vehicle to the vehicle `ahead`, and its speed, at each of its points before
+/// `until`.
+fn gaps(follower: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item = GapAndSpeed> {
+    let half_lengths_m = 0.5 * (follower.dimensions.length_m + ahead.dimensions.length_m);
+    let before = follower.points.iter().take_while(move |point| point.time < until);
     before.filter_map(move |point| {
         let gap_m = ahead.at(point.time)?.s_m - point.s_m - half_lengths_m;
         Some(GapAndSpeed { gap_m, speed_mps: point.speed_mps })
     })
 }
 
-/// Returns the driver of a vehicle other than the ego, the lead and the rear vehicle, or `None` if it is not simulated.
+/// Returns the driver of a vehicle other than the ego, the lead and the rear vehicle, or `None` if
+/// it is not simulated.
 fn other_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<DriverConfig> {
     let (start, rear) = (start_of(&vehicle.trajectory)?, start_of(encounter.ego_lead_rear()[REAR_INDEX])?);
     let stays = vehicle.trajectory.points.iter().all(|point| point.lane == start.lane);
@@ -299,7 +307,8 @@ fn other_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<
     })
 }
 
-/// Returns a driver with the recorded speeds, at the times of the common clock, and the recorded lane changes.
+/// Returns a driver with the recorded speeds, at the times of the common clock, and the recorded
+/// lane changes.
 pub(super) fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverConfig {
     let on_clock = vehicle.trajectory.points.iter().filter(|point| point.time.is_multiple_of(PERIOD));
     let pair = |point: &TrajectoryPoint| [rounded(point.time.s()), rounded(point.speed_mps.max(0.0))];
@@ -315,7 +324,8 @@ pub(super) fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Partici
         let crossing = lane_change_across(&vehicle.trajectory, [start_s, crossing_s], free_from_s);
         let (at_s, duration_s) = crossing.unwrap_or_else(as_recorded);
         let (at_s, duration_s) = (to_steps(at_s), to_steps(duration_s));
-        // The next lane change starts at least one rounding step after the end of this one, so that they never overlap.
+        // The next lane change starts at least one rounding step after the end of this one, so that
+        // they never overlap.
         free_from_s = at_s + duration_s + ROUNDING_STEP;
         lane_changes.push(PrescribedLaneChangeConfig {
             at_s: Num::Fixed(at_s),
@@ -330,12 +340,13 @@ pub(super) fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Partici
     })
 }
 
-/// Returns the start and the duration (s) of a lane change that crosses the marking when the recorded vehicle does, at
-/// `crossing_s`.
+/// Returns the start and the duration (s) of a lane change that crosses the marking when the
+/// recorded vehicle does, at `crossing_s`.
 ///
-/// A simulated lane change follows a symmetric path whose length is its duration times the speed at its start, so that it
-/// crosses the marking after half of that length. A recorded one is hardly ever symmetric. Of all starts from `free_from_s` on
-/// for which the duration is possible, the one nearest to the recorded `start_s` is chosen. Returns `None` if there is none.
+/// A simulated lane change follows a symmetric path whose length is its duration times the speed at
+/// its start, and crosses the marking after half of that length. A recorded one is hardly ever
+/// symmetric. Of all starts from `free_from_s` on for which the duration is possible, the start
+/// nearest to the recorded `start_s` is chosen. Returns `None` if there is none.
 pub(super) fn lane_change_across(
     vehicle: &Trajectory,
     [start_s, crossing_s]: [f64; 2],

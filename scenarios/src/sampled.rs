@@ -1,5 +1,5 @@
-//! Samples a recorded lane change: the other vehicles drive as recorded, the vehicle that changes lanes is driven by a
-//! model, and one of its parameters varies.
+//! Samples a recorded lane change: the other vehicles drive as recorded, the vehicle that changes
+//! lanes is driven by a model, and one of its parameters varies.
 //!
 //! ```text
 //!   target ───────────────────────────────────────────╭──────▶          ── opp2 ──▶
@@ -15,12 +15,14 @@
 //! | `track-…` | all other vehicles that are there from the start | the same |
 //! | `ego` | no recorded vehicle: a scenario has one ego, and here no vehicle carries the system under test | the ego stack without the margin increase system, [`EGO_DISTANCE_M`] behind all others |
 //!
-//! Vehicles that are behind the vehicle that changes lanes, in its lane or in the lane that it changes to, are left out: they
-//! do not influence it, and as recorded they would drive into it when it keeps a longer distance than recorded. A vehicle
-//! whose recorded lane changes do not fit the lanes of the road is left out, too.
+//! Vehicles behind the vehicle that changes lanes, in its lane or in its target lane, are left out.
+//! They do not influence it, and with their recorded motion they would drive into it when it keeps
+//! a longer distance than recorded. A vehicle whose recorded lane changes do not fit the lanes of
+//! the road is left out, too.
 //!
-//! Each step can be *transferred* to the margin increase system: the vehicle that changes lanes becomes the rear vehicle, the
-//! vehicle that it overtakes becomes the ego, and the next one ahead becomes the lead vehicle.
+//! Each step can be *transferred* to the margin increase system: the vehicle that changes lanes
+//! becomes the rear vehicle, the vehicle that it overtakes becomes the ego, and the next one ahead
+//! becomes the lead vehicle.
 
 use std::path::Path;
 
@@ -65,8 +67,8 @@ pub struct SampledEncounter {
     pub lane_change_s: [f64; 2],
 }
 
-/// Returns the scenario in which a parameter of a recorded lane change has one value. The last argument holds the path that
-/// names the source in error messages, and further settings.
+/// Returns the scenario in which a parameter of a recorded lane change has one value. The last
+/// argument holds the path that names the source in error messages, and further settings.
 ///
 /// # Errors
 /// [`ScenarioError`] if the recorded values or the settings do not result in a valid scenario.
@@ -96,9 +98,10 @@ pub fn sampled(
 }
 
 impl SampledEncounter {
-    /// Returns the encounter with the margin increase system: the vehicle that changes lanes becomes the rear vehicle, which
-    /// follows with the parameters of this step and pulls out at the headway `cut_out_thw_s` (s), with which it crossed the
-    /// marking in the run of this step. The path names the source in error messages.
+    /// Returns the encounter with the margin increase system: the vehicle that changes lanes
+    /// becomes the rear vehicle, which follows with the parameters of this step and pulls out at
+    /// the headway `cut_out_thw_s` (s), with which it crossed the marking in the run of this step.
+    /// The path names the source in error messages.
     ///
     /// # Errors
     /// [`ScenarioError`] if the values do not result in a valid scenario.
@@ -112,7 +115,8 @@ impl SampledEncounter {
             Some(DriverConfig::Wiedemann99(config)) => config.clone(),
             _ => Wiedemann99Config::default(),
         };
-        // A driver whose headway is no shorter than the one at which it pulls out would never come that close.
+        // A driver whose headway is no shorter than the one at which it pulls out would never come
+        // that close.
         let longest_s = FOLLOWING_SHARE * cut_out_thw_s;
         let cc1_s = match follow.cc1_s {
             Some(Num::Fixed(cc1_s)) => cc1_s.min(longest_s),
@@ -141,8 +145,9 @@ impl SampledEncounter {
     }
 }
 
-/// Returns the index of the vehicle that has overtaken the lane changer, in the list of vehicles of the encounter: the next
-/// vehicle ahead in the target lane at the recorded crossing, if it is there from the start.
+/// Returns the index of the vehicle that has overtaken the lane changer, in the list of vehicles of
+/// the encounter: the next vehicle ahead in the target lane at the recorded crossing, if it is
+/// there from the start.
 pub fn opp2_of(encounter: &RecordedEncounter) -> Option<usize> {
     let own_m = at_or_before(encounter.ego_lead_rear()[REAR_INDEX], encounter.crossing)?.s_m;
     let others = encounter.vehicles.iter().enumerate().skip(REAR_INDEX + 1);
@@ -223,7 +228,8 @@ fn built(
     })
 }
 
-/// Returns the vehicle that changes lanes: it follows by Wiedemann's model, and changes lanes when the recorded one does.
+/// Returns the vehicle that changes lanes: it follows by Wiedemann's model, and changes lanes when
+/// the recorded one does.
 fn lane_changer(
     encounter: &RecordedEncounter,
     changer: &Participant,
@@ -275,8 +281,8 @@ fn ego(encounter: &RecordedEncounter, others: &[&Participant]) -> Result<ActorCo
     })
 }
 
-/// Returns whether a vehicle is behind the lane changer at the crossing, or at the end of its track before it, in one of the
-/// two lanes of the lane change.
+/// Returns whether a vehicle is behind the lane changer at the crossing, or at the end of its track
+/// before it, in one of the two lanes of the lane change.
 fn is_behind(encounter: &RecordedEncounter, vehicle: &Participant) -> bool {
     let changer = encounter.ego_lead_rear()[REAR_INDEX];
     let until = vehicle.trajectory.span().map_or(Time::ZERO, |(_, last)| last.min(encounter.crossing));
@@ -286,7 +292,8 @@ fn is_behind(encounter: &RecordedEncounter, vehicle: &Participant) -> bool {
     })
 }
 
-/// Returns whether all lane changes of a vehicle that starts in lane `start` lead to a lane of the road.
+/// Returns whether all lane changes of a vehicle that starts in lane `start` lead to a lane of the
+/// road.
 fn fits_the_road(encounter: &RecordedEncounter, vehicle: &Participant, start: Lane) -> bool {
     let mut lane = start.0;
     vehicle.changes.iter().all(|change| {

@@ -1,8 +1,9 @@
 //! The JSON Schema of scenario files, with the ranges that the check of a scenario applies.
 //!
-//! The types give the keys and words. The ranges come from the checks themselves: a scenario that uses every key is
-//! changed in one number at a time, far beyond any range, and the check answers with the range that it allows. The schema
-//! thus cannot state another range than the check. Rules between several keys remain with the check.
+//! The types give the keys and words. The ranges come from the checks themselves: a scenario that
+//! uses every key is changed in one number at a time, far beyond any range, and the check answers
+//! with the range that it allows. The schema thus cannot state another range than the check. Rules
+//! between several keys remain with the check.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,8 +30,8 @@ const SCENARIO_PATTERN: &str = "^[a-z][a-z0-9-]*(@[a-z][a-z0-9-]*)?$";
 
 /// Returns the JSON Schema of scenario files.
 ///
-/// Besides keys and types it states the range of each number that the check of a scenario limits for itself. Rules
-/// between several keys are not part of it.
+/// Besides keys and types it states the range of each number that the check of a scenario limits
+/// for itself. Rules between several keys are not part of it.
 pub fn strict_schema() -> Value {
     let mut schema = schemars::schema_for!(ScenarioConfig).to_value();
     for (pointer, range) in ranges(&schema) {
@@ -69,8 +70,8 @@ pub fn strict_schema() -> Value {
     schema
 }
 
-/// Returns the range of each number, by the JSON pointer of its schema. Where a table stands in several places, the range
-/// contains the ranges of all of them.
+/// Returns the range of each number, by the JSON pointer of its schema. If a table is used in
+/// several places, the range contains the ranges of all of them.
 fn ranges(schema: &Value) -> BTreeMap<String, Range> {
     let Ok(mut document) = EVERY_KEY.parse::<Table>() else { return BTreeMap::new() };
     if let Some(actors) = document.get_mut("actor").and_then(toml::Value::as_array_mut) {
@@ -83,21 +84,22 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
     }
     // The ranges of distributions depend on the other numbers of the same distribution.
     let sampled = ["parameters"];
-    let mut search = Search { schema, document: &document, found: BTreeMap::new() };
+    let mut search = Search { schema, document: &document, ranges: BTreeMap::new() };
     for (key, value) in document.iter().filter(|(key, _)| !sampled.contains(&key.as_str())) {
         search.visit(&format!("/properties/{key}"), &[Segment::Key(key.clone())], value);
     }
-    search.found
+    search.ranges
 }
 
 struct Search<'a> {
     schema: &'a Value,
     document: &'a Table,
-    found: BTreeMap<String, Range>,
+    ranges: BTreeMap<String, Range>,
 }
 
 impl Search<'_> {
-    /// Finds the ranges of `value`, which stands at `path` of the document and has the schema at `pointer`.
+    /// Finds the ranges of `value`, which lies at `path` of the document and has the schema at
+    /// `pointer`.
     fn visit(&mut self, pointer: &str, path: &[Segment], value: &toml::Value) {
         let within = |segment| path.iter().cloned().chain([segment]).collect::<Vec<_>>();
         match value {
@@ -117,8 +119,8 @@ impl Search<'_> {
             }
             _ if self.is_number(pointer) => {
                 if let Some(range) = allowed(self.document, path) {
-                    let wider = self.found.get(pointer).map_or(range, |known| hull(*known, range));
-                    self.found.insert(pointer.to_owned(), wider);
+                    let wider = self.ranges.get(pointer).map_or(range, |range_so_far| hull(*range_so_far, range));
+                    self.ranges.insert(pointer.to_owned(), wider);
                 }
             }
             _ => {}
@@ -131,13 +133,13 @@ impl Search<'_> {
         if let Some(target) = schema["$ref"].as_str().and_then(|target| target.strip_prefix('#')) {
             return self.resolved(target);
         }
-        let mut found = vec![pointer.to_owned()];
+        let mut pointers = vec![pointer.to_owned()];
         for kind in ["anyOf", "oneOf"] {
             for index in 0..schema[kind].as_array().map_or(0, Vec::len) {
-                found.extend(self.resolved(&format!("{pointer}/{kind}/{index}")));
+                pointers.extend(self.resolved(&format!("{pointer}/{kind}/{index}")));
             }
         }
-        found
+        pointers
     }
 
     /// Returns the pointers of the schemas of a key.
@@ -156,7 +158,8 @@ impl Search<'_> {
     }
 }
 
-/// Returns the range that the check allows at `path`, or `None` if it states none for that key alone.
+/// Returns the range that the check allows at `path`, or `None` if it states none for that key
+/// alone.
 fn allowed(document: &Table, path: &[Segment]) -> Option<Range> {
     [-HUGE, HUGE].into_iter().find_map(|number| {
         let mut changed = toml::Value::Table(document.clone());
@@ -179,18 +182,18 @@ fn allowed(document: &Table, path: &[Segment]) -> Option<Range> {
     })
 }
 
-fn range_at(problem: &Problem, found: &KeyPath, path: &[Segment]) -> Option<Range> {
+fn range_at(problem: &Problem, key_path: &KeyPath, path: &[Segment]) -> Option<Range> {
     match problem {
-        Problem::OutOfRange { allowed, .. } if found.0 == path => Some(*allowed),
+        Problem::OutOfRange { allowed, .. } if key_path.0 == path => Some(*allowed),
         _ => None,
     }
 }
 
 /// Returns the smallest range that contains both.
-fn hull(one: Range, other: Range) -> Range {
-    let low = one.low().min(other.low());
-    let includes_low = [one, other].iter().any(|range| range.low() <= low && range.includes_low());
-    let high = one.high().max(other.high());
+fn hull(first: Range, second: Range) -> Range {
+    let low = first.low().min(second.low());
+    let includes_low = [first, second].iter().any(|range| range.low() <= low && range.includes_low());
+    let high = first.high().max(second.high());
     if includes_low { Range::closed(low, high) } else { Range::above(low, high) }
 }
 

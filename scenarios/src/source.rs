@@ -1,4 +1,5 @@
-//! Where a scenario comes from: a file, a folder, standard input, or the library inside the program.
+//! Where a scenario comes from: a file, a folder, standard input, or the library inside the
+//! program.
 //!
 //! | argument | scenario |
 //! |---|---|
@@ -18,9 +19,10 @@ use super::{ScenarioError, ScenarioFile, Setting, library};
 const STANDARD_INPUT: &str = "-";
 /// The folder in which a repository keeps its scenarios.
 pub const SCENARIOS: &str = "scenarios";
-/// The name of a project file, which holds the settings of a repository: a TOML file that is no scenario.
+/// The name of a project file, which holds the settings of a repository: a TOML file that is no
+/// scenario.
 pub const PROJECT_FILE: &str = "closecall.toml";
-/// The keys of which a scenario has at least one.
+/// The keys that identify a scenario: it has at least one of them.
 const KEYS_OF_SCENARIO: [&str; 3] = ["road", "actor", "base"];
 /// Largest length of a scenario on standard input (bytes).
 const MAX_LENGTH: u64 = 16 * 1024 * 1024;
@@ -42,10 +44,12 @@ pub enum SourceError {
     Scenario(#[from] ScenarioError),
 }
 
-/// Returns the scenarios that the arguments of a command name: each folder is replaced by the scenario files in it.
+/// Returns the scenarios that the arguments of a command name: each folder is replaced by the
+/// scenario files in it.
 ///
 /// # Errors
-/// [`SourceError`] if standard input is named twice, or if a folder cannot be read or has no scenario file.
+/// [`SourceError`] if standard input is named twice, or if a folder cannot be read or has no
+/// scenario file.
 pub fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, SourceError> {
     let inputs = paths.iter().filter(|path| path.as_os_str() == STANDARD_INPUT).count();
     if inputs > 1 {
@@ -91,7 +95,8 @@ fn toml_files(folder: &Path) -> Result<Vec<PathBuf>, ScenarioError> {
     Ok(entries(folder)?.into_iter().filter(is_wanted).collect())
 }
 
-/// Appends the TOML files of the folders in a folder. A link is not followed, so that no folder is entered twice, and neither is a folder whose name begins with a dot.
+/// Appends the TOML files of the folders in a folder. A link is not followed, so that no folder is
+/// entered twice, and neither is a folder whose name begins with a dot.
 fn append_below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ScenarioError> {
     let is_hidden = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
     for path in entries(folder)? {
@@ -103,8 +108,9 @@ fn append_below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ScenarioE
     Ok(())
 }
 
-/// Returns false for a TOML file that has no key of a scenario, such as the drivers of an ensemble or a fleet, which may lie below a folder of scenarios. A
-/// file that cannot be read as TOML may be a scenario with a mistake, and is not passed over.
+/// Returns false for a TOML file without any key of a scenario, such as the drivers of an ensemble
+/// or a fleet, which may lie below a folder of scenarios. A file that cannot be read as TOML may be
+/// a scenario with a mistake, and is not passed over.
 fn may_be_scenario(path: &Path) -> bool {
     let document = read_text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     document.is_none_or(|document| KEYS_OF_SCENARIO.iter().any(|key| document.contains_key(*key)))
@@ -113,8 +119,8 @@ fn may_be_scenario(path: &Path) -> bool {
 /// Reads the scenario that one argument names, and applies the settings.
 ///
 /// # Errors
-/// [`ScenarioError`] if there is no such scenario, if it is not valid, or if no value uses one of its parameters. A name close to one of the library is answered
-/// with that name.
+/// [`ScenarioError`] if there is no such scenario, if it is not valid, or if no value uses one of
+/// its parameters. A name close to one of the library is answered with that name.
 pub fn load(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
     read(path, settings)?.refuse_unused()
 }
@@ -136,12 +142,13 @@ fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError
     ScenarioFile::load(path, settings)
 }
 
-/// Returns true for a name without folder and extension, which may be that of a scenario of the library.
+/// Returns true for a name without folder and extension, which may name a scenario of the library.
 fn is_name(path: &Path) -> bool {
     path.components().count() == 1 && path.extension().is_none()
 }
 
-/// Returns the file that `path` names, with or without its extension and folder; `None` if there is none.
+/// Returns the file that `path` names, with or without its extension and folder; `None` if there is
+/// none.
 pub fn existing(path: &Path) -> Option<PathBuf> {
     let file = path.with_extension("toml");
     let named = [file.clone(), Path::new(SCENARIOS).join(file)];
@@ -190,8 +197,8 @@ mod tests {
         for name in ["b.toml", "a.toml", "closecall.toml", "notes.md"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
-        let found = expand(&[folder.path().to_owned(), PathBuf::from("-")]).unwrap();
-        assert_eq!(found, [folder.path().join("a.toml"), folder.path().join("b.toml"), PathBuf::from("-")]);
+        let paths = expand(&[folder.path().to_owned(), PathBuf::from("-")]).unwrap();
+        assert_eq!(paths, [folder.path().join("a.toml"), folder.path().join("b.toml"), PathBuf::from("-")]);
         let empty = tempfile::tempdir().unwrap();
         assert!(expand(&[empty.path().to_owned()]).unwrap_err().to_string().contains("contains no scenario file"));
         assert!(expand(&[PathBuf::from("-"), PathBuf::from("-")]).is_err());
@@ -212,16 +219,16 @@ mod tests {
         write("fleets/cars.toml", "[[vehicle]]\n");
         write("faults/broken.toml", "road = {");
         write(".git/hidden.toml", "road = {}\n");
-        let found = expand(&[folder.path().to_owned()]).unwrap();
+        let paths = expand(&[folder.path().to_owned()]).unwrap();
         let expected = ["z.toml", "faults/broken.toml", "traffic/busy.toml", "traffic/deep/derived.toml"];
-        assert_eq!(found, expected.map(|path| folder.path().join(path)));
+        assert_eq!(paths, expected.map(|path| folder.path().join(path)));
     }
 
     #[test]
     fn every_scenario_of_the_library_is_in_its_folder() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
-        let found = expand(&[folder]).unwrap();
-        let mut stems: Vec<&str> = found.iter().map(|path| path.file_stem().unwrap().to_str().unwrap()).collect();
+        let paths = expand(&[folder]).unwrap();
+        let mut stems: Vec<&str> = paths.iter().map(|path| path.file_stem().unwrap().to_str().unwrap()).collect();
         let mut names: Vec<&str> = library::names().collect();
         stems.sort_unstable();
         names.sort_unstable();

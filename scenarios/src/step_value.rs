@@ -43,8 +43,8 @@ pub struct StepValue<'a> {
 }
 
 impl Variation {
-    /// Creates a variation in equal steps. `parameter` is a parameter of the lane changer's driver (`cc1`), or a path of keys
-    /// in the scenario file (`actor.opp1.start.absolute.speed-mps`).
+    /// Creates a variation in equal steps. `parameter` is a parameter of the lane changer's driver
+    /// (`cc1`), or a path of keys in the scenario file (`actor.opp1.start.absolute.speed-mps`).
     ///
     /// # Errors
     /// Says what is wrong, and what is allowed.
@@ -86,7 +86,8 @@ impl StepValue<'_> {
         format!("{}={}", self.key, self.value).parse()
     }
 
-    /// Returns the name of the parameter without its path and its unit, with the value: `cc1 = 0.3`.
+    /// Returns the name of the parameter without its path and its unit, with the value:
+    /// `cc1 = 0.3`.
     pub fn label(&self) -> String {
         let last = self.key.rsplit('.').next().unwrap_or(self.key);
         let is_short = last.starts_with("cc");

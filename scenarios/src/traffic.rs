@@ -7,9 +7,10 @@
 //!           from-m
 //! ```
 //!
-//! The headways of vehicles that do not interact are exponential; with a least headway they are Cowan's model M2 (R. J.
-//! Cowan, *Useful headway models*, Transportation Research 9 (1975) 371–375). Everything is drawn from one number, the key
-//! `draw`: as a parameter of the scenario it is sampled, recorded and fixed like any other.
+//! The headways of vehicles that do not interact are exponential; with a least headway they are
+//! Cowan's model M2 (R. J. Cowan, *Useful headway models*, Transportation Research 9 (1975)
+//! 371–375). Everything is drawn from one number, the key `draw`: as a parameter of the scenario it
+//! is sampled, recorded and fixed like any other.
 
 use closecall_controllers::{CheckedDriver, DriverConfig};
 use closecall_traffic::{
@@ -30,20 +31,22 @@ const CHANNEL: &str = "traffic";
 const MAX_VEHICLES: u32 = 200;
 /// Number of standard deviations within which a speed lies.
 const SPEED_DEVIATIONS: f64 = 2.0;
-/// Least headway if the file gives none (s): an assumption, below most of the headways that drivers keep; 0.5 to 2 are plausible.
+/// Least headway if the file gives none (s): an assumption, below most of the headways that drivers
+/// keep; 0.5 to 2 are plausible.
 const LEAST_THW_S: f64 = 1.0;
 /// Distance that is added so that rounding lets no gap be too short (m).
 const ROUNDING_M: f64 = 1e-6;
 
-/// Vehicles around the ego. They are named ID-1, ID-2 and so on, and are placed lane by lane from the rear; where an actor of the
-/// file is in the way, they leave a gap. Give exactly one of `mean-thw-s` and `density-per-km`.
+/// Vehicles around the ego. They are named ID-1, ID-2 and so on, and are placed lane by lane from
+/// the rear; where an actor of the file is in the way, they leave a gap. Give exactly one of
+/// `mean-thw-s` and `density-per-km`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TrafficConfig {
     /// Beginning of the vehicles' names: lower-case letters, digits and hyphens.
     pub id: ActorId,
-    /// The number from which everything is drawn (-): that of a parameter with a uniform distribution from 0 to 1 gives other
-    /// traffic in each sample, a fixed number the same.
+    /// The number from which everything is drawn (-): that of a parameter with a uniform
+    /// distribution from 0 to 1 gives other traffic in each sample, a fixed number the same.
     pub draw: Num,
     /// The lanes, counted from 1 for the leftmost lane. The vehicles are dealt to them in turn.
     pub lanes: Vec<Lane>,
@@ -63,14 +66,16 @@ pub struct TrafficConfig {
     pub speed_sd_mps: Option<Num>,
     /// Weights of the classes. Default: cars only.
     pub classes: Option<ClassWeightsConfig>,
-    /// Fleet of the library from which paint, colour, body shape and plate of each vehicle are drawn. If absent, nothing is drawn.
+    /// Fleet of the library from which paint, colour, body shape and plate of each vehicle are
+    /// drawn. If absent, nothing is drawn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fleet: Option<String>,
     /// The drivers: a human driver model.
     pub driver: DriverConfig,
 }
 
-/// Weights of the vehicle classes: a vehicle is of a class with the probability of its weight over the sum of the weights.
+/// Weights of the vehicle classes: a vehicle is of a class with the probability of its weight over
+/// the sum of the weights.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ClassWeightsConfig {
@@ -137,7 +142,7 @@ struct Rear {
     speed_mps: f64,
 }
 
-/// What is drawn for one vehicle.
+/// The drawn values of one vehicle.
 struct Drawn {
     vehicle: Vehicle,
     speed_mps: f64,
@@ -228,8 +233,8 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Returns the position nearest to the wanted one, there or ahead, at which the least headway is kept to all vehicles that are
-    /// at the same place across the road.
+    /// Returns the position nearest to the wanted one, there or ahead, at which the least headway
+    /// is kept to all vehicles that are at the same place across the road.
     fn free_position_m(&self, actors: &[Actor], vehicle: &Vehicle, wanted: VehicleState) -> f64 {
         let mut s_m = wanted.s_m;
         loop {

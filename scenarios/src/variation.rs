@@ -6,9 +6,10 @@ use closecall_traffic::{Road, Time, VehicleState};
 use super::{Actor, Event, Scenario, Trigger};
 
 impl Scenario {
-    /// Returns the same scenario with half the step of the vehicle dynamics and the human drivers. The rates of the sensors
-    /// and of the ego controller do not change, since they are properties of the devices. The random streams do not change
-    /// either: sensor errors are drawn at the sensors' rate, and drivers draw once in a run.
+    /// Returns the same scenario with half the step of the vehicle dynamics and the human drivers.
+    /// The rates of the sensors and of the ego controller do not change, since they are properties
+    /// of the devices. The random streams do not change either: sensor errors are drawn at the
+    /// sensors' rate, and drivers draw once in a run.
     #[must_use]
     pub fn at_half_step(&self) -> Self {
         Self { physics_step: Time::from_ns(self.physics_step.ns() / 2), ..self.clone() }
@@ -29,8 +30,8 @@ impl Scenario {
         Self { sensors: self.sensors.with_clustering_check(check), ..self.clone() }
     }
 
-    /// Returns the mirror image, in which left and right are swapped. Returns `None` on a curved road: positions are measured
-    /// along its left edge, so that it has no exact mirror image.
+    /// Returns the mirror image, in which left and right are swapped. Returns `None` on a curved
+    /// road: positions are measured along its left edge, so that it has no exact mirror image.
     pub fn mirrored(&self) -> Option<Self> {
         let road = self.road.mirrored()?;
         let mirrored = |actor: &Actor| Actor {
@@ -44,7 +45,8 @@ impl Scenario {
 }
 
 impl Actor {
-    /// Returns the same actor with new indices of actors in its events. `new_index` maps the old index to the new one.
+    /// Returns the same actor with new indices of actors in its events. `new_index` maps the old
+    /// index to the new one.
     fn renumbered(&self, new_index: impl Fn(usize) -> usize) -> Self {
         let mut actor = self.clone();
         for event in &mut actor.events {

@@ -1,4 +1,5 @@
-//! Simulates one closed-loop run: a scenario, a seed and an arm (controller and sensors) go in, an outcome comes out.
+//! Simulates one closed-loop run: a scenario, a seed and an arm (controller and sensors) go in, an
+//! outcome comes out.
 //!
 //! ```text
 //!  concrete scenario ─▶ [ world ─▶ sensors ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome
@@ -9,8 +10,8 @@
 //! * [`calibration`]: car-following models fitted to recorded pairs
 //! * [`trajectories`]: simulated traffic as trajectory data
 //!
-//! The outcome depends on the scenario, the seed, the sample number and the arm only, down to the last bit. This crate is
-//! the only user of rapier, in its module `world`.
+//! The outcome depends on the scenario, the seed, the sample number and the arm only, down to the
+//! last bit. This crate is the only user of rapier, in its module `world`.
 
 pub mod calibration;
 pub mod controller;

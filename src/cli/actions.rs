@@ -1,4 +1,4 @@
-//! The commands by which a user does what a text proposes.
+//! The commands for the actions that a text proposes.
 
 use closecall_campaign::action::{Action, Replay, Resume, SavedSample};
 
@@ -7,7 +7,7 @@ pub(super) fn quoted(word: &str) -> String {
     shlex::try_quote(word).map_or_else(|_| word.to_owned(), |quoted| quoted.into_owned())
 }
 
-/// Returns the command of this program that does something.
+/// Returns the command of this program for an action.
 pub(super) fn command_for(action: &Action<'_>) -> String {
     match *action {
         Action::Replay(replay) => replay_command(&replay),
@@ -38,7 +38,7 @@ fn replay_command(replay: &Replay<'_>) -> String {
     let controller = option("--controller", replay.controller);
     format!(
         "{}{paired}{controller}{settings}{}",
-        sample_command("replay", replay.of),
+        sample_command("replay", replay.sample),
         option("--record", replay.recording)
     )
 }
@@ -74,8 +74,8 @@ mod tests {
 
     #[test]
     fn a_replay_names_what_differs_from_a_plain_run() {
-        let of = SavedSample { folder: "a b", sample: 7, scenario: Some("s") };
-        let plain = Replay::new(of);
+        let saved_sample = SavedSample { folder: "a b", sample: 7, scenario: Some("s") };
+        let plain = Replay::new(saved_sample);
         assert_eq!(command_for(&Action::Replay(plain)), "closecall replay 'a b' 7 --scenario s");
         let settings = ["mis.disabled=[\"holding\"]".to_owned()];
         let full = Replay {

@@ -1,5 +1,5 @@
-//! What the user can do after an error or a result without a verdict. The libraries say what is
-//! wrong; the options that help are those of this program.
+//! Advice for the user after an error or a result without a verdict. The libraries state the
+//! problem, and only this program has the options that help.
 
 use std::fmt::Display;
 
@@ -29,7 +29,7 @@ impl Diagnostic for CliError {
     }
 }
 
-/// Returns what the user can do, if an option helps.
+/// Returns the advice for the user, if an option helps.
 fn advice(error: &CliError) -> Option<&'static str> {
     match error {
         CliError::Results(_) | CliError::ResultsCut(_) => Some(OTHER_FOLDER),
@@ -85,7 +85,7 @@ fn of_saved(error: &SavedError) -> Option<&'static str> {
     }
 }
 
-/// Returns the lines after a verdict that say what makes a campaign judged, or a measurement.
+/// Returns the lines after a verdict that say how a campaign is judged, or becomes a measurement.
 pub(super) fn after_verdict(judged: &Judgement) -> &'static str {
     if judged.decision == Decision::NotJudged && judged.gates.is_empty() {
         "  --gate CRITERION sets a gate, --no-gate measures without a verdict\n"
@@ -94,7 +94,7 @@ pub(super) fn after_verdict(judged: &Judgement) -> &'static str {
     }
 }
 
-/// Returns the option that gives what is missing for a net effect.
+/// Returns the option that gives the missing input of a net effect.
 pub(super) const fn to_provide(missing: Missing) -> &'static str {
     match missing {
         Missing::Rate => "--per-million-km LOW..HIGH states a range of the rate",

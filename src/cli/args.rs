@@ -47,7 +47,8 @@ impl SensorsChoice {
     }
 }
 
-/// What is simulated of a scenario: its random numbers, the controller of the ego vehicle and its sensors, and settings.
+/// The simulation of a scenario: its random numbers, the controller of the ego vehicle and its
+/// sensors, and settings.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SimulationArgs {
     /// Seed of the random numbers
@@ -85,7 +86,7 @@ pub(super) struct FilesArgs {
 }
 
 impl FilesArgs {
-    /// Reads the files, none of which may be given twice.
+    /// Reads the files. None may be given twice.
     pub(super) fn read_all(&self) -> Result<Vec<TrajectoryData>, CliError> {
         let options = self.read.options();
         let data_sets = self.files.iter().map(|path| read_noting(path, options)).collect::<Result<Vec<_>, _>>()?;
@@ -94,7 +95,7 @@ impl FilesArgs {
     }
 }
 
-/// Reads a trajectory file, and prints what a reader of the results has to know of it.
+/// Reads a trajectory file, and prints the remarks that a reader of the results needs.
 ///
 /// # Errors
 /// The file cannot be read, or its content is wrong.
@@ -163,15 +164,16 @@ impl ReadArgs {
 /// Changes of single values of a scenario.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SetArgs {
-    /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`) or by a parameter
-    /// (`brake-mps2=6`); can be given more than once. In a campaign `ARM:KEY=VALUE` sets a value of the ego stack in one arm
-    /// (`acc+aeb:aeb.trigger-mps2=5`)
+    /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`)
+    /// or by a parameter (`brake-mps2=6`); can be given more than once. In a campaign
+    /// `ARM:KEY=VALUE` sets a value of the ego stack in one arm (`acc+aeb:aeb.trigger-mps2=5`)
     #[arg(long = "set", value_name = "KEY=VALUE", help_heading = heading::SCENARIO)]
     pub(super) settings: Vec<Setting>,
 }
 
 impl SetArgs {
-    /// Returns the changes of the scenario, and those of single arms: the arm, and its setting.
+    /// Returns the changes of the scenario, and the changes of single arms: the arm, and its
+    /// setting.
     pub(super) fn by_arm(&self) -> (Self, Vec<(String, String)>) {
         let (mut scenario, mut arms) = (Vec::new(), Vec::new());
         for setting in &self.settings {
@@ -196,17 +198,19 @@ impl SetArgs {
     }
 }
 
-/// Fitted distributions in place of those of a scenario.
+/// Fitted distributions that replace the distributions of a scenario.
 #[derive(Clone, Debug, Args)]
 pub(super) struct FittedArgs {
-    /// File with fitted distributions, as `traffic fit` writes it: they replace those of the parameters with the same name, or of those
-    /// that were fitted to the same quantity. --set is applied after it
+    /// File with fitted distributions, as `traffic fit` writes it. They replace the distributions
+    /// of parameters with the same name, or of parameters that were fitted to the same quantity.
+    /// --set is applied after it
     #[arg(long, value_name = "FITTED.toml", help_heading = heading::SCENARIO)]
     pub(super) fitted: Option<PathBuf>,
 }
 
 impl FittedArgs {
-    /// Reads a scenario, applies the fitted distributions, then the changes of `set`, and checks it.
+    /// Reads a scenario, applies the fitted distributions, then the changes of `set`, and checks
+    /// it.
     pub(super) fn load(&self, path: &Path, set: &SetArgs) -> Result<ScenarioFile, ScenarioError> {
         let Some(fitted) = &self.fitted else { return set.load(path) };
         let settings = FittedFile::read(fitted)?.settings(&source::load(path, &[])?)?;

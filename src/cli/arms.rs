@@ -1,4 +1,5 @@
-//! The controllers of the ego vehicle on the command line: the one under test, and those it is compared with.
+//! The controllers of the ego vehicle on the command line: the controller under test, its baseline
+//! and its references.
 
 use std::path::PathBuf;
 
@@ -43,7 +44,8 @@ impl ControllerArgs {
         self.controller.is_some()
     }
 
-    /// Returns the controllers, the processes among them with the limits of the command line. Each is tried.
+    /// Returns the controllers. The processes among them have the limits of the command line. Each
+    /// is tried.
     fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
         let (timeout_ms, memory_mib) = (self.limits.controller_timeout_ms, self.limits.controller_memory_mib);
         if let (Some(last), true) = (controllers.last(), timeout_ms.is_some() || memory_mib.is_some())
@@ -65,7 +67,7 @@ impl ControllerArgs {
 pub(super) struct ArmArgs {
     #[command(flatten)]
     pub(super) controller: ControllerArgs,
-    /// Depth of the sensor simulation [default: that of the scenario]
+    /// Depth of the sensor simulation [default: as in the scenario]
     #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     pub(super) sensors: Option<SensorsChoice>,
 }
@@ -82,23 +84,23 @@ impl ArmArgs {
     }
 }
 
-/// What the controller under test is compared with.
+/// The controllers with which the controller under test is compared.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ComparisonArgs {
     /// Also run every sample with the baseline controller, on the same random numbers: short for
-    /// `--arms acc,CONTROLLER` where a scenario judges the margin increase system
+    /// `--arms acc,CONTROLLER` if a scenario judges the margin increase system
     #[arg(long, help_heading = heading::CONTROLLER)]
     pub(super) paired: bool,
-    /// Controllers that run on the same samples and random numbers. The first is the baseline, the last is the one under
-    /// test, those between are references. An `exec:COMMAND` takes the rest of its list: let it stand last, or give --arms
-    /// several times
+    /// Controllers that run on the same samples and random numbers. The first is the baseline, the
+    /// last is the controller under test, and references lie between them. An `exec:COMMAND` takes
+    /// the rest of its list: let it stand last, or give --arms several times
     #[arg(long, value_name = "CONTROLLER,CONTROLLER…", conflicts_with_all = ["paired", "controller"], help_heading = heading::CONTROLLER)]
     pub(super) arms: Vec<ArmList>,
 }
 
 impl ComparisonArgs {
-    /// Returns the controllers in the order of the arms. `by_default` compares with the baseline even without `--paired`,
-    /// unless the controller under test is the baseline itself.
+    /// Returns the controllers in the order of the arms. `by_default` compares with the baseline
+    /// even without `--paired`, unless the controller under test is the baseline itself.
     pub(super) fn controllers(
         &self,
         tested: &ControllerArgs,
@@ -155,8 +157,8 @@ pub(super) fn tuned(
     let mut controllers = controllers;
     for (arm, setting) in settings {
         let Some(index) = names.iter().position(|name| name == arm) else {
-            let known = names.join("`, `");
-            return Err(CliError::usage(format!("--set {arm}:{setting}: no arm is `{arm}`, only `{known}`")));
+            let arms = names.join("`, `");
+            return Err(CliError::usage(format!("--set {arm}:{setting}: no arm is `{arm}`, only `{arms}`")));
         };
         let fail = |error| CliError::usage(format!("--set {arm}:{setting}: {error}"));
         controllers[index] = controllers[index].with_setting(setting).map_err(fail)?;

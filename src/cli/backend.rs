@@ -1,4 +1,5 @@
-//! The inference backend of the rear camera's network. It is loaded only by commands that may run the network.
+//! The inference backend of the rear camera's network. It is loaded only by commands that may run
+//! the network.
 
 use std::path::Path;
 use std::time::Duration;
@@ -18,7 +19,8 @@ pub(super) fn choose_backend(onnxruntime: Option<&Path>) {
     set_inference_backend(Backend::choose(onnxruntime, None));
 }
 
-/// Loads the chosen backend, so that a bad path is reported before any work is done. Does nothing if `is_used` is false.
+/// Loads the chosen backend, so that a bad path is reported before any work is done. Does nothing
+/// if `is_used` is false.
 pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
     let backend = inference_backend();
     if is_used && *backend != Backend::Tract {
@@ -30,12 +32,14 @@ pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Longest time in which ONNX Runtime is loaded. An assumption: ten times what it takes on a slow disk.
+/// Longest time in which ONNX Runtime is loaded. An assumption: ten times the time on a slow disk.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
-/// Memory of the process that tries it (MiB): that of the network and of all of ONNX Runtime, several times.
+/// Memory of the process that tries it (MiB): several times the memory of the network and of ONNX
+/// Runtime.
 const LOAD_MEMORY_MIB: u64 = 8_192;
 
-/// Loads the library in a process of its own: one that ends the process, or hangs it, must not end this program as if all was well.
+/// Loads the library in a separate process. A library that ends its process, or hangs, must not end
+/// this program with success.
 fn try_to_load(library: &Path, backend: &Backend) -> Result<(), ClassifierError> {
     let words = command(&["onnxruntime", &library.display().to_string()]);
     // A word with a NUL character, which cannot be quoted, names no file.
@@ -46,7 +50,7 @@ fn try_to_load(library: &Path, backend: &Backend) -> Result<(), ClassifierError>
     match answer {
         Ok(Some(_)) => Ok(()),
         Ok(None) => Err(fail(format!("it is not loaded within {} s", LOAD_TIMEOUT.as_secs()))),
-        // It cannot be loaded: this process finds the same, and says why.
+        // The library cannot be loaded: this process meets the same error, and reports it.
         Err(ExecError::Ended { status, .. }) if status.code() == Some(ExitCode::SampleError as i32) => Ok(()),
         Err(error) => Err(fail(error.to_string())),
     }

@@ -1,4 +1,5 @@
-//! `closecall baseline`: keeps the results of a campaign in a small file, and compares later campaigns with it.
+//! `closecall baseline`: keeps the results of a campaign in a small file, and compares later
+//! campaigns with it.
 
 use std::path::{Path, PathBuf};
 
@@ -43,8 +44,8 @@ enum Action {
         /// File to write; an existing baseline is replaced
         file: PathBuf,
     },
-    /// Name what newly fails, what is fixed, and which margins shrank since the baseline was saved. The exit code of a
-    /// regression is 1
+    /// Name what newly fails, what is fixed, and which margins shrank since the baseline was saved.
+    /// The exit code of a regression is 1
     #[command(after_help = examples([
         "closecall baseline compare closecall-results baseline.json",
         "closecall baseline compare closecall-results baseline.json --tolerance 0.1",
@@ -88,21 +89,21 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
 
 fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<ExitCode, CliError> {
     let (before, current) = (Baseline::read(file)?, Baseline::of(&Folder::open(dir))?);
-    let found = before.compare(&current, tolerance)?;
-    let code = if found.is_regression() { ExitCode::Fail } else { ExitCode::Pass };
+    let comparison = before.compare(&current, tolerance)?;
+    let code = if comparison.is_regression() { ExitCode::Fail } else { ExitCode::Pass };
     match format {
         Format::Json => {
             let object = json!({
                 "verdict": if code == ExitCode::Pass { "PASS" } else { "FAIL" },
                 "tolerance": tolerance,
-                "scenarios": found.scenarios,
-                "new_scenarios": found.new_scenarios,
+                "scenarios": comparison.scenarios,
+                "new_scenarios": comparison.new_scenarios,
             });
             outln!("{:#}", stamped(object, Some(current.seed), None));
         }
         Format::Human => {
-            out!("{}", BaselineText(&found));
-            if !found.is_regression() && (found.has_fixed() || !found.new_scenarios.is_empty()) {
+            out!("{}", BaselineText(&comparison));
+            if !comparison.is_regression() && (comparison.has_fixed() || !comparison.new_scenarios.is_empty()) {
                 outln!("`closecall baseline save DIR {}` keeps this result", file.display());
             }
         }

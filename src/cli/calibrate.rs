@@ -22,13 +22,15 @@ use crate::exit_code::ExitCode;
     "closecall traffic calibrate one.csv two.csv -o member.toml --format json",
 ]))]
 pub(super) struct CalibrateArgs {
-    /// Files of recorded pairs: a table of pairs, or a platoon of the OpenACC database; plain or gzip
+    /// Files of recorded pairs: a table of pairs, or a platoon of the OpenACC database; plain or
+    /// gzip
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Car-following model
     #[arg(long, value_enum, default_value_t = Model::Idm, help_heading = heading::METHOD)]
     model: Model,
-    /// File for the pooled parameters, as a member of a driver ensemble (`closecall campaign --ensemble FILE`)
+    /// File for the pooled parameters, as a member of a driver ensemble
+    /// (`closecall campaign --ensemble FILE`)
     #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format

@@ -62,7 +62,8 @@ use crate::exit_code::ExitCode;
     "closecall campaign low-thw-overtake -n 500 --paired --gate 'upper(induced) <= 0.01'",
 ]))]
 pub(super) struct CampaignArgs {
-    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input
+    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard
+    /// input
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
@@ -70,19 +71,20 @@ pub(super) struct CampaignArgs {
     /// Seed of the random numbers [default: 0]
     #[arg(long, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     seed: Option<u64>,
-    /// Seed of a campaign that judges: a number, or `secret`, which draws a seed that nobody knew before. The campaign states it in the end. `--preset pr`
-    /// without a seed draws one
+    /// Seed of a campaign that judges: a number, or `secret`, which draws a seed that nobody knew
+    /// before. The campaign states it in the end. `--preset pr` without a seed draws one
     #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
     judge_seed: Option<JudgeSeed>,
-    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or `importance` for a rare event,
-    /// which --event names. -n is then the largest number of runs [default: 200000]
+    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or
+    /// `importance` for a rare event, which --event names. -n is then the largest number of runs
+    /// [default: 200000]
     #[arg(long, default_value_t = DesignChoice::Plain(Design::Random), help_heading = heading::SAMPLES)]
     design: DesignChoice,
     #[command(flatten)]
     rare: RareArgs,
     #[command(flatten)]
     controller: ControllerArgs,
-    /// Depth of the sensor simulation [default: that of the scenario]
+    /// Depth of the sensor simulation [default: as in the scenario]
     #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     #[command(flatten)]
@@ -90,15 +92,17 @@ pub(super) struct CampaignArgs {
     /// Number of worker threads [default: one per processor]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
-    /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local` (start one here). Needs the
-    /// Python package: pip install "closecall[ray]"
+    /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local`
+    /// (start one here). Needs the Python package: pip install "closecall[ray]"
     #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs", help_heading = heading::EXECUTION)]
     ray: Option<String>,
-    /// Longest wall time of a sample with one controller; a sample that takes longer ends in an error
+    /// Longest wall time of a sample with one controller; a sample that takes longer ends in an
+    /// error
     #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive, help_heading = heading::EXECUTION)]
     sample_timeout_s: f64,
-    /// Run a sample up to N times more in a new process if the process of its library, FMU or Python controller crashes or hangs.
-    /// A sample that succeeds only so is FLAKY: it is counted and listed, see --max-flaky
+    /// Run a sample up to N times more in a new process if the process of its library, FMU or
+    /// Python controller crashes or hangs. A sample that succeeds only in this way is FLAKY: it is
+    /// counted and listed, see --max-flaky
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100), help_heading = heading::EXECUTION)]
     retry_crashed: u32,
     #[command(flatten)]
@@ -108,9 +112,9 @@ pub(super) struct CampaignArgs {
     /// With --out: run only part I of N of the samples; `closecall tool merge` merges the parts
     #[arg(long, value_name = "I/N", requires = "out", help_heading = heading::EXECUTION)]
     partition: Option<Partition>,
-    /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
-    /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
-    /// scenarios [default: each-kind]
+    /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows
+    /// them. KIND is `worst`, `failures` or `random`; `each-kind` is the worst prevented, the worst
+    /// induced and the worst shared collision of all scenarios [default: each-kind]
     #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
@@ -131,9 +135,9 @@ pub(super) struct CampaignArgs {
 /// The seed of a campaign that judges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum JudgeSeed {
-    /// It is drawn when the campaign starts.
+    /// The seed is drawn when the campaign starts.
     Secret,
-    /// It is named.
+    /// The seed is named.
     Number(u64),
 }
 
@@ -185,8 +189,8 @@ impl CampaignArgs {
         Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs) })
     }
 
-    /// Reads every scenario, and returns them with the controllers of their arms. Scenarios of a folder that judge another function than the rest are left out,
-    /// and named.
+    /// Reads every scenario, and returns them with the controllers of their arms. Scenarios of a
+    /// folder that judge another function than the rest are left out, and named.
     fn scenarios(&self, wants_pairs: bool) -> Result<(Vec<ScenarioFile>, Vec<ControllerChoice>), CliError> {
         let (set, of_arms) = self.set.by_arm();
         let mut files = Vec::new();
@@ -234,7 +238,7 @@ impl CampaignArgs {
     }
 }
 
-/// A campaign that is ready to run, with what the command line says of its results.
+/// A campaign that is ready to run, with the settings for its results.
 pub(super) struct Planned<'a> {
     pub(super) plan: &'a Plan,
     pub(super) gates: &'a GateSet,
@@ -253,17 +257,17 @@ pub(super) struct Planned<'a> {
     pub(super) has_drawn_seed: bool,
 }
 
-/// What a command keeps in the folder of a campaign beside the results.
+/// The files of a command in the folder of a campaign beside the results.
 pub(super) trait Companion {
     /// Called when the folder is ready, before the first sample runs.
     fn begin(&mut self, folder: &Folder) -> Result<(), CliError>;
     /// Called after the last sample, before the reports are written.
     fn end(&mut self, folder: &Folder) -> Result<(), CliError>;
-    /// Returns what is printed of it.
+    /// Returns the text to print.
     fn text(&self, summary: &Summary) -> String;
     /// Returns the same for programs, with its key.
     fn json(&self) -> Option<(&'static str, Value)>;
-    /// Returns the exit code, if `code` is that of the verdict.
+    /// Returns the exit code. `code` is the code of the verdict.
     fn code(&self, code: ExitCode) -> ExitCode;
 }
 
@@ -292,7 +296,7 @@ impl Companion for Alone {
     }
 }
 
-/// Checks what would fail after the samples have run.
+/// Checks everything that would fail only after the samples have run.
 fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
     if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place()? == Place::Nowhere {
         return Err(CliError::usage(
@@ -474,7 +478,8 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
 /// Counts the records of a running campaign, shows the progress, and applies the stop rule.
 struct Progress {
     names: Vec<String>,
-    /// The number of samples of each scenario; `None` of a part, which is judged with the others only.
+    /// The number of samples of each scenario; `None` of a part, which is judged with the others
+    /// only.
     counts: Option<Vec<u64>>,
     tally: Tally,
     stop: StopMonitor,

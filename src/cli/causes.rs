@@ -1,4 +1,5 @@
-//! `closecall explain` and `minimize`, `closecall study map` and `exposure`: from a collision to its cause, and how often it matters.
+//! `closecall explain` and `minimize`, `closecall study map` and `exposure`: from a collision to
+//! its cause, and how often it matters.
 
 use std::path::PathBuf;
 
@@ -47,7 +48,7 @@ pub(super) struct ExplainArgs {
     /// Name of the scenario; required if a sample is named and the campaign has several
     #[arg(long, help_heading = heading::SAMPLES)]
     scenario: Option<String>,
-    /// Largest number of samples to explain: induced failures first, then those with the most harm
+    /// Largest number of samples to explain: induced failures first, then the most harmful ones
     #[arg(long, value_name = "N", value_parser = count, default_value = "100", conflicts_with = "sample", help_heading = heading::SAMPLES)]
     most: u64,
     #[command(flatten)]
@@ -67,7 +68,9 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         Err(error) => print_error(format_args!("warning: the explanation is not kept: {error}\n")),
     }
     match (args.format, args.sample, &explanations[..]) {
-        (Format::Json, Some(_), [one]) => outln!("{:#}", stamped(json!(one), Some(one.seed), None)),
+        (Format::Json, Some(_), [explanation]) => {
+            outln!("{:#}", stamped(json!(explanation), Some(explanation.seed), None))
+        }
         (Format::Json, ..) => outln!("{:#}", stamped(json!(explanations), None, None)),
         (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
@@ -88,9 +91,9 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
 ]))]
 pub(super) struct MinimizeArgs {
     #[command(flatten)]
-    of: SavedSampleArgs,
-    /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is written beside it, with
-    /// `-passes` at the end of its name
+    saved_sample: SavedSampleArgs,
+    /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is
+    /// written beside it, with `-passes` at the end of its name
     #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
@@ -99,11 +102,16 @@ pub(super) struct MinimizeArgs {
 }
 
 pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
-    let saved = args.of.saved.open(&args.of.dir)?;
-    let case = Case::of(&saved, args.of.scenario.as_deref(), args.of.sample, args.of.controller.as_deref());
+    let saved = args.saved_sample.saved.open(&args.saved_sample.dir)?;
+    let case = Case::of(
+        &saved,
+        args.saved_sample.scenario.as_deref(),
+        args.saved_sample.sample,
+        args.saved_sample.controller.as_deref(),
+    );
     let case = case.map_err(CausesError::from)?;
     let paths = output_files(&case, args.output.as_deref())?;
-    protect(&of_campaign(&args.of.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
+    protect(&of_campaign(&args.saved_sample.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
     let minimized = minimize_sample(&saved, &case)?;
     let files = write_files(&case, &minimized, &paths, command_for)?;
     match args.format {
@@ -135,7 +143,8 @@ pub(super) struct MapArgs {
     /// Front time headways at the start
     #[arg(long, value_name = "S,…", value_delimiter = ',', value_parser = positive, default_value = "0.5,0.7,0.9,1.2", help_heading = heading::METHOD)]
     front_thw_s: Vec<f64>,
-    /// Engage at the gaps of the paper's system or of the extended one, and brake as strongly: `mis` or `mis-extended`
+    /// Engage at the gaps of the paper's system or of the extended one, and brake as strongly:
+    /// `mis` or `mis-extended`
     #[arg(long, default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
     /// Folder for the page, the pictures (SVG) and the points (CSV, JSON)
@@ -179,13 +188,14 @@ pub(super) struct ExposureArgs {
     /// Deceleration in m/s² from which the lead vehicle counts as braking
     #[arg(long, value_name = "M/S²", value_parser = positive, default_value = "4", help_heading = heading::METHOD)]
     braking_mps2: f64,
-    /// Encounters per 10^6 km, as a stated range, where no file shows one
+    /// Range of the encounters per 10^6 km, if no file shows the rate
     #[arg(long, value_name = "LOW..HIGH", conflicts_with = "counted", help_heading = heading::METHOD)]
     per_million_km: Option<StatedRange>,
     /// Encounters that were counted elsewhere, and the distance in km
     #[arg(long, value_name = "EVENTS/KM", conflicts_with = "files", help_heading = heading::METHOD)]
     counted: Option<Counted>,
-    /// Folder of a paired campaign: what the system prevents and induces, given an encounter
+    /// Folder of a paired campaign, which shows what the system prevents and induces, given an
+    /// encounter
     #[arg(long, value_name = "DIR", help_heading = heading::METHOD)]
     campaign: Option<PathBuf>,
     /// Name of the scenario, in which the lead vehicle brakes; required if the campaign has several

@@ -1,10 +1,11 @@
-//! `closecall traffic chain`: from recordings to a verdict on each of their most relevant encounters.
+//! `closecall traffic chain`: from recordings to a verdict on each of their most relevant
+//! encounters.
 //!
 //! ```text
 //!  files ─▶ flaws ─▶ lane changes ─▶ metrics ─▶ approaches ─▶ the most relevant ─▶ logical scenarios ─▶ campaign ─▶ report
 //! ```
 //!
-//! The folder is that of a campaign, so that all commands for campaigns work on it. It also holds:
+//! The folder is a campaign's folder, and all commands for campaigns work on it. It also holds:
 //!
 //! | file | content |
 //! |---|---|
@@ -56,7 +57,8 @@ use crate::exit_code::ExitCode;
 const SCENARIOS: &str = "scenarios";
 /// Folder of the recorded encounters, in the folder of the campaign.
 const ENCOUNTERS: &str = "encounters";
-/// Number of samples of each encounter of which a recording is kept, the worst ones. Those of each kind are kept, too.
+/// Number of samples of each encounter that are recorded, the worst ones. The worst sample of each
+/// kind is recorded, too.
 const RECORDED: u64 = 1;
 
 /// Arguments of `closecall traffic chain`.
@@ -69,13 +71,15 @@ const RECORDED: u64 = 1;
 pub(super) struct ChainArgs {
     #[command(flatten)]
     data: FilesArgs,
-    /// Folder for the results: scenarios, recorded encounters, and all that a campaign keeps. It must be new or empty
+    /// Folder for the results: scenarios, recorded encounters, and all that a campaign keeps. It
+    /// must be new or empty
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: PathBuf,
     /// Resume the interrupted campaign in the folder of --out
     #[arg(long, help_heading = heading::EXECUTION)]
     resume: bool,
-    /// Largest number of encounters: the most relevant ones, critical before others, and each as different as possible from the rest
+    /// Largest number of encounters: the most relevant ones, critical before others, and each as
+    /// different as possible from the rest
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1_000), help_heading = heading::METHOD)]
     encounters: u16,
     /// Number of samples of each encounter
@@ -92,7 +96,8 @@ pub(super) struct ChainArgs {
     /// Number of worker threads [default: one per processor]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
-    /// Save recordings (Rerun files) of selected samples of each encounter, as `campaign` does [default: worst:1,each-kind]
+    /// Save recordings (Rerun files) of selected samples of each encounter, as `campaign` does
+    /// [default: worst:1,each-kind]
     #[arg(long, value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]
@@ -106,7 +111,7 @@ pub(super) struct ChainArgs {
     format: Format,
 }
 
-/// A recording, with its approaches and what else the chain needs of it.
+/// A recording, with its approaches and further data that the chain needs.
 struct Recording {
     path: PathBuf,
     data: SmoothedTrajectoryData,
@@ -178,7 +183,7 @@ impl Recording {
         let (mut approaches, mut refused) = (Vec::new(), BTreeMap::new());
         for change in &changes {
             match approach(&smoothed, change) {
-                Ok(found) => approaches.push(found),
+                Ok(approach) => approaches.push(approach),
                 Err(reason) => *refused.entry(reason.to_string()).or_default() += 1,
             }
         }
@@ -236,7 +241,8 @@ impl Chain {
             let path = out.join(SCENARIOS).join(format!("{name}.toml"));
             let file = match logical(&approach, &spreads, &name, &path) {
                 Ok(file) => file,
-                // A vehicle or a road that no scenario can have: the next encounter takes its place.
+                // A vehicle or a road that no scenario can have: the next encounter takes its
+                // place.
                 Err(ScenarioError::Value { source, .. }) => {
                     *origins.refused.entry(format!("no scenario can have its values: {source}")).or_default() += 1;
                     continue;
@@ -270,12 +276,13 @@ const CHOICE: &str = "Encounters that are critical by at least one metric of the
 
 /// Returns the spread of all approaches.
 fn spreads(recordings: &[Recording], approaches: &[Approach]) -> Spreads {
-    let all = |quantity| recordings.iter().flat_map(|one| one.samples.values(quantity).iter().copied()).collect();
-    let of = |value: fn(&Approach) -> f64| Variation::of(&approaches.iter().map(value).collect::<Vec<f64>>());
+    let all =
+        |quantity| recordings.iter().flat_map(|recording| recording.samples.values(quantity).iter().copied()).collect();
+    let variation = |value: fn(&Approach) -> f64| Variation::of(&approaches.iter().map(value).collect::<Vec<f64>>());
     Spreads {
-        source: recordings.iter().map(|one| one.data.name.as_str()).collect::<Vec<_>>().join(", "),
-        ego_mps: of(|approach| approach.values.ego_mps),
-        closing_mps: of(|approach| approach.values.closing_mps),
+        source: recordings.iter().map(|recording| recording.data.name.as_str()).collect::<Vec<_>>().join(", "),
+        ego_mps: variation(|approach| approach.values.ego_mps),
+        closing_mps: variation(|approach| approach.values.closing_mps),
         front_headways_s: all(Quantity::FrontThw),
         durations_s: all(Quantity::LaneChangeDuration),
     }
@@ -349,9 +356,9 @@ impl Companion for Chain {
     }
 
     fn end(&mut self, folder: &Folder) -> Result<(), CliError> {
-        let mut found = engagements(&SavedCampaign::of(folder.clone())?)?;
+        let mut engagements = engagements(&SavedCampaign::of(folder.clone())?)?;
         for origin in &mut self.origins.encounters {
-            origin.engagement = found.remove(&origin.scenario);
+            origin.engagement = engagements.remove(&origin.scenario);
         }
         Ok(self.origins.write(folder)?)
     }

@@ -1,4 +1,5 @@
-//! `closecall check`: checks scenario files without running them, or one of them at every change; and folders of campaigns.
+//! `closecall check`: checks scenario files without running them, or one of them at every change;
+//! and folders of campaigns.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +29,8 @@ use crate::exit_code::ExitCode;
 ]))]
 #[command(mut_args(only_with_watch))]
 pub(super) struct CheckArgs {
-    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input; or folders of campaigns
+    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard
+    /// input; or folders of campaigns
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
@@ -61,7 +63,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
     let campaigns: Vec<&PathBuf> = args.scenarios.iter().filter(is_campaign).collect();
     if !campaigns.is_empty() {
         if campaigns.len() < args.scenarios.len() {
-            return Err(CliError::usage("a check is of scenarios or of folders of campaigns, not of both"));
+            return Err(CliError::usage("a check takes scenarios or folders of campaigns, not both"));
         }
         return Ok(check_campaigns(&campaigns, args.format));
     }
@@ -83,26 +85,26 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
 /// Checks whether folders of campaigns are whole.
 fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
     let checked: Vec<_> = paths.iter().map(|path| (path, check_folder(&Folder::open(path), command_for))).collect();
-    let is_sound = checked.iter().all(|(_, found)| found.is_sound());
+    let is_sound = checked.iter().all(|(_, integrity)| integrity.is_sound());
     match format {
         Format::Json => {
             let campaigns: Vec<Value> = checked
                 .iter()
-                .map(|(path, found)| {
-                    let (records, missing, problems) = (found.records, found.missing, &found.problems);
-                    json!({ "path": path, "sound": found.is_sound(), "records": records, "missing": missing, "problems": problems })
+                .map(|(path, integrity)| {
+                    let (records, missing, problems) = (integrity.records, integrity.missing, &integrity.problems);
+                    json!({ "path": path, "sound": integrity.is_sound(), "records": records, "missing": missing, "problems": problems })
                 })
                 .collect();
             outln!("{:#}", stamped(json!({ "valid": is_sound, "campaigns": campaigns }), None, None));
         }
         Format::Human => {
-            for (path, found) in checked {
-                for Problem { file, line, message, repair } in &found.problems {
+            for (path, integrity) in checked {
+                for Problem { file, line, message, repair } in &integrity.problems {
                     let line = line.map_or_else(String::new, |line| format!(":{line}"));
                     outln!("{}{line}: {message}\n  repair: {repair}", path.join(file).display());
                 }
-                if found.is_sound() {
-                    outln!("{}: sound, {} samples", path.display(), found.records);
+                if integrity.is_sound() {
+                    outln!("{}: sound, {} samples", path.display(), integrity.records);
                 }
             }
         }

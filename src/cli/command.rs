@@ -24,9 +24,9 @@ use crate::exit_code::ExitCode;
 
 /// A closed-loop software-in-the-loop testbed for highway ADAS.
 ///
-/// Closecall finds critical encounters in recorded traffic, samples variations of them, runs each in a closed loop of
-/// sensors, controller and world, and reports with numbers, pictures and an exit code whether the margin increase
-/// system (MIS) prevents collisions or causes them.
+/// Closecall finds critical encounters in recorded traffic, samples variations of them, runs each
+/// in a closed loop of sensors, controller and world, and reports with numbers, pictures and an
+/// exit code whether the margin increase system (MIS) prevents collisions or causes them.
 #[derive(Debug, Parser)]
 #[command(name = "closecall", version, long_version = BUILD, after_help = AFTER_HELP)]
 struct Cli {
@@ -122,29 +122,37 @@ enum Command {
     Baseline(baseline::BaselineArgs),
     /// Run one sample of a campaign again, and check that it gives the same bits
     Replay(replay::ReplayArgs),
-    /// Find the stage of the chain whose perfection prevents a failure of a campaign, and what the system did
+    /// Find the stage of the chain whose perfection prevents a failure of a campaign, and what the
+    /// system did
     Explain(causes::ExplainArgs),
-    /// Find the smallest failing case near a failing sample of a campaign, and the nearest case that passes
+    /// Find the smallest failing case near a failing sample of a campaign, and the nearest case
+    /// that passes
     Minimize(causes::MinimizeArgs),
-    /// Explore the samples of a campaign in the browser, and open recordings in the installed Rerun viewer
+    /// Explore the samples of a campaign in the browser, and open recordings in the installed Rerun
+    /// viewer
     View(view::ViewArgs),
     /// Draw an encounter as a static figure, SVG or PNG
     Plot(plot::PlotArgs),
     /// Write a commented scenario to start from
     New(new::NewArgs),
-    /// Write the files of a repository of scenarios, with CI jobs for GitHub and GitLab. No file is overwritten
+    /// Write the files of a repository of scenarios, with CI jobs for GitHub and GitLab. No file is
+    /// overwritten
     Init(new::InitArgs),
     /// List the scenarios of the library with their questions, requirements and gates
     List(library::ListArgs),
-    /// Check scenario files without running them; with --watch, check a file at every change and run a few samples of it
+    /// Check scenario files without running them; with --watch, check a file at every change and
+    /// run a few samples of it
     Check(check::CheckArgs),
-    /// Turn recorded traffic into scenarios: quality, lane changes, criticality, distributions, encounters
+    /// Turn recorded traffic into scenarios: quality, lane changes, criticality, distributions,
+    /// encounters
     #[command(subcommand)]
     Traffic(Traffic),
-    /// Compute from many runs, without a verdict: what moves a result, what a system reaches, where perception ends
+    /// Compute from many runs, without a verdict: influences on a result, margins of a system,
+    /// range of perception
     #[command(subcommand)]
     Study(Study),
-    /// Write what other programs read: schema, completions, manual pages, labelled images, OpenSCENARIO, merged campaigns
+    /// Write what other programs read: schema, completions, manual pages, labelled images,
+    /// OpenSCENARIO, merged campaigns
     #[command(subcommand)]
     Tool(Tool),
     /// Run samples with a library or an FMU, for another process of this program
@@ -152,7 +160,8 @@ enum Command {
     Host { arguments: Vec<String> },
 }
 
-/// The commands that belong to a group or to another command, each with its whole name. A user may know them by their name alone.
+/// The commands that belong to a group or to another command, each with its whole name. A user may
+/// know them by their name alone.
 const GROUPED: [(&str, &str); 26] = [
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
@@ -182,21 +191,23 @@ const GROUPED: [(&str, &str); 26] = [
     ("watch", "check --watch"),
 ];
 
-/// Returns the commands and options of the program, from which help, manual pages and completions are made.
+/// Returns the commands and options of the program, from which help, manual pages and completions
+/// are made.
 pub fn command() -> clap::Command {
     WITH_NETWORK.into_iter().fold(Cli::command(), with_network)
 }
 
 /// Parses the arguments, and returns the command and the shared library of ONNX Runtime.
 fn parse(arguments: &[std::ffi::OsString]) -> Result<(Command, Option<PathBuf>), clap::Error> {
-    let mut known = command();
-    let matches = known.try_get_matches_from_mut(arguments).map_err(plain_words)?;
+    let mut command = command();
+    let matches = command.try_get_matches_from_mut(arguments).map_err(plain_words)?;
     let onnxruntime = onnxruntime(&matches);
-    let cli = Cli::from_arg_matches(&matches).map_err(|error| plain_words(error.format(&mut known)))?;
+    let cli = Cli::from_arg_matches(&matches).map_err(|error| plain_words(error.format(&mut command)))?;
     Ok((cli.command, onnxruntime))
 }
 
-/// Says in plain words what is wrong with an argument: the whole name of a command that belongs to a group, and what a number must be.
+/// Explains an argument error in plain words: the whole name of a command that belongs to a group,
+/// and the allowed numbers.
 fn plain_words(error: clap::Error) -> clap::Error {
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.as_str()),
@@ -206,7 +217,7 @@ fn plain_words(error: clap::Error) -> clap::Error {
         kind @ ErrorKind::InvalidSubcommand => {
             let grouped = GROUPED.iter().find(|(alone, _)| text(ContextKind::InvalidSubcommand) == Some(*alone));
             let Some((_, whole)) = grouped else { return error };
-            (kind, format!("the command is now `closecall {whole}`"))
+            (kind, format!("the command is `closecall {whole}`"))
         }
         kind @ ErrorKind::ValueValidation => {
             let (Some(value), Some(option)) = (text(ContextKind::InvalidValue), text(ContextKind::InvalidArg)) else {
@@ -227,7 +238,7 @@ fn plain_words(error: clap::Error) -> clap::Error {
     clap::Error::raw(kind, format!("{message}\n\nFor more information, try '--help'.\n"))
 }
 
-/// Returns what a number must be, if this is why it could not be read.
+/// Returns the allowed numbers, if another number is the reason for the error.
 fn allowed_number(error: &(dyn Error + 'static)) -> Option<&'static str> {
     if error.is::<ParseIntError>() {
         Some("a whole number, 0 or more")
@@ -291,11 +302,13 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     }
 }
 
-/// Sizes of the stacks of threads that the variable `RUST_MIN_STACK` may name (bytes). The default of Rust is 2 MiB. A run needs less than
-/// 1 MiB; that a thread for each processor fits into the address space is an assumption.
+/// Sizes of the stacks of threads that the variable `RUST_MIN_STACK` may name (bytes). The default
+/// of Rust is 2 MiB. A run needs less than 1 MiB; that a thread for each processor fits into the
+/// address space is an assumption.
 const STACK_BYTES: std::ops::RangeInclusive<u64> = 1 << 20..=1 << 30;
 
-/// Returns what is wrong with the stacks that the environment asks for. Samples would overflow them, or no thread could start.
+/// Returns the fault of the stack size that the environment asks for. Samples would overflow the
+/// stacks, or no thread could start.
 fn wrong_stack() -> Option<String> {
     let stated = std::env::var("RUST_MIN_STACK").ok()?;
     let bytes: u64 = stated.parse().ok()?;
@@ -304,8 +317,8 @@ fn wrong_stack() -> Option<String> {
         .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
 }
 
-/// Runs a command that another program calls, and returns the exit code of the command line and what it has printed. The first
-/// of the arguments is the program's name.
+/// Runs a command that another program calls, and returns the exit code of the command line and its
+/// output. The first of the arguments is the program's name.
 pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<ExitCode, CliError>, Printed) {
     session.run(arguments, || {
         let (command, onnxruntime) = parse(arguments).map_err(|error| CliError::refused(&error.to_string()))?;

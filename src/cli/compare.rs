@@ -42,8 +42,8 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let (baseline, current) = (Folder::open(&args.baseline), Folder::open(&args.dir));
     let (baseline_manifest, current_manifest) = (baseline.manifest()?, current.manifest()?);
     let differences = baseline_manifest.differences(&current_manifest);
-    let found = compare_folders(&baseline, &current)?;
-    let regression = Regression::of(&found, args.max_newly_failing, args.tolerance);
+    let scenarios = compare_folders(&baseline, &current)?;
+    let regression = Regression::of(&scenarios, args.max_newly_failing, args.tolerance);
     let code = match regression {
         Regression::None => ExitCode::Pass,
         Regression::NewErrors => ExitCode::SampleError,
@@ -54,14 +54,14 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
             outln!(
                 "{:#}",
                 stamped(
-                    json::comparison(&found, &differences, args.tolerance, code == ExitCode::Pass),
+                    json::comparison(&scenarios, &differences, args.tolerance, code == ExitCode::Pass),
                     Some(current_manifest.sampling.seed),
                     None
                 )
             )
         }
         Format::Human => {
-            let (scenarios, differences) = (&found[..], &differences[..]);
+            let (scenarios, differences) = (&scenarios[..], &differences[..]);
             out!("{}", ComparisonText { scenarios, differences, tolerance: args.tolerance });
             outln!("{regression}");
         }

@@ -35,12 +35,12 @@ pub(super) struct DriftArgs {
 }
 
 pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
-    let found = compare(&Fitted::read(&args.fitted)?, &args.data.read_all()?, args.seed);
+    let drift = compare(&Fitted::read(&args.fitted)?, &args.data.read_all()?, args.seed);
     match args.format {
-        Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),
-        Format::Human => out!("{}", DriftText(&found)),
+        Format::Json => outln!("{:#}", stamped(serde_json::json!(drift), None, None)),
+        Format::Human => out!("{}", DriftText(&drift)),
     }
-    Ok(match (found.is_tested, found.has_drifted) {
+    Ok(match (drift.is_tested, drift.has_drifted) {
         (_, true) => ExitCode::Fail,
         (true, false) => ExitCode::Pass,
         (false, false) => ExitCode::Inconclusive,

@@ -1,5 +1,6 @@
-//! The ends of a campaign before its last sample: a signal, a failing sample, too many errors. Such a campaign has no
-//! verdict and no reports. Its journal is complete up to its end, and the command that resumes it is printed.
+//! The ends of a campaign before its last sample: a signal, a failing sample, too many errors. Such
+//! a campaign has no verdict and no reports. Its journal is complete up to its end, and the command
+//! that resumes it is printed.
 
 use std::path::Path;
 
@@ -20,8 +21,8 @@ use crate::exit_code::ExitCode;
 /// When a campaign ends before its last sample.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct EndArgs {
-    /// End at the first failing sample: the ego collides under the controller under test, or a controller ends in an
-    /// error; or as soon as a gate can only fail. There is then no verdict
+    /// End at the first failing sample: the ego collides under the controller under test, or a
+    /// controller ends in an error; or as soon as a gate can only fail. There is then no verdict
     #[arg(long, help_heading = heading::EXECUTION)]
     fail_fast: bool,
     /// End as soon as more than N samples have ended in an error. There is then no verdict

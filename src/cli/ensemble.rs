@@ -13,15 +13,17 @@ use super::output::print_error;
 /// The driver ensemble of a campaign.
 #[derive(Clone, Debug, Args)]
 pub(super) struct EnsembleArgs {
-    /// Run each scenario with each member of a driver ensemble, as an entry SCENARIO@MEMBER of its own on the same samples,
-    /// and state the verdict over the members: median and worst. Members are files, folders of them, or names (`closecall
-    /// list` shows them) [default: all members of the program]
+    /// Run each scenario with each member of a driver ensemble, as an entry SCENARIO@MEMBER of its
+    /// own on the same samples, and state the verdict over the members: median and worst. Members
+    /// are files, folders of them, or names (`closecall list` shows them) [default: all members of
+    /// the program]
     #[arg(long, value_name = "DIR|FILE|NAME", num_args = 0.., help_heading = heading::SCENARIO)]
     ensemble: Option<Vec<PathBuf>>,
 }
 
 impl EnsembleArgs {
-    /// Returns the scenarios with every member; the scenarios themselves if no ensemble is requested.
+    /// Returns the scenarios with every member; the scenarios themselves if no ensemble is
+    /// requested.
     pub(super) fn apply(&self, files: Vec<ScenarioFile>) -> Result<Ensemble, CliError> {
         let Some(arguments) = &self.ensemble else {
             return Ok(Ensemble { entries: files, without_effect: Vec::new() });

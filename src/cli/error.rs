@@ -78,7 +78,7 @@ pub enum CliError {
     Results(FolderError),
     /// The default folder of a campaign's results holds only the first of them.
     #[error(
-        "{0}\nthe campaign went on without its folder: the verdict counts every sample, and --resume runs those again that are not kept"
+        "{0}\nthe campaign went on without its folder: the verdict counts every sample, and --resume runs the samples again that are not kept"
     )]
     ResultsCut(WriteError),
     /// A file cannot be written.
@@ -153,7 +153,7 @@ pub enum CliError {
     /// A sensitivity study cannot be planned.
     #[error(transparent)]
     Sensitivity(#[from] PlanFailure),
-    /// A saved campaign cannot provide what was requested.
+    /// A saved campaign cannot fulfil a request.
     #[error(transparent)]
     Saved(#[from] SavedError),
     /// The reports of a campaign cannot be written.

@@ -1,4 +1,5 @@
-//! The explorer of a campaign: a page in the browser that asks this program to run the samples that are chosen.
+//! The explorer of a campaign: a page in the browser that asks this program to run the samples that
+//! are chosen.
 //!
 //! ```text
 //!  GET  (nothing)             the page
@@ -8,8 +9,8 @@
 //!  GET  report.html, recordings/NAME.html
 //! ```
 //!
-//! Samples run one at a time. Of the folder only pages are served, no link is followed, and they run in a sandbox: another person may have
-//! written the folder.
+//! Samples run one at a time. Of the folder only pages are served, no link is followed, and they
+//! run in a sandbox: another person may have written the folder.
 
 use std::fs::{OpenOptions, symlink_metadata};
 use std::io::{self, Read};
@@ -38,7 +39,7 @@ use super::view_error::ViewError;
 use super::viewer::Viewer;
 
 const HTML: &str = "text/html; charset=utf-8";
-/// What a page of the folder may do: run its own scripts, and nothing with this server.
+/// The rights of a page of the folder: to run its own scripts, without access to this server.
 const SANDBOX: &str = "Content-Security-Policy: sandbox allow-scripts allow-popups; default-src 'none'; \
                        style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\r\n";
 /// Largest page of the folder that is served (bytes).
@@ -91,9 +92,7 @@ pub(super) fn explore(saved: &SavedCampaign, viewer: &ViewerChoice<'_>) -> Resul
     outln!("{address}");
     print_error(format_args!("the explorer is open until Ctrl-C\n"));
     if let Err(error) = opener::open_browser(&address) {
-        print_error(format_args!(
-            "warning: no browser can be opened: {error}; the address above is that of the page\n"
-        ));
+        print_error(format_args!("warning: no browser can be opened: {error}; the address above leads to the page\n"));
     }
     let explorer = Explorer { saved, page, viewer, running: Mutex::default(), recordings: folder().map_err(served)? };
     server.serve(&|method, path| explorer.answer(method, path)).map_err(served)?;
@@ -136,7 +135,7 @@ impl Explorer<'_> {
         made.unwrap_or_else(|error| Answer::text("409 Conflict", shown(&error.to_string())))
     }
 
-    /// Does something with the sample of this number, one at a time.
+    /// Acts on the sample of this number, one sample at a time.
     fn of(&self, number: &str, make: impl FnOnce(u64) -> Result<String, CliError>) -> Result<String, CliError> {
         let sample = number.parse().map_err(|_| CliError::usage("a sample has a whole number"))?;
         let _running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
@@ -171,7 +170,7 @@ impl Explorer<'_> {
         Ok(twin_part(&minimized, &films))
     }
 
-    /// Opens a sample in the viewer, which is not waited for.
+    /// Opens a sample in the viewer, and does not wait for it.
     fn open(&self, scenario: &str, sample: u64) -> Result<String, CliError> {
         let viewer = Viewer::find(self.viewer.program).map_err(ViewError::from)?;
         let films = self.films(scenario, sample, Level::Full)?;

@@ -58,7 +58,8 @@ pub(super) struct ExportArgs {
     /// Number of the sample
     #[arg(default_value_t = 0)]
     sample: u64,
-    /// Folder for the case: OpenSCENARIO XML 1.3, OpenDRIVE 1.8 and a catalogue of vehicles, or CommonRoad XML
+    /// Folder for the case: OpenSCENARIO XML 1.3, OpenDRIVE 1.8 and a catalogue of vehicles, or
+    /// CommonRoad XML
     #[arg(short, long = "out", alias = "output", value_name = "FOLDER", help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Forms to write [default: open-loop,closed-loop,logical]
@@ -67,7 +68,7 @@ pub(super) struct ExportArgs {
     /// Number of samples in the value set of the logical form, from SAMPLE on
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000), help_heading = heading::OUTPUT)]
     value_sets: u64,
-    /// Seed of the random numbers [default: 0, or that of the campaign]
+    /// Seed of the random numbers [default: 0, or the seed of the campaign]
     #[arg(long, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
     seed: Option<u64>,
     /// Name of the scenario of a campaign; required if it has several
@@ -78,7 +79,7 @@ pub(super) struct ExportArgs {
     arm: Option<String>,
     #[command(flatten)]
     controller: ControllerArgs,
-    /// Depth of the sensor simulation [default: that of the scenario]
+    /// Depth of the sensor simulation [default: as in the scenario]
     #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     #[command(flatten)]
@@ -119,7 +120,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     files.files.iter().for_each(|(name, _)| print_written(&args.output.join(name)));
     for (form, unsaid) in &files.unsaid {
         outln!("{}: not said in the file:", form.name());
-        unsaid.iter().for_each(|what| outln!("  {what}"));
+        unsaid.iter().for_each(|statement| outln!("  {statement}"));
     }
     Ok(ExitCode::Pass)
 }

@@ -16,7 +16,8 @@ use super::output::print_error;
 #[derive(Clone, Debug, Args)]
 pub(super) struct GateArgs {
     /// Require this of the samples of each scenario, such as "p1(min_ttc_rear_s) >= 1.0" or
-    /// "lower(prevented | baseline.ego_collided) >= 0.5"; can be repeated. docs/reference/criteria.md lists aggregates and measures
+    /// "lower(prevented | baseline.ego_collided) >= 0.5"; can be repeated.
+    /// docs/reference/criteria.md lists aggregates and measures
     #[arg(long = "gate", value_name = "CRITERION", help_heading = heading::GATES)]
     require: Vec<Expression>,
     /// Measure only: no gate is judged, and there is no verdict
@@ -26,22 +27,24 @@ pub(super) struct GateArgs {
     /// Fail if the ego collides in more than K samples of any scenario
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_collisions: Option<u64>,
-    /// Fail if vehicles other than the ego collide with each other in more than K samples of any scenario
+    /// Fail if vehicles other than the ego collide with each other in more than K samples of any
+    /// scenario
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_other_collisions: Option<u64>,
-    /// Pass only if the samples show, for every scenario, that the probability of a collision of the ego is at most P.
-    /// The verdict is inconclusive if they show neither that nor the opposite
+    /// Pass only if the samples show, for every scenario, that the probability of a collision of
+    /// the ego is at most P. The verdict is inconclusive if they show neither that nor the opposite
     #[arg(long, value_name = "P", value_parser = probability, help_heading = heading::GATES)]
     pub(super) max_probability: Option<f64>,
-    /// Confidence with which --max-probability is to be shown, above 0.5 and below 1 [default: 0.95]
+    /// Confidence with which --max-probability is to be shown, above 0.5 and below 1 [default:
+    /// 0.95]
     #[arg(long, value_name = "C", value_parser = confidence, requires = "max_probability", help_heading = heading::GATES)]
     confidence: Option<f64>,
-    /// Fail if the ego collides in more than K samples of any scenario in which it does not collide with the baseline; needs
-    /// --paired
+    /// Fail if the ego collides in more than K samples of any scenario in which it does not collide
+    /// with the baseline; needs --paired
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     pub(super) max_induced: Option<u64>,
-    /// Pass only if, in every scenario, at least this share (0 to 1) of the baseline's collisions is prevented, with 95 %
-    /// confidence; needs --paired
+    /// Pass only if, in every scenario, at least this share (0 to 1) of the baseline's collisions
+    /// is prevented, with 95 % confidence; needs --paired
     #[arg(long, value_name = "SHARE", value_parser = share, help_heading = heading::GATES)]
     min_prevented: Option<f64>,
     /// Fail if the harm of all samples of any scenario exceeds this, in expected driver deaths
@@ -50,7 +53,8 @@ pub(super) struct GateArgs {
     /// Fail if the time headway of the rear vehicle falls below this in any sample
     #[arg(long, value_name = "S", value_parser = positive, help_heading = heading::GATES)]
     min_rear_thw: Option<f64>,
-    /// Fail if the margin increase system engages in a larger share (0 to 1) of the samples of any scenario
+    /// Fail if the margin increase system engages in a larger share (0 to 1) of the samples of any
+    /// scenario
     #[arg(long, value_name = "SHARE", value_parser = share, help_heading = heading::GATES)]
     max_engagement_rate: Option<f64>,
     /// Fail if the ego is slower than the lead vehicle by more than this, in any sample
@@ -59,18 +63,19 @@ pub(super) struct GateArgs {
     /// Fail if the ego's jerk exceeds this in any sample, before a collision of its own
     #[arg(long, value_name = "M/S³", alias = "max-jerk-mps3", value_parser = positive, help_heading = heading::GATES)]
     max_jerk: Option<f64>,
-    /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at half the time step
+    /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at
+    /// half the time step
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE, help_heading = heading::GATES)]
     max_flip_rate: f64,
-    /// Fail if more than K samples are flaky: they crashed or hung, and have an outcome only because of --retry-crashed
-    /// [default: any number; 0 with --preset]
+    /// Fail if more than K samples are flaky: they crashed or hung, and have an outcome only
+    /// because of --retry-crashed [default: any number; 0 with --preset]
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_flaky: Option<u64>,
 }
 
 impl GateArgs {
-    /// Returns the gates: those of the command line, then those of a preset, then those of the project file. `is_paired` says
-    /// whether the campaign has a baseline, `design` is its sampling design.
+    /// Returns the gates of the command line, then of a preset, then of the project file.
+    /// `is_paired` says whether the campaign has a baseline, `design` is its sampling design.
     pub(super) fn gates(
         &self,
         is_paired: bool,

@@ -1,4 +1,5 @@
-//! `closecall tool completions` and `closecall tool man`: files for shells and for the manual, made from the command line itself.
+//! `closecall tool completions` and `closecall tool man`: files for shells and for the manual, made
+//! from the command line itself.
 
 use std::path::PathBuf;
 

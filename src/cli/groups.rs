@@ -1,4 +1,5 @@
-//! The commands that belong to a group: `closecall traffic …`, `closecall study …` and `closecall tool …`.
+//! The commands that belong to a group: `closecall traffic …`, `closecall study …` and
+//! `closecall tool …`.
 
 use clap::Subcommand;
 
@@ -18,7 +19,8 @@ use crate::exit_code::ExitCode;
     "closecall traffic reenact traffic.csv --record beside.rrd",
 ]))]
 pub(super) enum Traffic {
-    /// Turn recordings into scenarios, run them with the system and without it, and report what becomes of each recorded encounter
+    /// Turn recordings into scenarios, run them with the system and without it, and report what
+    /// becomes of each recorded encounter
     Chain(chain::ChainArgs),
     /// Report the flaws of a trajectory file: gaps, jumps, overlaps, and rows that cannot be used
     Inspect(inspect::InspectArgs),
@@ -28,17 +30,21 @@ pub(super) enum Traffic {
     Criticality(trajectories::CriticalityArgs),
     /// Fit the distributions of a logical scenario to trajectory files
     Fit(trajectories::FitArgs),
-    /// Check whether new trajectory files still match the distributions that a scenario was fitted to
+    /// Check whether new trajectory files still match the distributions that a scenario was fitted
+    /// to
     Drift(drift::DriftArgs),
     /// Compute durations, speeds, counts and correlations of recorded lane changes
     Statistics(statistics::StatisticsArgs),
     /// Study how much noise and offset the criteria for lane changes tolerate
     Robustness(robustness::RobustnessArgs),
-    /// Draw the figures of the published method on any set of trajectory files, with one page of all
+    /// Draw the figures of the published method on any set of trajectory files, with one page of
+    /// all
     Paper(paper::PaperArgs),
-    /// Simulate an encounter of recorded traffic with the controller under test in the ego vehicle, and compare the two
+    /// Simulate an encounter of recorded traffic with the controller under test in the ego vehicle,
+    /// and compare the two
     Reenact(reenact::ReenactArgs),
-    /// Sample a recorded lane change: the other vehicles drive as recorded, a parameter of a driver varies
+    /// Sample a recorded lane change: the other vehicles drive as recorded, a parameter of a driver
+    /// varies
     Sample(sample::SampleArgs),
     /// Simulate samples of a scenario, and write their traffic as a trajectory file
     Record(record::RecordArgs),
@@ -46,7 +52,7 @@ pub(super) enum Traffic {
     Calibrate(calibrate::CalibrateArgs),
 }
 
-/// What is computed from many runs and judged by no gate.
+/// Results that are computed from many runs and judged by no gate.
 #[derive(Debug, Subcommand)]
 #[command(after_help = examples([
     "closecall study sensors --quick",
@@ -60,7 +66,8 @@ pub(super) enum Study {
     Frontier(study::FrontierArgs),
     /// Map the margin that the system reaches, over approach speed, detection distance and front time headway
     Map(causes::MapArgs),
-    /// Count how often the encounter happens in trajectory files, and state the net effect of the system per 10^6 km
+    /// Count how often the encounter happens in trajectory files, and state the net effect of the
+    /// system per 10^6 km
     Exposure(causes::ExposureArgs),
     /// Sharpen the rates of a campaign with runs of the same samples, and more of them, with fast sensors
     Fidelity(fidelity::FidelityArgs),
@@ -68,7 +75,8 @@ pub(super) enum Study {
     Sensors(sensors::SensorsArgs),
 }
 
-/// What other programs read: files for editors, shells and networks, and campaigns that were made in parts.
+/// What other programs read: files for editors, shells and networks, and campaigns that were made
+/// in parts.
 #[derive(Debug, Subcommand)]
 #[command(after_help = examples([
     "closecall tool schema > scenario.schema.json",

@@ -1,20 +1,21 @@
-//! The form of each command's help: options under headings that name a purpose, and three examples at the end.
+//! The form of each command's help: options under headings that name a purpose, and three examples
+//! at the end.
 
-/// The headings of options, each the purpose of what stands under it.
+/// The headings of options. Each names the purpose of its options.
 pub(super) mod heading {
     /// The scenario, and changes of it.
     pub(in crate::cli) const SCENARIO: &str = "Scenario";
-    /// Which samples run, and how many.
+    /// The samples that run, and their number.
     pub(in crate::cli) const SAMPLES: &str = "Samples";
-    /// What drives the ego vehicle, what it perceives, and what it is compared with.
+    /// The driver of the ego vehicle, its perception, and its references.
     pub(in crate::cli) const CONTROLLER: &str = "Controller and sensors";
-    /// Which part of a trajectory file is used, and how it is read.
+    /// The used part of a trajectory file, and its interpretation.
     pub(in crate::cli) const DATA: &str = "Trajectory data";
-    /// What a study varies or computes.
+    /// The varied or computed quantities of a study.
     pub(in crate::cli) const METHOD: &str = "Method";
     /// The random scenes of labelled images.
     pub(in crate::cli) const SCENES: &str = "Scenes";
-    /// By what a result is judged.
+    /// The criteria of a result.
     pub(in crate::cli) const GATES: &str = "Gates";
     /// How the simulator itself is checked.
     pub(in crate::cli) const VALIDITY: &str = "Validity checks";
@@ -26,7 +27,7 @@ pub(super) mod heading {
     pub(in crate::cli) const CI: &str = "CI job";
     /// The program that shows recordings.
     pub(in crate::cli) const VIEWER: &str = "Viewer";
-    /// What is printed and written.
+    /// The printed and written output.
     pub(in crate::cli) const OUTPUT: &str = "Output";
 }
 

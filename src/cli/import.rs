@@ -20,13 +20,15 @@ use crate::exit_code::ExitCode;
     "closecall tool import cut-in.xosc --parameter EgoSpeed=120 -o scenario.toml",
 ]))]
 pub(super) struct ImportArgs {
-    /// Scenario of OpenSCENARIO XML 1.0 to 1.3; its road and its catalogues are found relative to it
+    /// Scenario of OpenSCENARIO XML 1.0 to 1.3; its road and its catalogues are found relative to
+    /// it
     #[arg(value_name = "FILE.xosc")]
     file: PathBuf,
     /// Scenario file to write
     #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: PathBuf,
-    /// Vehicle that the controller under test drives [default: `Ego`, or the only one with a controller]
+    /// Vehicle that the controller under test drives [default: `Ego`, or the only one with a
+    /// controller]
     #[arg(long, value_name = "NAME", help_heading = heading::SCENARIO)]
     ego: Option<String>,
     /// Value of a parameter of the file, instead of its default; can be given more than once
@@ -53,7 +55,7 @@ pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
     }
     if !imported.events.is_empty() {
         outln!("events, if the ego keeps the speed of the file:");
-        imported.events.iter().for_each(|(time_s, what)| outln!("  {time_s:7.2} s  {what}"));
+        imported.events.iter().for_each(|(time_s, event)| outln!("  {time_s:7.2} s  {event}"));
     }
     Ok(ExitCode::Pass)
 }

@@ -31,8 +31,8 @@ pub(super) struct InspectArgs {
     format: Format,
 }
 
-/// Prints the flaws of a trajectory file. If some rows cannot be used, the exit code is that with which other commands
-/// refuse the file.
+/// Prints the flaws of a trajectory file. If some rows cannot be used, the exit code is the code of
+/// a file that other commands refuse.
 pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     let mut tracks = open(&args.file, ReadOptions { bad_rows: BadRows::Skip, ..args.read.options() })?;
     let mut inspector = QualityInspector::default();
@@ -49,7 +49,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     }
     let path = tracks.path().display();
     let first = dropped.reasons().filter_map(|(_, rows)| Some((rows.first_line?, &rows.first))).min();
-    let first = first.map(|(line, what)| format!(", line {line}: {what}")).unwrap_or_default();
+    let first = first.map(|(line, message)| format!(", line {line}: {message}")).unwrap_or_default();
     let count = dropped.count();
     print_error(format_args!(
         "{path}{first}\n{count} rows cannot be used: other commands refuse the file unless --drop-bad-rows is given\n"

@@ -27,8 +27,8 @@ const FAULT_TAG: &str = "fault";
     "closecall list --format json > library.json",
 ]))]
 pub(super) struct ListArgs {
-    /// Describe these scenarios in full: part of their names, `faults`, or the `members` of the driver ensemble [default: a line
-    /// for each scenario without a fault]
+    /// Describe these scenarios in full: part of their names, `faults`, or the `members` of the
+    /// driver ensemble [default: a line for each scenario without a fault]
     what: Option<String>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -47,7 +47,8 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
             outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
         }
         (Format::Human, Some(what)) => {
-            let is_meant = |one: &&LibraryEntry| if what == FAULTS { is_fault(one) } else { one.name.contains(what) };
+            let is_meant =
+                |entry: &&LibraryEntry| if what == FAULTS { is_fault(entry) } else { entry.name.contains(what) };
             let meant: Vec<&LibraryEntry> = listed.iter().filter(is_meant).collect();
             if meant.is_empty() && members.iter().any(|member| member.name == what) {
                 let said =
@@ -71,7 +72,7 @@ fn is_fault(scenario: &LibraryEntry) -> bool {
 
 /// Prints a line for each scenario without a fault, and how many others there are.
 fn overview(listed: &[LibraryEntry], members: &[&str]) {
-    let (faults, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) = listed.iter().partition(|one| is_fault(one));
+    let (faults, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) = listed.iter().partition(|entry| is_fault(entry));
     let width = plain.iter().map(|scenario| scenario.name.len()).max().unwrap_or(0);
     for scenario in &plain {
         outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));

@@ -38,12 +38,13 @@ pub(super) struct MergeArgs {
     /// Folder for the whole campaign; it must be new or empty
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: PathBuf,
-    /// Write the whole campaign anew into a folder that holds it already, or a part of it after a merge that was interrupted
+    /// Write the whole campaign anew into a folder that holds it already, or a part of it after a
+    /// merge that was interrupted
     #[arg(long, help_heading = heading::OUTPUT)]
     resume: bool,
-    /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
-    /// `failures` or `random`; `each-kind` is the worst prevented, the worst induced and the worst shared collision of all
-    /// scenarios [default: each-kind]
+    /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows
+    /// them. KIND is `worst`, `failures` or `random`; `each-kind` is the worst prevented, the worst
+    /// induced and the worst shared collision of all scenarios [default: each-kind]
     #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
     record: Option<Selection>,
     #[command(flatten)]

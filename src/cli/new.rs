@@ -1,4 +1,5 @@
-//! `closecall new` and `closecall init`: write a scenario, or the files of a repository of scenarios.
+//! `closecall new` and `closecall init`: write a scenario, or the files of a repository of
+//! scenarios.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +27,8 @@ pub(super) struct NewArgs {
     /// Name of the scenario: lower-case letters, digits and hyphens
     #[arg(value_parser = scenario_name)]
     name: String,
-    /// Start from a scenario of the library, which `closecall list` names, instead of the commented template
+    /// Start from a scenario of the library, which `closecall list` names, instead of the commented
+    /// template
     #[arg(long, value_name = "LIBRARY_NAME", help_heading = heading::SCENARIO)]
     from: Option<String>,
     /// File to write [default: NAME.toml; in a repository with closecall.toml, scenarios/NAME.toml]
@@ -104,7 +106,7 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// What stands in a CI job for a value that is not known.
+/// The placeholder in a CI job for an unknown value.
 const TO_FILL_IN: &str = "FILL-IN";
 
 pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
@@ -133,13 +135,14 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Returns which lines an existing list of what Git leaves alone lacks; nothing for any other file.
+/// Returns the lines that an existing list of files ignored by Git lacks; nothing for any other
+/// file.
 fn advice(path: &Path, text: &str) -> String {
     if !path.ends_with(".gitignore") {
         return String::new();
     }
     let there = std::fs::read_to_string(path).unwrap_or_default();
-    let lacks = |line: &&str| !there.lines().any(|known| known.trim_matches('/') == line.trim_matches('/'));
+    let lacks = |line: &&str| !there.lines().any(|known_line| known_line.trim_matches('/') == line.trim_matches('/'));
     let missing: Vec<&str> = text.lines().filter(lacks).collect();
     if missing.is_empty() { String::new() } else { format!(" (add the line {})", missing.join(", and ")) }
 }

@@ -16,8 +16,9 @@ use indicatif::ProgressBar;
 use super::CliError;
 use crate::exit_code::ExitCode;
 
-/// Prints to standard output, without control characters of others (see [`shown`]). A reader that has closed the pipe (`closecall … | head`) does not change the exit code.
-/// Any other failure ends the program with [`ExitCode::Io`].
+/// Prints to standard output, without control characters of others (see [`shown`]). A reader that
+/// has closed the pipe (`closecall … | head`) does not change the exit code. Any other failure ends
+/// the program with [`ExitCode::Io`].
 pub(super) fn print(text: Arguments<'_>) {
     let text = text.to_string();
     let text = shown(&text);
@@ -33,8 +34,8 @@ pub(super) fn print(text: Arguments<'_>) {
     }
 }
 
-/// Prints to standard error, without control characters of others (see [`shown`]). A failure is ignored, since there is nowhere left
-/// to report it.
+/// Prints to standard error, without control characters of others (see [`shown`]). A failure is
+/// ignored, since there is nowhere left to report it.
 pub(super) fn print_error(text: Arguments<'_>) {
     let text = text.to_string();
     let text = shown(&text);
@@ -81,7 +82,8 @@ pub(super) fn print_written(path: &Path) {
     print_error(format_args!("written: {}\n", path.display()));
 }
 
-/// Writes charts (SVG) into a folder, which is created if it does not exist, and prints their paths to standard error.
+/// Writes charts (SVG) into a folder, which is created if it does not exist, and prints their paths
+/// to standard error.
 pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) -> Result<(), WriteError> {
     write_texts(folder, (paths, charts), print_written)
 }
@@ -102,7 +104,8 @@ pub(super) fn command_line() -> String {
         .join(" ")
 }
 
-/// Returns the text of a scenario that was made from the trajectory file `source`, with a heading that states its origin.
+/// Returns the text of a scenario that was made from the trajectory file `source`, with a heading
+/// that states its origin.
 pub(super) fn made_by(source: &Path, file: &ScenarioFile) -> String {
     format!("# Made by `{}`\n# from {}\n{}", command_line(), source.display(), file.text())
 }

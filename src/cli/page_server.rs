@@ -5,12 +5,14 @@
 //!                        └ 128 random bits: who does not know them gets nothing
 //! ```
 //!
-//! It listens on the loopback alone. Each connection carries one request without a body. The number of connections, the length of a
-//! request and the time for it are bounded, and a request must name this server as its host, so that no page of another site reads
-//! through a name that leads here (DNS rebinding).
+//! It listens on the loopback alone. Each connection carries one request without a body. The number
+//! of connections, the length of a request and the time for it are bounded, and a request must name
+//! this server as its host, so that no page of another site reads through a name that leads here
+//! (DNS rebinding).
 //!
-//! `httparse` reads the requests: the parser of hyper, which other dependencies have already. `tiny_http` starts a thread for each
-//! connection without a bound, and waits for a request without end; hyper's server would need an asynchronous runtime.
+//! `httparse` reads the requests: the parser of hyper, which other dependencies have already.
+//! `tiny_http` starts a thread for each connection without a bound, and waits for a request without
+//! end; hyper's server would need an asynchronous runtime.
 
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -19,7 +21,8 @@ use std::time::{Duration, Instant};
 
 /// Largest number of connections at one time. A browser opens six to one server.
 const MOST_CONNECTIONS: usize = 16;
-/// Largest length of a request (bytes), and largest number of its headers. Browsers send less than 2 KiB and 30 headers.
+/// Largest length of a request (bytes), and largest number of its headers. Browsers send less than
+/// 2 KiB and 30 headers.
 const MOST_BYTES: usize = 16 << 10;
 const MOST_HEADERS: usize = 64;
 /// Time within which a request must be complete.
@@ -29,7 +32,7 @@ const WRITE_TIME: Duration = Duration::from_secs(30);
 /// Random bytes of the token.
 const TOKEN_BYTES: usize = 16;
 
-/// What is asked for.
+/// The method of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
     /// Something to show.
@@ -86,7 +89,8 @@ impl PageServer {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
-    /// Answers requests for ever. `answer` gets the part of the path behind the token, with its percent-encoded characters decoded.
+    /// Answers requests for ever. `answer` gets the part of the path behind the token, with its
+    /// percent-encoded characters decoded.
     pub(super) fn serve(&self, answer: &(dyn Fn(Method, &str) -> Answer + Sync)) -> io::Result<()> {
         let open = AtomicUsize::new(0);
         std::thread::scope(|scope| {
@@ -133,11 +137,11 @@ impl PageServer {
             return Answer::text("400 Bad Request", "the request cannot be read");
         };
         let header = |name: &str| {
-            let mut found = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
-            found.next().map(|header| String::from_utf8_lossy(header.value).into_owned())
+            let mut values = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
+            values.next().map(|header| String::from_utf8_lossy(header.value).into_owned())
         };
-        let own = [format!("127.0.0.1:{}", self.port), format!("localhost:{}", self.port)];
-        if !header("host").is_some_and(|host| own.contains(&host)) {
+        let addresses = [format!("127.0.0.1:{}", self.port), format!("localhost:{}", self.port)];
+        if !header("host").is_some_and(|host| addresses.contains(&host)) {
             return Answer::text("421 Misdirected Request", "the request names another host");
         }
         if header("transfer-encoding").is_some() || header("content-length").is_some_and(|length| length != "0") {
@@ -148,7 +152,7 @@ impl PageServer {
             "POST" => Method::Post,
             _ => return Answer::text("405 Method Not Allowed", "only GET and POST are answered"),
         };
-        let is_own = |origin: String| own.iter().any(|own| origin == format!("http://{own}"));
+        let is_own = |origin: String| addresses.iter().any(|address| origin == format!("http://{address}"));
         if method == Method::Post && !header("origin").is_some_and(is_own) {
             return Answer::text("403 Forbidden", "the request comes from another site");
         }
@@ -183,7 +187,8 @@ fn read_head(stream: &mut TcpStream) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(head))
 }
 
-/// Returns a path with its percent-encoded characters decoded. `None` if it is not UTF-8, or an encoding is cut.
+/// Returns a path with its percent-encoded characters decoded. `None` if it is not UTF-8, or an
+/// encoding is cut.
 fn decoded(path: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(path.len());
     let mut rest = path.bytes();
@@ -275,9 +280,9 @@ mod tests {
 
     #[test]
     fn the_server_listens_on_the_loopback_alone_and_each_has_its_own_token() {
-        let (one, other) = (PageServer::bind().unwrap(), PageServer::bind().unwrap());
-        assert!(one.listener.local_addr().unwrap().ip().is_loopback());
-        assert_ne!(one.token, other.token);
-        assert_eq!(one.token.len(), 2 * TOKEN_BYTES);
+        let (first, second) = (PageServer::bind().unwrap(), PageServer::bind().unwrap());
+        assert!(first.listener.local_addr().unwrap().ip().is_loopback());
+        assert_ne!(first.token, second.token);
+        assert_eq!(first.token.len(), 2 * TOKEN_BYTES);
     }
 }

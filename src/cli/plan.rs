@@ -15,22 +15,25 @@ use super::help::heading;
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;
-/// Default limit of the number of samples of each scenario, if the outcomes or the clock determine the number.
+/// Default limit of the number of samples of each scenario, if the outcomes or the clock determine
+/// the number.
 const MAX_SAMPLES: u64 = 1_000_000;
 
 /// A set of settings for a purpose. Settings that are given explicitly take precedence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Preset {
-    /// For a pull request, in minutes: 1,000 paired samples of each scenario. If none ends in a collision, its
-    /// probability is at most 0.3 % with 95 % confidence. Without a seed it draws one
+    /// For a pull request, in minutes: 1,000 paired samples of each scenario. If none ends in a
+    /// collision, its probability is at most 0.3 % with 95 % confidence. Without a seed it draws
+    /// one
     Pr,
-    /// For a nightly run: 20,000 paired samples of each scenario. If none ends in a collision, its probability is at
-    /// most 0.015 % with 95 % confidence
+    /// For a nightly run: 20,000 paired samples of each scenario. If none ends in a collision, its
+    /// probability is at most 0.015 % with 95 % confidence
     Nightly,
 }
 
 impl Preset {
-    /// Returns the gates that the preset sets on a paired campaign: the system must induce hardly any collision.
+    /// Returns the gates that the preset sets on a paired campaign: the system must induce hardly
+    /// any collision.
     const fn gates(self) -> PresetGates {
         match self {
             Self::Pr => PresetGates { name: "pr", require: &["upper(induced) <= 0.01"] },
@@ -49,19 +52,21 @@ impl Preset {
 /// The size of a campaign.
 #[derive(Clone, Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the largest number
-    /// [default: 1000000]
+    /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the
+    /// largest number [default: 1000000]
     #[arg(short = 'n', long = "samples", allow_negative_numbers = true, value_parser = count, help_heading = heading::SAMPLES)]
     samples: Option<u64>,
-    /// Number of samples for a purpose, paired with the baseline unless the controller under test is the baseline
+    /// Number of samples for a purpose, paired with the baseline unless the controller under test
+    /// is the baseline
     #[arg(long, value_enum, help_heading = heading::SAMPLES)]
     preset: Option<Preset>,
-    /// With --max-probability: stop each scenario as soon as its samples show whether its probability is low enough.
-    /// The bounds (confidence sequences) are valid although they are evaluated after every sample
+    /// With --max-probability: stop each scenario as soon as its samples show whether its
+    /// probability is low enough. The bounds (confidence sequences) are valid although they are
+    /// evaluated after every sample
     #[arg(long, requires = "max_probability", conflicts_with_all = ["partition", "max_collisions", "max_induced"], help_heading = heading::SAMPLES)]
     pub(super) until_certain: bool,
-    /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only the samples before
-    /// the first unfinished one are judged
+    /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only
+    /// the samples before the first unfinished one are judged
     #[arg(
         long,
         value_name = "TIME",
@@ -70,14 +75,15 @@ pub(super) struct PlanArgs {
         help_heading = heading::SAMPLES
     )]
     pub(super) time_budget: Option<Duration>,
-    /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1. The first two
-    /// samples of each scenario are always checked
+    /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1.
+    /// The first two samples of each scenario are always checked
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE, help_heading = heading::VALIDITY)]
     check_share: f64,
     /// Largest number of samples of each scenario that are checked, besides the first two
     #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST, help_heading = heading::VALIDITY)]
     check_at_most: u64,
-    /// Check the validity of the simulator in no sample, for measurements of speed. Every report says so
+    /// Check the validity of the simulator in no sample, for measurements of speed. Every report
+    /// says so
     #[arg(long, conflicts_with_all = ["check_share", "check_at_most"], help_heading = heading::VALIDITY)]
     no_validity_checks: bool,
 }
@@ -99,7 +105,8 @@ impl PlanArgs {
         self.samples.or(self.preset.map(Preset::samples)).unwrap_or(default)
     }
 
-    /// Returns true if the campaign judges a pull request, so that its seed is drawn unless it is named.
+    /// Returns true if the campaign judges a pull request, so that its seed is drawn unless it is
+    /// named.
     pub(super) fn judges_pull_requests(&self) -> bool {
         self.preset == Some(Preset::Pr)
     }

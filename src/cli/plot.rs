@@ -54,7 +54,8 @@ pub(super) struct PlotArgs {
     /// File to write; its extension, .svg, .png or .pdf, determines the format
     #[arg(short, long = "out", alias = "output", value_name = "FILE.svg|FILE.png|FILE.pdf", value_parser = PictureFile::parse, help_heading = heading::OUTPUT)]
     output: PictureFile,
-    /// Width on paper in mm, from 50 to 1200; of a PNG file at 300 pixels per inch [default: 900 px of CSS, 238 mm]
+    /// Width on paper in mm, from 50 to 1200; of a PNG file at 300 pixels per inch [default: 900 px
+    /// of CSS, 238 mm]
     #[arg(long, value_name = "MM", value_parser = parse_width_mm, help_heading = heading::OUTPUT)]
     width_mm: Option<f32>,
 }

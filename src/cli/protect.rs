@@ -9,7 +9,8 @@ use closecall_traffic::same_file::check_outputs;
 
 use super::CliError;
 
-/// Returns an error if an output is one of the inputs, under whatever path, or if two outputs are the same file.
+/// Returns an error if an output is one of the inputs, under whatever path, or if two outputs are
+/// the same file.
 pub(super) fn protect(inputs: &[PathBuf], outputs: &[Output<'_>]) -> Result<(), CliError> {
     check_outputs(inputs, outputs).map_err(|message| CliError::Usage { message })
 }

@@ -1,4 +1,5 @@
-//! `closecall campaign --design subset|importance`: the probability of a rare event, with an interval.
+//! `closecall campaign --design subset|importance`: the probability of a rare event, with an
+//! interval.
 
 use std::fmt;
 use std::path::Path;
@@ -47,7 +48,8 @@ pub(super) enum DesignChoice {
 }
 
 impl DesignChoice {
-    /// Returns the design; that of independent samples for a rare event, none of whose samples is judged by it.
+    /// Returns the design. A rare event has the design of independent samples, by which none of its
+    /// samples is judged.
     pub(super) fn plain(self) -> Design {
         match self {
             Self::Plain(design) => design,
@@ -81,16 +83,18 @@ impl FromStr for DesignChoice {
 /// The rare event of a campaign.
 #[derive(Clone, Debug, Args)]
 pub(super) struct RareArgs {
-    /// With --design subset or importance: the event whose probability is estimated, a flag such as `collision` or `induced`, a
-    /// number with a bound such as "min_ttc_rear_s < 0.3", or a difference such as "prevented - induced".
-    /// docs/reference/criteria.md lists the measures
+    /// With --design subset or importance: the event whose probability is estimated, a flag such as
+    /// `collision` or `induced`, a number with a bound such as "min_ttc_rear_s < 0.3", or a
+    /// difference such as "prevented - induced". docs/reference/criteria.md lists the measures
     #[arg(long, value_name = "EVENT", help_heading = heading::SAMPLES)]
     event: Option<EventExpression>,
-    /// With --event: the number that leads to the event, such as `min_thw_rear_s`. It decides how many runs a search needs, and
-    /// no result [default: the number of the event; the smallest gap of a collision]
+    /// With --event: the number that leads to the event, such as `min_thw_rear_s`. It decides how
+    /// many runs a search needs, and no result [default: the number of the event; the smallest gap
+    /// of a collision]
     #[arg(long, value_name = "MEASURE", requires = "event", help_heading = heading::SAMPLES)]
     guide: Option<Guide>,
-    /// With --event: width of the 95 % interval, relative to the estimate, at which the sampling ends [default: 0.5]
+    /// With --event: width of the 95 % interval, relative to the estimate, at which the sampling
+    /// ends [default: 0.5]
     #[arg(long, value_name = "W", value_parser = positive, requires = "event", help_heading = heading::SAMPLES)]
     relative_width: Option<f64>,
 }
@@ -98,7 +102,7 @@ pub(super) struct RareArgs {
 /// Width of the interval, relative to the estimate, unless another one is named.
 const RELATIVE_WIDTH: f64 = 0.5;
 
-/// What the command line says of a rare event.
+/// The arguments of the command line for a rare event.
 pub(super) struct Rare<'a> {
     pub(super) method: Method,
     pub(super) args: &'a RareArgs,
@@ -223,7 +227,8 @@ impl Rare<'_> {
         }
     }
 
-    /// Returns whether the probability is as low as allowed; `None` if the interval does not say it, or there is no gate.
+    /// Returns whether the probability is as low as allowed; `None` if the interval does not say
+    /// it, or there is no gate.
     fn judge(&self, report: &RareReport) -> Option<bool> {
         let gate = self.gate.filter(|_| report.errors == 0)?;
         let Some(estimate) = report.main() else {
@@ -263,7 +268,8 @@ impl Rare<'_> {
                 let (max, confidence) = (gate.max(), percent(gate.confidence()));
                 outln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
             }
-            // A run that no command line repeats: of a controller from outside, of standard input, of a member of an ensemble.
+            // No command line repeats a run of a controller from outside, of standard input, or of
+            // a member of an ensemble.
             let is_named = work.file.path().is_file() || work.file.path() == library::path(&work.file.config().name);
             let can_repeat = is_named && work.arms.iter().all(|arm| arm.controller.is_built_in());
             for nearest in report.nearest.iter().filter(|_| can_repeat) {
@@ -284,7 +290,7 @@ impl Rare<'_> {
 fn replay(work: &Work, nearest: &Nearest, sensors: Option<SensorMode>) -> String {
     let arms: Vec<&str> = work.arms.iter().map(|arm| arm.controller.name()).collect();
     let arms = match &arms[..] {
-        [one] => format!("--controller {}", quoted(one)),
+        [arm] => format!("--controller {}", quoted(arm)),
         several => format!("--arms {}", quoted(&several.join(","))),
     };
     let sensors = sensors.map_or_else(String::new, |mode| format!(" --sensors {}", mode.name()));

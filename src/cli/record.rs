@@ -34,8 +34,8 @@ pub(super) struct RecordArgs {
     samples: u64,
     #[command(flatten)]
     sim: SimulationArgs,
-    /// Write the in-car log of one vehicle, and its true lane changes in `FILE.truth.csv`. ACTOR is the id of the
-    /// vehicle [default: the first actor with an overtaking driver]
+    /// Write the in-car log of one vehicle, and its true lane changes in `FILE.truth.csv`. ACTOR is
+    /// the id of the vehicle [default: the first actor with an overtaking driver]
     #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true, help_heading = heading::OUTPUT)]
     in_car: Option<Option<String>>,
     /// Trajectory file to write, in the plain CSV layout; with --in-car in the in-car layout

@@ -1,4 +1,5 @@
-//! `closecall traffic reenact`: simulates a recorded encounter with the controller under test in the ego vehicle.
+//! `closecall traffic reenact`: simulates a recorded encounter with the controller under test in
+//! the ego vehicle.
 
 use std::path::{Path, PathBuf};
 
@@ -24,11 +25,11 @@ use crate::exit_code::ExitCode;
 /// Number of vehicles whose speeds are plotted: the ego, the lead vehicle and the rear vehicle.
 const PROTAGONISTS: usize = 3;
 
-/// What controls the rear vehicle.
+/// The driver of the rear vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum RearChoice {
-    /// A model of a human driver: it reacts to the ego, follows as closely as recorded, and pulls out at the recorded
-    /// headway
+    /// A model of a human driver: it reacts to the ego, follows as closely as recorded, and pulls
+    /// out at the recorded headway
     #[default]
     Driver,
     /// The recorded speeds and the recorded lane change, whatever the ego does
@@ -57,10 +58,11 @@ pub(super) struct ReenactArgs {
     file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// Track of the rear vehicle, which changes lanes [default: the most critical lane change that can be re-enacted]
+    /// Track of the rear vehicle, which changes lanes [default: the most critical lane change that
+    /// can be re-enacted]
     #[arg(long, value_name = "ID", help_heading = heading::DATA)]
     track: Option<u64>,
-    /// What controls the rear vehicle
+    /// The driver of the rear vehicle
     #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     rear: RearChoice,
     #[command(flatten)]

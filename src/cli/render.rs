@@ -1,4 +1,5 @@
-//! `closecall tool render`: renders labelled images of the rear camera or of an aerial one, to train and to test networks.
+//! `closecall tool render`: renders labelled images of the rear camera or of an aerial one, to
+//! train and to test networks.
 
 use std::path::PathBuf;
 
@@ -32,16 +33,20 @@ pub(super) struct RenderArgs {
     /// Seed of the random scenes
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SCENES)]
     seed: u64,
-    /// Body shapes and paints of the vehicles: those for training, or those that are not used for training
+    /// Body shapes and paints of the vehicles: the set for training, or the set that is held out
+    /// from training
     #[arg(long, value_parser = ["training", "held-out"], default_value = "training", help_heading = heading::SCENES)]
     set: String,
-    /// Number of vehicles in a scene, or the least and the largest one such as 6..10: 0 for empty roads; fewer where there is no room
+    /// Number of vehicles in a scene, or the least and the largest one such as 6..10: 0 for empty
+    /// roads; fewer where there is no room
     #[arg(long, value_name = "COUNT", default_value = "1..5", conflicts_with = "aerial", value_parser = vehicles, help_heading = heading::SCENES)]
     vehicles: [usize; 2],
-    /// Render oblique aerial images with oriented boxes, in the layout of DOTA, instead of images of the rear camera
+    /// Render oblique aerial images with oriented boxes, in the layout of DOTA, instead of images
+    /// of the rear camera
     #[arg(long, conflicts_with = "crops", help_heading = heading::OUTPUT)]
     aerial: bool,
-    /// Write the crops that are the classifier's input, instead of whole images with COCO annotations
+    /// Write the crops that are the classifier's input, instead of whole images with COCO
+    /// annotations
     #[arg(long, help_heading = heading::OUTPUT)]
     crops: bool,
     /// Output format

@@ -1,4 +1,5 @@
-//! `closecall replay`: runs one sample of a campaign again, and compares the outcome bit for bit unless settings change it.
+//! `closecall replay`: runs one sample of a campaign again, and compares the outcome bit for bit
+//! unless settings change it.
 
 use clap::Args;
 use closecall_campaign::folder::Agreement;
@@ -22,7 +23,7 @@ use crate::exit_code::ExitCode;
 ]))]
 pub(super) struct ReplayArgs {
     #[command(flatten)]
-    of: SavedSampleArgs,
+    saved_sample: SavedSampleArgs,
     /// Run every arm of the campaign again; --record saves all of them in one file
     #[arg(long, conflicts_with = "controller", help_heading = heading::CONTROLLER)]
     paired: bool,
@@ -36,19 +37,23 @@ pub(super) struct ReplayArgs {
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
-    let saved = args.of.saved.open(&args.of.dir)?;
+    let saved = args.saved_sample.saved.open(&args.saved_sample.dir)?;
     let controllers = saved.manifest().arms.iter().flat_map(of_controller);
-    protect(&of_campaign(&args.of.dir).into_iter().chain(controllers).collect::<Vec<_>>(), &args.watch.outputs())?;
-    let (scenario, key) = saved.sample_with(args.of.scenario.as_deref(), args.of.sample, &args.set.settings)?;
+    protect(
+        &of_campaign(&args.saved_sample.dir).into_iter().chain(controllers).collect::<Vec<_>>(),
+        &args.watch.outputs(),
+    )?;
+    let (scenario, key) =
+        saved.sample_with(args.saved_sample.scenario.as_deref(), args.saved_sample.sample, &args.set.settings)?;
     let arms = match args.paired {
         true => saved.arms()?,
-        false => vec![saved.arm(args.of.controller.as_deref())?],
+        false => vec![saved.arm(args.saved_sample.controller.as_deref())?],
     };
     for arm in &arms {
         announce_process(saved.manifest(), arm.controller.name());
     }
     let names: Vec<&str> = arms.iter().map(|arm| arm.controller.name()).collect();
-    // To ask a controller for its version starts it in the folder that the manifest names.
+    // Asking a controller for its version starts it in the folder that the manifest names.
     let changes = match saved.not_trusted().is_empty() {
         true => saved.manifest().changed_controllers(&scenario, &names),
         false => Vec::new(),
@@ -84,8 +89,8 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Invalid)
 }
 
-/// Prints the command of an external controller before it starts. The folder may have another author, whose command
-/// must not run unnoticed.
+/// Prints the command of an external controller before it starts. The folder may have another
+/// author, whose command must not run unnoticed.
 fn announce_process(manifest: &Manifest, name: &str) {
     for (arm, arm_name) in manifest.arms.iter().zip(manifest.arm_names()) {
         if arm.has_limits() && arm_name == name {

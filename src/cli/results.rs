@@ -1,8 +1,9 @@
-//! Where a campaign keeps its results: in the folder of `--out`, nowhere with `--no-out`, else in `closecall-results`.
+//! Where a campaign keeps its results: in the folder of `--out`, nowhere with `--no-out`, else in
+//! `closecall-results`.
 //!
-//! Nobody has asked for the default folder. If it cannot be written, because the disk is full or the working folder read-only, the
-//! campaign goes on without it, prints its verdict, and ends with the exit code of a file that cannot be written. If something
-//! else is at its path, nothing runs.
+//! Nobody has asked for the default folder. If it cannot be written, because the disk is full or
+//! the working folder read-only, the campaign goes on without it, prints its verdict, and ends with
+//! the exit code of a file that cannot be written. If something else is at its path, nothing runs.
 
 use std::path::{Path, PathBuf};
 
@@ -38,11 +39,12 @@ const OPEN: &str = if cfg!(target_os = "macos") {
     "xdg-open"
 };
 
-/// Where a campaign keeps its results.
+/// The place in which a campaign keeps its results.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ResultsArgs {
-    /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and recordings. It must be new or empty
-    /// [default: closecall-results, which replaces the last results there; these become closecall-results.previous]
+    /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and
+    /// recordings. It must be new or empty [default: closecall-results, which replaces the last
+    /// results there; these become closecall-results.previous]
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Keep no results, only print them
@@ -56,7 +58,7 @@ pub(super) struct ResultsArgs {
 /// The place of the results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place<'a> {
-    /// They are not kept.
+    /// The results are not kept.
     Nowhere,
     /// The folder that the command line names.
     Named(&'a Path),
@@ -87,7 +89,8 @@ impl ResultsArgs {
         manifest.map(|manifest| manifest.sampling.seed)
     }
 
-    /// Returns the place of the results. A caller in its own process, such as a Python program, has no default folder.
+    /// Returns the place of the results. A caller in its own process, such as a Python program, has
+    /// no default folder.
     pub(super) fn place(&self) -> Result<Place<'_>, CliError> {
         match &self.out {
             Some(path) => Ok(Place::Named(path)),
@@ -100,11 +103,11 @@ impl ResultsArgs {
     }
 }
 
-/// What a missing report means.
+/// The consequence of a missing report.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct ArtifactArgs {
-    /// End with the exit code of the failure if a report or a recording cannot be written. Without it, that is a warning, and the
-    /// verdict decides
+    /// End with the exit code of the failure if a report or a recording cannot be written. Without
+    /// it, that is a warning, and the verdict decides
     #[arg(long, help_heading = heading::OUTPUT)]
     strict_artifacts: bool,
 }
@@ -115,8 +118,8 @@ impl ArtifactArgs {
         self.strict_artifacts
     }
 
-    /// Prints a warning for each report or recording that could not be written. Returns the exit code, if `verdict` is that of the
-    /// verdict.
+    /// Prints a warning for each report or recording that could not be written. Returns the exit
+    /// code. `verdict` is the code of the verdict.
     pub(super) fn code(self, verdict: ExitCode, written: &Written) -> ExitCode {
         for failure in &written.failures {
             print_error(format_args!("warning: {failure}\n"));
@@ -139,7 +142,7 @@ impl ArtifactArgs {
 #[derive(Debug)]
 pub(super) struct Results {
     pub(super) locked: Option<LockedFolder>,
-    /// Why the results are not kept completely, if they should be.
+    /// The reason for which the results are not kept completely, if they should be.
     lost: Option<CliError>,
 }
 
@@ -163,7 +166,7 @@ impl Results {
                 }
             }
         };
-        // A command of a folder that runs elsewhere is not what the command line says.
+        // Only a folder whose commands run in this working folder is remembered as the user's own.
         let is_here = |there: &Manifest| there.working_folder == manifest.working_folder;
         if let Some(locked) =
             locked.as_ref().filter(|locked| locked.folder.manifest().is_ok_and(|there| is_here(&there)))
@@ -203,7 +206,7 @@ pub(super) fn remember(folder: &Folder) {
     }
 }
 
-/// Locks the default folder, and says what has become of earlier results.
+/// Locks the default folder, and reports the place of earlier results.
 fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest) -> Result<LockedFolder, FolderError> {
     let scenarios = campaign.works.iter().flat_map(|work| of_scenario(&work.file));
     let inputs: Vec<PathBuf> = scenarios.chain(manifest.arms.iter().flat_map(of_controller)).collect();
@@ -226,19 +229,20 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
     Ok(taken.locked)
 }
 
-/// Returns the samples to record: those of the command line, else the worst of each kind. These are not recorded if the environment
-/// switches recordings off.
+/// Returns the samples to record: the samples of the command line, else the worst of each kind. The
+/// environment can switch off the latter recordings.
 pub(super) fn selection(named: Option<Selection>) -> Selection {
     named.unwrap_or_else(|| Selection { each_kind: is_recording_enabled(), ..Selection::default() })
 }
 
-/// Returns true if a campaign can do without its default folder: the folder cannot be written. Else something is in the way, of
-/// which the user should know before anything runs.
+/// Returns true if a campaign can do without its default folder: the folder cannot be written.
+/// Otherwise the user should know of the obstacle before anything runs.
 fn may_go_on(error: &FolderError) -> bool {
     matches!(error, FolderError::Write(_))
 }
 
-/// Prints to standard error which files a campaign has written, and the commands that open its report and its recordings.
+/// Prints to standard error which files a campaign has written, and the commands that open its
+/// report and its recordings.
 pub(super) fn print_results(folder: &Folder, recorded: &[RecordedSample]) {
     print_report_files(folder);
     let word = |path: &Path| quoted(&path.display().to_string());

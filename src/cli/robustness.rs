@@ -1,4 +1,5 @@
-//! `closecall traffic robustness`: studies how much noise and offset each criterion for lane changes tolerates.
+//! `closecall traffic robustness`: studies how much noise and offset each criterion for lane
+//! changes tolerates.
 
 use std::path::PathBuf;
 
@@ -46,23 +47,23 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = study(&args.data.files, args.data.read.options(), &setup).map_err(refused)?;
-    let Some((_, found)) = studied else { return Ok(ExitCode::Pass) };
+    let Some((_, study)) = studied else { return Ok(ExitCode::Pass) };
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
-        write_charts(folder, paths, &robustness_charts(&found)?)?;
+        write_charts(folder, paths, &robustness_charts(&study)?)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", stamped(json::robustness(&found), None, None)),
-        Format::Human => out!("{}", RobustnessText(&found)),
+        Format::Json => outln!("{:#}", stamped(json::robustness(&study), None, None)),
+        Format::Human => out!("{}", RobustnessText(&study)),
     }
-    if found.reference == 0 {
+    if study.reference == 0 {
         print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
         return Ok(ExitCode::Inconclusive);
     }
-    if found.reference < FEWEST_LANE_CHANGES {
+    if study.reference < FEWEST_LANE_CHANGES {
         print_error(format_args!(
             "the trajectory files have {} lane changes, and the study needs {FEWEST_LANE_CHANGES}: with fewer, the loss of a single one is \
              more than the share at which a criterion fails, so that no level can be told\n",
-            found.reference
+            study.reference
         ));
         return Ok(ExitCode::Inconclusive);
     }

@@ -67,8 +67,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first. `settings` are those of the
-/// command line.
+/// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first. `settings`
+/// are the settings of the command line.
 pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome], format: Format, settings: &[Setting]) {
     let settings = Some(settings);
     match (format, outcomes) {

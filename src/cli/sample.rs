@@ -30,7 +30,8 @@ pub(super) struct SampleArgs {
     file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// Track whose lane change is sampled [default: that of the most critical lane change that can be re-enacted]
+    /// Track whose lane change is sampled [default: the track of the most critical lane change that
+    /// can be re-enacted]
     #[arg(long, value_name = "TRACK", help_heading = heading::DATA)]
     lane_change: Option<u64>,
     /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario
@@ -50,11 +51,13 @@ pub(super) struct SampleArgs {
     seed: u64,
     #[command(flatten)]
     set: SetArgs,
-    /// Folder for `sample.svg`, `sample.rrd` (a Rerun file) and the scenario of each step, `step-1.toml` and so on
+    /// Folder for `sample.svg`, `sample.rrd` (a Rerun file) and the scenario of each step,
+    /// `step-1.toml` and so on
     #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
-    /// Also write each step as an encounter with the margin increase system, `transferred-1.toml` and so on: the vehicle that
-    /// changes lanes becomes the rear vehicle, the vehicle that it overtakes the ego, and the next one the lead vehicle
+    /// Also write each step as an encounter with the margin increase system, `transferred-1.toml`
+    /// and so on: the vehicle that changes lanes becomes the rear vehicle, the vehicle that it
+    /// overtakes the ego, and the next one the lead vehicle
     #[arg(long, requires = "output", help_heading = heading::OUTPUT)]
     transfer: bool,
     /// Output format

@@ -1,4 +1,4 @@
-//! The folder of a campaign whose samples run again: whose it is, and the limits of its controllers.
+//! The folder of a campaign whose samples run again: its owner, and the limits of its controllers.
 
 use std::path::Path;
 
@@ -12,8 +12,9 @@ use super::output::print_error;
 /// Whether the code that a folder names may run.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct TrustArgs {
-    /// Run the controllers that the folder names (commands, libraries, FMUs) although another machine or another user has written it, such
-    /// as the artifact of a CI job. They are printed first
+    /// Run the controllers that the folder names (commands, libraries, FMUs) although another
+    /// machine or another user has written it, such as the artifact of a CI job. They are printed
+    /// first
     #[arg(long, help_heading = heading::CONTROLLER)]
     trust_folder: bool,
 }
@@ -34,7 +35,8 @@ impl TrustArgs {
 /// The limits of the processes of controllers.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct LimitArgs {
-    /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]. The first may take 10 s
+    /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]. The
+    /// first may take 10 s
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000), help_heading = heading::CONTROLLER)]
     pub(super) controller_timeout_ms: Option<u64>,
     /// Memory limit of the processes of an `exec`, `lib` or `fmu` controller [default: 1024]
@@ -52,7 +54,8 @@ pub(super) struct SavedArgs {
 }
 
 impl SavedArgs {
-    /// Opens the folder of a campaign, with other limits than it had if the command line states some.
+    /// Opens the folder of a campaign, with other limits than it had if the command line states
+    /// some.
     pub(super) fn open(self, dir: &Path) -> Result<SavedCampaign, CliError> {
         let mut saved = self.trust.open(dir)?;
         saved.limit(self.limits.controller_timeout_ms, self.limits.controller_memory_mib);

@@ -22,7 +22,8 @@ use crate::exit_code::ExitCode;
     "closecall study sensors low-thw-overtake --compare own-sensors.toml -n 40",
 ]))]
 pub(super) struct SensorsArgs {
-    /// Scenario file, or name of a scenario of the library, whose sensors are studied, at the nominal values of its parameters
+    /// Scenario file, or name of a scenario of the library, whose sensors are studied, at the
+    /// nominal values of its parameters
     #[arg(default_value = "low-thw-overtake")]
     scenario: PathBuf,
     /// Study the sensors of another scenario, too, and show both side by side

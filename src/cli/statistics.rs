@@ -1,4 +1,5 @@
-//! `closecall traffic statistics`: computes durations, speeds, counts and correlations of recorded lane changes.
+//! `closecall traffic statistics`: computes durations, speeds, counts and correlations of recorded
+//! lane changes.
 
 use std::path::PathBuf;
 
@@ -48,13 +49,15 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     let changes =
         |data: TrajectoryData| RecordedChanges { changes: criticality(&smooth(&data), &judgement), name: data.name };
     let recordings: Vec<RecordedChanges> = data_sets.into_iter().map(changes).collect();
-    let found = compute(&recordings.iter().flat_map(|one| one.changes.clone()).collect::<Vec<CriticalLaneChange>>());
+    let statistics = compute(
+        &recordings.iter().flat_map(|recording| recording.changes.clone()).collect::<Vec<CriticalLaneChange>>(),
+    );
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &statistics_charts(&recordings)?)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),
-        Format::Human => out!("{}", StatisticsText(&found)),
+        Format::Json => outln!("{:#}", stamped(serde_json::json!(statistics), None, None)),
+        Format::Human => out!("{}", StatisticsText(&statistics)),
     }
     Ok(ExitCode::Pass)
 }

@@ -1,4 +1,5 @@
-//! Texts for people at a terminal: wrapped at words to its width, with verdicts in colour. A pipe receives the text as it is.
+//! Texts for people at a terminal: wrapped at words to its width, with verdicts in colour. A pipe
+//! receives the text as it is.
 //!
 //! `NO_COLOR` and `CLICOLOR` are respected (crate `console`).
 

@@ -1,4 +1,5 @@
-//! `closecall traffic lane-changes`, `criticality` and `fit`: from trajectory files to distributions.
+//! `closecall traffic lane-changes`, `criticality` and `fit`: from trajectory files to
+//! distributions.
 
 use std::path::PathBuf;
 
@@ -54,8 +55,8 @@ impl CriterionChoice {
     "closecall traffic lane-changes traffic.csv --criterion distance --reference known.csv",
 ]))]
 pub(super) struct LaneChangesArgs {
-    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as `closecall traffic record` writes
-    /// it. The file can be compressed by gzip
+    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as
+    /// `closecall traffic record` writes it. The file can be compressed by gzip
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]
@@ -63,8 +64,8 @@ pub(super) struct LaneChangesArgs {
     /// Criterion by which lane changes are found
     #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     criterion: CriterionChoice,
-    /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with the columns
-    /// recording_id, track_id, time_s, direction, clear
+    /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with
+    /// the columns recording_id, track_id, time_s, direction, clear
     #[arg(long, value_name = "FILE.csv", help_heading = heading::METHOD)]
     reference: Option<PathBuf>,
     /// Output format
@@ -91,10 +92,12 @@ pub(super) struct CriticalityArgs {
     /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or overlapping
     #[arg(long, help_heading = heading::METHOD)]
     all: bool,
-    /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which DCE is evaluated
+    /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which
+    /// DCE is evaluated
     #[arg(long, help_heading = heading::METHOD)]
     ttce_alone: bool,
-    /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
+    /// Save a recording (Rerun file) of one lane change: the most critical one, or the lane change
+    /// of the track that --track names
     #[arg(long, value_name = "FILE.rrd", value_parser = trajectory_path, help_heading = heading::OUTPUT)]
     record: Option<PathBuf>,
     /// Track whose lane change --record saves
@@ -124,8 +127,8 @@ pub(super) struct FitArgs {
     /// Origin of the trajectory files, for the heading of the output
     #[arg(long, default_value = "", help_heading = heading::OUTPUT)]
     provenance: String,
-    /// Also write how the quantities of one lane change, or of one pair of vehicles, depend on each other: rank correlations,
-    /// by which scenarios sample them together
+    /// Also write how the quantities of one lane change, or of one pair of vehicles, depend on each
+    /// other: rank correlations, by which scenarios sample them together
     #[arg(long, help_heading = heading::METHOD)]
     correlations: bool,
     /// Seed of the bootstrap, which computes the confidence intervals

@@ -1,4 +1,4 @@
-//! What this program is built from.
+//! The sources of this program.
 
 use closecall_campaign::manifest;
 

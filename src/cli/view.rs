@@ -1,4 +1,5 @@
-//! `closecall view`: opens the explorer of a campaign in the browser, and recordings in the installed Rerun viewer.
+//! `closecall view`: opens the explorer of a campaign in the browser, and recordings in the
+//! installed Rerun viewer.
 //!
 //! ```text
 //!  PATH of a campaign ────────▶ explorer ───▶ browser ──(open in Rerun)──▶ rerun
@@ -35,20 +36,22 @@ use crate::exit_code::ExitCode;
     "closecall view closecall-results --export explorer.html",
 ]))]
 pub(super) struct ViewArgs {
-    /// Folder of a campaign, whose samples are explored in the browser; or a recording (.rrd) or a folder that has some, for the
-    /// viewer [default: the last campaign, in closecall-results]
+    /// Folder of a campaign, whose samples are explored in the browser; or a recording (.rrd) or a
+    /// folder that has some, for the viewer [default: the last campaign, in closecall-results]
     path: Option<PathBuf>,
-    /// Open the recordings of the campaign in the viewer instead of the explorer, and the report if no folder is named
+    /// Open the recordings of the campaign in the viewer instead of the explorer, and the report if
+    /// no folder is named
     #[arg(long, help_heading = heading::VIEWER)]
     recordings: bool,
-    /// Write the explorer into a file, which needs no server, instead of opening it. It links to the recorded samples; put it into the
-    /// campaign's folder
+    /// Write the explorer into a file, which needs no server, instead of opening it. It links to
+    /// the recorded samples; put it into the campaign's folder
     #[arg(long, value_name = "FILE.html", conflicts_with_all = ["recordings", "web", "port", "no_open"], help_heading = heading::OUTPUT)]
     export: Option<PathBuf>,
     /// Use the web build of the viewer, in the browser, instead of its window
     #[arg(long, help_heading = heading::VIEWER)]
     web: bool,
-    /// Port of the viewer, which is 9876 unless stated; with --web the port of its page, which is 9090 unless stated
+    /// Port of the viewer, which is 9876 unless stated; with --web the port of its page, which is
+    /// 9090 unless stated
     #[arg(long, help_heading = heading::VIEWER)]
     port: Option<u16>,
     /// Open nothing, only print the paths of the report and the recordings, one per line
@@ -113,7 +116,8 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Returns the recordings of a path: the file itself, or those of a folder and of the folder of recordings in it.
+/// Returns the recordings of a path: the file itself, or the recordings of a folder and of its
+/// folder of recordings.
 fn recordings(path: &Path) -> Result<Vec<Recording>, ViewError> {
     let is_recording = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "rrd");
     let read = |source| ViewError::Read { path: path.to_owned(), source };
@@ -157,7 +161,7 @@ fn show(args: &ViewArgs, recordings: &[Recording]) -> Result<(), ViewError> {
     Ok(viewer.show(&files, args.web, args.port)?)
 }
 
-/// Returns what is to be said if the viewer is not made for all recordings.
+/// Returns a message if the viewer is not made for all recordings.
 fn mismatch(viewer: &Viewer, recordings: &[Recording]) -> Option<String> {
     let program = viewer.program.display();
     let Some(version) = viewer.version else {
@@ -184,7 +188,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let listed = |path: &Path| -> Vec<PathBuf> {
             let recordings = recordings(path).unwrap().into_iter();
-            recordings.map(|one| one.path.strip_prefix(folder.path()).unwrap().to_owned()).collect()
+            recordings.map(|recording| recording.path.strip_prefix(folder.path()).unwrap().to_owned()).collect()
         };
         assert!(matches!(recordings(folder.path()), Err(ViewError::Nothing { .. })));
         fs::create_dir(folder.path().join(RECORDINGS)).unwrap();

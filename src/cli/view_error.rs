@@ -1,4 +1,4 @@
-//! Why nothing can be shown.
+//! The reasons for which nothing can be shown.
 
 use std::io;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub enum ViewError {
     Foreign {
         /// The path.
         path: PathBuf,
-        /// What the library says of it.
+        /// The message of the library.
         reason: String,
     },
     /// The path cannot be read.

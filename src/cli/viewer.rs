@@ -18,7 +18,8 @@ pub(super) const INSTALL: &str = "`pip install rerun-sdk==0.36.3`";
 const LOOPBACK: &str = "127.0.0.1";
 /// The port of a viewer to which none is stated.
 const PORT: u16 = 9876;
-/// Time within which a connection to a port of this machine is accepted, if a program listens there.
+/// Time within which a connection to a port of this machine is accepted, if a program listens
+/// there.
 const CONNECT_TIME: Duration = Duration::from_millis(200);
 /// Time within which a viewer listens, also on a slow machine.
 const LISTEN_TIME: Duration = Duration::from_secs(30);
@@ -83,7 +84,8 @@ impl Viewer {
         if status.success() { Ok(()) } else { Err(ViewerError::Failed { program: self.program.clone(), status }) }
     }
 
-    /// Starts the viewer. In its window it loops the seconds around the critical moment of each recording, if it does not run already.
+    /// Starts the viewer. In its window it loops the seconds around the critical moment of each
+    /// recording, if it does not run already.
     fn begin(&self, files: &[&Path], is_web: bool, port: Option<u16>) -> Result<Child, ViewerError> {
         let start = |source| no_start(&self.program, source);
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port.unwrap_or(PORT)));
@@ -107,7 +109,8 @@ impl Viewer {
         Ok(viewer)
     }
 
-    /// Opens a file, and waits only as long as a viewer that cannot start needs to end. A viewer that runs already takes the file.
+    /// Opens a file, and waits only as long as a viewer that cannot start needs to end. A viewer
+    /// that runs already takes the file.
     pub(super) fn start(&self, file: &Path, is_web: bool, port: Option<u16>) -> Result<(), ViewerError> {
         let start = |source| no_start(&self.program, source);
         let mut viewer = self.begin(&[file], is_web, port)?;
@@ -150,7 +153,8 @@ fn options(is_web: bool, port: Option<u16>) -> Vec<OsString> {
     }
     let port = port.map(|port| port.to_string());
     match &port {
-        // The page gets its data through a second port, which a viewer that already runs may have taken.
+        // The page gets its data through a second port, which a viewer that already runs may have
+        // taken.
         Some(port) if is_web => options.extend(["--web-viewer-port", port, "--port", "auto"]),
         Some(port) => options.extend(["--port", port]),
         None => {}

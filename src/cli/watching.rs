@@ -59,16 +59,16 @@ pub(super) fn watch(
         let message = format!("there is no file {}: `closecall new NAME` writes one", scenario.display());
         return Err(CliError::Usage { message });
     };
-    let mut seen = None;
+    let mut last_state = None;
     let mut rounds = 0;
     let mut code = ExitCode::Pass;
     while args.rounds.is_none_or(|last| rounds < last) {
         let state = state(&path);
-        if seen == Some(state) {
+        if last_state == Some(state) {
             std::thread::sleep(POLL_INTERVAL);
             continue;
         }
-        seen = Some(state);
+        last_state = Some(state);
         rounds += 1;
         code = ExitCode::Pass;
         // An editor may replace the file by another one: for a moment there is none.

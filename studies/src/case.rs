@@ -37,10 +37,10 @@ pub enum CausesError {
     Sample {
         /// The sample's number.
         sample: u64,
-        /// Why it has no outcome.
+        /// The reason for which the sample has no outcome.
         source: SampleError,
     },
-    /// The sample fails in the journal of the campaign, and not if it is run again.
+    /// The sample fails in the journal of the campaign, but not when it is run again.
     #[error(
         "sample {sample} with `{controller}` collides in the journal of the campaign, but not if it is run again: the \
          controller or the program has changed, or does not repeat"
@@ -51,7 +51,7 @@ pub enum CausesError {
         /// The controller.
         controller: String,
     },
-    /// The reduced case of a sample does not fail if it is run again.
+    /// The reduced case of a sample does not fail when it is run again.
     #[error(
         "the reduced case of sample {sample} with `{controller}` collided while it was looked for, but not if it is run \
          again: the controller does not repeat"
@@ -71,10 +71,10 @@ pub enum CausesError {
         /// The file.
         path: PathBuf,
     },
-    /// A scenario of a campaign is not the encounter that is counted.
+    /// A scenario of a campaign is not the counted encounter.
     #[error(
-        "in `{scenario}` the lead vehicle brakes in {braked} of {runs} samples: the event that is counted is that it begins to brake, \
-         so that these samples say nothing about it; a scenario in which it brakes in at least 95 % is needed"
+        "in `{scenario}` the lead vehicle brakes in {braked} of {runs} samples: the counted event is the begin of this \
+         braking, about which these samples say nothing; a scenario in which it brakes in at least 95 % is needed"
     )]
     OtherEncounter {
         /// The scenario.
@@ -140,8 +140,8 @@ impl std::fmt::Debug for Case {
 }
 
 impl Case {
-    /// Returns a sample of a saved campaign. `scenario` may be left out if the campaign has only one, `controller` for the arm
-    /// under test.
+    /// Returns a sample of a saved campaign. `scenario` may be left out if the campaign has only
+    /// one, `controller` for the arm under test.
     ///
     /// # Errors
     /// [`SavedError`] if the campaign has no such scenario, sample or arm.
@@ -191,7 +191,7 @@ impl Case {
     /// Runs the sample with further settings in any arm.
     ///
     /// # Errors
-    /// As for [`Self::run`].
+    /// Works like [`Self::run`].
     pub fn run_as(&self, settings: &[Setting], arm: &Arm, observer: &mut dyn Observer) -> Result<Outcome, CausesError> {
         let scenario = self.concrete(settings)?;
         run_guarded(&scenario, self.key(), arm, observer).map_err(|source| self.failed(source))

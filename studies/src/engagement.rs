@@ -1,8 +1,10 @@
-//! Why the margin increase system does not engage: the condition that is missing when it comes closest to engaging.
+//! Why the margin increase system does not engage: the condition that is missing when the system is
+//! closest to engaging.
 //!
-//! While the system follows, each command names the first condition for engaging that is missing, in the order of the conditions. The
-//! last command of a run says nothing about the encounter: by then the rear vehicle is past. The condition that counts is the one
-//! furthest in the order over all control steps. Each sample without an engagement runs once more for it, with the same outcome.
+//! While the system follows, each command names the first missing condition for engaging, in the
+//! order of the conditions. The last command of a run says nothing about the encounter: the rear
+//! vehicle is past by then. The condition that counts is the one furthest in the order over all
+//! control steps. Each sample without an engagement runs once more for it, with the same outcome.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +18,7 @@ use closecall_traffic::Time;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The conditions for engaging in their order, each by the reason that names it where it is missing.
+/// The conditions for engaging in their order, each by the reason that names it if it is missing.
 const CONDITIONS: [Reason; 14] = [
     Reason::NotAutomated,
     Reason::FrontSensorFailed,
@@ -34,15 +36,17 @@ const CONDITIONS: [Reason; 14] = [
     Reason::PassingLaneOccupied,
 ];
 
-/// In how many samples of a scenario the system engages, and why not in the others.
+/// Number of samples of a scenario in which the system engages, and why it does not engage in the
+/// others.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Engagement {
     /// Samples in which it engages.
     pub engaged: u64,
-    /// Of these, the samples in which it engages before the lead vehicle brakes, as it is meant to. Braking of the ego alone lets a
-    /// vehicle behind approach.
+    /// Of these, the samples in which it engages before the lead vehicle brakes, as intended.
+    /// Braking of the ego alone lets a vehicle behind approach.
     pub before_braking: u64,
-    /// The other samples with an outcome, by the condition that was missing when it came closest to engaging.
+    /// The other samples with an outcome, by the condition that was missing when the system was
+    /// closest to engaging.
     pub missing: BTreeMap<String, u64>,
 }
 
@@ -78,7 +82,7 @@ pub fn engagements(saved: &SavedCampaign) -> Result<BTreeMap<String, Engagement>
             (Err(_), None) => {}
         }
     }
-    // The journal's reason stands in for a sample that cannot be run again.
+    // The journal's reason replaces the condition of a sample that cannot be run again.
     let reasons: Vec<Reason> =
         others.par_iter().map(|(work, sample, last)| closest(work, *sample).unwrap_or(*last)).collect();
     for ((work, _, _), reason) in others.iter().zip(reasons) {
@@ -93,12 +97,12 @@ fn time_of(outcome: &Outcome, moment: Moment) -> Option<f64> {
     outcome.moments.iter().find(|reached| reached.moment == moment).map(|reached| reached.time.s())
 }
 
-/// Returns the condition that is missing when the system comes closest to engaging in a sample.
+/// Returns the condition that is missing when the system is closest to engaging in a sample.
 fn closest(work: &Work, sample: u64) -> Option<Reason> {
     let scenario = concrete(&work.file, work.sampling, sample).ok()?;
-    let mut seen = Closest(None);
-    run_guarded(&scenario, RunKey { seed: work.sampling.seed, sample }, work.arms.last()?, &mut seen).ok()?;
-    seen.0.map(|index| CONDITIONS[index])
+    let mut observer = Closest(None);
+    run_guarded(&scenario, RunKey { seed: work.sampling.seed, sample }, work.arms.last()?, &mut observer).ok()?;
+    observer.0.map(|index| CONDITIONS[index])
 }
 
 /// Keeps the furthest condition that was missing, as its index.

@@ -1,4 +1,5 @@
-//! What is computed from many runs and judged by none: from a collision to its cause, and what the sensors can do.
+//! Results that are computed from many runs and judged by none: the cause of a collision, and the
+//! performance of the sensors.
 //!
 //! ```text
 //!  failing sample ─▶ attribution   which vehicle closed the gap, in which phase, how it was avoidable
@@ -12,8 +13,9 @@
 //!  cases          ─▶ perception    where perception ends, how it errs, and what spoils it
 //! ```
 //!
-//! Stages and minimized cases rest on runs that can be repeated: each is a run of the same sample with settings, as `--set` applies
-//! them. Avoidability is computed: from the recorded motion, with another way of braking, and by a run with another driver as the ego.
+//! Stages and minimized cases rest on runs that can be repeated: each is a run of the same sample
+//! with settings, as `--set` applies them. Avoidability is computed: from the recorded motion, with
+//! another way of braking, and by a run with another driver as the ego.
 
 pub mod attribution;
 pub mod case;

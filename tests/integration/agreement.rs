@@ -1,7 +1,9 @@
-//! Exit code, console, JSON, HTML, Markdown and JUnit of a campaign give one verdict, whatever its outcomes and gates are.
+//! Exit code, console, JSON, HTML, Markdown and JUnit of a campaign give one verdict, whatever its
+//! outcomes and gates are.
 //!
-//! The campaigns are synthetic: the journal of a real one, with collisions, margins, errors and findings of the validity
-//! checks drawn at random, judged by randomly drawn gates through `closecall tool merge`.
+//! The campaigns are synthetic: the journal of a real one, with collisions, margins, errors and
+//! findings of the validity checks drawn at random, judged by randomly drawn gates through
+//! `closecall tool merge`.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -236,13 +238,13 @@ fn every_output_of_a_campaign_gives_the_same_verdict() {
     ];
     let outcomes = parts[0].records.iter().flat_map(|record| &record.arms).filter_map(|arm| arm.result.as_ref().ok());
     let collision = outcomes.flat_map(|outcome| &outcome.collisions).next().expect("a collision").clone();
-    let mut found = BTreeSet::new();
+    let mut verdicts = BTreeSet::new();
     for seed in 0..CAMPAIGNS {
         let random = &mut StdRng::seed_from_u64(seed);
         let part = &parts[[0, 1, 0, 2][(seed % 4) as usize]];
         let (changed, gates) = (synthetic(&part.records, &collision, random), gates(random));
-        found.insert(verdict_of(&part.path, &changed, &gates, &at("out")));
+        verdicts.insert(verdict_of(&part.path, &changed, &gates, &at("out")));
     }
     let all: BTreeSet<String> = VERDICTS.iter().flat_map(|(_, words)| words.iter().map(ToString::to_string)).collect();
-    assert_eq!(found, all);
+    assert_eq!(verdicts, all);
 }

@@ -71,7 +71,7 @@ fn workspace() -> Vec<Crate> {
         .collect()
 }
 
-/// Returns what is wrong with a table of the crates.
+/// Returns the errors of a table of the crates.
 fn wrong(table: &[Crate], workspace: &[Crate]) -> Vec<String> {
     let mut wrong = Vec::new();
     for of_workspace in workspace {
@@ -119,11 +119,11 @@ fn a_wrong_table_of_crates_is_found() {
     assert_eq!(problems("| `studies` |", "| `campaign/studies` |").len(), 1);
 }
 
-/// The libraries. The command line, `src`, maps what they say to its options.
+/// The libraries. The command line, `src`, maps their messages to its options.
 const LIBRARIES: [&str; 9] =
     ["traffic", "recorded", "scenarios", "sensors", "controllers", "simulation", "campaign", "studies", "report"];
 
-/// Returns the source files below a folder, without those of tests.
+/// Returns the source files below a folder, without the files of tests.
 pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -139,7 +139,7 @@ pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Returns the code of a file up to its unit tests, without comments that have lines of their own.
+/// Returns the code of a file up to its unit tests, without comments on separate lines.
 pub(crate) fn code_of(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let until_tests = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
     until_tests.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))

@@ -42,20 +42,20 @@ fn records(folder: &Path) -> Vec<Record> {
 
 /// The outcomes of a campaign, by sample and controller.
 fn outcomes(folder: &Path) -> BTreeMap<(u64, String), Outcome> {
-    let of = |record: Record| {
+    let arms_of = |record: Record| {
         let sample = record.sample;
         record.arms.into_iter().map(move |arm| ((sample, arm.controller), arm.result.unwrap()))
     };
-    records(folder).into_iter().flat_map(of).collect()
+    records(folder).into_iter().flat_map(arms_of).collect()
 }
 
 /// Files that depend on the outcomes alone.
 const FILES: [&str; 5] = ["journal.jsonl", "outcomes.parquet", "arm_pairs.parquet", "samples.xml", "summary.md"];
 
-fn assert_same_files(one: &Path, other: &Path) {
+fn assert_same_files(first: &Path, second: &Path) {
     for file in FILES {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
-        assert_eq!(read(one), read(other), "{file} of {} and {}", one.display(), other.display());
+        assert_eq!(read(first), read(second), "{file} of {} and {}", first.display(), second.display());
     }
 }
 
@@ -79,8 +79,8 @@ fn the_bytes_are_the_same_with_any_number_of_threads_resumed_and_merged() {
     let parts =
         ["1/2", "2/2"].map(|part| campaign(folder.path(), &part.replace('/', "-"), ARMS, &["--partition", part]));
     let merged = folder.path().join("merged");
-    let [one, two, out] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
-    stdout(&closecall(["tool", "merge", one, two, "--no-gate", "--record", "worst:0", "--out", out]), 0);
+    let [first, second, out] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
+    stdout(&closecall(["tool", "merge", first, second, "--no-gate", "--record", "worst:0", "--out", out]), 0);
     for file in ["journal.jsonl", "outcomes.parquet", "arm_pairs.parquet"] {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert_eq!(read(&whole), read(&merged), "{file}");
@@ -89,7 +89,7 @@ fn the_bytes_are_the_same_with_any_number_of_threads_resumed_and_merged() {
         stdout(&closecall(["replay", out, "3", "--controller", controller]), 0);
     }
     stdout(&closecall(["replay", out, "3", "--paired"]), 0);
-    let compared = stdout(&closecall(["compare", one, one]), 0);
+    let compared = stdout(&closecall(["compare", first, first]), 0);
     assert!(compared.contains("NO REGRESSION"), "{compared}");
 }
 
@@ -113,12 +113,12 @@ fn every_report_holds_all_pairs_as_the_journal_counts_them() {
     let pairs = machine["scenarios"]["low-thw-overtake"]["arm_pairs"].as_array().unwrap();
     assert_eq!(pairs, machine["arm_pairs"].as_array().unwrap());
     let named = |pair: &Value, key: &str| pair[key].as_str().unwrap().to_owned();
-    let of: Vec<_> = pairs.iter().map(|pair| (named(pair, "baseline"), named(pair, "tested"))).collect();
+    let arms: Vec<_> = pairs.iter().map(|pair| (named(pair, "baseline"), named(pair, "tested"))).collect();
     let expected = [("acc", "gap-1.6"), ("acc", "mis"), ("gap-1.6", "mis")];
-    assert_eq!(of, expected.map(|(one, other)| (one.to_owned(), other.to_owned())));
+    assert_eq!(arms, expected.map(|(baseline, tested)| (baseline.to_owned(), tested.to_owned())));
     let outcomes = outcomes(&out);
     let (mut smallest_p, mut prevented_by_any) = (1.0_f64, 0);
-    for (pair, (baseline, tested)) in pairs.iter().zip(&of) {
+    for (pair, (baseline, tested)) in pairs.iter().zip(&arms) {
         let mut counts = [0_u64; 4];
         for sample in 0..SAMPLES as u64 {
             let of_arm = |name: &String| &outcomes[&(sample, name.clone())];
@@ -242,19 +242,19 @@ fn in_every_arm_the_ego_starts_in_balance_and_all_other_vehicles_start_as_in_the
             let baseline = start("acc");
             let r157_s = 1.0 + 0.036 * baseline.states[scenario.ego].speed_mps;
             for (name, gap_s) in [("gap-1.6", 1.6), ("r157-gap", r157_s), ("r157-driver", 2.0), ("r157-fsm", 2.0)] {
-                let found = start(name);
+                let tested = start(name);
                 let context = format!("{}, sample {sample}, {name}", path.display());
-                for (actor, (one, other)) in baseline.states.iter().zip(&found.states).enumerate() {
+                for (actor, (baseline_state, state)) in baseline.states.iter().zip(&tested.states).enumerate() {
                     if actor != scenario.ego {
-                        assert_eq!(one, other, "{context}: actor {actor}");
+                        assert_eq!(baseline_state, state, "{context}: actor {actor}");
                     }
                 }
-                let [before, now] = [&baseline, &found].map(|start| start.states[scenario.ego]);
+                let [before, now] = [&baseline, &tested].map(|start| start.states[scenario.ego]);
                 assert_eq!(VehicleState { s_m: before.s_m, ..now }, before, "{context}");
                 // The longest gap of the baseline is 0.9 s.
                 assert!(before.s_m - now.s_m > (gap_s - 0.95) * now.speed_mps, "{context}: {}", before.s_m - now.s_m);
-                let is_balanced = found.commands_mps2.iter().all(|command_mps2| command_mps2.abs() < 0.5);
-                assert!(is_balanced || brakes_at_once, "{context}: {:?}", found.commands_mps2);
+                let is_balanced = tested.commands_mps2.iter().all(|command_mps2| command_mps2.abs() < 0.5);
+                assert!(is_balanced || brakes_at_once, "{context}: {:?}", tested.commands_mps2);
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Every constant of the controllers and drivers that is an assumption stands in the list of `docs/reference/assumptions.md`, and nothing else.
+//! Every constant of the controllers and drivers that is an assumption is in the list of
+//! `docs/reference/assumptions.md`, and nothing else is.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

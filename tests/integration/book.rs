@@ -1,4 +1,5 @@
-//! The book holds together: its links resolve, its summary lists every page, and there is one glossary.
+//! The book holds together: its links resolve, its summary lists every page, and there is one
+//! glossary.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -17,14 +18,15 @@ fn prose(markdown: &str) -> Vec<&str> {
     markdown.lines().filter(is_prose).collect()
 }
 
-/// Returns the targets of the links and pictures of a Markdown file, without those of the web.
+/// Returns the targets of the links and pictures of a Markdown file, without addresses of the web.
 fn targets(markdown: &str) -> Vec<&str> {
     let ends = prose(markdown).into_iter().flat_map(|line| line.split("](").skip(1));
     let targets = ends.filter_map(|end| end.split_once(')').map(|(target, _)| target));
     targets.filter(|target| !target.contains("://") && !target.contains(' ')).collect()
 }
 
-/// Returns the anchors of a Markdown file: its explicit ids, and its headings as GitHub and mdBook spell them.
+/// Returns the anchors of a Markdown file: its explicit ids, and its headings as GitHub and mdBook
+/// spell them.
 fn anchors(markdown: &str) -> BTreeSet<String> {
     let ids = markdown.split("id=\"").skip(1).filter_map(|rest| rest.split_once('"')).map(|(id, _)| id.to_owned());
     let headings = prose(markdown).into_iter().filter(|line| line.starts_with('#'));
@@ -49,7 +51,7 @@ fn plain(path: &Path) -> PathBuf {
     plain
 }
 
-/// Returns what is wrong with the links of a document.
+/// Returns the errors of the links of a document.
 fn broken(path: &Path, markdown: &str) -> Vec<String> {
     let book = Path::new(ROOT).join("docs");
     let wrong = |target: &&str| {
@@ -77,13 +79,13 @@ fn every_link_of_the_documents_resolves() {
 #[test]
 fn a_broken_link_is_found() {
     let page = Path::new(ROOT).join("docs/reference/glossary.md");
-    let found = |text: &str| broken(&page, text).len();
+    let broken_links = |text: &str| broken(&page, text).len();
     assert_eq!(
-        found("[a](criteria.md) ![b](../how-to/looking/pair.png) [c](#terms-of-the-field) [d](https://x.org/y)"),
+        broken_links("[a](criteria.md) ![b](../how-to/looking/pair.png) [c](#terms-of-the-field) [d](https://x.org/y)"),
         0
     );
     for wrong in ["[a](nothing.md)", "[a](criteria.md#nothing)", "[a](#nothing)", "[a](../../README.md)"] {
-        assert_eq!(found(wrong), 1, "{wrong}");
+        assert_eq!(broken_links(wrong), 1, "{wrong}");
     }
 }
 
@@ -98,7 +100,8 @@ fn the_summary_lists_every_page_once() {
     assert_eq!(listed, pages);
 }
 
-/// Returns the first and the last cell of each row of a glossary that begins with the term of a paper.
+/// Returns the first and the last cell of each row of a glossary that begins with the term of a
+/// paper.
 fn terms(text: &str) -> Vec<(String, String)> {
     let lines = text.lines().map(|line| line.trim_start_matches("//!").trim());
     let table = lines.skip_while(|line| !line.starts_with("| paper |")).take_while(|line| line.starts_with('|'));

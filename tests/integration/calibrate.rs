@@ -5,7 +5,8 @@ use std::fmt::Write;
 use crate::support::{closecall, code, folder, json, message, stdout};
 use closecall_traffic::maths;
 
-/// Returns a table of pairs whose followers keep 1.5 s and 2 m behind a leader that drives in waves.
+/// Returns a table of pairs whose followers keep 1.5 s and 2 m behind a leader that drives in
+/// waves.
 fn table() -> String {
     let mut text =
         "pair_id,time_s,follower_front_y_m,follower_speed_mps,leader_front_y_m,leader_length_m,leader_speed_mps\n"
@@ -15,7 +16,7 @@ fn table() -> String {
         let leader_mps = |time_s: f64| 10.0 + 4.0 * maths::sin(0.2 * time_s + f64::from(pair));
         for step in 0..400 {
             let time_s = 0.1 * f64::from(step);
-            // The follower does what the leader did 1.5 s ago, 2 m behind it (Newell).
+            // The follower repeats the leader's motion of 1.5 s ago, 2 m behind it (Newell).
             let (front_m, mps) = (leader_m(time_s - 1.5) - 2.0, leader_mps(time_s - 1.5));
             let (leader_front_m, leader) = (leader_m(time_s) + 4.5, leader_mps(time_s));
             writeln!(text, "p{pair},{time_s:.1},{front_m},{mps},{leader_front_m},4.5,{leader}").unwrap();

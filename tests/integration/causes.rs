@@ -1,4 +1,5 @@
-//! From a collision to its cause: what `explain`, `minimize`, `map` and `exposure` say, and that it can be repeated.
+//! From a collision to its cause: what `explain`, `minimize`, `map` and `exposure` say, and that it
+//! can be repeated.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -48,10 +49,10 @@ fn an_injected_fault_is_named_in_the_failures_that_it_causes() {
         assert!(caused.len() >= 3, "{fault} causes {} failures only", caused.len());
         let all = closecall(["explain", faulty.to_str().unwrap(), "--most", "1000", "--format", "json"]);
         let explained = json(&all, 0);
-        let is_caused = |found: &&Value| caused.contains(&found["sample"].as_u64().unwrap());
-        let found: Vec<&Value> = explained.as_array().unwrap().iter().filter(is_caused).collect();
-        assert_eq!(found.len(), caused.len());
-        let named = found.iter().filter(|found| found["cause"]["stage"] == stage).count();
+        let is_caused = |explanation: &&Value| caused.contains(&explanation["sample"].as_u64().unwrap());
+        let explanations: Vec<&Value> = explained.as_array().unwrap().iter().filter(is_caused).collect();
+        assert_eq!(explanations.len(), caused.len());
+        let named = explanations.iter().filter(|explanation| explanation["cause"]["stage"] == stage).count();
         assert!(100 * named >= 95 * caused.len(), "{fault}: {stage} is named in {named} of {}", caused.len());
     }
 }
@@ -66,11 +67,11 @@ fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
     assert_eq!(explained.len(), failing(&path).len());
     assert!(explained.len() >= 5, "{} failures only", explained.len());
     let mut confirmed = 0;
-    for found in explained {
-        let sample = found["sample"].to_string();
+    for explanation in explained {
+        let sample = explanation["sample"].to_string();
         let replayed = json(&closecall(["replay", dir, &sample, "--format", "json"]), 0);
         assert!(number_of_collisions(&replayed) > 0, "{sample} fails");
-        let Some(stage) = found["cause"]["stage"].as_str() else { continue };
+        let Some(stage) = explanation["cause"]["stage"].as_str() else { continue };
         let setting = format!("ideal.{stage}=true");
         let perfect = json(&closecall(["replay", dir, &sample, "--set", &setting, "--format", "json"]), 0);
         assert_eq!(number_of_collisions(&perfect), 0, "sample {sample} with {setting}");
@@ -85,9 +86,12 @@ fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
     let page = std::fs::read_to_string(path.join("report.html")).unwrap();
     assert!(page.contains("<h2 id=\"part-") && page.contains(">Causes</h2>"), "no table of causes");
     assert!(page.contains("Cost where nothing happens"));
-    for found in explained {
+    for explanation in explained {
         for command in ["replay", "explain", "minimize"] {
-            assert!(page.contains(&format!("<code>closecall {command} . {}</code>", found["sample"])), "{command}");
+            assert!(
+                page.contains(&format!("<code>closecall {command} . {}</code>", explanation["sample"])),
+                "{command}"
+            );
         }
     }
     assert_eq!(page.matches("<!-- causes -->").count(), 1);
@@ -102,12 +106,12 @@ fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
     for sample in failing.into_iter().take(5) {
         let file = parent.path().join(format!("case-{sample}.toml"));
         let (dir, name, number) = (path.to_str().unwrap(), file.to_str().unwrap(), sample.to_string());
-        let found = json(&closecall(["minimize", dir, &number, "--out", name, "--format", "json"]), 0);
-        let off = found["minimized"]["off_nominal"].as_array().unwrap().len();
-        assert!(off <= 3 || found["minimized"]["why_more_than_three"].is_string(), "{found:#}");
+        let case = json(&closecall(["minimize", dir, &number, "--out", name, "--format", "json"]), 0);
+        let off = case["minimized"]["off_nominal"].as_array().unwrap().len();
+        assert!(off <= 3 || case["minimized"]["why_more_than_three"].is_string(), "{case:#}");
         let run = |file: &str| number_of_collisions(&json(&closecall(["run", file, "--format", "json"]), 0));
         assert!(run(name) > 0, "{name}");
-        let twin = found["files"]["twin"].as_str().unwrap();
+        let twin = case["files"]["twin"].as_str().unwrap();
         assert_eq!(run(twin), 0, "{twin}");
         // A campaign judges both by the gates that they carry.
         stdout(&closecall(["campaign", name, twin, "-n", "1"]), 0);
@@ -152,8 +156,8 @@ fn the_map_agrees_with_theory_or_says_why() {
     let grid = ["study", "map", "--closing-kmh", "8,15,24,40", "--detection-m", "80,100", "--front-thw-s", "0.7,1.6"];
     let out = folder();
     let dir = out.path().join("map");
-    let found = json(&closecall(grid.iter().copied().chain(["--format", "json", "--out", dir.to_str().unwrap()])), 0);
-    let points = found["points"].as_array().unwrap();
+    let map = json(&closecall(grid.iter().copied().chain(["--format", "json", "--out", dir.to_str().unwrap()])), 0);
+    let points = map["points"].as_array().unwrap();
     assert_eq!(points.len(), 16);
     for point in points {
         let differs = match (point["theory_s"].as_f64(), point["loop_s"].as_f64()) {
@@ -175,14 +179,14 @@ fn the_net_effect_is_recomputed_from_its_inputs_or_cannot_be_said() {
     let parent = folder();
     let path = campaign(parent.path(), "paired", 100, &["--paired"]);
     let dir = path.to_str().unwrap();
-    let found =
+    let report =
         json(&closecall(["study", "exposure", "--counted", "20/5000", "--campaign", dir, "--format", "json"]), 0);
-    let shares = &found["exposure"]["campaign"];
-    let of = |key: &str| shares[key].as_f64().unwrap();
-    let by_hand = 1e6 * 20.0 / 5_000.0 * (of("prevented") - of("induced")) / of("samples");
-    assert!((found["exposure"]["effect"]["net"].as_f64().unwrap() - by_hand).abs() < 1e-6, "{found:#}");
+    let shares = &report["exposure"]["campaign"];
+    let share = |key: &str| shares[key].as_f64().unwrap();
+    let by_hand = 1e6 * 20.0 / 5_000.0 * (share("prevented") - share("induced")) / share("samples");
+    assert!((report["exposure"]["effect"]["net"].as_f64().unwrap() - by_hand).abs() < 1e-6, "{report:#}");
     // The lead vehicle brakes in every sample.
-    assert_eq!(found["cost"]["scenarios"][0]["samples"], 0, "{found:#}");
+    assert_eq!(report["cost"]["scenarios"][0]["samples"], 0, "{report:#}");
     let nothing = closecall(["study", "exposure"]);
     let text = stdout(&nothing, 4);
     assert!(

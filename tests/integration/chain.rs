@@ -20,7 +20,8 @@ const GROUPS: usize = 6;
 /// Length of the recorded road, and size of a vehicle (m).
 const ROAD_M: f64 = 800.0;
 const SIZE_M: [f64; 2] = [4.6, 1.8];
-/// Time in a group at which the rear vehicle crosses the marking, and duration of its lane change (s).
+/// Time in a group at which the rear vehicle crosses the marking, and duration of its lane change
+/// (s).
 const CROSSING_S: f64 = 7.0;
 const DURATION_S: f64 = 4.0;
 /// Width of a lane (m), and the upper marking of each carriageway.
@@ -28,9 +29,10 @@ const LANE_M: f64 = 3.75;
 const UPPER_M: f64 = 2.0;
 const LOWER_M: f64 = 14.0;
 
-/// Writes a recording in the layout of highD: two carriageways with two lanes each. In each group a rear vehicle approaches the ego in
-/// the right lane, which follows a lead vehicle, and overtakes it. Tracks 3k + 1, 3k + 2 and 3k + 3 are lead vehicle, ego and rear
-/// vehicle. With `overtaking` false, nobody changes lanes.
+/// Writes a recording in the layout of highD: two carriageways with two lanes each. In each group a
+/// rear vehicle approaches the ego in the right lane, which follows a lead vehicle, and overtakes
+/// it. Tracks 3k + 1, 3k + 2 and 3k + 3 are lead vehicle, ego and rear vehicle. With `overtaking`
+/// false, nobody changes lanes.
 fn two_carriageways(folder: &Path, overtaking: bool) -> PathBuf {
     let mut tracks = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,precedingId,laneId\n".to_owned();
     let mut meta = "id,width,height,initialFrame,finalFrame,numFrames,class,drivingDirection\n".to_owned();
@@ -54,7 +56,8 @@ fn two_carriageways(folder: &Path, overtaking: bool) -> PathBuf {
                 } else {
                     0.0
                 };
-                // Distance to the left of the middle of the right lane, along the direction of travel.
+                // Distance to the left of the middle of the right lane, along the direction of
+                // travel.
                 let (s_m, left_m) = (start_m + speed_mps * time_s, share * LANE_M);
                 let is_left = left_m > 0.5 * LANE_M;
                 let (x_m, y_m, lane) = if is_upper {
@@ -140,7 +143,7 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
     }
     assert_eq!((samples, carriageways.len()), (120, 2));
     assert!(engaged > 0 && page.contains(&format!("the system engages in {engaged} of 120 samples")), "{engaged}");
-    // The folder is that of a campaign.
+    // The folder is a campaign's folder.
     stdout(&closecall(["check", out.to_str().unwrap()]), 0);
     stdout(&closecall(["check", out.join("scenarios").to_str().unwrap()]), 0);
 }

@@ -1,4 +1,5 @@
-//! A controller that was edited between two parts of a campaign is noticed, and the changed file is named.
+//! A controller that was edited between two parts of a campaign is noticed, and the changed file is
+//! named.
 
 use std::fs;
 use std::path::Path;

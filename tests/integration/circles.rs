@@ -5,8 +5,8 @@
 //! name ─▶ files that reach each other
 //! ```
 //!
-//! A file that only passes a name on is not what its user depends on: a path through a re-export
-//! leads to the file that declares the name.
+//! A file that only passes a name on is no dependency of its user: a path through a re-export leads
+//! to the file that declares the name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -145,7 +145,7 @@ impl Crate {
     }
 
     fn of(files: impl Iterator<Item = (Names, String)>) -> Self {
-        // A crate with a library and a program has two roots, of which the library comes first.
+        // A crate with a library and a program has two roots. The library comes first.
         let mut codes: BTreeMap<Names, String> = BTreeMap::new();
         for (module, code) in files {
             codes.entry(module).or_insert(code);
@@ -180,8 +180,8 @@ impl Crate {
         }
     }
 
-    /// Returns the modules whose names a module uses. What it passes on to others counts only if it
-    /// uses that itself.
+    /// Returns the modules whose names a module uses. A name that the module passes on counts only
+    /// if it uses that name itself.
     fn used_by(&self, module: &Names) -> BTreeSet<Names> {
         let file = &self.0[module];
         let has_child = |child: &str| self.0.contains_key(&[&module[..], &[child.to_owned()]].concat());
@@ -189,7 +189,7 @@ impl Crate {
             let is_part = |c: char| c.is_alphanumeric() || c == '_';
             file.code.split(|c: char| !is_part(c)).any(|word| word == name)
         };
-        // Of an imported module, the names count that are used by a path through it.
+        // Of an imported module, the names count that a path through it uses.
         let is_module = |names: &Names| self.0.contains_key(names);
         let imported = file.imports.iter().filter(|(name, names)| !is_module(names) && has_word(name));
         let imported = imported.map(|(_, names)| names.clone());
@@ -210,11 +210,11 @@ impl Crate {
         let used: BTreeMap<&Names, BTreeSet<Names>> =
             self.0.keys().map(|module| (module, self.used_by(module))).collect();
         let reached = |start: &Names| {
-            let (mut seen, mut open) = (BTreeSet::new(), vec![start.clone()]);
+            let (mut reached, mut open) = (BTreeSet::new(), vec![start.clone()]);
             while let Some(module) = open.pop() {
-                open.extend(used[&module].iter().filter(|other| seen.insert((*other).clone())).cloned());
+                open.extend(used[&module].iter().filter(|other| reached.insert((*other).clone())).cloned());
             }
-            seen
+            reached
         };
         let reached: BTreeMap<&Names, BTreeSet<Names>> =
             self.0.keys().map(|module| (module, reached(module))).collect();
@@ -229,14 +229,14 @@ impl Crate {
 
 #[test]
 fn no_circle_of_imports_runs_over_more_than_four_files() {
-    let found: Vec<String> = CRATES
+    let circles: Vec<String> = CRATES
         .iter()
         .flat_map(|folder| {
             let circles = Crate::read(&Path::new(ROOT).join(folder)).circles();
             circles.into_iter().map(move |circle| format!("{folder}: {}", circle.join(", ")))
         })
         .collect();
-    assert!(found.is_empty(), "move a type to where it belongs:\n{}", found.join("\n"));
+    assert!(circles.is_empty(), "move a type to where it belongs:\n{}", circles.join("\n"));
 }
 
 #[test]

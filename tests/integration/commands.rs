@@ -1,6 +1,6 @@
-//! The commands around a scenario: `new`, `init`, `list`, `check`, `baseline`, `tool completions`, `tool man`; and what all
-//! commands have in common: their groups and their help, where scenarios come from, what they say of their own making, and
-//! their answers to misspelt words.
+//! The commands around a scenario: `new`, `init`, `list`, `check`, `baseline`, `tool completions`,
+//! `tool man`; and the common parts of all commands: their groups and their help, the sources of
+//! scenarios, the statements about the origin of an output, and the answers to misspelt words.
 
 use std::io::Write;
 use std::path::Path;
@@ -61,15 +61,15 @@ fn the_library_is_listed_and_works_from_anywhere() {
     let listed = json(&run_in(folder.path(), &["list", "--format", "json"]), 0);
     let scenarios = listed["scenarios"].as_array().unwrap();
     assert!(scenarios.len() >= 8);
-    assert!(scenarios.iter().all(|one| !one["requirements"].as_array().unwrap().is_empty()));
+    assert!(scenarios.iter().all(|scenario| !scenario["requirements"].as_array().unwrap().is_empty()));
     let text = stdout(&run_in(folder.path(), &["list"]), 0);
     let line = text.lines().find(|line| line.starts_with("paper-figure ")).expect("a line for each scenario");
     assert!(line.contains("  Does the margin increase system"), "{text}");
     assert!(text.lines().count() < 40 && text.contains("closecall list faults"), "{text}");
     let faults = stdout(&run_in(folder.path(), &["list", "faults"]), 0);
     assert!(faults.contains("lidar-dead\n  What does the system do"), "{faults}");
-    let one = stdout(&run_in(folder.path(), &["list", "paper"]), 0);
-    assert!(one.starts_with("paper-figure\n  Does the margin increase system"), "{one}");
+    let listing = stdout(&run_in(folder.path(), &["list", "paper"]), 0);
+    assert!(listing.starts_with("paper-figure\n  Does the margin increase system"), "{listing}");
     assert!(message(&run_in(folder.path(), &["list", "no-such"])).contains("no scenario has `no-such` in its name"));
     let run = json(&run_in(folder.path(), &["run", "paper-figure", "--format", "json"]), 0);
     assert_eq!(run["scenario"], "paper-figure");
@@ -95,11 +95,11 @@ fn a_scenario_is_read_from_standard_input() {
 fn check_states_each_error_as_json() {
     let folder = folder();
     std::fs::write(folder.path().join("bad.toml"), "schema-version = 1\nnme = 'a'\n").unwrap();
-    let found = json(&run_in(folder.path(), &["check", "bad.toml", "paper-figure", "--format", "json"]), 3);
-    assert_eq!((&found["valid"], &found["schema_version"]), (&false.into(), &1.into()));
-    assert_eq!(found["scenarios"][0]["line"], 2);
-    assert!(found["scenarios"][0]["message"].as_str().unwrap().ends_with("did you mean `name`?"));
-    assert_eq!(found["scenarios"][1]["valid"], true);
+    let check = json(&run_in(folder.path(), &["check", "bad.toml", "paper-figure", "--format", "json"]), 3);
+    assert_eq!((&check["valid"], &check["schema_version"]), (&false.into(), &1.into()));
+    assert_eq!(check["scenarios"][0]["line"], 2);
+    assert!(check["scenarios"][0]["message"].as_str().unwrap().ends_with("did you mean `name`?"));
+    assert_eq!(check["scenarios"][1]["valid"], true);
 }
 
 #[test]
@@ -107,10 +107,10 @@ fn each_json_output_states_how_it_was_made() {
     let scenario = library("paper-figure");
     let args = ["campaign", scenario.to_str().unwrap(), "-n", "3", "--seed", "7", "--set", "duration-s=20"];
     let output = closecall(args.into_iter().chain(["--format", "json"]));
-    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((&found["schema_version"], &found["seed"]), (&1.into(), &7.into()));
-    assert_eq!(found["settings"], serde_json::json!(["duration-s=20"]));
-    assert!(found["closecall_version"].as_str().unwrap().starts_with(env!("CARGO_PKG_VERSION")));
+    let output_json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&output_json["schema_version"], &output_json["seed"]), (&1.into(), &7.into()));
+    assert_eq!(output_json["settings"], serde_json::json!(["duration-s=20"]));
+    assert!(output_json["closecall_version"].as_str().unwrap().starts_with(env!("CARGO_PKG_VERSION")));
 }
 
 #[test]
@@ -237,8 +237,8 @@ fn commands() -> Vec<(String, Command)> {
     let mut all = vec![("closecall".to_owned(), closecall::cli::command())];
     let mut next = 0;
     while let Some((words, command)) = all.get(next).cloned() {
-        let shown = command.get_subcommands().filter(|one| !one.is_hide_set());
-        all.extend(shown.map(|one| (format!("{words} {}", one.get_name()), one.clone())));
+        let shown = command.get_subcommands().filter(|subcommand| !subcommand.is_hide_set());
+        all.extend(shown.map(|subcommand| (format!("{words} {}", subcommand.get_name()), subcommand.clone())));
         next += 1;
     }
     all
@@ -249,14 +249,17 @@ fn grouped() -> Vec<(String, String)> {
     let of_group = |group: &str| {
         let program = closecall::cli::command();
         let command = program.find_subcommand(group).unwrap();
-        command.get_subcommands().map(|one| (one.get_name().to_owned(), group.to_owned())).collect::<Vec<_>>()
+        command
+            .get_subcommands()
+            .map(|subcommand| (subcommand.get_name().to_owned(), group.to_owned()))
+            .collect::<Vec<_>>()
     };
     ["traffic", "study", "tool"].into_iter().flat_map(of_group).collect()
 }
 
 #[test]
 fn the_program_has_at_most_sixteen_commands_and_groups() {
-    let count = closecall::cli::command().get_subcommands().filter(|one| !one.is_hide_set()).count();
+    let count = closecall::cli::command().get_subcommands().filter(|subcommand| !subcommand.is_hide_set()).count();
     assert!(count <= 16, "{count}");
     assert_eq!(grouped().len(), 25);
 }
@@ -279,7 +282,7 @@ fn the_help_of_each_command_ends_with_three_examples_that_parse() {
         assert_eq!(examples.len(), 3, "{words}");
         for example in examples {
             assert!(example.starts_with(&format!("  {words}")), "{words}: {example}");
-            // Longer lines are wrapped, and no longer commands.
+            // Longer lines are wrapped, and are no commands.
             assert!(example.len() <= 100, "{example}");
             let line = shlex::split(example).unwrap();
             let arguments = line.into_iter().take_while(|word| ![">", "|"].contains(&word.as_str()));
@@ -296,7 +299,7 @@ fn the_name_of_a_grouped_command_alone_is_answered_with_its_whole_name() {
         let output = closecall([name.as_str(), "file.csv", "--format", "json"]);
         assert_eq!(code(&output), 2, "{name}");
         let said = stderr(&output);
-        assert!(said.starts_with(&format!("error: the command is now `closecall {whole}`\n")), "{said}");
+        assert!(said.starts_with(&format!("error: the command is `closecall {whole}`\n")), "{said}");
     }
     let elsewhere = stderr(&closecall(["traffic", "merge", "a", "b"]));
     assert!(elsewhere.contains("`closecall tool merge`"), "{elsewhere}");
@@ -304,7 +307,8 @@ fn the_name_of_a_grouped_command_alone_is_answered_with_its_whole_name() {
     assert!(unknown.contains("unrecognized subcommand 'lanechanges'"), "{unknown}");
 }
 
-/// Returns true if a line names one of these commands behind the name of the program. The import of Python names none.
+/// Returns true if a line names one of these commands behind the name of the program. The import of
+/// Python names none.
 fn names_one_of(line: &str, names: &[String]) -> bool {
     let line = line.replace("from closecall import", "");
     let word = |rest: &str| rest.split(|c: char| !c.is_alphanumeric() && c != '-').next().map(str::to_owned);
@@ -331,7 +335,7 @@ fn no_text_names_a_grouped_command_without_its_group() {
             // The change log names the commands as they were.
             let is_text = ["md", "rs", "py", "toml", "yml", "yaml"]
                 .iter()
-                .any(|&end| path.extension().is_some_and(|one| one == end));
+                .any(|&end| path.extension().is_some_and(|extension| extension == end));
             if !is_text || name == "CHANGELOG.md" {
                 continue;
             }
@@ -357,13 +361,13 @@ fn a_baseline_names_what_newly_fails() {
     stdout(&closecall(["baseline", "save", &at("mis"), &file]), 0);
     assert!(std::fs::metadata(&file).unwrap().len() < 10_000);
     assert!(stdout(&closecall(["baseline", "compare", &at("mis"), &file]), 0).ends_with("NO REGRESSION\n"));
-    let found = json(&closecall(["baseline", "compare", &at("acc"), &file, "--format", "json"]), 1);
-    assert!(!found["scenarios"][0]["newly_failing"].as_array().unwrap().is_empty());
+    let comparison = json(&closecall(["baseline", "compare", &at("acc"), &file, "--format", "json"]), 1);
+    assert!(!comparison["scenarios"][0]["newly_failing"].as_array().unwrap().is_empty());
     // A file that is not a baseline is not replaced.
-    let own = at("own.json");
-    std::fs::write(&own, "{}").unwrap();
-    assert_eq!(code(&closecall(["baseline", "save", &at("mis"), &own])), 3);
-    assert_eq!(std::fs::read_to_string(&own).unwrap(), "{}");
+    let other_file = at("own.json");
+    std::fs::write(&other_file, "{}").unwrap();
+    assert_eq!(code(&closecall(["baseline", "save", &at("mis"), &other_file])), 3);
+    assert_eq!(std::fs::read_to_string(&other_file).unwrap(), "{}");
 }
 
 #[test]

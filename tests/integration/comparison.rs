@@ -1,4 +1,4 @@
-//! `compare` holds one campaign against an earlier one.
+//! `compare` compares one campaign with an earlier one.
 
 use std::path::{Path, PathBuf};
 
@@ -37,13 +37,13 @@ fn compare_names_newly_failing_and_fixed_samples() {
     let newly: Vec<u64> = bad.iter().copied().filter(|sample| !good.contains(sample)).collect();
     let fixed: Vec<u64> = good.iter().copied().filter(|sample| !bad.contains(sample)).collect();
     assert!(newly.len() > 5, "{newly:?}");
-    let found = &json(&compare(&with, &without, &["--format", "json"]), 1)["scenarios"]["low-thw-overtake"];
+    let changes = &json(&compare(&with, &without, &["--format", "json"]), 1)["scenarios"]["low-thw-overtake"];
     let list =
         |value: &Value| value.as_array().unwrap().iter().map(|value| value.as_u64().unwrap()).collect::<Vec<_>>();
-    assert_eq!((list(&found["newly_failing"]), list(&found["fixed"])), (newly.clone(), fixed.clone()));
-    assert_eq!(found["samples"], 80);
+    assert_eq!((list(&changes["newly_failing"]), list(&changes["fixed"])), (newly.clone(), fixed.clone()));
+    assert_eq!(changes["samples"], 80);
     // Without the MIS the ego has less headway.
-    let margin = &found["margins"]["min_thw_front_s"];
+    let margin = &changes["margins"]["min_thw_front_s"];
     assert!(margin["worst_change"].as_f64().unwrap() < 0.0);
     let text = stdout(&compare(&with, &without, &[]), 1);
     assert!(text.contains("REGRESSION") && text.contains("arms"), "{text}");
@@ -58,11 +58,11 @@ fn compare_names_newly_failing_and_fixed_samples() {
 #[test]
 fn a_campaign_is_no_regression_against_itself() {
     let folder = folder();
-    let one = campaign(folder.path().join("one"), &["-n", "30"]);
-    let found = json(&compare(&one, &one, &["--format", "json"]), 0);
-    let scenario = &found["scenarios"]["low-thw-overtake"];
+    let results = campaign(folder.path().join("one"), &["-n", "30"]);
+    let comparison = json(&compare(&results, &results, &["--format", "json"]), 0);
+    let scenario = &comparison["scenarios"]["low-thw-overtake"];
     assert_eq!((&scenario["same"], &scenario["samples"]), (&Value::from(30), &Value::from(30)));
-    assert_eq!(found["differences"].as_array().map(Vec::len), Some(0));
+    assert_eq!(comparison["differences"].as_array().map(Vec::len), Some(0));
 }
 
 #[test]
@@ -76,8 +76,8 @@ fn a_margin_that_shrinks_is_a_regression_even_without_a_collision() {
         out
     });
     // The rear vehicle comes closer to an ego that brakes.
-    let found = json(&compare(&without, &with, &["--format", "json"]), 1);
-    let scenario = &found["scenarios"]["overtake-without-brake"];
+    let comparison = json(&compare(&without, &with, &["--format", "json"]), 1);
+    let scenario = &comparison["scenarios"]["overtake-without-brake"];
     assert_eq!(scenario["newly_failing"].as_array().map(Vec::len), Some(0));
     let lost = scenario["margin_regressions"].as_array().unwrap();
     assert!(
@@ -93,13 +93,13 @@ fn a_margin_that_shrinks_is_a_regression_even_without_a_collision() {
 #[test]
 fn campaigns_with_different_samples_are_not_compared() {
     let folder = folder();
-    let one = campaign(folder.path().join("one"), &["-n", "12"]);
+    let first = campaign(folder.path().join("one"), &["-n", "12"]);
     let longer = campaign(folder.path().join("longer"), &["-n", "13"]);
     let other = campaign(folder.path().join("other"), &["-n", "12", "--set", "brake-mps2=6"]);
     for (dir, named) in [(&longer, "only the second has sample 12"), (&other, "brake-mps2")] {
-        let refused = compare(&one, dir, &[]);
+        let refused = compare(&first, dir, &[]);
         assert_eq!(code(&refused), 2);
         assert!(stderr(&refused).contains(named), "{}", stderr(&refused));
     }
-    assert_eq!(code(&compare(&one, &folder.path().join("nothing"), &[])), 6);
+    assert_eq!(code(&compare(&first, &folder.path().join("nothing"), &[])), 6);
 }

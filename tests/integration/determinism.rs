@@ -1,5 +1,5 @@
-//! The same binary, scenario and seed give the same bits: with any number of jobs, in every repetition, alone or in a
-//! campaign.
+//! The same binary, scenario and seed give the same bits: with any number of jobs, in every
+//! repetition, alone or in a campaign.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,14 +29,15 @@ fn campaign(out: &Path, more: &[&str]) {
     stdout(&closecall(args.iter().chain(size).chain(more)), 0);
 }
 
-/// Files of a campaign's folder that differ between two runs: they hold wall times or a process number, or come from the Rerun SDK.
+/// Files of a campaign's folder that differ between two runs: they hold wall times or a process
+/// number, or come from the Rerun SDK.
 fn varies(path: &str) -> bool {
     ["timings.parquet", "report.html", "wall-times.jsonl", "junit.xml", "lock"].contains(&path)
         || path.ends_with(".rrd")
 }
 
-/// Returns the content of each file below `folder` by its path. A file that varies has no content here. The manifest
-/// lacks the command, which names the folder and the number of jobs.
+/// Returns the content of each file below `folder` by its path. A file that varies has no content
+/// here. The manifest lacks the command, which names the folder and the number of jobs.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -55,7 +56,8 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 bytes = manifest.to_string().into_bytes();
             }
             if name == "recordings/index.html" {
-                // The page shows the commands that run the samples again, and these name the folder.
+                // The page shows the commands that run the samples again, and these name the
+                // folder.
                 let page = String::from_utf8(bytes).unwrap();
                 bytes = page.replace(folder.to_str().unwrap(), "FOLDER").into_bytes();
             }
@@ -79,10 +81,10 @@ fn a_campaign_writes_the_same_bytes_with_any_number_of_jobs_and_in_every_repetit
     {
         assert!(!one_job[name].is_empty(), "{name} is empty");
     }
-    for (other, what) in [(&two_jobs, "two jobs"), (&repetition, "a repetition")] {
-        assert_eq!(one_job.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "files of {what}");
+    for (other, variant) in [(&two_jobs, "two jobs"), (&repetition, "a repetition")] {
+        assert_eq!(one_job.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "files of {variant}");
         for (name, bytes) in &one_job {
-            assert!(*bytes == other[name], "{name} differs between one job and {what}");
+            assert!(*bytes == other[name], "{name} differs between one job and {variant}");
         }
     }
 }
@@ -104,7 +106,8 @@ fn a_replay_gives_the_outcome_of_the_journal_to_the_last_bit() {
         for arm in &records[usize::try_from(sample).unwrap()].arms {
             let again = simulate(&scenario, key, &saved.arm(Some(&arm.controller)).unwrap(), &mut NoObserver).unwrap();
             // Numbers are written so that they read back exactly: equal text means equal bits.
-            let [replayed, kept] = [&again, arm.result.as_ref().unwrap()].map(|it| serde_json::to_string(it).unwrap());
+            let [replayed, kept] =
+                [&again, arm.result.as_ref().unwrap()].map(|outcome| serde_json::to_string(outcome).unwrap());
             assert_eq!(replayed, kept, "sample {sample} with {}", arm.controller);
         }
     }

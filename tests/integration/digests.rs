@@ -1,4 +1,5 @@
-//! Outcomes have the bits that `docs/evidence/determinism.json` states, in every scenario of the library: no change moves one unnoticed.
+//! Outcomes have the bits that `docs/evidence/determinism.json` states, in every scenario of the
+//! library: no change moves one unnoticed.
 
 use std::path::Path;
 
@@ -26,7 +27,8 @@ fn outcomes_of_the_library_have_the_stated_bits() {
     assert!(stated.outcomes.len() >= LEAST_SCENARIOS, "{}", stated.outcomes.len());
     assert_eq!(generator::functions(), stated.functions, "the mathematical functions are not those of {DIGESTS}");
     let now = generator::digests().unwrap();
-    let changed: Vec<_> = now.outcomes.iter().filter(|(name, of)| stated.outcomes.get(*name) != Some(of)).collect();
+    let changed: Vec<_> =
+        now.outcomes.iter().filter(|(name, digest)| stated.outcomes.get(*name) != Some(digest)).collect();
     assert!(
         changed.is_empty() && now == stated,
         "other outcomes than before: {changed:?}. If that is meant, `cargo run --release -p closecall-xtask -- write-references` writes {DIGESTS}; \
@@ -37,9 +39,9 @@ fn outcomes_of_the_library_have_the_stated_bits() {
 #[test]
 fn a_digest_tells_modes_and_seeds_apart() {
     let file = ScenarioFile::load(&library("low-thw-overtake"), &[]).unwrap();
-    let of = |mode, seed| generator::outcomes(&file, mode, seed).unwrap();
-    let object = of(SensorMode::Object, SEED);
-    assert_eq!(object, of(SensorMode::Object, SEED));
-    assert_ne!(object, of(SensorMode::Object, SEED + 1));
-    assert_ne!(object, of(SensorMode::GroundTruth, SEED));
+    let digest = |mode, seed| generator::outcomes(&file, mode, seed).unwrap();
+    let object = digest(SensorMode::Object, SEED);
+    assert_eq!(object, digest(SensorMode::Object, SEED));
+    assert_ne!(object, digest(SensorMode::Object, SEED + 1));
+    assert_ne!(object, digest(SensorMode::GroundTruth, SEED));
 }

@@ -26,8 +26,8 @@ fn traffic_of_the_same_kind_matches_and_faster_traffic_does_not() {
     let table = stdout(&closecall(["traffic", "fit", first.to_str().unwrap(), "-o", fitted]), 0);
     assert!(table.contains("Kolmogorov-Smirnov distance"), "{table}");
     let again = recorded(folder.path(), "again.csv", "2", &[]);
-    let found = json(&closecall(["traffic", "drift", fitted, again.to_str().unwrap(), "--format", "json"]), 0);
-    assert_eq!((&found["is_tested"], &found["has_drifted"]), (&true.into(), &false.into()), "{found}");
+    let drift = json(&closecall(["traffic", "drift", fitted, again.to_str().unwrap(), "--format", "json"]), 0);
+    assert_eq!((&drift["is_tested"], &drift["has_drifted"]), (&true.into(), &false.into()), "{drift}");
     let slower = recorded(folder.path(), "slower.csv", "2", &["--set", "cruise-mps=24"]);
     let table = stdout(&closecall(["traffic", "drift", fitted, slower.to_str().unwrap()]), 1);
     assert!(table.contains("DRIFTED") && table.contains("crossing-mps"), "{table}");
@@ -70,10 +70,10 @@ fn the_library_has_not_drifted_from_the_recordings_that_it_was_fitted_to() {
     let fitted = Path::new(ROOT).join("scenarios/library/fitted/us101.toml");
     for file in scenarios.iter().chain([&fitted]) {
         let words = ["traffic", "drift", file.to_str().unwrap(), "--format", "json"].map(str::to_owned);
-        let found = json(&closecall(words.iter().chain(&recordings)), 0);
-        let of_front = |one: &&Value| one["quantity"] == "front-thw-s";
-        let front = found["quantities"].as_array().unwrap().iter().find(of_front).unwrap();
-        let of_itself = |one: &Value| one["fitted_n"] == one["n"];
+        let drift = json(&closecall(words.iter().chain(&recordings)), 0);
+        let of_front = |quantity: &&Value| quantity["quantity"] == "front-thw-s";
+        let front = drift["quantities"].as_array().unwrap().iter().find(of_front).unwrap();
+        let of_itself = |quantity: &Value| quantity["fitted_n"] == quantity["n"];
         assert!(of_itself(front), "both sides have the same cut: {front}");
     }
     // What must not pass: the headways below half a second, as if they had the cut of the scenario.

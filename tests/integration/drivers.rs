@@ -1,4 +1,4 @@
-//! The human drivers do in the closed loop what the scenario file asks of them.
+//! The human drivers follow the scenario file in the closed loop.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -21,8 +21,8 @@ const SAMPLES: u64 = 300;
 /// Significance level of the Kolmogorov–Smirnov tests.
 const LEVEL: f64 = 0.01;
 
-/// Returns the largest distance between the distribution of `values` and `cdf`, and the probability of a distance at
-/// least as large.
+/// Returns the largest distance between the distribution of `values` and `cdf`, and the probability
+/// of a distance at least as large.
 fn kolmogorov_smirnov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f64) {
     values.sort_by(f64::total_cmp);
     let n = values.len() as f64;
@@ -34,19 +34,21 @@ fn kolmogorov_smirnov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f
             (expected - index as f64 / n).max((index + 1) as f64 / n - expected)
         })
         .fold(0.0, f64::max);
-    // Stephens' form of the asymptotic distribution (Journal of the Royal Statistical Society B 32 (1970) 115–122).
+    // Stephens' form of the asymptotic distribution (Journal of the Royal Statistical Society B 32
+    // (1970) 115–122).
     let lambda = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
     let term = |k: i32| 2.0 * f64::from(k % 2 * 2 - 1) * maths::exp(-2.0 * f64::from(k * k) * lambda * lambda);
     (distance, (1..=100).map(term).sum::<f64>().clamp(0.0, 1.0))
 }
 
-/// Fails if `values` do not follow the distribution `cdf`. Prints the result past the capture of the test runner.
-fn assert_follows(what: &str, values: Vec<f64>, cdf: impl Fn(f64) -> f64) {
+/// Fails if `values` do not follow the distribution `cdf`. Prints the result past the capture of
+/// the test runner.
+fn assert_follows(quantity: &str, values: Vec<f64>, cdf: impl Fn(f64) -> f64) {
     let n = values.len();
     let (distance, p) = kolmogorov_smirnov(values, cdf);
-    writeln!(std::io::stderr(), "{what}: Kolmogorov-Smirnov D = {distance:.4}, p = {p:.3}, n = {n}")
+    writeln!(std::io::stderr(), "{quantity}: Kolmogorov-Smirnov D = {distance:.4}, p = {p:.3}, n = {n}")
         .expect("standard error");
-    assert!(p > LEVEL, "{what}: D = {distance}, p = {p}");
+    assert!(p > LEVEL, "{quantity}: D = {distance}, p = {p}");
 }
 
 fn arm(controller: BuiltIn) -> Arm {
@@ -64,7 +66,8 @@ duration-s = 20.0
 road = { lanes = 3, lane-width-m = 3.75, curvature-per-m = 0.0, speed-limit-mps = 36.1, overtaking-side = "left" }
 "#;
 
-/// The ego follows the lead vehicle, the rear vehicle follows the ego. The lead vehicle brakes after 12 s.
+/// The ego follows the lead vehicle, the rear vehicle follows the ego. The lead vehicle brakes
+/// after 12 s.
 const REACTION: &str = r#"
 [[actor]]
 id = "ego"
@@ -89,7 +92,8 @@ start = { behind = { of = "ego", thw-s = 1.0, speed-mps = 30.0 } }
 driver = { wiedemann99 = { cc1-s = 0.9, reaction-s = { log-normal = { median = 0.9, sigma = 0.3 } }, perception = { anticipation = 0.0 } } }
 "#;
 
-/// The time at which the ego's brake light goes on, and the time at which the rear vehicle then decelerates.
+/// The time at which the ego's brake light goes on, and the time at which the rear vehicle then
+/// decelerates.
 #[derive(Default)]
 struct BrakeLight {
     on: Option<Time>,
@@ -159,8 +163,8 @@ impl Observer for Crossing {
     fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
-/// Returns the scenario `overtake-without-brake` as it ships, and with a rear vehicle that weaves in its lane and
-/// varies its speed.
+/// Returns the scenario `overtake-without-brake` as it ships, and with a rear vehicle that weaves
+/// in its lane and varies its speed.
 fn steady_and_weaving() -> [ScenarioFile; 2] {
     let text = std::fs::read_to_string(library("overtake-without-brake")).unwrap();
     let folder = folder();
@@ -191,14 +195,14 @@ fn the_headway_at_the_crossing_of_the_marking_follows_the_distribution_of_the_sc
     assert_follows("the rear vehicle's headway at the crossing of the marking", without, |thw_s| {
         expected.cdf(thw_s).unwrap()
     });
-    // The driver predicts its crossing from the ego's deceleration, as it perceives it, and from its own present
-    // offset. With the MIS the ego's deceleration changes, and while weaving the offset changes. The headway is then
-    // only close to the drawn one.
+    // The driver predicts its crossing from the ego's deceleration, as it perceives it, and from
+    // its own present offset. With the MIS the ego's deceleration changes, and while weaving the
+    // offset changes. The headway is then only close to the drawn one.
     for (when, file, controller) in [("with the MIS", &file, BuiltIn::Mis), ("while weaving", &weaving, BuiltIn::Acc)] {
-        let found: Vec<(f64, f64)> = (0..SAMPLES).map(|index| headway_s(file, controller, index)).collect();
-        let headways_s = found.iter().map(|(thw_s, _)| *thw_s).collect();
+        let crossings: Vec<(f64, f64)> = (0..SAMPLES).map(|index| headway_s(file, controller, index)).collect();
+        let headways_s = crossings.iter().map(|(thw_s, _)| *thw_s).collect();
         let (distance, p) = kolmogorov_smirnov(headways_s, |thw_s| expected.cdf(thw_s).unwrap());
-        let mut errors_s: Vec<f64> = found.iter().map(|(thw_s, drawn_s)| thw_s - drawn_s).collect();
+        let mut errors_s: Vec<f64> = crossings.iter().map(|(thw_s, drawn_s)| thw_s - drawn_s).collect();
         errors_s.sort_by(f64::total_cmp);
         let [low_s, median_s, high_s] = [5, 50, 95].map(|percent| errors_s[errors_s.len() * percent / 100]);
         writeln!(
@@ -211,7 +215,8 @@ fn the_headway_at_the_crossing_of_the_marking_follows_the_distribution_of_the_sc
     }
 }
 
-/// Runs the vehicles of a test with an ego far behind them in another lane. Returns the rows of the trace by actor.
+/// Runs the vehicles of a test with an ego far behind them in another lane. Returns the rows of the
+/// trace by actor.
 fn traced(actors: &str, duration_s: f64) -> BTreeMap<String, Vec<Row>> {
     let folder = folder();
     let (path, trace) = (folder.path().join("drivers.toml"), folder.path().join("trace.csv"));
@@ -290,7 +295,7 @@ fn a_column_of_followers_stops_without_contact_behind_a_lead_vehicle_with_prescr
         "{ acceleration-profile = [[6.0, 1.1], [9.0, 0.0], [30.0, -5.3]] }",
         "{ wiedemann99 = { cc1-s = 0.9, reaction-s = 0.7, hardest-braking-mps2 = 8.0 } }",
     );
-    for (id, of, driver) in [
+    for (id, lead, driver) in [
         (
             "second",
             "tail",
@@ -301,7 +306,7 @@ fn a_column_of_followers_stops_without_contact_behind_a_lead_vehicle_with_prescr
     ] {
         actors += &format!(
             "[[actor]]\nid = \"{id}\"\nvehicle = {{ class = \"car\" }}\n\
-             start = {{ behind = {{ of = \"{of}\", thw-s = 1.3, speed-mps = 28.0 }} }}\ndriver = {driver}\n"
+             start = {{ behind = {{ of = \"{lead}\", thw-s = 1.3, speed-mps = 28.0 }} }}\ndriver = {driver}\n"
         );
     }
     let rows = traced(&actors, 75.0);
@@ -337,8 +342,8 @@ fn a_loaded_scenario_holds_the_track_of_a_recorded_vehicle_and_no_longer_needs_t
     std::fs::remove_file(&trajectories).unwrap();
     let again = ScenarioFile::parse(&path, file.text(), &[]).unwrap();
     assert_eq!((again.text(), again.config()), (file.text(), file.config()));
-    // The scenario as it was written needs the trajectory file. The error names the file, and the line that asks for
-    // it.
+    // The scenario as it was written needs the trajectory file. The error names the file, and the
+    // line that asks for it.
     let error = ScenarioFile::parse(&path, &text, &[]).unwrap_err().to_string();
     let line = 1 + text.lines().position(|line| line.contains("recorded")).unwrap();
     assert!(error.contains(&format!("scenario.toml:{line}")) && error.contains("own.csv"), "{error}");

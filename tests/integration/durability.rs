@@ -1,5 +1,5 @@
-//! A campaign that is killed and resumed, stopped by a full disk, or split among machines gives the same bytes as one
-//! that runs undisturbed.
+//! A campaign that is killed and resumed, stopped by a full disk, or split among machines gives the
+//! same bytes as one that runs undisturbed.
 
 use std::fs;
 use std::path::Path;
@@ -43,17 +43,19 @@ fn wait_until(mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// Returns the bytes of a journal up to the end of its first `lines` lines, or all of them if it has fewer.
+/// Returns the bytes of a journal up to the end of its first `lines` lines, or all of them if it
+/// has fewer.
 fn first_lines(journal: &[u8], lines: usize) -> &[u8] {
     let ends = journal.iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(index, _)| index + 1);
     &journal[..ends.take(lines).last().unwrap_or(0)]
 }
 
-/// Runs a campaign until its journal has at least `lines` more lines, kills it, and tears the journal: the last of
-/// these lines lacks its last `torn` bytes. Returns true if the campaign still ran when it was killed.
+/// Runs a campaign until its journal has at least `lines` more lines, kills it, and tears the
+/// journal: the last of these lines lacks its last `torn` bytes. Returns true if the campaign still
+/// ran when it was killed.
 ///
-/// What the program wrote beyond these lines before the signal arrived is cut off, so that the rest of the test is the
-/// same on any machine.
+/// Lines that the program wrote beyond these before the signal arrived are cut off: the rest of the
+/// test is the same on any machine.
 fn kill_after(args: &[String], out: &Path, lines: usize, torn: usize) -> bool {
     let journal = out.join("journal.jsonl");
     let read = || fs::read(&journal).unwrap_or_default();
@@ -85,8 +87,8 @@ fn a_campaign_that_is_killed_and_resumed_repeatedly_ends_in_the_same_bytes() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let out = folder.path().join("killed");
-    // The first kill comes after one of 400 samples, so it does interrupt the campaign. On a slow machine a later one
-    // may come after the end.
+    // The first kill comes after one of 400 samples, so it does interrupt the campaign. On a slow
+    // machine a later one may come after the end.
     for (index, (jobs, lines)) in [("1", 1), ("2", 57), ("1", 90), ("2", 3), ("2", 120)].into_iter().enumerate() {
         let was_running = kill_after(&args(&out, &["--jobs", jobs, "--resume"]), &out, lines, lines);
         assert!(was_running || index > 0, "the campaign ended before it was killed");
@@ -150,7 +152,8 @@ fn a_damaged_journal_record_costs_only_its_own_sample() {
     for (index, byte) in [(ends[100] - 30, b'#'), (ends[200], b'#'), (ends[300] - 30, b'\n')] {
         let mut damaged = intact.clone();
         damaged[index] = byte;
-        // The line before the damaged one ends here: from there to the end, no other line may be run again.
+        // The line before the damaged one ends here: from there to the end, no other line may be
+        // run again.
         fs::write(whole.join("journal.jsonl"), &damaged).unwrap();
         let times = fs::read_to_string(whole.join("wall-times.jsonl")).unwrap();
         let resumed = closecall(args(&whole, &["--resume"]));
@@ -216,8 +219,8 @@ fn a_full_disk_is_an_i_o_error_and_loses_nothing() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let out = folder.path().join("full");
-    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit ignored, the write
-    // fails as on a full disk.
+    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit
+    // ignored, the write fails as on a full disk.
     let script = "ulimit -f 200; trap '' XFSZ; exec \"$@\"";
     let limited = Command::new("sh")
         .current_dir(ROOT)
@@ -245,7 +248,8 @@ fn a_gigabyte_of_zeros_behind_a_journal_is_cut_off_and_not_kept_in_memory() {
     stdout(&closecall(args(&out, &[])), 0);
     let journal = fs::OpenOptions::new().write(true).open(out.join("journal.jsonl")).unwrap();
     journal.set_len(journal.metadata().unwrap().len() + (1 << 30)).unwrap();
-    // The shell limits the address space to less than the zeros take. Two worker threads and the network fit.
+    // The shell limits the address space to less than the zeros take. Two worker threads and the
+    // network fit.
     let limited = |arguments: &[String]| {
         let script = "ulimit -v 900000; exec \"$@\"";
         let mut command = Command::new("sh");
@@ -329,7 +333,7 @@ fn parts_that_do_not_make_a_campaign_are_refused_by_name() {
     stdout(&closecall(resumed), 0);
     stdout(&merge(&[&one, &two, &three], &out), 0);
     assert!(bytes(&whole, "outcomes.parquet") == bytes(&out, "outcomes.parquet"));
-    // The merged folder can be replayed like that of any campaign.
+    // The merged folder can be replayed like the folder of any campaign.
     let replayed = closecall(["replay", out.to_str().unwrap(), "5"]);
     stdout(&replayed, 0);
     let again = merge(&[&one, &two, &three], &out);

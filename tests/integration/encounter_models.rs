@@ -1,5 +1,5 @@
-//! The models of the encounter in the closed loop: the ego's jerk, the start, emergency braking that ends, and the rear
-//! driver's brake and headway.
+//! The models of the encounter in the closed loop: the ego's jerk, the start, emergency braking
+//! that ends, and the rear driver's brake and headway.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
@@ -65,7 +65,8 @@ fn commands(name: &str, settings: &[&str], key: RunKey, controller: BuiltIn) -> 
 /// The tolerance of the plant's jerk: it follows steps of 25 Hz, not a ramp.
 const RIPPLE: f64 = 1.1;
 
-/// The jerk limits of the cruise control from 20 m/s on (ISO 15622), and of the margin increase system (m/s³).
+/// The jerk limits of the cruise control from 20 m/s on (ISO 15622), and of the margin increase
+/// system (m/s³).
 const JERK_LIMITS_MPS3: [(BuiltIn, f64); 2] = [(BuiltIn::Acc, 2.5), (BuiltIn::Mis, 3.0)];
 
 /// Scenarios in which nothing but the approach of the rear vehicle happens.
@@ -136,7 +137,8 @@ fn after_emergency_braking_the_ego_follows_the_comfort_command_at_once() {
     assert!(ends > 10, "emergency braking ended only {ends} times");
 }
 
-/// The smallest time headways of the rear vehicle over some samples without braking (s), their mean.
+/// The smallest time headways of the rear vehicle over some samples without braking (s), their
+/// mean.
 fn mean_rear_headway_s(cc1: &str) -> f64 {
     let samples = 20;
     let total_s: f64 = (0..samples)
@@ -156,7 +158,8 @@ fn a_larger_cc1_of_the_overtaker_gives_a_larger_rear_headway() {
     assert!(some_s > none_s + 0.03, "{none_s} and {some_s}");
 }
 
-/// Collects the time at which the ego's brake light goes on, and the rear vehicle's acceleration over time.
+/// Collects the time at which the ego's brake light goes on, and the rear vehicle's acceleration
+/// over time.
 #[derive(Default)]
 struct RearBrakes {
     light_on: Option<Time>,

@@ -1,6 +1,6 @@
-//! With true tracks the margin increase system (MIS) engages if and only if its conditions hold, and reaches a goal
-//! that it reports as reachable. These tests evaluate the conditions from the true state of the vehicles, independently
-//! of the controller.
+//! With true tracks the margin increase system (MIS) engages if and only if its conditions hold,
+//! and reaches a goal that it reports as reachable. These tests evaluate the conditions from the
+//! true state of the vehicles, independently of the controller.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
@@ -35,8 +35,8 @@ impl Observer for Engagement {
     fn step(&mut self, view: &StepView<'_>) {
         let speed_mps = |actor: usize| view.vehicles[actor].state.speed_mps;
         let closing_mps = view.margins.follower.map(|rear| speed_mps(rear) - speed_mps(view.scenario.ego));
-        // In these scenarios only the rear vehicle uses the left lane, which is therefore free while that vehicle is in
-        // the ego's lane.
+        // In these scenarios only the rear vehicle uses the left lane, which is therefore free
+        // while that vehicle is in the ego's lane.
         let all_hold = view.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= ENGAGE_GAP_M + ROUNDING)
             && closing_mps.is_some_and(|closing_mps| closing_mps >= ENGAGE_CLOSING_MPS - ROUNDING)
             && view.margins.thw_front_s.is_ok_and(|thw_s| thw_s < SHORT_THW_S + ROUNDING);
@@ -94,14 +94,14 @@ fn the_mis_engages_within_two_control_steps_of_its_conditions_and_never_before()
 
 #[test]
 fn the_mis_does_not_engage_if_one_condition_is_missing() {
-    for (settings, what) in [
+    for (settings, condition) in [
         (["actor.ego.driver.ego-stack.automated=false"], "not automated"),
         (["actor.ego.driver.ego-stack.mis.short-thw-s=0.3"], "long front headway"),
         (["actor.ego.driver.ego-stack.mis.engage-gap-m=1.0"], "rear vehicle far away"),
         (["actor.ego.driver.ego-stack.mis.engage-closing-mps=30.0"], "rear vehicle not approaching"),
     ] {
         for (engagement, outcome) in run("overtake-without-brake", &settings, 12) {
-            assert_eq!(engagement.engaged, None, "{what}: {outcome:?}");
+            assert_eq!(engagement.engaged, None, "{condition}: {outcome:?}");
         }
     }
 }

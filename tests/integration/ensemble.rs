@@ -1,4 +1,5 @@
-//! A campaign over a driver ensemble: entries on the same samples, the verdict, partitions, resumption, replay.
+//! A campaign over a driver ensemble: entries on the same samples, the verdict, partitions,
+//! resumption, replay.
 
 use std::path::Path;
 
@@ -144,8 +145,9 @@ fn the_page_of_the_drivers_names_every_member_with_its_values() {
     }
 }
 
-/// Returns the time at which a driver first brakes by more than 1 m/s² (s). The driver follows at 30 m/s, 25 m behind a
-/// vehicle that brakes at `braking_mps2` from 2 s on. The vehicle beyond that one brakes from 1 s on.
+/// Returns the time at which a driver first brakes by more than 1 m/s² (s). The driver follows at
+/// 30 m/s, 25 m behind a vehicle that brakes at `braking_mps2` from 2 s on. The vehicle beyond that
+/// one brakes from 1 s on.
 fn brakes_at_s(config: &Wiedemann99Config, braking_mps2: f64) -> f64 {
     let settings = config.check(&Parameters::default()).unwrap();
     let mut driver = Wiedemann99Driver::new(settings);
@@ -169,8 +171,9 @@ fn brakes_at_s(config: &Wiedemann99Config, braking_mps2: f64) -> f64 {
     };
     for step in 0..600 {
         let time = Time::from_ms(10 * step);
-        let own = LaneNeighbours { lead: Some(ahead(1, 25.0, 2.0, time.s())), ..LaneNeighbours::default() };
-        let neighbours = Neighbours { own, beyond: Some(ahead(2, 60.0, 1.0, time.s())), ..Neighbours::default() };
+        let own_lane = LaneNeighbours { lead: Some(ahead(1, 25.0, 2.0, time.s())), ..LaneNeighbours::default() };
+        let neighbours =
+            Neighbours { own: own_lane, beyond: Some(ahead(2, 60.0, 1.0, time.s())), ..Neighbours::default() };
         let state = VehicleState { s_m: 30.0 * time.s(), d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
         let input = DriverInput {
             time,

@@ -1,4 +1,5 @@
-//! What a user meets every day: why samples failed, a campaign that grows, and inputs that are refused before any sample runs.
+//! What a user meets every day: why samples failed, a campaign that grows, and inputs that are
+//! refused before any sample runs.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +19,8 @@ fn python(answer: &str) -> String {
     )
 }
 
-/// Twelve controllers that fail in twelve ways: what each is, and what tells its author what to mend.
+/// Twelve controllers that fail in twelve ways: the fault of each, and the message that tells its
+/// author the repair.
 fn twelve(folder: &Path) -> Vec<(String, Vec<&'static str>)> {
     let script = |name: &str, text: &str| {
         fs::write(folder.join(name), text).unwrap();
@@ -57,7 +59,8 @@ fn twelve(folder: &Path) -> Vec<(String, Vec<&'static str>)> {
 
 /// Runs a campaign of few samples in a folder. What follows `#` names the fault of a library.
 fn failing(folder: &Path, controller: &str, more: &[&str]) -> Output {
-    let (controller, fault) = controller.split_once('#').map_or((controller, None), |(one, fault)| (one, Some(fault)));
+    let (controller, fault) =
+        controller.split_once('#').map_or((controller, None), |(name, fault)| (name, Some(fault)));
     let mut command = program();
     command.current_dir(folder).env("FAULT_ALWAYS", "1");
     command.args(["campaign", "short.toml", "-n", "2", "--sensors", "object", "--no-gate", "--no-validity-checks"]);
@@ -154,21 +157,21 @@ const FILES: [&str; 5] = ["journal.jsonl", "outcomes.parquet", "arm_pairs.parque
 
 /// Returns the bytes of the files that do not depend on how a campaign came about.
 fn bytes(out: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut found = Vec::new();
+    let mut contents = Vec::new();
     for path in FILES.map(|name| out.join(name)) {
         let files: Vec<_> = match path.is_dir() {
             true => fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()).collect(),
             false => vec![path],
         };
         for file in files {
-            // A recording has times of its own: which there are must be the same.
+            // A recording has its own times: only the set of recordings must be the same.
             let is_recording = file.extension().is_some_and(|end| end == "rrd" || end == "html");
             let content = if is_recording { Vec::new() } else { fs::read(&file).unwrap_or_default() };
-            found.push((file.file_name().unwrap().to_string_lossy().into_owned(), content));
+            contents.push((file.file_name().unwrap().to_string_lossy().into_owned(), content));
         }
     }
-    found.sort();
-    found
+    contents.sort();
+    contents
 }
 
 #[test]
@@ -190,8 +193,8 @@ fn a_campaign_that_grows_has_the_bytes_of_one_that_ran_at_once() {
         let resume = [more, &["--resume"]].concat();
         assert_eq!(code(&campaign(&grown, "5", &resume)), 2);
         stdout(&campaign(&grown, "14", &resume), 0);
-        for ((name, one), (_, other)) in bytes(&at(&once)).iter().zip(bytes(&at(&grown))) {
-            assert!(*one == other, "{part}: {name}");
+        for ((name, content), (_, other)) in bytes(&at(&once)).iter().zip(bytes(&at(&grown))) {
+            assert!(*content == other, "{part}: {name}");
         }
         assert_eq!(bytes(&at(&once)).len(), bytes(&at(&grown)).len());
         stdout(&closecall(["check", at(&grown).to_str().unwrap()]), 0);
@@ -259,7 +262,7 @@ fn what_cannot_end_well_is_refused_before_any_sample_runs() {
     // The recordings have no place.
     let output = closecall(["campaign", "low-thw-overtake", "-n", "1000000", "--no-out", "--record", "worst:1"]);
     assert_eq!(code(&output), 2, "{}", stderr(&output));
-    // A name of which no file can be named.
+    // A name that no file can have.
     let long = at("long.toml");
     fs::write(&long, headline_with("name = \"low-thw-overtake\"", &format!("name = \"{}\"", "a".repeat(200)))).unwrap();
     let output = closecall(["campaign", long.to_str().unwrap(), "-n", "1000000"]);

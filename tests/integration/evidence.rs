@@ -1,4 +1,4 @@
-//! PASS means evidence: what only looks like it gives neither PASS nor exit code 0.
+//! PASS means evidence: a mere appearance of evidence gives neither PASS nor exit code 0.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -42,7 +42,8 @@ fn an_ego_that_is_slower_and_does_not_look_back_fails_the_headline() {
                 && text.contains("NOT MET: low-thw-overtake: MIS-9"),
             "{text}"
         );
-        // It prevents more than the system does: the demand on what is prevented does not tell them apart.
+        // The fault prevents more than the system does: the demand on prevented collisions does not
+        // tell them apart.
         assert!(text.contains("\n  met: low-thw-overtake: MIS-1"), "{text}");
     }
 }
@@ -88,7 +89,7 @@ fn a_parameter_that_nothing_uses_is_refused() {
 #[test]
 fn three_hundred_runs_that_are_alike_are_one_sample() {
     let folder = folder();
-    // The run uses the value, and nothing depends on it: true tracks see as far as they like.
+    // The run uses the value, and nothing depends on it: true tracks have no limit of range.
     let parameters = "sight-m = { uniform = { min = 5000.0, max = 10000.0 }, assumed = \"nothing depends on it\" }";
     let text = paper_figure_with(parameters, "visibility-m = 10000.0", "visibility-m = \"$sight-m\"");
     let path = scenario(folder.path(), &text);
@@ -162,8 +163,8 @@ fn a_weakened_check_gives_overridden_and_exit_code_4() {
         folder
     });
     let merged = folder.path().join("merged");
-    let [one, two, merged] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
-    let args = ["tool", "merge", one, two, "--out", merged, "--record", "worst:0"];
+    let [first, second, merged] = [&parts[0], &parts[1], &merged].map(|path| path.to_str().unwrap());
+    let args = ["tool", "merge", first, second, "--out", merged, "--record", "worst:0"];
     assert!(stdout(&closecall(args), 4).contains("OVERRIDDEN"));
 }
 
@@ -176,8 +177,8 @@ fn a_single_sample_meets_no_count_extreme_or_percentile() {
         "mean(harm) <= 1000",
     ];
     for gate in gates {
-        let one = campaign(&library("slow-approach"), &["-n", "1", "--sensors", "object", "--gate", gate]);
-        assert!(stdout(&one, 4).contains("too few samples to decide"), "{gate}");
+        let single = campaign(&library("slow-approach"), &["-n", "1", "--sensors", "object", "--gate", gate]);
+        assert!(stdout(&single, 4).contains("too few samples to decide"), "{gate}");
     }
     // A count that is too high with one sample stays so with more.
     let args = ["-n", "1", "--sensors", "object", "--gate", "count(rear_passed) <= 0"];

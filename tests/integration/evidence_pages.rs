@@ -1,4 +1,5 @@
-//! The pages of `docs/evidence` have the sections that `xtask write-evidence` writes, of the outcomes of this version.
+//! The pages of `docs/evidence` have the sections that `xtask write-evidence` writes, of the
+//! outcomes of this version.
 
 use std::path::PathBuf;
 
@@ -78,9 +79,9 @@ fn every_scenario_of_the_library_is_in_the_tables() {
         .iter()
         .flat_map(|name| ["mis", "mis-extended", "gap-1.6"].map(|arm| vec![format!("`{name}`"), format!("`{arm}`")]));
     let (scenarios, agreement) = tables.split_once("### Agreement of the sensor modes").unwrap();
-    let found = rows(scenarios);
-    assert_eq!(found.iter().map(|row| row[..2].to_vec()).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
-    for row in &found {
+    let listed = rows(scenarios);
+    assert_eq!(listed.iter().map(|row| row[..2].to_vec()).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
+    for row in &listed {
         assert_eq!(row.len(), 13, "{row:?}");
         let count = |index: usize| row[index].parse::<u64>().unwrap();
         assert_eq!(count(3), count(5) + count(9), "without = prevented + both: {row:?}");
@@ -90,7 +91,7 @@ fn every_scenario_of_the_library_is_in_the_tables() {
         agreement.iter().map(|row| row[0].clone()).collect::<Vec<_>>(),
         names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>()
     );
-    for (row, arm) in agreement.iter().zip(found.iter().step_by(3)) {
+    for (row, arm) in agreement.iter().zip(listed.iter().step_by(3)) {
         assert_eq!(row.len(), 6, "{row:?}");
         let count = |cell: &str| cell.parse::<u64>().unwrap();
         assert!((1..=count(&arm[2])).contains(&count(&row[1])), "the first of the same samples: {row:?} {arm:?}");

@@ -28,7 +28,8 @@ fn exported(words: &str, folder: &Path) -> BTreeMap<String, String> {
     texts.collect()
 }
 
-/// Returns the value of an attribute of the first element that begins at or behind the start of the text.
+/// Returns the value of an attribute of the first element that begins at or behind the start of the
+/// text.
 fn attribute<'a>(text: &'a str, name: &str) -> &'a str {
     let (_, rest) = text.split_once(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name}: {text:.200}"));
     rest.split('"').next().unwrap()
@@ -95,9 +96,9 @@ fn a_case_lists_what_it_cannot_say_in_its_header_and_on_the_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let said = stdout(&run("tool export rear-follower-stays --form closed-loop -o", folder.path()), 0);
     let text = fs::read_to_string(folder.path().join("closed-loop.xosc")).unwrap();
-    for what in ["rear: the state of Wiedemann 99", "paint, registration plates", "front: its weaving"] {
-        assert!(said.contains(what), "{said}");
-        assert!(text.contains(what), "{what}");
+    for statement in ["rear: the state of Wiedemann 99", "paint, registration plates", "front: its weaving"] {
+        assert!(said.contains(statement), "{said}");
+        assert!(text.contains(statement), "{statement}");
     }
     assert!(attribute(&text, "description").ends_with("closed loop"));
     assert!(!folder.path().join("open-loop.xosc").exists());
@@ -115,7 +116,8 @@ fn the_closed_loop_has_the_manoeuvres_with_their_triggers_and_names_the_controll
     assert_eq!(number(brakes.split_once("<SimulationTimeCondition").unwrap().1, "value"), 12.0);
     let changes = text.split_once("<Event name=\"rear-changes-lanes\"").unwrap().1;
     assert_eq!(attribute(changes.split_once("<AbsoluteTargetLane").unwrap().1, "value"), "-1");
-    // The marking is crossed after half of 6.8 s, in which the headway falls by closing × time / speed.
+    // The marking is crossed after half of 6.8 s, in which the headway falls by closing × time /
+    // speed.
     let closing_mps = 20.0 / 3.0;
     let expected_s = 0.2 + closing_mps * 3.4 / (30.0 + closing_mps);
     let begins_s = number(changes.split_once("<TimeHeadwayCondition").unwrap().1, "value");
@@ -240,7 +242,7 @@ fn the_quality_checkers_find_what_is_wrong() {
     }
 }
 
-/// Runs the readers of OSI on these files, and returns what they find.
+/// Runs the readers of OSI on these files, and returns their results.
 fn read_osi(python: &Path, files: &[PathBuf]) -> serde_json::Value {
     let script = PathBuf::from(ROOT).join("tests/integration/exchange/osi.py");
     let output = Command::new(python).arg(script).args(files).output().unwrap();
@@ -283,19 +285,20 @@ fn other_programs_read_the_osi_messages_of_a_run() {
     stdout(&run(&format!("{words} --osi"), &mcap), 0);
     stdout(&run(&format!("{words} --trace"), &trace), 0);
     stdout(&run(&format!("{words} --osi"), &osi), 0);
-    let found = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
-    let (truth, tracks) = (&found["traces"]["gt"], &found["traces"]["sd"]);
+    let summary = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
+    let (truth, tracks) = (&summary["traces"]["gt"], &summary["traces"]["sd"]);
     let messages = &truth["messages"];
-    assert_eq!(found["objects"], 3);
-    assert_eq!(found["host"], 1);
-    for count in [&found["instants"], &tracks["messages"], &truth["betterosi"], &truth["named"], &tracks["betterosi"]] {
+    assert_eq!(summary["objects"], 3);
+    assert_eq!(summary["host"], 1);
+    for count in [&summary["instants"], &tracks["messages"], &truth["betterosi"], &truth["named"], &tracks["betterosi"]]
+    {
         assert_eq!(count, messages);
     }
     for topic in ["ground_truth", "sensor_data", "ground_truth_map"] {
-        assert_eq!(found["channels"][topic]["unknown"], 0, "{found}");
+        assert_eq!(summary["channels"][topic]["unknown"], 0, "{summary}");
     }
-    assert_eq!(found["channels"]["sensor_data"]["messages"], *messages);
-    assert_eq!(found["channels"]["ground_truth_map"]["messages"], 1);
+    assert_eq!(summary["channels"]["sensor_data"]["messages"], *messages);
+    assert_eq!(summary["channels"]["ground_truth_map"]["messages"], 1);
     for trace in [truth, tracks] {
         assert_eq!(trace["unknown"], 0);
         assert_eq!(trace["version"], serde_json::json!([3, 8, 0]));
@@ -304,7 +307,7 @@ fn other_programs_read_the_osi_messages_of_a_run() {
     let lanes: Vec<u64> = truth["lanes"].as_array().unwrap().iter().map(|lanes| lanes.as_u64().unwrap()).collect();
     assert_eq!((lanes[0], lanes[1..].iter().max()), (3, Some(&0)));
     assert!(tracks["tracks"].as_u64().unwrap() > 100 && tracks["rmse"].as_f64().unwrap() > 0.0);
-    // The positions are those of the trace.
+    // The positions equal the positions of the trace.
     let mut reader = csv::Reader::from_path(&trace).unwrap();
     let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
     let centres = truth["centres"].as_array().unwrap();
@@ -335,9 +338,9 @@ fn the_lanes_are_in_each_message_on_request() {
         ),
         0,
     );
-    let found = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
-    let lanes = found["traces"]["gt"]["lanes"].as_array().unwrap();
-    assert!(lanes.len() > 10 && lanes.iter().all(|count| count == &lanes[0] && count.as_u64() > Some(0)), "{found}");
+    let summary = read_osi(&python, &[vec![mcap], traces(folder.path())].concat());
+    let lanes = summary["traces"]["gt"]["lanes"].as_array().unwrap();
+    assert!(lanes.len() > 10 && lanes.iter().all(|count| count == &lanes[0] && count.as_u64() > Some(0)), "{summary}");
 }
 
 #[test]
@@ -358,7 +361,7 @@ fn a_sample_as_commonroad_is_read_back_with_the_positions_of_the_trace() {
             "rear" => 1_002,
             _ => continue,
         };
-        let vehicle = data.trajectories.iter().find(|one| one.vehicle_id == number).unwrap();
+        let vehicle = data.trajectories.iter().find(|trajectory| trajectory.vehicle_id == number).unwrap();
         let time_s: f64 = row[0].parse().unwrap();
         let point = vehicle.points.iter().find(|point| (point.time.s() - time_s).abs() < 1e-6).unwrap();
         // Positions along a road of the reader begin at the start of its lanelets.
@@ -379,10 +382,10 @@ fn commonroad_io_reads_a_sample_with_its_planning_problem() {
     exported("paper-figure --sensors object --form commonroad", folder.path());
     let script = PathBuf::from(ROOT).join("tests/integration/exchange/commonroad.py");
     let output = Command::new(python).arg(script).arg(folder.path().join("commonroad.xml")).output().unwrap();
-    let found: serde_json::Value = serde_json::from_str(stdout(&output, 0).lines().last().unwrap()).unwrap();
-    assert_eq!((found["step_s"].as_f64(), found["lanelets"].as_u64()), (Some(0.04), Some(3)));
-    assert_eq!(found["start"], serde_json::json!([500.0, -5.625, 30.0]));
-    assert_eq!(found["on_lanelet"], serde_json::json!([2]));
-    let ends: Vec<_> = ["1001", "1002"].map(|id| found["obstacles"][id].as_u64().unwrap()).into();
-    assert!(ends[0] > 250 && ends[0] == ends[1], "{found}");
+    let summary: serde_json::Value = serde_json::from_str(stdout(&output, 0).lines().last().unwrap()).unwrap();
+    assert_eq!((summary["step_s"].as_f64(), summary["lanelets"].as_u64()), (Some(0.04), Some(3)));
+    assert_eq!(summary["start"], serde_json::json!([500.0, -5.625, 30.0]));
+    assert_eq!(summary["on_lanelet"], serde_json::json!([2]));
+    let ends: Vec<_> = ["1001", "1002"].map(|id| summary["obstacles"][id].as_u64().unwrap()).into();
+    assert!(ends[0] > 250 && ends[0] == ends[1], "{summary}");
 }

@@ -1,6 +1,6 @@
-//! Controllers that run as processes. The shipped example behaves like the built-in controller. A process that
-//! misbehaves causes an error in its own samples only, with a message that names the fault, and leaves no process
-//! behind.
+//! Controllers that run as processes. The shipped example behaves like the built-in controller. A
+//! process that misbehaves causes an error in its own samples only, with a message that names the
+//! fault, and leaves no process behind.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,7 +14,8 @@ use serde_json::Value;
 
 use crate::support::{closecall, code, folder, library, message, program, stderr, stdout};
 
-/// The time that a controller has for an answer (ms): much longer than any of these controllers needs.
+/// The time that a controller has for an answer (ms): much longer than any of these controllers
+/// needs.
 const TIMEOUT_MS: &str = "2000";
 
 /// The faults of `bad.sh`: its arguments, and a part of the error message.
@@ -49,8 +50,8 @@ fn run_with(controller: &str, mark: &str) -> Output {
 
 /// Returns the processes with `mark` in their environment that do not end.
 ///
-/// The program kills its processes when it ends, and the kernel removes them some time later. This function waits for
-/// that, at most a minute.
+/// The program kills its processes when it ends, and the kernel removes them some time later. This
+/// function waits for that, at most a minute.
 pub(crate) fn left_behind(mark: &str) -> Vec<String> {
     const LOOKS: usize = 600;
     const PAUSE: Duration = Duration::from_millis(100);
@@ -124,8 +125,8 @@ fn a_command_that_cannot_be_started_or_parsed_is_an_error() {
     }
 }
 
-/// Returns the results of a campaign by sample: the outcome without the keys that name the controller, or the error
-/// message.
+/// Returns the results of a campaign by sample: the outcome without the keys that name the
+/// controller, or the error message.
 fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
     let records = Folder::open(out).records().unwrap().map(Result::unwrap);
     let result = |record: Record| {
@@ -151,17 +152,19 @@ fn campaign(controller: &str, out: &Path, samples: &str, more: &[&str]) -> Outpu
 }
 
 /// Returns true if two values are equal, with a tolerance of 1e-9 for numbers.
-fn agree(one: &Value, other: &Value) -> bool {
-    match (one, other) {
-        (Value::Number(one), Value::Number(other)) => (one.as_f64().unwrap() - other.as_f64().unwrap()).abs() <= 1e-9,
-        (Value::Array(one), Value::Array(other)) => {
-            one.len() == other.len() && one.iter().zip(other).all(|(one, other)| agree(one, other))
+fn agree(first: &Value, second: &Value) -> bool {
+    match (first, second) {
+        (Value::Number(first), Value::Number(second)) => {
+            (first.as_f64().unwrap() - second.as_f64().unwrap()).abs() <= 1e-9
         }
-        (Value::Object(one), Value::Object(other)) => {
-            one.len() == other.len()
-                && one.iter().all(|(key, value)| other.get(key).is_some_and(|other| agree(value, other)))
+        (Value::Array(first), Value::Array(second)) => {
+            first.len() == second.len() && first.iter().zip(second).all(|(first, second)| agree(first, second))
         }
-        (one, other) => one == other,
+        (Value::Object(first), Value::Object(second)) => {
+            first.len() == second.len()
+                && first.iter().all(|(key, value)| second.get(key).is_some_and(|second| agree(value, second)))
+        }
+        (first, second) => first == second,
     }
 }
 
@@ -178,8 +181,8 @@ fn the_python_example_behaves_like_the_built_in_cruise_control() {
     let (built_in, by_process) = (results(&built_in), results(&process));
     assert!(built_in.values().flatten().any(|outcome| !outcome["collisions"].as_array().unwrap().is_empty()));
     for (sample, outcome) in &built_in {
-        let [one, other] = [outcome, &by_process[sample]].map(|outcome| outcome.as_ref().unwrap());
-        assert!(agree(one, other), "sample {sample}: {one} {other}");
+        let [built_in, by_python] = [outcome, &by_process[sample]].map(|outcome| outcome.as_ref().unwrap());
+        assert!(agree(built_in, by_python), "sample {sample}: {built_in} {by_python}");
     }
     // The manifest holds the command, so a replay needs only the folder.
     let output = closecall(["replay", process.to_str().unwrap(), "3"]);
@@ -208,7 +211,7 @@ fn faults_in_some_samples_leave_the_other_samples_unchanged() {
     let output = campaign(controller, &process, "24", &["--controller-timeout-ms", TIMEOUT_MS]);
     assert_eq!(code(&output), 5, "{}", stderr(&output));
     let (built_in, process) = (results(&built_in), results(&process));
-    let mut seen = [0; SOMETIMES_BAD.len()];
+    let mut counts = [0; SOMETIMES_BAD.len()];
     for (sample, expected) in &built_in {
         let expected = expected.as_ref().unwrap();
         let cruise_mps = expected["parameters"]["cruise-mps"].as_f64().unwrap();
@@ -218,10 +221,10 @@ fn faults_in_some_samples_leave_the_other_samples_unchanged() {
             (Ok(outcome), None) => assert!(agree(outcome, expected), "sample {sample}"),
             (Err(message), Some(expected)) => {
                 assert!(message.contains(expected), "sample {sample}: {message}");
-                seen[kind] += 1;
+                counts[kind] += 1;
             }
             (result, _) => panic!("sample {sample}, kind {kind}: {result:?}"),
         }
     }
-    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+    assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
 }

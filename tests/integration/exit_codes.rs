@@ -32,7 +32,8 @@ fn paired_gates_judge_the_arm_under_test() {
     let report = json(&closecall(args.into_iter().chain(["200"])), 0);
     let collisions = |arm: &str| report["controllers"][arm]["collisions"].as_u64().unwrap();
     assert!(collisions("acc") > collisions("mis"));
-    // The gate allows the collisions of the arm under test. The baseline has more, which does not matter.
+    // The gate allows the collisions of the arm under test. The baseline has more, which does not
+    // matter.
     let allowed = collisions("mis").to_string();
     stdout(&closecall(args.into_iter().chain([allowed.as_str()])), 0);
 }

@@ -1,4 +1,5 @@
-//! `closecall view DIR`: the explorer in a real browser, as a page that is served and as a file, and attacks on its server.
+//! `closecall view DIR`: the explorer in a real browser, as a page that is served and as a file,
+//! and attacks on its server.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -22,7 +23,7 @@ struct Served {
 }
 
 impl Served {
-    /// Serves the campaign in `folder`. A program that notes its arguments stands for the viewer.
+    /// Serves the campaign in `folder`. A program that notes its arguments replaces the viewer.
     fn new(folder: &Path) -> Self {
         let written = crate::support::folder();
         let stand_in = Path::new(crate::support::ROOT).join("tests/fixtures/programs/rerun");
@@ -82,9 +83,10 @@ fn open(folder: &TempDir, address: &str) -> Option<Page> {
     Some(page)
 }
 
-/// Returns the addresses that the page has asked for and that do not begin like its own. What is in the page itself is no request.
-fn requests_but(page: &mut Page, own: &str) -> Vec<String> {
-    let is_own = |url: &String| [own, "about:", "data:"].iter().any(|start| url.starts_with(start));
+/// Returns the requested addresses that do not begin like the page's own. Content of the page
+/// itself is no request.
+fn requests_but(page: &mut Page, server: &str) -> Vec<String> {
+    let is_own = |url: &String| [server, "about:", "data:"].iter().any(|start| url.starts_with(start));
     page.requests().into_iter().filter(|url| !is_own(url)).collect()
 }
 

@@ -1,8 +1,10 @@
-//! Every command that reads or writes a folder of results survives the failure of any of its calls of the operating system.
+//! Every command that reads or writes a folder of results survives the failure of any of its calls
+//! of the operating system.
 //!
-//! A preloaded library fails one call after the other: see `fixtures/programs/failing_calls.c`. After each failure the command has
-//! ended with its undisturbed exit code or that of an I/O error, no file is half written, and the same command again gives the
-//! bytes of an undisturbed one. `CLOSECALL_EVERY_CALL=1` fails each call in each way. Without it, one call in a few fails.
+//! A preloaded library fails one call after the other: see `fixtures/programs/failing_calls.c`.
+//! After each failure, the command has ended with its undisturbed exit code or with the code of an
+//! I/O error, no file is half written, and the same command again gives the bytes of an undisturbed
+//! one. `CLOSECALL_EVERY_CALL=1` fails each call in each way. Without it, one call in a few fails.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,7 +15,8 @@ use crate::support::{ROOT, code, folder, library, program, stderr};
 
 /// The ways in which a call fails: see `failing_calls.c`.
 const WAYS: [&str; 5] = ["once", "always", "short", "interrupt", "kill"];
-/// One call in so many fails in the first way, and in each of the others, unless every call is to fail.
+/// One call in so many fails in the first way, and in each of the others, unless every call is to
+/// fail.
 const STRIDES: [usize; 2] = [3, 17];
 /// Exit code of an I/O error.
 const IO_ERROR: i32 = 6;
@@ -113,7 +116,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     all
 }
 
-/// Returns what is wrong with a command that ended while one of its calls failed.
+/// Returns the violations of a command that ended while one of its calls failed.
 fn judge(disturbed: &Ended, undisturbed: &Ended, way: &str) -> Vec<String> {
     let mut wrong = Vec::new();
     let message = stderr(&disturbed.output);
@@ -138,7 +141,7 @@ fn judge(disturbed: &Ended, undisturbed: &Ended, way: &str) -> Vec<String> {
     }
     if ended_with == expected {
         wrong.extend(judge_files(disturbed, undisturbed, &message));
-        // What is printed of the files that were written may lack one of them.
+        // The printed list of written files may lack one of them.
         if undisturbed.files.is_empty() && disturbed.output.stdout != undisturbed.output.stdout {
             wrong.push("it prints something else".to_owned());
         }
@@ -146,7 +149,7 @@ fn judge(disturbed: &Ended, undisturbed: &Ended, way: &str) -> Vec<String> {
     wrong
 }
 
-/// Returns what is wrong with the files of a command that has ended as if nothing had failed.
+/// Returns the violations in the files of a command that has ended as if nothing had failed.
 fn judge_files(disturbed: &Ended, undisturbed: &Ended, message: &str) -> Vec<String> {
     let mut wrong = Vec::new();
     let is_warned = message.contains("the verdict stands");
@@ -161,7 +164,7 @@ fn judge_files(disturbed: &Ended, undisturbed: &Ended, message: &str) -> Vec<Str
     wrong
 }
 
-/// Returns what is wrong after the same command has run again, undisturbed.
+/// Returns the violations after the same command has run again, undisturbed.
 fn judge_again(again: &Ended, undisturbed: &Ended) -> Vec<String> {
     let mut wrong = judge_files(again, undisturbed, "");
     if code(&again.output) != code(&undisturbed.output) {
@@ -172,7 +175,8 @@ fn judge_again(again: &Ended, undisturbed: &Ended) -> Vec<String> {
     wrong
 }
 
-/// Fails the calls of a command one after the other. Returns the number of calls, and what is wrong.
+/// Fails the calls of a command one after the other. Returns the number of calls, and the
+/// violations.
 fn attack(case: &Case) -> (usize, Vec<String>) {
     let library = compile(&case.root);
     case.prepare();
@@ -193,7 +197,9 @@ fn attack(case: &Case) -> (usize, Vec<String>) {
             if disturbed.output.status.code() != undisturbed.output.status.code() {
                 of_call.extend(judge_again(&case.end(case.command()), &undisturbed));
             }
-            wrong.extend(of_call.into_iter().map(|what| format!("{way} {at}: {what} ({})", stderr(&disturbed.output))));
+            wrong.extend(
+                of_call.into_iter().map(|violation| format!("{way} {at}: {violation} ({})", stderr(&disturbed.output))),
+            );
         }
     }
     (most_calls, wrong)

@@ -1,5 +1,5 @@
-//! A controller that panics, hangs, or returns nonsense causes an error of its sample, with the reason. All other
-//! samples have the same outcomes as without the fault.
+//! A controller that panics, hangs, or returns nonsense causes an error of its sample, with the
+//! reason. All other samples have the same outcomes as without the fault.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -38,13 +38,14 @@ enum Fault {
     AnswersNan,
 }
 
-/// Builds ego stacks with a fault that shows in samples in which the ego is fast. The controller itself can see this
-/// property.
+/// Builds ego stacks with a fault that shows in samples in which the ego is fast. The controller
+/// itself can see this property.
 struct Faulty {
     fault: Option<Fault>,
 }
 
-/// The lowest initial speed of the ego at which the fault shows (m/s): about one sample in six of `low-thw-overtake`.
+/// The lowest initial speed of the ego at which the fault shows (m/s): about one sample in six of
+/// `low-thw-overtake`.
 const FAULTY_FROM_MPS: f64 = 32.7;
 /// The time at which the fault shows.
 const FAULTY_AT: Time = Time::from_ms(2_000);
@@ -86,10 +87,10 @@ impl EgoController for FaultyStack {
 
 const SAMPLES: u64 = 32;
 const SEED: u64 = 3;
-/// The time that a sample may take. Every sample that hangs costs the test this time; a sound one needs a few
-/// milliseconds.
+/// The time that a sample may take. Every sample that hangs costs the test this time; a sound one
+/// needs a few milliseconds.
 const HANG_TIMEOUT: Duration = Duration::from_secs(5);
-/// The same for faults that do not hang: only there to end the test if the program itself hangs.
+/// The same for faults that do not hang. The limit ends the test only if the program itself hangs.
 const WATCHDOG: Duration = Duration::from_mins(10);
 
 fn timeout(fault: Option<Fault>) -> Duration {

@@ -50,7 +50,8 @@ fn an_unknown_name_in_a_fitted_file_is_refused_with_the_allowed_ones() {
     }
     let missing = closecall(["check", scenario.to_str().unwrap(), "--fitted", "/no/such.toml"]);
     assert_eq!(code(&missing), 6, "{}", message(&missing));
-    // US-101 has closing speeds of a millimetre per second, which no encounter of this scenario can have.
+    // US-101 has closing speeds of a millimetre per second, which no encounter of this scenario can
+    // have.
     let us101 = std::path::Path::new(ROOT).join("scenarios/library/fitted/us101.toml");
     let refused = closecall(["check", scenario.to_str().unwrap(), "--fitted", us101.to_str().unwrap()]);
     assert_eq!(code(&refused), 3, "{}", message(&refused));

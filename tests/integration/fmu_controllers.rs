@@ -1,5 +1,6 @@
-//! Controllers that are FMUs. The examples for FMI 2.0 and 3.0 have the outcomes of the built-in controller, to the last bit. An FMU
-//! that misbehaves costs its own samples; one that cannot be used is refused before the first sample.
+//! Controllers that are FMUs. The examples for FMI 2.0 and 3.0 have the outcomes of the built-in
+//! controller, to the last bit. An FMU that misbehaves costs its own samples; one that cannot be
+//! used is refused before the first sample.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,15 +18,16 @@ pub(crate) fn fmu(fmi: &str, to: &Path, options: &[&str]) -> String {
     format!("fmu:{}", to.display())
 }
 
-/// Writes the description of the example with the first `from` replaced by `to`, and returns the FMU.
+/// Writes the description of the example with the first `from` replaced by `to`, and returns the
+/// FMU.
 fn fmu_with(folder: &Path, name: &str, (fmi, from, to): (&str, &str, &str), options: &[&str]) -> String {
     let source = Path::new(ROOT).join(format!("examples/fmu/modelDescription-fmi{fmi}.xml"));
     let text = std::fs::read_to_string(source).unwrap();
     assert!(text.contains(from), "{from}");
     let description = folder.join(format!("{name}.xml"));
     std::fs::write(&description, text.replacen(from, to, 1)).unwrap();
-    let given = ["--description", description.to_str().unwrap()];
-    fmu(fmi, &folder.join(format!("{name}.fmu")), &[&given, options].concat())
+    let description_option = ["--description", description.to_str().unwrap()];
+    fmu(fmi, &folder.join(format!("{name}.fmu")), &[&description_option, options].concat())
 }
 
 #[test]
@@ -50,8 +52,8 @@ fn fmus_of_both_versions_have_the_outcomes_of_the_built_in_controller() {
         let records = records(&outs[0]);
         assert!(records.iter().all(is_as_baseline), "{controller}");
         assert!(records.iter().any(|record| record.arms[1].tally().collided == Some(true)), "nothing happens");
-        let [one, two] = outs.each_ref().map(|out| std::fs::read(out.join("outcomes.parquet")).unwrap());
-        assert!(one == two, "{controller}");
+        let [version_1, version_2] = outs.each_ref().map(|out| std::fs::read(out.join("outcomes.parquet")).unwrap());
+        assert!(version_1 == version_2, "{controller}");
     }
     let run = |controller: &str| {
         let arguments = ["run", "low-thw-overtake", "--sensors", "object", "--controller", controller];
@@ -133,7 +135,8 @@ fn a_fault_of_an_fmu_costs_its_samples_and_changes_no_other() {
         }
         assert!(failed > 1, "{fault} shows in {failed} samples");
     }
-    // A process that crashes leaves nothing behind: the program that has unpacked the FMU for it removes the folder.
+    // A process that crashes leaves nothing behind: the program that has unpacked the FMU for it
+    // removes the folder.
     let temporary = folder.path().join("temporary");
     std::fs::create_dir(&temporary).unwrap();
     let run = |fault: &str| {
@@ -253,7 +256,8 @@ fn an_fmu_that_cannot_be_used_is_refused_before_the_first_sample() {
     }
 }
 
-/// Writes an archive with the files of another one, whose names and description a line of Python changes.
+/// Writes an archive with the files of another one, whose names and description a line of Python
+/// changes.
 const REWRITE: &str = "\
 import sys, zipfile
 source, target, change = sys.argv[1:]

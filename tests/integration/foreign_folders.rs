@@ -1,4 +1,5 @@
-//! A folder that another machine or another user has written runs nothing unasked, and leads to no other file.
+//! A folder that another machine or another user has written runs nothing unasked, and leads to no
+//! other file.
 
 use std::fs;
 use std::path::Path;
@@ -36,9 +37,9 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
     let controller = "exec:sh telling.sh";
     let campaign = ["campaign", "low-thw-overtake", "-n", "3", "--sensors", "object", "--no-gate", "--paired"];
     let limits = ["--controller", controller, "--controller-timeout-ms", "60000"];
-    let [own, foreign] = ["own", "foreign"].map(at);
+    let [user_folder, foreign] = ["own", "foreign"].map(at);
     let user = |home: &Path| of_user(home, place.path());
-    stdout(&run(user(&own).args(campaign).args(limits), &["--out", "out", "--record", "failures:0"]), 0);
+    stdout(&run(user(&user_folder).args(campaign).args(limits), &["--out", "out", "--record", "failures:0"]), 0);
     fs::remove_file(&ran).unwrap();
 
     let commands: [&[&str]; 5] = [
@@ -68,12 +69,12 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
     assert!(message(&trusted).contains("trusting out, which names: exec:sh telling.sh"), "{}", stderr(&trusted));
     // The user who has run the campaign is not asked, nor after the folder was moved.
     fs::rename(at("out"), at("moved")).unwrap();
-    stdout(&run(&mut user(&own), &["replay", "moved", "1"]), 0);
+    stdout(&run(&mut user(&user_folder), &["replay", "moved", "1"]), 0);
     // An edited manifest is not the one that was written.
     let manifest = at("moved/manifest.json");
     let edited = fs::read_to_string(&manifest).unwrap().replace("sh telling.sh", "sh  telling.sh");
     fs::write(&manifest, edited).unwrap();
-    assert_eq!(code(&run(&mut user(&own), &["replay", "moved", "1"])), 2);
+    assert_eq!(code(&run(&mut user(&user_folder), &["replay", "moved", "1"])), 2);
 }
 
 #[test]
@@ -83,7 +84,7 @@ fn parts_of_others_are_merged_without_running_their_commands() {
     fs::write(at("telling.sh"), TELLING).unwrap();
     let ran = at("ran");
     let controller = "exec:sh telling.sh";
-    let [own, foreign] = ["own", "foreign"].map(at);
+    let [user_folder, foreign] = ["own", "foreign"].map(at);
     let user = |home: &Path| of_user(home, place.path());
     for part in ["1/2", "2/2"] {
         let out = format!("part-{}", &part[..1]);
@@ -98,7 +99,7 @@ fn parts_of_others_are_merged_without_running_their_commands() {
             "--record",
             "failures:0",
         ];
-        stdout(&run(user(&own).args(words), &more), 0);
+        stdout(&run(user(&user_folder).args(words), &more), 0);
     }
     fs::remove_file(&ran).unwrap();
     let merge = ["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "merged"];
@@ -114,8 +115,8 @@ fn parts_of_others_are_merged_without_running_their_commands() {
     assert_eq!(code(&run(&mut user(&foreign), &["replay", "merged", "1"])), 2);
     let recorded = ["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "third", "--record", "worst:1"];
     assert_eq!(code(&run(&mut user(&foreign), &recorded)), 2);
-    stdout(&run(&mut user(&own), &["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "again"]), 0);
-    stdout(&run(&mut user(&own), &["replay", "again", "1"]), 0);
+    stdout(&run(&mut user(&user_folder), &["tool", "merge", "part-1", "part-2", "--no-gate", "--out", "again"]), 0);
+    stdout(&run(&mut user(&user_folder), &["replay", "again", "1"]), 0);
 }
 
 /// Runs a command, and fails if it takes longer than a minute.
@@ -161,8 +162,13 @@ fn neither_a_link_nor_a_named_pipe_is_taken_for_a_file_of_a_folder() {
             }
             let output = within_a_minute(&mut campaign());
             assert_eq!(code(&output), 6, "{name}: {}", stderr(&output));
-            let what = if is_pipe { "it is a named pipe, and no file" } else { "it is a symbolic link, and no file" };
-            assert!(message(&output).contains(name) && message(&output).contains(what), "{name}: {}", stderr(&output));
+            let refusal =
+                if is_pipe { "it is a named pipe, and no file" } else { "it is a symbolic link, and no file" };
+            assert!(
+                message(&output).contains(name) && message(&output).contains(refusal),
+                "{name}: {}",
+                stderr(&output)
+            );
             assert_eq!(fs::read_to_string(&victim).unwrap(), "kept", "{name}");
         }
     }
@@ -195,7 +201,7 @@ fn no_input_that_is_a_named_pipe_hangs() {
 fn a_controller_that_changes_during_the_campaign_makes_it_invalid() {
     let place = folder();
     let at = |name: &str| place.path().join(name);
-    // The controller edits a file in its first run: itself, or one that it reads.
+    // The controller edits a file in its first run: itself, or a file that it reads.
     let script = |edited: &str| {
         format!(
             "#!/bin/sh\n. ./helper.sh\nun=un\n[ -e edited ] || {{ : > edited; echo '# more' >> {edited}; }}\n\
@@ -210,7 +216,7 @@ fn a_controller_that_changes_during_the_campaign_makes_it_invalid() {
         }
         fs::write(at("helper.sh"), "true\n").unwrap();
         fs::write(at("unused.sh"), "true\n").unwrap();
-        // A name that stands in the text would count as that of a part.
+        // A name in the text would count as the name of a part.
         fs::write(at("own.sh"), script(&edited.replace("unused", "${un}used"))).unwrap();
         // The greeting before the campaign is no part of it.
         fs::write(at("edited"), "").unwrap();

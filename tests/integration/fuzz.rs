@@ -1,7 +1,9 @@
-//! Damaged inputs of every kind end with a documented exit code and a message: never with a panic, a hang or a demand for memory.
+//! Damaged inputs of every kind end with a documented exit code and a message: never with a panic,
+//! a hang or a demand for memory.
 //!
-//! Each target starts from valid files, damages one of them, and gives it to the program, which has a limit of memory and of time. A damaged
-//! file whose result is new (another exit code, or other words) joins the files that are damaged further. A night takes more rounds:
+//! Each target starts from valid files, damages one of them, and gives it to the program, which has
+//! a limit of memory and of time. A damaged file whose result is new (another exit code, or other
+//! words) joins the files that are damaged further. A night takes more rounds:
 //!
 //! ```sh
 //! CLOSECALL_FUZZ_ROUNDS=20000 CLOSECALL_FUZZ_SEED=7 cargo test --release --workspace --test integration fuzz
@@ -25,9 +27,9 @@ use crate::support::{ROOT, closecall, folder, library};
 
 /// Damaged files of each target.
 const ROUNDS: u64 = 60;
-/// Limit of the address space (KiB), of which threads reserve a part that they do not use.
+/// Limit of the address space (KiB). Threads reserve a part that they do not use.
 const MEMORY_KIB: u64 = 6 << 20;
-/// Limit of time for one file: many times what a valid one takes on a busy machine.
+/// Limit of time for one file: many times the time of a valid one on a busy machine.
 const LIMIT: Duration = Duration::from_secs(60);
 /// Largest damaged file (bytes).
 const MAX_BYTES: usize = 1 << 20;
@@ -132,14 +134,16 @@ fn limited(words: &[String], within: &Path) -> Option<Output> {
     }
 }
 
-/// What tells two results apart: the exit code, and the first words of what the program complains of.
+/// The features that tell two results apart: the exit code, and the first words of the program's
+/// complaint.
 fn kind(output: &Output) -> (Option<i32>, String) {
     let text = String::from_utf8_lossy(&output.stderr) + String::from_utf8_lossy(&output.stdout);
     let words: String = text.chars().filter(|c| c.is_alphabetic() || *c == ' ').take(80).collect();
     (output.status.code(), words)
 }
 
-/// Damages the file `place` within a folder again and again, starting from `seeds`, and runs the program with `words` each time.
+/// Damages the file `place` within a folder again and again, starting from `seeds`, and runs the
+/// program with `words` each time.
 fn fuzz(target: &str, seeds: &[Vec<u8>], within: &Path, place: &str, words: &[&str]) {
     fuzz_within(target, seeds, within, place, words, &|bytes| bytes.to_vec());
 }

@@ -1,5 +1,6 @@
-//! Ten deliberately bad controllers against the library with its own requirement checks: each fails or is not judged, and the
-//! requirement that it violates is named. The margin increase system (MIS) itself passes.
+//! Ten deliberately bad controllers against the library with its own requirement checks: each fails
+//! or is not judged, and the requirement that it violates is named. The margin increase system
+//! (MIS) itself passes.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -26,7 +27,8 @@ use crate::support::library;
 
 /// Samples of each scenario: as many as a 99th percentile needs.
 const SAMPLES: u64 = 300;
-/// Samples of each scenario in which a share is judged that is well below one, but not zero: enough to decide.
+/// Samples of each scenario in which a share is judged that is well below one, but not zero: enough
+/// to decide.
 const SHARE_SAMPLES: u64 = 1_200;
 /// Samples of each scenario with a fault: enough to fail.
 const FAULT_SAMPLES: u64 = 40;
@@ -47,8 +49,8 @@ const LIBRARY: [&str; 12] = [
     "cut-in-into-margin",
 ];
 
-/// The scenario that the system fails, and the requirement: it is more than 10 m/s slower than the vehicle ahead in more than
-/// 1 % of the samples.
+/// The scenario that the system fails, and the requirement: it is more than 10 m/s slower than the
+/// vehicle ahead in more than 1 % of the samples.
 const MISSED: (&str, &str) = ("cut-in-into-margin", "MIS-6");
 /// The scenarios in which the lead vehicle brakes, so that shares of collisions are judged.
 const BRAKING: [&str; 4] =
@@ -105,7 +107,7 @@ impl ControllerFactory for Fault {
         settings.mis().is_some()
     }
 
-    /// The states are those of the system of this program, with a fault.
+    /// The states are states of this program's system, with a fault.
     fn is_built_in(&self) -> bool {
         true
     }
@@ -176,7 +178,8 @@ impl EgoController for Faulty {
     }
 }
 
-/// Runs scenarios with the cruise control and with the controller under test, and judges them by their own checks.
+/// Runs scenarios with the cruise control and with the controller under test, and judges them by
+/// their own checks.
 fn judged(names: &[&str], tested: &Arc<dyn ControllerFactory>, samples: u64) -> (Summary, Judgement) {
     let sampling = Sampling { seed: SEED, design: Design::Random, samples };
     let arm = |controller| Arm { controller, sensors: Some(SensorMode::GroundTruth) };

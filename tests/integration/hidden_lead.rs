@@ -1,6 +1,7 @@
-//! A regression test. The ego brakes behind the lead vehicle, and the rear vehicle passes close by. For half a second
-//! the ego once took the rear vehicle for its lead vehicle, released the brake, and ran into the lead vehicle. Samples
-//! 36, 176 and 189 of `low-thw-overtake` with object-level sensors showed it.
+//! A regression test. The ego brakes behind the lead vehicle, and the rear vehicle passes close by.
+//! For half a second the ego once took the rear vehicle for its lead vehicle, released the brake,
+//! and ran into the lead vehicle. Samples 36, 176 and 189 of `low-thw-overtake` with object-level
+//! sensors showed it.
 
 use crate::support::{closecall, json, library};
 

@@ -1,4 +1,4 @@
-//! Inputs are neither overwritten nor read without a bound, and what is not used cannot fail.
+//! Inputs are neither overwritten nor read without a bound, and an unused part cannot fail.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `inspect` reports flaws of trajectory files and reads the logs that a vehicle makes of itself.
+//! `inspect` reports flaws of trajectory files and reads the logs that a vehicle records of itself.
 
 use std::fs;
 
@@ -49,8 +49,8 @@ fn an_in_car_log_has_a_file_of_true_lane_changes_beside_it() {
     assert_eq!((report["layout"].as_str(), report["period_s"].as_f64()), (Some("in-car"), Some(0.01)));
     let changes = json(&closecall(["traffic", "lane-changes", csv, "--format", "json"]), 0);
     for (change, truth) in changes.as_array().unwrap().iter().zip(&crossings) {
-        let found = change["crossing_s"].as_f64().unwrap();
-        assert!((found - truth).abs() <= 0.3, "{found} instead of {truth}");
+        let crossing_s = change["crossing_s"].as_f64().unwrap();
+        assert!((crossing_s - truth).abs() <= 0.3, "{crossing_s} instead of {truth}");
     }
     assert_eq!(changes.as_array().unwrap().len(), 3);
     let unknown = closecall(["traffic", "record", scenario, "-n", "1", "--in-car=nobody", "-o", csv]);

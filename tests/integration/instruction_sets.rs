@@ -1,6 +1,7 @@
-//! The network of the rear camera runs on kernels that are chosen by what the processor can do, and so do the mathematical functions of
-//! the C library. Outcomes do not depend on the choice: the code calls the functions of `libm` by name instead (`docs/explanation/determinism.md`).
-//! The ray cast, whose vector registers no variable chooses, is compared in `sensors/src/lidar/tests/cast.rs`.
+//! The network of the rear camera runs on kernels that depend on the processor, and so do the
+//! mathematical functions of the C library. Outcomes do not depend on the choice: the code calls
+//! the functions of `libm` by name instead (`docs/explanation/determinism.md`). The ray cast, whose
+//! vector registers no variable chooses, is compared in `sensors/src/lidar/tests/cast.rs`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -10,7 +11,8 @@ use object::{Object, ObjectSymbol};
 
 use crate::support::{folder, library, program, stderr, stdout};
 
-/// The variables by which `tract` (`+avx2,-fma`) and the GNU C library are told what the processor can do.
+/// The variables that tell `tract` (`+avx2,-fma`) and the GNU C library the abilities of the
+/// processor.
 const INSTRUCTION_SETS: [&str; 2] = ["TRACT_CPU_ISA", "GLIBC_TUNABLES"];
 
 /// Runs a paired campaign as if the processor had these instruction sets.
@@ -40,7 +42,8 @@ fn outcomes_do_not_depend_on_vector_instructions() {
     assert!(!refused.status.success() && stderr(&refused).contains(INSTRUCTION_SETS[0]), "{}", stderr(&refused));
 }
 
-/// Functions of the C library whose last digits depend on its version and on the processor. Those of single precision have an `f` behind.
+/// Functions of the C library whose last digits depend on its version and on the processor. Those
+/// of single precision have an `f` behind.
 const INEXACT: [&str; 35] = [
     "sin", "cos", "sincos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
     "exp", "exp2", "exp10", "expm1", "log", "log2", "log10", "log1p", "pow", "cbrt", "hypot", "erf", "erfc", "lgamma",

@@ -1,4 +1,5 @@
-//! The scenarios of the library are valid, name the source of their numbers, and behave as their descriptions promise.
+//! The scenarios of the library are valid, name the source of their numbers, and behave as their
+//! descriptions promise.
 
 use std::path::Path;
 
@@ -81,7 +82,8 @@ fn fitted_distributions_equal_those_of_the_committed_fit() {
                 continue;
             }
             count += 1;
-            // A quantity of another vehicle is drawn from the fit of all vehicles, or of the vehicle ahead.
+            // A quantity of another vehicle is drawn from the fit of all vehicles, or of the
+            // vehicle ahead.
             let name = name.to_string();
             let quantity = name.split_once('-').map_or("", |(_, quantity)| quantity);
             let names: Vec<String> = [name.clone(), quantity.to_owned(), format!("front-{quantity}")]

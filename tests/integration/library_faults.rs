@@ -1,10 +1,12 @@
-//! A sensor that is dead or frozen leaves the margin increase system not available, with its reason, and no campaign passes.
+//! A sensor that is dead or frozen leaves the margin increase system not available, with its
+//! reason, and no campaign passes.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::{ROOT, closecall, code, folder, json, message, stdout};
 
-/// The scenarios in which a sensor delivers nothing, or always the same, and the reason that the ego gives.
+/// The scenarios in which a sensor delivers nothing, or always the same, and the reason that the
+/// ego gives.
 const FAILED: [(&str, &str); 11] = [
     ("camera-dead", "not available: rear sensors failed"),
     ("camera-frozen", "not available: rear sensors failed"),
@@ -23,7 +25,8 @@ fn text_of(name: &str) -> String {
     std::fs::read_to_string(Path::new(ROOT).join(format!("scenarios/library/faults/{name}.toml"))).unwrap()
 }
 
-/// Writes the scenario without what judges it. With `is_sound`, its fault begins when the encounter is over.
+/// Writes the scenario without what judges it. With `is_sound`, its fault begins when the encounter
+/// is over.
 fn unjudged(folder: &Path, name: &str, is_sound: bool) -> PathBuf {
     let text = text_of(name);
     let (before, rest) = text.split_once("[checks]").unwrap();

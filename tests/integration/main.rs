@@ -1,4 +1,5 @@
-//! Tests of the whole program: its commands, files and exit codes, and the evidence behind its verdicts.
+//! Tests of the whole program: its commands, files and exit codes, and the evidence behind its
+//! verdicts.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -80,5 +81,6 @@ mod view;
 mod viewer;
 mod worker_processes;
 
-// `xtask` has this constant, too: its modules that are tested here look for it in the root of their crate.
+// `xtask` has this constant, too: its modules that are tested here look for it in the root of their
+// crate.
 use support::ROOT;

@@ -4,7 +4,8 @@ use std::fs;
 
 use crate::support::{closecall, code, folder, headline_with, message, stderr};
 
-/// Returns the invalid scenarios: the fault, the content of the file, and the words that the message must contain.
+/// Returns the invalid scenarios: the fault, the content of the file, and the words that the
+/// message must contain.
 fn cases() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
     let text = |from: &str, to: &str| headline_with(from, to).into_bytes();
     vec![

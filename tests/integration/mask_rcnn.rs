@@ -36,7 +36,8 @@ fn without_onnx_runtime_it_says_how_to_get_it() {
     assert!(!out.exists(), "nothing is written");
 }
 
-/// Writes a scenario in which a parameter gives the pipeline, which is the crop classifier nearly always.
+/// Writes a scenario in which a parameter gives the pipeline, which is the crop classifier nearly
+/// always.
 fn sampled_pipeline(folder: &Path) -> String {
     let path = folder.join("sampled-pipeline.toml");
     let text = "base = \"low-thw-overtake\"\nname = \"sampled-pipeline\"\n\
@@ -118,15 +119,16 @@ fn one_and_three_jobs_give_the_same_bits() {
     let outcomes = |jobs: &str| {
         let out = folder.path().join(jobs);
         let more = ["--onnxruntime", library_file.to_str().unwrap(), "--paired", "--jobs", jobs];
-        // After 12 s, the events that the scenario expects have not happened: no verdict is wanted, but the same one.
+        // After 12 s, the events that the scenario expects have not happened: no verdict is wanted,
+        // but the same one.
         let output = closecall(campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
         let verdict = code(&output);
         let read = |path: &Path| std::fs::read(path).unwrap();
         (verdict, read(&out.join("outcomes.parquet")))
     };
-    let (one, three) = (outcomes("1"), outcomes("3"));
-    assert_eq!(one.0, three.0);
-    assert!(one.1 == three.1, "the outcomes differ");
+    let (one_job, three_jobs) = (outcomes("1"), outcomes("3"));
+    assert_eq!(one_job.0, three_jobs.0);
+    assert!(one_job.1 == three_jobs.1, "the outcomes differ");
 }
 
 #[test]

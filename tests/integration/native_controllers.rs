@@ -1,5 +1,6 @@
-//! Controllers that are shared libraries. The examples in C and Rust have the outcomes of the built-in controller, to the last bit.
-//! A library that misbehaves costs its own samples, with a message that names the fault.
+//! Controllers that are shared libraries. The examples in C and Rust have the outcomes of the
+//! built-in controller, to the last bit. A library that misbehaves costs its own samples, with a
+//! message that names the fault.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -67,8 +68,8 @@ pub(crate) fn records(out: &Path) -> Vec<Record> {
     Folder::open(out).records().unwrap().map(Result::unwrap).collect()
 }
 
-/// Returns an outcome under the name of another, and with its summary of the margin increase system: what the reference says of
-/// neither is not compared.
+/// Returns an outcome with the name and the summary of the margin increase system of another: the
+/// reference has neither, and they are not compared.
 fn named_as(outcome: &Outcome, reference: &Outcome) -> Outcome {
     Outcome { controller: reference.controller.clone(), mis: reference.mis.clone(), ..outcome.clone() }
 }
@@ -102,8 +103,8 @@ fn libraries_in_c_and_rust_have_the_outcomes_of_the_built_in_controller() {
         assert!(records.iter().all(is_as_baseline), "{}", library.display());
         assert!(records.iter().any(|record| record.arms[1].tally().collided == Some(true)), "nothing happens");
         // The number of jobs changes no byte.
-        let [one, three] = outs.each_ref().map(|out| std::fs::read(out.join("outcomes.parquet")).unwrap());
-        assert!(one == three);
+        let [one_job, three_jobs] = outs.each_ref().map(|out| std::fs::read(out.join("outcomes.parquet")).unwrap());
+        assert!(one_job == three_jobs);
         // A run outside of a campaign answers step by step, with the same bits.
         let run = |controller: &str| {
             let arguments = ["run", "low-thw-overtake", "--seed", "3", "--sample", "5", "--sensors", "object"];
@@ -224,15 +225,15 @@ fn the_rounding_mode_of_a_library_is_not_that_of_the_simulation() {
 #[test]
 fn a_library_that_is_replaced_during_a_campaign_ends_it() {
     let folder = folder();
-    let (own, next) = (folder.path().join("own.so"), folder.path().join("next.so"));
-    compile("tests/fixtures/controllers/faulty.c", &own, &[]);
+    let (library, next) = (folder.path().join("own.so"), folder.path().join("next.so"));
+    compile("tests/fixtures/controllers/faulty.c", &library, &[]);
     compile("tests/fixtures/controllers/faulty.c", &next, &["-DVERSION=\"2\""]);
     let out = folder.path().join("out");
     let mut command = program();
     command
         .args(["campaign", "low-thw-overtake", "-n", "4", "--sensors", "object", "--no-gate", "--jobs", "1"])
-        .args(["--controller", &lib(&own), "--out", out.to_str().unwrap()])
-        .envs([("FAULT_ALWAYS", "1".as_ref()), ("OWN", own.as_os_str()), ("NEXT", next.as_os_str())]);
+        .args(["--controller", &lib(&library), "--out", out.to_str().unwrap()])
+        .envs([("FAULT_ALWAYS", "1".as_ref()), ("OWN", library.as_os_str()), ("NEXT", next.as_os_str())]);
     let output = with_fault(&mut command, Some("replaces"));
     assert_eq!(code(&output), 7, "{}", stderr(&output));
     assert!(stderr(&output).contains("own.so has changed since the start"), "{}", stderr(&output));

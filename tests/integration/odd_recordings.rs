@@ -1,5 +1,5 @@
-//! Recordings with the blemishes that public bug reports describe: the lane changes of the clean file, or a refusal that names
-//! the cause. A wrong number never leaves with exit code 0.
+//! Recordings with the blemishes that public bug reports describe: the lane changes of the clean
+//! file, or a refusal that names the cause. A wrong number never leaves with exit code 0.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,8 @@ fn refusal(file: &Path, options: &[&str]) -> String {
     stderr(&output)
 }
 
-/// Writes the rows for which `keep` returns true, given their column `frame` and their line, and returns the file.
+/// Writes the rows for which `keep` returns true, given their column `frame` and their line, and
+/// returns the file.
 fn thinned(clean: &Path, to: &Path, keep: impl Fn(u64, usize) -> bool) -> PathBuf {
     let text = fs::read_to_string(clean).unwrap();
     let mut lines = text.lines();
@@ -60,8 +61,8 @@ fn a_file_with_fewer_frames_has_the_lane_changes_of_the_whole_file() {
     let whole = lane_changes(&clean, &[]).0.len();
     assert!(whole >= 35, "{whole}");
     let thin = |name: &str, keep: &dyn Fn(u64, usize) -> bool| {
-        let (found, warnings) = lane_changes(&thinned(&clean, &folder.path().join(name), keep), &[]);
-        assert!(found.len().abs_diff(whole) <= 1, "{name}: {} instead of {whole}", found.len());
+        let (changes, warnings) = lane_changes(&thinned(&clean, &folder.path().join(name), keep), &[]);
+        assert!(changes.len().abs_diff(whole) <= 1, "{name}: {} instead of {whole}", changes.len());
         warnings
     };
     assert_eq!(thin("second", &|frame, _| frame % 2 == 0), "");
@@ -79,9 +80,9 @@ fn recorded_traffic_with_fewer_frames_keeps_its_lane_changes() {
     let folder = folder();
     let whole = lane_changes(&clean, &[]).0.len();
     for (name, step) in [("second", 2), ("fourth", 4)] {
-        let found =
+        let changes =
             lane_changes(&thinned(&clean, &folder.path().join(name), |frame, _| frame % step == 0), &[]).0.len();
-        assert!(found.abs_diff(whole) <= 1, "{name}: {found} instead of {whole}");
+        assert!(changes.abs_diff(whole) <= 1, "{name}: {changes} instead of {whole}");
     }
     let lost = lane_changes(&thinned(&clean, &folder.path().join("lost"), |_, line| line % 50 != 7), &[]).0.len();
     assert!(lost.abs_diff(whole) <= 1, "{lost} instead of {whole}");

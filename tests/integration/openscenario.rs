@@ -103,7 +103,7 @@ fn a_scenario_command_says_which_command_imports_xml() {
     assert!(message(&output).contains("closecall tool import"), "{}", message(&output));
 }
 
-/// Faults of a scenario: what is replaced by what, and the words that the message must have.
+/// Faults of a scenario: a text, its replacement, and the words that the message must have.
 fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
     vec![
         ("<OpenSCENARIO>", "<OpenScenario>", &["OpenSCENARIO"]),
@@ -228,7 +228,7 @@ fn an_entity_bomb_is_refused_before_it_grows() {
     let refused = imported(&written(folder.path(), &with_bomb, ROAD), &output, &[]);
     assert_eq!(code(&refused), 3);
     assert!(message(&refused).contains("document type declaration"), "{}", message(&refused));
-    // Without its declaration, the name stands for nothing.
+    // Without its declaration, the name has no value.
     let with_name = SCENARIO.replacen("a cut-in, for tests", "&a9;", 1);
     let refused = imported(&written(folder.path(), &with_name, ROAD), &output, &[]);
     assert_eq!(code(&refused), 3);
@@ -240,7 +240,8 @@ fn an_entity_bomb_is_refused_before_it_grows() {
     assert!(!output.exists());
 }
 
-/// The scenarios of others that are imported; all others are refused, each at a line and an element.
+/// The scenarios of others that are imported; all others are refused, each at a line and an
+/// element.
 const IMPORTED: [&str; 9] = [
     "alks_decelerate",
     "cut-in",

@@ -17,7 +17,8 @@ fn the_controller_of_the_example_runs_a_campaign() {
     let file = ScenarioFile::load(&library("low-thw-overtake"), &[]).unwrap();
     let counts = example::against_cruise_control(file, Arc::new(example::RoomMakers), 40).unwrap();
     assert_eq!((counts.samples, counts.errors(), counts.invalid), (40, 0, 0));
-    // The controller has an effect: some sample ends differently than with the cruise control alone.
+    // The controller has an effect: some sample ends differently than with the cruise control
+    // alone.
     assert!(counts.pairs.prevented + counts.pairs.induced > 0, "{counts:?}");
 }
 

@@ -1,4 +1,5 @@
-//! A page in a browser without a window, driven through the browser's own protocol (Chrome DevTools Protocol, over a pipe).
+//! A page in a browser without a window, driven through the browser's own protocol (Chrome DevTools
+//! Protocol, over a pipe).
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -22,7 +23,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    /// Opens an address. `profile` is a folder for what the browser keeps.
+    /// Opens an address. `profile` is a folder for the browser's data.
     ///
     /// # Panics
     /// If the browser does not start.
@@ -99,8 +100,8 @@ impl Page {
     pub(crate) fn wait_for(&mut self, expression: &str) {
         let start = Instant::now();
         while self.evaluate(expression) != json!(true) {
-            let seen = self.evaluate("document.body?.innerText.slice(0, 2000)");
-            assert!(start.elapsed() < DEADLINE, "{expression} does not become true: {seen}");
+            let shown = self.evaluate("document.body?.innerText.slice(0, 2000)");
+            assert!(start.elapsed() < DEADLINE, "{expression} does not become true: {shown}");
             sleep(Duration::from_millis(50));
         }
     }

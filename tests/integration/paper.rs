@@ -50,10 +50,10 @@ fn one_command_draws_all_figures_of_our_own_traffic() {
         ];
         stdout(&closecall(args), 0);
     }
-    let (one, two, out) = (file("one.csv"), file("two.csv"), file("paper"));
-    stdout(&closecall(["traffic", "paper", &one, &two, "-o", &out, "--repetitions", "2"]), 0);
+    let (first, second, out) = (file("one.csv"), file("two.csv"), file("paper"));
+    stdout(&closecall(["traffic", "paper", &first, &second, "-o", &out, "--repetitions", "2"]), 0);
     check_figures(Path::new(&out), &["overtake-without-brake"]);
-    let twice = closecall(["traffic", "paper", &one, &one, "-o", &out]);
+    let twice = closecall(["traffic", "paper", &first, &first, "-o", &out]);
     assert_eq!(code(&twice), 2, "{}", message(&twice));
 }
 

@@ -1,4 +1,5 @@
-//! The scenario `paper-figure` reproduces the figure of the paper: its numbers, and its five moments.
+//! The scenario `paper-figure` reproduces the figure of the paper: its numbers, and its five
+//! moments.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::ScenarioFile;

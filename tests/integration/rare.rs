@@ -1,4 +1,5 @@
-//! `campaign --design subset|importance` estimates the probability of a rare event, resumes to the same bytes, and refuses what does not fit.
+//! `campaign --design subset|importance` estimates the probability of a rare event, resumes to the
+//! same bytes, and refuses options that do not fit.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -38,7 +39,8 @@ fn both_methods_cover_a_probability_that_plain_sampling_does_not_reach() {
 
 #[test]
 fn a_number_with_a_bound_is_an_event_of_its_own() {
-    // The smallest gap is the gap at the start less 10 m: below 2 m beyond (30 − 12) / 5 = 3.6 standard deviations.
+    // The smallest gap is the gap at the start less 10 m: below 2 m beyond (30 − 12) / 5 = 3.6
+    // standard deviations.
     let path = fixture();
     let event = "min_gap_rear_m < 2";
     let words = ["campaign", path.to_str().unwrap(), "--controller", "acc", "--design", "importance", "--event", event];
@@ -52,12 +54,12 @@ fn a_number_with_a_bound_is_an_event_of_its_own() {
 #[test]
 fn a_campaign_that_was_cut_off_goes_on_to_the_same_bytes_with_any_number_of_threads() {
     let place = folder();
-    let [one, other] = ["one", "other"].map(|name| place.path().join(name));
+    let [whole_run, other] = ["one", "other"].map(|name| place.path().join(name));
     let run = |out: &Path, more: &str| rare(&format!("{BY_IMPORTANCE} --seed 3 --out {} {more}", out.display()));
-    let whole = stdout(&run(&one, "--jobs 1"), 0);
+    let whole = stdout(&run(&whole_run, "--jobs 1"), 0);
     stdout(&run(&other, "--jobs 2"), 0);
     let journal = |out: &Path| fs::read(out.join("rare-journal.jsonl")).unwrap();
-    assert_eq!(journal(&one), journal(&other));
+    assert_eq!(journal(&whole_run), journal(&other));
     // As a kill leaves it: within a line, and without a result.
     let kept = journal(&other);
     for share in [3, 2] {
@@ -65,7 +67,7 @@ fn a_campaign_that_was_cut_off_goes_on_to_the_same_bytes_with_any_number_of_thre
         fs::remove_file(other.join("rare.json")).unwrap();
         assert_eq!(stdout(&run(&other, "--jobs 3 --resume"), 0), whole);
         assert_eq!(journal(&other), kept);
-        assert_eq!(fs::read(other.join("rare.json")).unwrap(), fs::read(one.join("rare.json")).unwrap());
+        assert_eq!(fs::read(other.join("rare.json")).unwrap(), fs::read(whole_run.join("rare.json")).unwrap());
     }
     let refused = run(&other, "--jobs 2");
     assert_eq!(code(&refused), 2, "{}", stderr(&refused));
@@ -78,9 +80,9 @@ fn a_campaign_that_was_cut_off_goes_on_to_the_same_bytes_with_any_number_of_thre
     ));
     assert!(message(&event).contains("event: ego_collided there, others_collided here"), "{}", message(&event));
     // No other command takes the weighted runs for samples.
-    let compared = closecall(["compare", one.to_str().unwrap(), other.to_str().unwrap()]);
+    let compared = closecall(["compare", whole_run.to_str().unwrap(), other.to_str().unwrap()]);
     assert_ne!(code(&compared), 0);
-    // A damaged line ends what is kept: its run and those behind it are run again.
+    // A damaged line ends the kept part: its run and all later runs are run again.
     let mut damaged = kept.clone();
     damaged[30] ^= 1;
     fs::write(other.join("rare-journal.jsonl"), damaged).unwrap();

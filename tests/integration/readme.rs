@@ -1,12 +1,13 @@
 //! The README and the pages of `docs/` show commands that work, with the output that they print.
 //!
-//! Each document is followed from top to bottom in a folder of its own, as a reader does it:
+//! Each document is followed from top to bottom in a separate folder, as a reader does it:
 //!
 //! - In a `sh` block every line that starts with a known program is run. It must end with exit code 0, or with the one
 //!   that a comment at the end of the line gives: `closecall check broken.toml  # exit code 3`.
 //! - A block whose info string has a second word is a file of that name: `toml my.toml`.
-//! - A `text` block that is the next one after a `sh` block is the output of its commands, to the letter. Only the wall
-//!   time of a campaign, its number of threads and the share of its validity checks may differ.
+//! - A `text` block that is the next one after a `sh` block is the output of its commands, to the
+//!   letter. Only the wall time of a campaign, its number of threads and the share of its validity
+//!   checks may differ.
 //!
 //! With `CLOSECALL_WRITE_DOCUMENTS=1` the documents get the outputs that their commands print.
 
@@ -79,7 +80,8 @@ fn lines(block: &str) -> Vec<Line> {
     joined.lines().map(run).filter(is_run).collect()
 }
 
-/// Returns a text without what differs between machines: the wall time and the number of threads of a campaign.
+/// Returns a text without what differs between machines: the wall time and the number of threads of
+/// a campaign.
 fn without_wall_time(text: &str) -> Vec<String> {
     const SIMULATED: &str = " simulated seconds in ";
     let steady = |line: &str| match line.split_once(SIMULATED) {
@@ -136,8 +138,9 @@ impl Reader {
             .unwrap()
     }
 
-    /// Runs a `sh` block, and returns the output of its commands: what they print, or if they print nothing, what they
-    /// complain of. The error lists the commands that ended with another exit code than the document says.
+    /// Runs a `sh` block, and returns the output of its commands: their standard output, or else
+    /// their complaints. The error lists the commands that ended with another exit code than the
+    /// document says.
     fn run_block(&self, block: &Block) -> Result<String, String> {
         let (mut printed, mut complaints, mut wrong) = (String::new(), String::new(), String::new());
         for Line { command, exit_code } in lines(&block.text) {
@@ -153,7 +156,8 @@ impl Reader {
     }
 }
 
-/// If this variable of the environment is set, the documents are written anew with what their commands print.
+/// If this variable of the environment is set, the documents are written anew with the output of
+/// their commands.
 const WRITES: &str = "CLOSECALL_WRITE_DOCUMENTS";
 
 /// Returns a document with another text in the block that opens in this line, counted from 1.
@@ -169,12 +173,12 @@ fn with_block(document: &str, line: usize, text: &str) -> String {
     written
 }
 
-/// What a document showed, and what was wrong with it.
+/// The outputs of a document, and their errors.
 #[derive(Debug, Default)]
 struct Findings {
     commands: usize,
     outputs: usize,
-    /// True if one of the outputs is that of a campaign.
+    /// True if one of the outputs comes from a campaign.
     has_campaign: bool,
     wrong: Vec<String>,
 }
@@ -213,7 +217,7 @@ fn follow(path: &Path) -> Findings {
         }
     }
     if std::env::var_os(WRITES).is_some() {
-        // From the last to the first, so that the lines of the others stay.
+        // From the last to the first: the lines of the others stay.
         let document = std::fs::read_to_string(path).unwrap();
         let written = outputs.iter().rev().fold(document, |text, (line, output)| with_block(&text, *line, output));
         std::fs::write(path, written).unwrap();
@@ -258,12 +262,15 @@ fn documents_show_commands_that_work_with_the_output_that_they_print() {
 fn a_block_is_read_with_its_commands_and_exit_codes() {
     let markdown = "Words.\n```sh\ncargo build --release\ncargo run --release -- check a.toml \\\n  b.toml\n\
                     closecall run c.toml  # exit code 3\n```\n\n```toml c.toml\nname = 1\n```\n```\na\n```\n";
-    let found = blocks(markdown);
-    let infos: Vec<(usize, &str)> = found.iter().map(|block| (block.line, block.info.as_str())).collect();
+    let read_blocks = blocks(markdown);
+    let infos: Vec<(usize, &str)> = read_blocks.iter().map(|block| (block.line, block.info.as_str())).collect();
     assert_eq!(infos, [(2, "sh"), (9, "toml c.toml"), (12, "")]);
-    assert_eq!(found[1].text, "name = 1\n");
+    assert_eq!(read_blocks[1].text, "name = 1\n");
     let line = |command: &str, exit_code| Line { command: command.to_owned(), exit_code };
-    assert_eq!(lines(&found[0].text), [line("closecall check a.toml    b.toml", 0), line("closecall run c.toml", 3)]);
+    assert_eq!(
+        lines(&read_blocks[0].text),
+        [line("closecall check a.toml    b.toml", 0), line("closecall run c.toml", 3)]
+    );
 }
 
 #[test]

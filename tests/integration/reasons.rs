@@ -1,5 +1,5 @@
-//! The reason that is stated for a margin increase system (MIS) that never engaged is the one that the log of its steps shows:
-//! the reason that held longest while it could have engaged.
+//! The reason that is stated for a margin increase system (MIS) that never engaged is the one that
+//! the log of its steps shows: the reason that held longest while it could have engaged.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::Reason;
@@ -55,7 +55,8 @@ fn run(file: &ScenarioFile, sample: u64) -> (Outcome, Log) {
     (outcome, log)
 }
 
-/// The numbers of control steps with each reason in the time in which the system could have engaged.
+/// The numbers of control steps with each reason in the time in which the system could have
+/// engaged.
 fn tally(steps: &[Step], outcome: &Outcome) -> Vec<(Reason, usize)> {
     let since = |actor: usize| steps.iter().find(|step| step.near == Some(actor)).map(|step| step.time);
     let at = |time: Time| steps.iter().find(|step| step.time == time);
@@ -101,11 +102,11 @@ fn the_stated_reason_agrees_with_the_log_in_every_scenario() {
             for sample in 0..samples {
                 let (outcome, Log(steps)) = run(&file, sample);
                 let mis = outcome.mis.as_ref().unwrap();
-                let what = format!("{}, sample {sample}", file.config().name);
-                let of = |span: &ReasonSpan| (span.reason, Time::from_s(span.from_s));
-                assert_eq!(mis.reasons.iter().map(of).collect::<Vec<_>>(), spans(&steps), "{what}");
+                let context = format!("{}, sample {sample}", file.config().name);
+                let stated_span = |span: &ReasonSpan| (span.reason, Time::from_s(span.from_s));
+                assert_eq!(mis.reasons.iter().map(stated_span).collect::<Vec<_>>(), spans(&steps), "{context}");
                 let gaps = mis.reasons.windows(2).filter(|pair| pair[0].until_s != pair[1].from_s).count();
-                assert_eq!(gaps, 0, "{what}: the intervals leave no gap");
+                assert_eq!(gaps, 0, "{context}: the intervals leave no gap");
                 if mis.engaged_at_s.is_ok() {
                     continue;
                 }
@@ -113,7 +114,7 @@ fn the_stated_reason_agrees_with_the_log_in_every_scenario() {
                 let counts = tally(&steps, &outcome);
                 let Some(most) = counts.iter().map(|(_, count)| *count).max() else { continue };
                 let stated = counts.iter().find(|(reason, _)| *reason == mis.reason);
-                assert!(stated.is_some_and(|(_, count)| *count == most), "{what}: {} of {counts:?}", mis.reason);
+                assert!(stated.is_some_and(|(_, count)| *count == most), "{context}: {} of {counts:?}", mis.reason);
             }
         }
     }

@@ -1,4 +1,5 @@
-//! A library that cannot be used as a controller is refused before the first sample, with a message that names what is wrong.
+//! A library that cannot be used as a controller is refused before the first sample, with a message
+//! that names the reason.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,7 +9,7 @@ use crate::support::{code, folder, message, program, stderr};
 
 /// A part of the message for each library that is refused.
 fn refusals(folder: &Path) -> BTreeMap<&'static str, (String, i32, Vec<String>)> {
-    let own = format!("{} {}", std::env::consts::ARCH, std::env::consts::OS);
+    let platform = format!("{} {}", std::env::consts::ARCH, std::env::consts::OS);
     let source = |name: &str, text: &str| {
         let path = folder.join(format!("{name}.c"));
         std::fs::write(&path, text).unwrap();
@@ -32,8 +33,8 @@ fn refusals(folder: &Path) -> BTreeMap<&'static str, (String, i32, Vec<String>)>
     let other = if cfg!(target_arch = "aarch64") { "x86_64" } else { "aarch64" };
     BTreeMap::from([
         ("no file", (lib(&folder.join("absent.so")), 6, vec!["failed to read".to_owned(), "absent.so".to_owned()])),
-        ("text", (lib(&text), 3, vec!["text.so is not a shared library".to_owned(), own.clone()])),
-        ("platform", (lib(&foreign), 3, vec![format!("is a library for {other} linux; expected one for {own}")])),
+        ("text", (lib(&text), 3, vec!["text.so is not a shared library".to_owned(), platform.clone()])),
+        ("platform", (lib(&foreign), 3, vec![format!("is a library for {other} linux; expected one for {platform}")])),
         (
             "abi",
             (
@@ -75,16 +76,16 @@ fn refusals(folder: &Path) -> BTreeMap<&'static str, (String, i32, Vec<String>)>
 #[test]
 fn a_library_that_cannot_be_used_is_refused_before_the_first_sample() {
     let folder = folder();
-    for (what, (controller, expected, parts)) in refusals(folder.path()) {
+    for (case, (controller, expected, parts)) in refusals(folder.path()) {
         let out = folder.path().join("out");
         let output = campaign(&controller, &out, "1", None, &[]);
-        assert_eq!(code(&output), expected, "{what}: {}", stderr(&output));
-        assert!(!out.exists(), "{what}");
+        assert_eq!(code(&output), expected, "{case}: {}", stderr(&output));
+        assert!(!out.exists(), "{case}");
         for part in parts {
-            assert!(message(&output).contains(&part), "{what}: {}", stderr(&output));
+            assert!(message(&output).contains(&part), "{case}: {}", stderr(&output));
         }
         let run = program().args(["run", "low-thw-overtake", "--controller", &controller]).output().unwrap();
-        assert_eq!(code(&run), expected, "{what}: {}", stderr(&run));
+        assert_eq!(code(&run), expected, "{case}: {}", stderr(&run));
     }
     let output = program().args(["run", "low-thw-overtake", "--controller", "lib:"]).output().unwrap();
     assert_eq!(code(&output), 2, "{}", stderr(&output));

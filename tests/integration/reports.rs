@@ -88,7 +88,8 @@ fn a_browser_shows_every_element_of_the_page() {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&shown.stdout);
-    // The browser's document has the verdict as its title, and the charts with their bars and points.
+    // The browser's document has the verdict as its title, and the charts with their bars and
+    // points.
     assert!(text.contains("<title>PASS: low-thw-overtake-at-cut-out, overtake-without-brake</title>"), "{text}");
     let file = fs::read_to_string(out.join("report.html")).unwrap();
     for element in ["<svg", "<circle", "<rect", "<table", "<tr"] {
@@ -104,16 +105,16 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
     fs::write(&summary, "the summary of an earlier step\n").unwrap();
     campaign(&out, &["--recordings", "0"], Some(&summary), 0);
     let text = fs::read_to_string(&summary).unwrap();
-    let own = fs::read_to_string(out.join("summary.md")).unwrap();
-    assert_eq!(text, format!("the summary of an earlier step\n{own}"));
-    assert!(own.starts_with("## Closecall: PASS"), "{own}");
+    let summary = fs::read_to_string(out.join("summary.md")).unwrap();
+    assert_eq!(text, format!("the summary of an earlier step\n{summary}"));
+    assert!(summary.starts_with("## Closecall: PASS"), "{summary}");
     assert!(
-        own.contains("| low-thw-overtake-at-cut-out | mis | 480 |")
-            && own.contains("| MIS-1 | low-thw-overtake-at-cut-out | met |"),
-        "{own}"
+        summary.contains("| low-thw-overtake-at-cut-out | mis | 480 |")
+            && summary.contains("| MIS-1 | low-thw-overtake-at-cut-out | met |"),
+        "{summary}"
     );
     // Every row of a table has as many cells as the head.
-    for table in own.split("\n\n").filter(|block| block.starts_with('|')) {
+    for table in summary.split("\n\n").filter(|block| block.starts_with('|')) {
         let cells: Vec<usize> = table.lines().map(|line| line.matches('|').count()).collect();
         assert!(cells.iter().all(|count| *count == cells[0]), "{table}");
     }

@@ -7,8 +7,8 @@ use closecall_testing::viewer;
 
 use crate::support::{all_of_library, closecall, code, folder, library, program, stderr, stdout};
 
-/// Fails if the viewer does not verify a recording, or if the recording lacks a timeline or an entity that its
-/// blueprint shows.
+/// Fails if the viewer does not verify a recording, or if the recording lacks a timeline or an
+/// entity that its blueprint shows.
 fn verify(viewer: &Path, file: &Path) {
     let size = std::fs::metadata(file).unwrap().len();
     assert!(size > 10_000 && size < 25_000_000, "{}: {size} bytes", file.display());
@@ -41,14 +41,14 @@ fn recordings_of_a_pair_a_full_run_and_recorded_traffic_verify() {
     let [pair, full, traffic, beside] = ["pair.rrd", "full.rrd", "traffic.rrd", "beside.rrd"].map(file);
     stdout(&closecall(["run", figure.to_str().unwrap(), "--paired", "--record", &pair]), 0);
     stdout(&closecall(["run", headline.to_str().unwrap(), "--sensors", "full", "--record", &full]), 0);
-    let own = file("own.csv");
-    stdout(&closecall(["traffic", "record", headline.to_str().unwrap(), "-n", "2", "-o", &own]), 0);
-    stdout(&closecall(["traffic", "criticality", &own, "--record", &traffic]), 0);
-    stdout(&closecall(["traffic", "reenact", &own, "--record", &beside]), 0);
+    let trajectories = file("own.csv");
+    stdout(&closecall(["traffic", "record", headline.to_str().unwrap(), "-n", "2", "-o", &trajectories]), 0);
+    stdout(&closecall(["traffic", "criticality", &trajectories, "--record", &traffic]), 0);
+    stdout(&closecall(["traffic", "reenact", &trajectories, "--record", &beside]), 0);
     for file in [pair, full, traffic, beside] {
         verify(&viewer, Path::new(&file));
     }
-    let none = closecall(["traffic", "criticality", &own, "--record", &file("none.rrd"), "--track", "99999"]);
+    let none = closecall(["traffic", "criticality", &trajectories, "--record", &file("none.rrd"), "--track", "99999"]);
     assert_eq!(code(&none), 2, "{}", stderr(&none));
     assert!(stderr(&none).contains("no lane change of track 99999"), "{}", stderr(&none));
 }
@@ -62,15 +62,15 @@ fn the_same_run_gives_the_same_rows() {
         stdout(&closecall(["run", library(scenario).to_str().unwrap(), "--record", &file].iter().chain(more)), 0);
         file
     };
-    let compared = |one: &str, two: &str| {
-        Command::new(&viewer).args(["rrd", "compare", "--unordered", one, two]).output().unwrap()
+    let compared = |first: &str, second: &str| {
+        Command::new(&viewer).args(["rrd", "compare", "--unordered", first, second]).output().unwrap()
     };
     for more in [["--paired"].as_slice(), ["--sensors", "full"].as_slice()] {
-        let [one, two] = ["one.rrd", "two.rrd"].map(|name| written(name, "low-thw-overtake", more));
-        let same = compared(&one, &two);
+        let [first, second] = ["one.rrd", "two.rrd"].map(|name| written(name, "low-thw-overtake", more));
+        let same = compared(&first, &second);
         assert!(same.status.success(), "{more:?}: {}", stderr(&same));
         let other = written("other.rrd", "paper-figure", more);
-        assert!(!compared(&one, &other).status.success(), "{more:?}: another run has the same rows");
+        assert!(!compared(&first, &other).status.success(), "{more:?}: another run has the same rows");
     }
 }
 
@@ -79,8 +79,8 @@ fn the_same_run_gives_the_same_rows() {
 fn a_full_disk_is_an_error_and_leaves_no_part_of_a_recording() {
     let folder = folder();
     let file = folder.path().join("run.rrd");
-    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit ignored, the write
-    // fails as on a full disk.
+    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit
+    // ignored, the write fails as on a full disk.
     let script = "ulimit -f 200; trap '' XFSZ; exec \"$@\"";
     let limited = Command::new("sh")
         .args(["-c", script, "sh", env!("CARGO_BIN_EXE_closecall"), "run"])

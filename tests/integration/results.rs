@@ -1,4 +1,5 @@
-//! A campaign that names no folder leaves its results in `closecall-results`, and takes the place of nothing but earlier results.
+//! A campaign that names no folder leaves its results in `closecall-results`, and replaces nothing
+//! but earlier results.
 
 use std::fs;
 use std::path::Path;
@@ -93,15 +94,15 @@ fn the_recorded_samples_are_those_with_the_largest_harm_of_their_kind() {
         let mut worst = std::collections::BTreeMap::<String, f64>::new();
         for collision in arm["collisions"].as_array().unwrap() {
             for side in 0..2 {
-                let known = worst.entry(collision["between"][side].as_str().unwrap().to_owned()).or_default();
-                *known = known.max(collision["delta_v_mps"][side].as_f64().unwrap());
+                let worst_mps = worst.entry(collision["between"][side].as_str().unwrap().to_owned()).or_default();
+                *worst_mps = worst_mps.max(collision["delta_v_mps"][side].as_f64().unwrap());
             }
         }
         worst.values().map(|delta_v_mps| (delta_v_mps / 31.739_84).powi(4)).sum()
     };
     let ego = |arm: &serde_json::Value| {
         let collisions = arm["collisions"].as_array().unwrap().iter();
-        collisions.flat_map(|one| one["between"].as_array().unwrap()).any(|one| one == "ego")
+        collisions.flat_map(|actor| actor["between"].as_array().unwrap()).any(|actor| actor == "ego")
     };
     let mut worst = [(0.0, None); 2];
     for line in journal.lines() {
@@ -193,7 +194,7 @@ fn the_last_results_become_the_previous_ones_and_only_these_are_removed() {
     stdout(&run(folder.path(), &["compare", PREVIOUS, RESULTS]), 0);
 }
 
-/// Asserts that a campaign runs nothing and changes nothing, and says what is in the way and what to do.
+/// Asserts that a campaign runs nothing, changes nothing, and names the obstacle and the remedy.
 fn assert_refused(folder: &Path, reason: &str) {
     let before = content(folder);
     // The campaign would not end in any reasonable time.
@@ -226,9 +227,9 @@ fn what_no_campaign_has_written_is_neither_overwritten_nor_moved() {
         fs::write(path.join("thesis.tex"), "do not lose this").unwrap();
         assert_refused(folder.path(), "no results of a campaign");
         fs::write(path.join("manifest.json"), "{\"name\": \"My app\", \"manifest_version\": 3}").unwrap();
-        assert_refused(folder.path(), "its manifest is not that of a campaign");
+        assert_refused(folder.path(), "its manifest does not belong to a campaign");
         clear();
-        // The folder of a campaign that somebody has put there.
+        // The folder of a campaign that the user has put there.
         stdout(&campaign(folder.path(), &["--out", "own"]), 0);
         fs::rename(folder.path().join("own"), &path).unwrap();
         assert_refused(folder.path(), "whose command line named its folder");
@@ -291,7 +292,7 @@ fn an_input_among_the_results_is_not_overwritten() {
     assert_refused(folder.path(), "it holds mine.toml");
 }
 
-/// Starts a campaign without end, and waits until it has written results.
+/// Starts an endless campaign, and waits until it has written results.
 fn start(folder: &Path, more: &[&str]) -> std::process::Child {
     let endless = ["campaign", "low-thw-overtake", "-n", "10000000", "--no-gate", "--sensors", "ground-truth"];
     let mut command = program();
@@ -412,7 +413,8 @@ fn an_early_end_leaves_a_folder_to_look_at_and_to_resume() {
     assert!(nothing.contains("nothing was kept"), "{nothing}");
 }
 
-/// Runs a campaign in a folder whose mount has these options. Returns `None` if this machine mounts nothing.
+/// Runs a campaign in a folder whose mount has these options. Returns `None` if this machine mounts
+/// nothing.
 fn campaign_on(options: &str, prepare: &str, more: &[&str]) -> Option<Output> {
     let folder = folder();
     let script = format!("mount -t tmpfs -o {options} none \"$0\" && cd \"$0\" && {prepare} && exec \"$@\"");
@@ -430,7 +432,7 @@ fn campaign_on(options: &str, prepare: &str, more: &[&str]) -> Option<Output> {
     Some(output)
 }
 
-/// Asserts that the verdict is printed, and that the error says what to do.
+/// Asserts that the verdict is printed, and that the error names the remedy.
 fn assert_verdict_without_results(output: &Output, named: &str) {
     let text = stdout(output, 6);
     assert!(text.contains("overtake-without-brake: 60 samples") && text.contains("PASS"), "{text}");
@@ -454,7 +456,8 @@ fn a_read_only_working_folder_costs_the_results_and_not_the_verdict() {
 
 #[test]
 fn a_full_disk_costs_the_results_and_not_the_verdict() {
-    // Full at the start, during the samples, and at the reports, which are no part of the results unless they are asked for.
+    // Full at the start, during the samples, and at the reports, which are no part of the results
+    // unless they are asked for.
     let strict = &["--record", "worst:2", "--strict-artifacts"];
     for (size, more) in [("8k", &[][..]), ("60k", &[]), ("260k", strict)] {
         let Some(output) = campaign_on(&format!("size={size}"), "true", &[&JUDGED[..], more].concat()) else { return };

@@ -1,4 +1,5 @@
-//! `sample` varies a parameter of a recorded lane change while the other vehicles drive as recorded.
+//! `sample` varies a parameter of a recorded lane change while the other vehicles drive as
+//! recorded.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,8 +18,8 @@ start = { behind = { of = \"rear\", gap-m = 10.0, closing-mps = 8.0, lane = 1 } 
 driver = { prescribed = { acceleration-profile = [[0.0, 0.0]] } }
 ";
 
-/// Writes a trajectory file of simulated traffic. Each sample has four vehicles: the ego, the lead vehicle, the rear
-/// vehicle, and one that overtakes it.
+/// Writes a trajectory file of simulated traffic. Each sample has four vehicles: the ego, the lead
+/// vehicle, the rear vehicle, and one that overtakes it.
 fn own_trajectories(folder: &Path) -> PathBuf {
     let (scenario, csv) = (folder.join("passing.toml"), folder.join("own.csv"));
     fs::write(&scenario, fs::read_to_string(library("overtake-without-brake")).unwrap() + PASSING).unwrap();
@@ -47,10 +48,10 @@ fn falling_cc1<'a>(trajectories: &'a Path, track: &'a str) -> Vec<&'a str> {
     ]
 }
 
-/// Checks that the smallest headway to the vehicle that is overtaken falls with each step, and that to the vehicle that has
-/// overtaken stays.
-fn check_headways(found: &Value) {
-    let runs: Vec<&Value> = found["runs"].as_array().unwrap().iter().filter(|run| !run["value"].is_null()).collect();
+/// Checks that the smallest headway to the vehicle that is overtaken falls with each step, and that
+/// to the vehicle that has overtaken stays.
+fn check_headways(sampled: &Value) {
+    let runs: Vec<&Value> = sampled["runs"].as_array().unwrap().iter().filter(|run| !run["value"].is_null()).collect();
     assert_eq!(runs.len(), 5);
     let column = |key: &str| -> Vec<f64> { runs.iter().map(|run| run[key].as_f64().unwrap()).collect() };
     let (opp1, opp2) = (column("min_thw_opp1_s"), column("min_thw_opp2_s"));
@@ -58,17 +59,17 @@ fn check_headways(found: &Value) {
     assert!(opp1[0] - opp1[4] > 0.5, "{opp1:?}");
     let spread_s = opp2.iter().fold(0.0, |spread: f64, thw_s| spread.max((thw_s - opp2[0]).abs()));
     assert!(spread_s < 0.1, "{opp2:?}");
-    assert!(runs.iter().all(|run| run["collision"].is_null()), "{found}");
+    assert!(runs.iter().all(|run| run["collision"].is_null()), "{sampled}");
 }
 
 #[test]
 fn as_cc1_falls_the_headway_to_the_overtaken_vehicle_falls_and_that_to_the_overtaking_one_stays() {
     let folder = folder();
-    let own = own_trajectories(folder.path());
+    let trajectories = own_trajectories(folder.path());
     for track in ["11", "15"] {
-        let found = json(&closecall(falling_cc1(&own, track).into_iter().chain(["--format", "json"])), 0);
-        check_headways(&found);
-        let smallest = found["runs"][1]["min_thw_opp2_s"].as_f64().unwrap();
+        let sampled = json(&closecall(falling_cc1(&trajectories, track).into_iter().chain(["--format", "json"])), 0);
+        check_headways(&sampled);
+        let smallest = sampled["runs"][1]["min_thw_opp2_s"].as_f64().unwrap();
         assert!(smallest > 0.1, "track {track}: the overtaking vehicle is ahead from the start: {smallest}");
     }
 }
@@ -83,10 +84,10 @@ fn as_cc1_falls_the_headways_of_a_recorded_lane_change_do_the_same() {
 #[test]
 fn each_step_runs_and_its_transfer_is_a_campaign_with_the_margin_increase_system() {
     let folder = folder();
-    let own = own_trajectories(folder.path());
+    let trajectories = own_trajectories(folder.path());
     let out = folder.path().join("sampled");
     let outputs = ["--transfer", "-o", out.to_str().unwrap()];
-    let table = stdout(&closecall(falling_cc1(&own, "11").into_iter().chain(outputs)), 0);
+    let table = stdout(&closecall(falling_cc1(&trajectories, "11").into_iter().chain(outputs)), 0);
     assert!(table.contains("Opp1: track 9; Opp2: track 12") && table.contains("cc1 = 0.3"), "{table}");
     let svg = fs::read_to_string(out.join("sample.svg")).unwrap();
     assert!(["recorded", "cc1 = 1.5", "Opp1", "Opp2"].iter().all(|text| svg.contains(text)));
@@ -111,9 +112,9 @@ fn each_step_runs_and_its_transfer_is_a_campaign_with_the_margin_increase_system
 #[test]
 fn any_parameter_of_a_driver_can_be_varied_and_a_wrong_one_is_refused() {
     let folder = folder();
-    let own = own_trajectories(folder.path());
+    let trajectories = own_trajectories(folder.path());
     let sample = |vary: &str, values: [&str; 2], steps: &str| {
-        let file = own.to_str().unwrap();
+        let file = trajectories.to_str().unwrap();
         let [from, to] = values;
         closecall(["traffic", "sample", file, "--vary", vary, "--from", from, "--to", to, "--steps", steps])
     };
@@ -140,9 +141,9 @@ fn any_parameter_of_a_driver_can_be_varied_and_a_wrong_one_is_refused() {
 #[test]
 fn a_lane_change_by_an_event_needs_a_driver_who_follows_and_a_lane_on_that_side() {
     let folder = folder();
-    let own = own_trajectories(folder.path());
+    let trajectories = own_trajectories(folder.path());
     let out = folder.path().join("sampled");
-    stdout(&closecall(falling_cc1(&own, "11").into_iter().chain(["-o", out.to_str().unwrap()])), 0);
+    stdout(&closecall(falling_cc1(&trajectories, "11").into_iter().chain(["-o", out.to_str().unwrap()])), 0);
     let text = fs::read_to_string(out.join("step-1.toml")).unwrap();
     let refused = |changed: String, words: &str| {
         let path = folder.path().join("changed.toml");

@@ -1,4 +1,5 @@
-//! Sensitivity studies and frontiers: what they find, what a campaign says of it, and how they end.
+//! Sensitivity studies and frontiers: their results, a campaign's statements about them, and their
+//! ends.
 
 use std::fs;
 use std::process::Stdio;
@@ -9,7 +10,7 @@ use serde_json::Value;
 
 use crate::support::{closecall, code, folder, json, message, program, stdout};
 
-/// Holds all parameters of the headline but four, so that few runs decide.
+/// Fixes all parameters of the headline but four: few runs decide.
 const FIXED: [&str; 16] = [
     "--set",
     "cruise-mps=31.6",
@@ -44,16 +45,18 @@ fn prevented(setting: &str) -> f64 {
 #[test]
 fn a_campaign_with_the_greatest_assumption_moved_confirms_it() {
     let more = ["--no-default-factors", "--method", "sobol", "-n", "256", "--set", "reaction-s=1.25"];
-    let found = json(&closecall(study(&more)), 0);
-    let greatest = found["greatest"].as_str().unwrap();
-    let of_prevented = &found["decomposition"]["outputs"][0];
+    let study_json = json(&closecall(study(&more)), 0);
+    let greatest = study_json["greatest"].as_str().unwrap();
+    let of_prevented = &study_json["decomposition"]["outputs"][0];
     assert_eq!(of_prevented["output"], "prevented");
     let effect = &of_prevented["main_effects"][0];
     assert_eq!(effect["factor"], greatest);
-    // The three parameters that vary are uniform: the middles of the quarters in which the least and the most are prevented.
-    let factor = found["factors"].as_array().unwrap().iter().find(|one| one["name"] == greatest).unwrap();
+    // The three parameters that vary are uniform: the middles of the quarters in which the least
+    // and the most are prevented.
+    let factor = study_json["factors"].as_array().unwrap().iter().find(|factor| factor["name"] == greatest).unwrap();
     let [low, high] = [0, 1].map(|end| factor["range"][end].as_f64().unwrap());
-    let means: Vec<f64> = effect["quarter_means"].as_array().unwrap().iter().map(|one| one.as_f64().unwrap()).collect();
+    let means: Vec<f64> =
+        effect["quarter_means"].as_array().unwrap().iter().map(|mean| mean.as_f64().unwrap()).collect();
     let mut quarters: Vec<usize> = (0..4).collect();
     quarters.sort_by(|a, b| means[*a].total_cmp(&means[*b]));
     let middle = |quarter: usize| low + (quarter as f64 + 0.5) / 4.0 * (high - low);
@@ -70,19 +73,19 @@ fn a_study_is_the_same_on_any_number_of_threads_and_its_stages_agree() {
         let args = ["--no-default-factors", "--trajectories", "8", "-n", "32", "--top", "2", "--jobs", jobs];
         json(&closecall(study(&[&args[..], more].concat())), 0)
     };
-    let found = with("2", &["--out", out.to_str().unwrap()]);
-    assert_eq!(found, with("1", &[]));
+    let study_json = with("2", &["--out", out.to_str().unwrap()]);
+    assert_eq!(study_json, with("1", &[]));
     // Screening keeps two factors and chance apart; the others are one group.
-    let indices = found["decomposition"]["outputs"][0]["indices"].as_array().unwrap();
-    let mut sizes: Vec<usize> = indices.iter().map(|one| one["factors"].as_array().unwrap().len()).collect();
+    let indices = study_json["decomposition"]["outputs"][0]["indices"].as_array().unwrap();
+    let mut sizes: Vec<usize> = indices.iter().map(|index| index["factors"].as_array().unwrap().len()).collect();
     sizes.sort_unstable();
     assert_eq!(sizes, [1, 1, 1, 2]);
-    assert_eq!(found["screening"]["points"], 8 * 6);
+    assert_eq!(study_json["screening"]["points"], 8 * 6);
     let page = fs::read_to_string(out.join("sensitivity.html")).unwrap();
     assert!(page.contains("<svg") && !page.contains("<script") && !page.contains(" src="));
     assert!(fs::read_to_string(out.join("tornado-prevented.svg")).unwrap().contains("evasive-lateral-mps2"));
     let kept: Value = serde_json::from_str(&fs::read_to_string(out.join("sensitivity.json")).unwrap()).unwrap();
-    assert_eq!(kept, found);
+    assert_eq!(kept, study_json);
 }
 
 #[test]
@@ -90,16 +93,19 @@ fn the_list_of_factors_and_named_keys_are_varied_and_what_does_not_apply_is_said
     let key = "actor.rear.driver.overtaker.follow.wiedemann99.cc2-m";
     let more = ["--method", "morris", "--trajectories", "2", "--factor"];
     let named = format!("{key}=2..6");
-    let found = json(&closecall(study(&[&more[..], &[&named]].concat())), 0);
-    let factors = found["factors"].as_array().unwrap();
-    let of = |name: &str| factors.iter().find(|factor| factor["name"] == name);
-    assert_eq!(of(key).unwrap()["range"], serde_json::json!([2.0, 6.0]));
-    assert_eq!(of("actor.ego.driver.ego-stack.aeb.trigger-mps2").unwrap()["kind"], "controller");
-    assert_eq!(of("sensors.rear-object.latency-s").unwrap()["kind"], "sensor");
+    let study_json = json(&closecall(study(&[&more[..], &[&named]].concat())), 0);
+    let factors = study_json["factors"].as_array().unwrap();
+    let factor_named = |name: &str| factors.iter().find(|factor| factor["name"] == name);
+    assert_eq!(factor_named(key).unwrap()["range"], serde_json::json!([2.0, 6.0]));
+    assert_eq!(factor_named("actor.ego.driver.ego-stack.aeb.trigger-mps2").unwrap()["kind"], "controller");
+    assert_eq!(factor_named("sensors.rear-object.latency-s").unwrap()["kind"], "sensor");
     assert_eq!(factors.last().unwrap()["name"], "chance");
-    assert!(of("cruise-mps").is_none(), "a parameter that --set has fixed does not vary");
-    let left_out = found["left_out"].as_array().unwrap();
-    assert!(left_out.iter().any(|one| one["reason"] == "the scenario samples it as `reaction-s`"), "{left_out:?}");
+    assert!(factor_named("cruise-mps").is_none(), "a parameter that --set has fixed does not vary");
+    let left_out = study_json["left_out"].as_array().unwrap();
+    assert!(
+        left_out.iter().any(|factor| factor["reason"] == "the scenario samples it as `reaction-s`"),
+        "{left_out:?}"
+    );
 }
 
 #[test]
@@ -127,20 +133,20 @@ fn a_factor_that_cannot_be_used_is_refused_by_name() {
 #[test]
 fn runs_that_end_in_an_error_are_counted_and_have_no_result() {
     let more = ["--no-default-factors", "--method", "sobol", "-n", "32", "--controller", "exec:false"];
-    let found = json(&closecall(study(&more)), 5);
-    assert_eq!(found["errors"]["count"], found["decomposition"]["points"]);
-    assert_eq!(found["errors"]["kinds"][0]["kind"], "controller");
-    assert_eq!(found["greatest"], Value::Null);
-    assert_eq!(found["decomposition"]["outputs"][0]["mean"], Value::Null);
+    let study_json = json(&closecall(study(&more)), 5);
+    assert_eq!(study_json["errors"]["count"], study_json["decomposition"]["points"]);
+    assert_eq!(study_json["errors"]["kinds"][0]["kind"], "controller");
+    assert_eq!(study_json["greatest"], Value::Null);
+    assert_eq!(study_json["decomposition"]["outputs"][0]["mean"], Value::Null);
     let text: Vec<&str> = study(&more).into_iter().filter(|word| !["--format", "json"].contains(word)).collect();
     let text = stdout(&closecall(text), 5);
     assert!(text.contains("ended in an ERROR") && text.contains("No assumption was seen"), "{text}");
     let frontier =
         ["study", "frontier", "low-thw-overtake", "-n", "3", "--controller", "exec:false", "--format", "json"];
     let vary = ["--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
-    let found = json(&closecall([&frontier[..], &vary].concat()), 5);
-    assert_eq!(found["errors"]["count"], 6);
-    assert!(found["points"].as_array().unwrap().iter().all(|point| point["optimal"] == false));
+    let study_json = json(&closecall([&frontier[..], &vary].concat()), 5);
+    assert_eq!(study_json["errors"]["count"], 6);
+    assert!(study_json["points"].as_array().unwrap().iter().all(|point| point["optimal"] == false));
 }
 
 #[test]
@@ -167,13 +173,13 @@ fn a_frontier_runs_every_combination_on_the_same_samples() {
     let mis = "actor.ego.driver.ego-stack.mis";
     let vary = [format!("{mis}.max-deceleration-mps2=1.0,2.0"), format!("{mis}.engage-gap-m=100,150")];
     let more = ["-n", "60", "--seed", "3", "--format", "json", "--out", out.to_str().unwrap()];
-    let found = json(
+    let frontier = json(
         &closecall(
             [&["study", "frontier", "low-thw-overtake", "--vary", &vary[0], "--vary", &vary[1]], &more[..]].concat(),
         ),
         0,
     );
-    let points = found["points"].as_array().unwrap();
+    let points = frontier["points"].as_array().unwrap();
     assert_eq!(points.len(), 4);
     assert!(points.iter().all(|point| point["collisions_without"] == points[0]["collisions_without"]));
     assert!(points.iter().any(|point| point["optimal"] == true));
@@ -196,15 +202,15 @@ fn every_report_of_a_campaign_says_what_moves_its_result_or_that_it_cannot() {
     let path = out.to_str().unwrap();
     let args = ["campaign", "low-thw-overtake", "-n", "400", "--seed", "8", "--paired", "--no-gate", "--out", path];
     let more = ["--record", "failures:0", "--format", "json"];
-    let found = json(&closecall([&args[..], &more].concat()), 0);
-    let events = found["influence"]["low-thw-overtake"]["events"].as_array().unwrap();
-    let of = |name: &str| events.iter().find(|event| event["event"] == name).unwrap();
-    let without = of("collided_without")["parameters"].as_array().unwrap();
+    let result = json(&closecall([&args[..], &more].concat()), 0);
+    let events = result["influence"]["low-thw-overtake"]["events"].as_array().unwrap();
+    let event_named = |name: &str| events.iter().find(|event| event["event"] == name).unwrap();
+    let without = event_named("collided_without")["parameters"].as_array().unwrap();
     assert_eq!(without[0]["parameter"], "evasive-lateral-mps2", "{without:?}");
-    assert_eq!(of("collided_without")["events"], found["controllers"]["acc"]["collisions"]);
+    assert_eq!(event_named("collided_without")["events"], result["controllers"]["acc"]["collisions"]);
     assert!(without[0]["interval_95"][0].as_f64().unwrap() > 0.0);
-    assert_eq!(of("induced")["parameters"], Value::Null);
-    assert!(of("induced")["parameters_absent"].as_str().unwrap().contains("too few"));
+    assert_eq!(event_named("induced")["parameters"], Value::Null);
+    assert!(event_named("induced")["parameters_absent"].as_str().unwrap().contains("too few"));
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     let summary = fs::read_to_string(out.join("summary.md")).unwrap();
     for text in [&page, &summary] {

@@ -1,5 +1,6 @@
-//! A signal ends a campaign with what is done, and no process of a controller is left: not after SIGINT and SIGTERM, nor
-//! after SIGKILL, which the program cannot catch. The resumed campaign ends in the same bytes.
+//! A signal ends a campaign with its finished samples, and no process of a controller is left: not
+//! after SIGINT and SIGTERM, nor after SIGKILL, which the program cannot catch. The resumed
+//! campaign ends in the same bytes.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +11,8 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::support::{closecall, code, folder, library, message, program, stderr, stdout};
 
-/// A controller that starts a process in a session of its own, which would run for an hour, and then never brakes.
+/// A controller that starts a process in a separate session, which would run for an hour, and then
+/// never brakes.
 const STRAYING: &str = r#"#!/bin/sh
 setsid sleep 3600 >/dev/null 2>&1 </dev/null &
 (setsid sh -c 'sleep 3600; :' >/dev/null 2>&1 </dev/null &)
@@ -19,7 +21,8 @@ read -r line
 while read -r line; do echo '{"acceleration_mps2":0.0,"state":"following"}'; done
 "#;
 
-/// Returns the processes with `mark` in their environment, once there is none or a minute has passed.
+/// Returns the processes with `mark` in their environment, once there is none or a minute has
+/// passed.
 fn left_behind(mark: &str) -> Vec<String> {
     let started = Instant::now();
     loop {
@@ -62,7 +65,7 @@ fn start(command: &mut Command) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits until the journal has some lines, and sends a signal. Returns what the program then did.
+/// Waits until the journal has some lines, and sends a signal. Returns the program's reaction.
 fn interrupted(mut child: Child, out: &Path, signal: Signal) -> Output {
     let journal = out.join("journal.jsonl");
     let started = Instant::now();

@@ -1,4 +1,4 @@
-//! The statistics of a campaign agree with a scenario whose collision probability is known.
+//! The statistics of a campaign agree with a scenario of known collision probability.
 //!
 //! `xtask/src/validate_statistics.rs` does the same with many more campaigns.
 
@@ -142,7 +142,8 @@ fn a_sequential_campaign_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_time_budget_ends_a_campaign() {
     let output = campaign(&["--time-budget", "1s", "--max-probability", "0.2", "--format", "json"]);
-    // The number of samples in a second depends on the machine, and so does whether there is an answer by then.
+    // The number of samples in a second depends on the machine, and so does whether there is an
+    // answer by then.
     assert!([0, 4].contains(&code(&output)), "{}", stderr(&output));
     let report = json(&output, code(&output));
     let samples = report["samples"].as_u64().unwrap();
@@ -168,7 +169,7 @@ fn an_option_beside_a_preset_overrides_it() {
     let path = library("slow-approach");
     let run = |more: &[&str]| {
         let args = ["campaign", path.to_str().unwrap(), "--preset", "pr", "--set", "duration-s=2", "--format", "json"];
-        // In two seconds nothing happens of what the scenario expects, so that no number of samples passes.
+        // In two seconds no expected event of the scenario happens: no number of samples passes.
         json(&closecall(args.iter().chain(more)), 7)
     };
     let report = run(&[]);

@@ -24,7 +24,8 @@ pub(crate) fn traffic_of_library() -> Vec<PathBuf> {
     scenarios_in(&library_folder().join("traffic"))
 }
 
-/// Returns the scenarios of the library in folders of their own: those of other functions, and the headline as recorded.
+/// Returns the scenarios of the library in separate folders: the scenarios of other functions, and
+/// the headline as recorded.
 pub(crate) fn families_of_library() -> Vec<PathBuf> {
     ["aeb", "acc", "as-recorded"].iter().flat_map(|name| scenarios_in(&library_folder().join(name))).collect()
 }
@@ -49,7 +50,8 @@ pub(crate) fn program() -> Command {
     program
 }
 
-/// Runs the program in the folder of the repository. A campaign that names no folder keeps no results: they would lie there.
+/// Runs the program in the folder of the repository. A campaign that names no folder keeps no
+/// results: they would lie there.
 pub(crate) fn closecall<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> Output {
     let mut args: Vec<OsString> = args.into_iter().map(|arg| arg.as_ref().to_owned()).collect();
     let has_place = |arg: &OsString| arg.to_str().is_some_and(|arg| arg == "--out" || arg.starts_with("--out="));
@@ -64,7 +66,8 @@ pub(crate) fn code(output: &Output) -> i32 {
     output.status.code().expect("no signal ended the program")
 }
 
-/// Returns the standard output of the program. Fails if the program ended with another exit code than `expected`.
+/// Returns the standard output of the program. Fails if the program ended with another exit code
+/// than `expected`.
 pub(crate) fn stdout(output: &Output, expected: i32) -> String {
     assert_eq!(code(output), expected, "{}", stderr(output));
     String::from_utf8(output.stdout.clone()).expect("the output is text")
@@ -75,13 +78,14 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Returns the standard error of the program in one line: without the frames and line breaks of its error reports.
+/// Returns the standard error of the program in one line: without the frames and line breaks of its
+/// error reports.
 pub(crate) fn message(output: &Output) -> String {
     stderr(output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the words of a gate in a line of a verdict. The page has its scenario, its words and its criterion in cells of their
-/// own.
+/// Returns the words of a gate in a line of a verdict. The page has its scenario, its words and its
+/// criterion in separate cells.
 pub(crate) fn words_of_gate(line: &str) -> &str {
     const STANDINGS: [&str; 4] = ["NOT MET: ", "open: ", "met: ", "not checked: "];
     let Some(of_scenario) = STANDINGS.iter().find_map(|standing| line.strip_prefix(standing)) else { return line };
@@ -93,7 +97,8 @@ pub(crate) fn words_of_gate(line: &str) -> &str {
     }
 }
 
-/// Returns the JSON value that the program printed. Fails if the program ended with another exit code than `expected`.
+/// Returns the JSON value that the program printed. Fails if the program ended with another exit
+/// code than `expected`.
 pub(crate) fn json(output: &Output, expected: i32) -> Value {
     serde_json::from_str(&stdout(output, expected)).expect("the output is JSON")
 }

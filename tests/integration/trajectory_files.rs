@@ -1,5 +1,5 @@
-//! The commands that turn trajectory files into lane changes, metrics and distributions: on recorded traffic, and on
-//! trajectory files that the simulation wrote.
+//! The commands that turn trajectory files into lane changes, metrics and distributions: on
+//! recorded traffic, and on trajectory files that the simulation wrote.
 
 use std::fs;
 
@@ -53,9 +53,9 @@ fn recorded_traffic_has_the_same_lane_changes_in_both_layouts() {
         let changes = json(&closecall(["traffic", "lane-changes", path.to_str().unwrap(), "--format", "json"]), 0);
         changes.as_array().unwrap().iter().map(|change| change["crossing_s"].as_f64().unwrap()).collect()
     };
-    let (one, other) = (crossings(&metres), crossings(&feet));
-    assert!(one.len() > 10);
-    assert_eq!(one.len(), other.len());
+    let (in_metres, in_feet) = (crossings(&metres), crossings(&feet));
+    assert!(in_metres.len() > 10);
+    assert_eq!(in_metres.len(), in_feet.len());
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn broken_trajectory_files_are_refused_by_name() {
     let good = fs::read_to_string(&csv).unwrap();
     let cut = &good[..good.len() - 25];
     let nan = good.replacen(",1,", ",nan,", 1);
-    for (what, content) in [
+    for (defect, content) in [
         ("empty", Vec::new()),
         ("ends within a line", cut.as_bytes().to_vec()),
         ("nan", nan.into_bytes()),
@@ -77,15 +77,15 @@ fn broken_trajectory_files_are_refused_by_name() {
         fs::write(&csv, content).unwrap();
         for command in ["lane-changes", "criticality", "fit"] {
             let output = closecall(["traffic", command, csv.to_str().unwrap()]);
-            assert_eq!(code(&output), 3, "{what}, {command}: {}", stderr(&output));
-            assert!(stderr(&output).contains("own.csv"), "{what}: {}", stderr(&output));
-            assert!(!stderr(&output).contains("panicked"), "{what}");
+            assert_eq!(code(&output), 3, "{defect}, {command}: {}", stderr(&output));
+            assert!(stderr(&output).contains("own.csv"), "{defect}: {}", stderr(&output));
+            assert!(!stderr(&output).contains("panicked"), "{defect}");
         }
     }
 }
 
-/// Reads the true lane changes of an in-car log: direction, time of the crossing (s), and whether the log holds both
-/// ends.
+/// Reads the true lane changes of an in-car log: direction, time of the crossing (s), and whether
+/// the log holds both ends.
 fn truth(path: &std::path::Path) -> Vec<(String, f64, bool)> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
@@ -112,31 +112,32 @@ fn every_criterion_finds_the_true_lane_changes_of_an_in_car_log_and_two_tolerate
         truth(&folder.path().join("drive.truth.csv")).into_iter().filter(|(.., complete)| *complete).collect();
     assert!(truth.len() >= 8, "{}", truth.len());
     for (criterion, within_s) in [("gradient", 0.05), ("peak", 0.05), ("distance", 0.25)] {
-        let found = json(&closecall(["traffic", "lane-changes", csv, "--criterion", criterion, "--format", "json"]), 0);
-        let found = found.as_array().unwrap();
+        let lane_changes =
+            json(&closecall(["traffic", "lane-changes", csv, "--criterion", criterion, "--format", "json"]), 0);
+        let lane_changes = lane_changes.as_array().unwrap();
         for (direction, crossing_s, _) in &truth {
             let is_same = |change: &&Value| {
                 change["direction"] == direction.as_str()
                     && (change["crossing_s"].as_f64().unwrap() - crossing_s).abs() <= within_s
             };
-            assert_eq!(found.iter().filter(is_same).count(), 1, "{criterion} at {crossing_s}");
+            assert_eq!(lane_changes.iter().filter(is_same).count(), 1, "{criterion} at {crossing_s}");
         }
     }
     let plots = folder.path().join("plots");
     let args =
         ["traffic", "robustness", csv, "--repetitions", "1", "--format", "json", "--plot", plots.to_str().unwrap()];
-    let found = json(&closecall(args), 0);
-    assert_eq!(found["reference_kind"], "gradient");
-    assert_eq!(found["criteria"], serde_json::json!(["peak", "distance", "gradient"]));
-    let reference = found["reference"].as_f64().unwrap();
+    let study = json(&closecall(args), 0);
+    assert_eq!(study["reference_kind"], "gradient");
+    assert_eq!(study["criteria"], serde_json::json!(["peak", "distance", "gradient"]));
+    let reference = study["reference"].as_f64().unwrap();
     assert!(reference >= truth.len() as f64);
-    let levels = found["setup"]["offset_m"].as_array().unwrap();
+    let levels = study["setup"]["offset_m"].as_array().unwrap();
     let one_metre = levels.iter().position(|level| level.as_f64() == Some(1.0)).unwrap();
-    let found_again = |column: usize| found["offset"][one_metre][column]["again"].as_f64().unwrap();
+    let found_again = |column: usize| study["offset"][one_metre][column]["again"].as_f64().unwrap();
     let [peak, distance, gradient] = [0, 1, 2].map(found_again);
     assert!(peak >= 0.95 * reference && gradient == reference, "peak {peak}, gradient {gradient}");
     assert!(distance <= 0.5 * reference, "distance {distance}");
-    assert!(found["fails_from_noise_m_per_sqrt_s"]["peak"].as_f64().unwrap() > 0.0);
+    assert!(study["fails_from_noise_m_per_sqrt_s"]["peak"].as_f64().unwrap() > 0.0);
     for name in ["noise.svg", "offset.svg"] {
         let chart = fs::read_to_string(plots.join(name)).unwrap();
         assert!(chart.contains("gradient: found again") && chart.contains("distance fails"), "{name}");
@@ -155,13 +156,13 @@ fn statistics_count_lane_changes_by_class_and_draw_box_plots() {
     );
     let plots = folder.path().join("plots");
     let args = ["traffic", "statistics", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
-    let found = json(&closecall(args), 0);
-    let classes = found["classes"].as_array().unwrap();
+    let statistics = json(&closecall(args), 0);
+    let classes = statistics["classes"].as_array().unwrap();
     let changes = json(&closecall(["traffic", "lane-changes", csv, "--format", "json"]), 0);
     let counted: u64 = classes.iter().map(|class| class["lane_changes"].as_u64().unwrap()).sum();
     assert_eq!(counted, changes.as_array().unwrap().len() as u64);
     assert!(classes.iter().any(|class| class["duration_s"]["n"].as_u64() > Some(5)));
-    assert_eq!(found["correlations"].as_array().unwrap().len(), 15);
+    assert_eq!(statistics["correlations"].as_array().unwrap().len(), 15);
     for name in ["duration.svg", "width.svg", "speed.svg"] {
         let chart = fs::read_to_string(plots.join(name)).unwrap();
         let complete: u64 = classes.iter().map(|class| class["complete"].as_u64().unwrap()).sum();

@@ -1,5 +1,5 @@
-//! Nothing is taken on trust: a journal is checked against its plan by every reader, a part of the samples says nothing about all, and
-//! a report that cannot be written does not cost the verdict.
+//! Nothing is taken on trust: a journal is checked against its plan by every reader, a part of the
+//! samples says nothing about all, and a report that cannot be written does not cost the verdict.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,8 @@ fn write_lines(out: &Path, lines: &[String]) {
     fs::write(out.join("journal.jsonl"), lines.join("\n") + "\n").unwrap();
 }
 
-/// Returns a line of a journal with its record changed, and with the checksum of the changed record.
+/// Returns a line of a journal with its record changed, and with the checksum of the changed
+/// record.
 fn changed(line: &str, change: impl FnOnce(&mut Value)) -> String {
     let mut record: Value = serde_json::from_str(&line[17..]).unwrap();
     change(&mut record);
@@ -209,11 +210,11 @@ fn a_mirrored_run_that_takes_too_long_is_not_checked_and_no_defect_of_the_simula
 fn the_table_of_outcomes_does_not_depend_on_the_working_folder() {
     let folder = folder();
     let tables = ["one", "other"].map(|name| {
-        let own: PathBuf = folder.path().join(name);
-        fs::create_dir(&own).unwrap();
-        let output = program().current_dir(&own).args(CAMPAIGN).args(["--out", "out"]).output().unwrap();
+        let working_folder: PathBuf = folder.path().join(name);
+        fs::create_dir(&working_folder).unwrap();
+        let output = program().current_dir(&working_folder).args(CAMPAIGN).args(["--out", "out"]).output().unwrap();
         stdout(&output, 0);
-        fs::read(own.join("out/outcomes.parquet")).unwrap()
+        fs::read(working_folder.join("out/outcomes.parquet")).unwrap()
     });
     assert!(tables[0] == tables[1]);
 }
@@ -231,13 +232,13 @@ fn a_check_of_a_folder_names_each_problem_and_its_repair() {
     assert!(problems(&out, 0).ends_with("out: sound, 8 samples\n"));
     let kept = lines(&out);
     let resumed = || {
-        let found = problems(&out, 3);
-        let command = found.lines().find_map(|line| line.split_once("repair: resume the campaign: ")).unwrap().1;
-        assert!(command.contains(out.to_str().unwrap()) && command.ends_with("--resume"), "{found}");
+        let listed = problems(&out, 3);
+        let command = listed.lines().find_map(|line| line.split_once("repair: resume the campaign: ")).unwrap().1;
+        assert!(command.contains(out.to_str().unwrap()) && command.ends_with("--resume"), "{listed}");
         stdout(&campaign(&out, &["--resume"]), 0);
         assert!(lines(&out) == kept);
         assert!(problems(&out, 0).contains("sound"));
-        found
+        listed
     };
     write_lines(&out, &kept[..6]);
     assert!(resumed().contains("journal.jsonl: it has 6 of the 8 samples"));
@@ -259,9 +260,9 @@ fn a_check_of_a_folder_names_each_problem_and_its_repair() {
     let mut exchanged = kept.clone();
     exchanged.swap(2, 5);
     write_lines(&out, &exchanged);
-    let found = problems(&out, 3);
-    assert!(found.contains("journal.jsonl:3: sample 5 of `low-thw-overtake` is not the next sample"), "{found}");
-    assert!(found.contains("run the campaign into a new folder"), "{found}");
+    let listed = problems(&out, 3);
+    assert!(listed.contains("journal.jsonl:3: sample 5 of `low-thw-overtake` is not the next sample"), "{listed}");
+    assert!(listed.contains("run the campaign into a new folder"), "{listed}");
     fs::write(out.join("manifest.json"), "{}").unwrap();
     assert!(problems(&out, 3).contains("there is no `manifest_version`"));
 }

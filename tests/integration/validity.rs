@@ -1,4 +1,5 @@
-//! The validity checks of the simulator find the faults that they look for, and a finding makes a campaign invalid.
+//! The validity checks of the simulator find the faults that they look for, and a finding makes a
+//! campaign invalid.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -58,7 +59,8 @@ struct FlawedStack {
     stack: EgoStack,
 }
 
-/// A change of the acceleration that is too small to cause a collision, but changes the bits of the outcome (m/s²).
+/// A change of the acceleration that is too small to cause a collision, but changes the bits of the
+/// outcome (m/s²).
 const SMALL_MPS2: f64 = -1e-3;
 /// An acceleration that leads to a collision with the lead vehicle (m/s²).
 const RECKLESS_MPS2: f64 = 4.0;
@@ -125,8 +127,8 @@ fn no_check_finds_a_fault_of_a_sound_controller() {
     assert_eq!((findings(&total), total.checks.runs, total.invalid), (Vec::new(), 6, 0));
 }
 
-/// The rear vehicle brakes between two steps of 10 ms. The gaps lie so close to the limit between a collision and none
-/// that half the time step changes the result of some samples.
+/// The rear vehicle brakes between two steps of 10 ms. The gaps lie so close to the limit between a
+/// collision and none that half the time step changes the result of some samples.
 const EDGE: &str = r#"
 schema-version = 1
 name = "edge-of-the-step"

@@ -20,7 +20,7 @@ const START: &[u8] = b"RRF2\0\x24\x03\0\x01\x02\0\0";
 /// Time after which a program that should have started counts as absent.
 const DEADLINE: Duration = Duration::from_secs(60);
 
-/// Returns a program that stands for the viewer or the browser.
+/// Returns a program that replaces the viewer or the browser.
 fn stand_in(name: &str) -> PathBuf {
     Path::new(ROOT).join("tests/fixtures/programs").join(name)
 }
@@ -72,8 +72,8 @@ impl Place {
         self.view(args).output().unwrap()
     }
 
-    /// Returns the arguments with which the viewer was started, apart from the address that it listens on, and forgets them.
-    /// `None` if it was not started.
+    /// Returns the arguments with which the viewer was started, apart from the address that it
+    /// listens on, and forgets them. `None` if it was not started.
     fn viewer_args(&self) -> Option<Vec<String>> {
         let file = self.written.path().join("viewer");
         let text = fs::read_to_string(&file).ok()?;
@@ -100,7 +100,7 @@ impl Place {
         names.iter().map(|name| self.path(name).display().to_string()).collect()
     }
 
-    /// Writes what a campaign leaves.
+    /// Writes the files of a campaign.
     fn with_results(names: &[&str]) -> Self {
         let place = Self::with_recordings(names);
         fs::create_dir_all(place.path("closecall-results")).unwrap();

@@ -10,7 +10,8 @@ use crate::support::{closecall, folder, library, stdout};
 
 /// The size of the viewer's window. The picture may have more pixels.
 const WINDOW: &str = "1600x900";
-/// The time after which the viewer is taken for hung (s). Without a graphics card it can need minutes.
+/// The time after which the viewer is taken for hung (s). Without a graphics card it can need
+/// minutes.
 const HUNG_AFTER_S: &str = "600";
 
 /// The kind of pixels that a view shows if it is not empty.
@@ -22,7 +23,8 @@ enum Content {
     Text,
 }
 
-/// A view: its name, its left, top, right and bottom edge as shares of the picture, and its content.
+/// A view: its name, its left, top, right and bottom edge as shares of the picture, and its
+/// content.
 type View = (&'static str, [f64; 4], Content);
 
 /// The views of a run without camera. The edges lie well within the frames of the views.
@@ -50,8 +52,8 @@ const BESIDE: [View; 8] = [
 const LEAST_SHARE: f64 = 0.000_5;
 /// The largest number of pictures that are taken of a file.
 const PICTURES: usize = 5;
-/// Held while a viewer runs. Two viewers at once, without a graphics card, slow each other so much that neither loads
-/// its file in time.
+/// Held while a viewer runs. Two viewers at once, without a graphics card, slow each other so much
+/// that neither loads its file in time.
 static VIEWER: Mutex<()> = Mutex::new(());
 
 /// Returns the viewer if it has a display to draw on.
@@ -99,8 +101,8 @@ impl Picture {
 
 /// Opens a recording in the viewer, and fails if one of its views is empty.
 ///
-/// The viewer takes its picture after a number of frames: on a busy machine this can be before it has loaded the whole
-/// file. A view counts as empty if it is empty in every picture.
+/// The viewer takes its picture after a number of frames: on a busy machine this can be before it
+/// has loaded the whole file. A view counts as empty if it is empty in every picture.
 fn assert_shows(viewer: &Path, file: &Path, views: &[View]) {
     let _guard = VIEWER.lock().unwrap_or_else(PoisonError::into_inner);
     let mut empty = Vec::new();
@@ -115,7 +117,8 @@ fn assert_shows(viewer: &Path, file: &Path, views: &[View]) {
     panic!("empty views, with the share of their pixels that show content: {empty:?}");
 }
 
-/// Returns a picture of the viewer with a recording. Returns `None` if the viewer cannot draw on this machine.
+/// Returns a picture of the viewer with a recording. Returns `None` if the viewer cannot draw on
+/// this machine.
 fn draw(viewer: &Path, file: &Path) -> Option<Picture> {
     let picture = file.with_extension("png");
     let output = Command::new("timeout")

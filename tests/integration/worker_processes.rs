@@ -1,5 +1,5 @@
-//! Worker processes of campaigns: a crash is an outcome of the sample that it hits, an answer is that of its question, and a
-//! relative path leads to the same file wherever the process runs.
+//! Worker processes of campaigns: a crash is an outcome of the sample that it hits, an answer
+//! belongs to its question, and a relative path leads to the same file wherever the process runs.
 
 use std::io::Write;
 use std::path::Path;
@@ -13,7 +13,8 @@ use crate::fmu_controllers::fmu;
 use crate::native_controllers::{campaign, compile, is_as_baseline, lib, records, with_fault};
 use crate::support::{code, folder, json, program, stderr, stdout};
 
-/// Faults that show from the second run of a process on: it crashes, or hangs. `wears-out` also crashes in every sample in which the ego is fast.
+/// Faults that show from the second run of a process on: it crashes, or hangs. `wears-out` also
+/// crashes in every sample in which the ego is fast.
 const WEAR: [&str; 2] = ["wears-out", "tires"];
 
 #[test]
@@ -130,7 +131,7 @@ fn a_library_that_forks_files_no_outcome_under_another_sample() {
             .env("CLOSECALL_TEST_MARK", &mark);
         let output = with_fault(&mut command, Some("forks"));
         assert_eq!(code(&output), 5, "{}", stderr(&output));
-        // Reading the records checks that each is that of its sample.
+        // Reading the records checks that each belongs to its sample.
         let records = records(&out);
         assert_eq!(records.len(), 40);
         let messages: Vec<_> = records
@@ -138,7 +139,7 @@ fn a_library_that_forks_files_no_outcome_under_another_sample() {
             .filter_map(|record| record.arms[0].result.as_ref().err().map(|failure| failure.message.clone()))
             .collect();
         let named = |message: &String| {
-            message.contains("is not that of the sample: ") || message.contains("a line that nobody had asked for")
+            message.contains("does not belong to the sample: ") || message.contains("a line that nobody had asked for")
         };
         assert!(!messages.is_empty() && messages.iter().all(named), "{messages:?}");
     }
@@ -160,8 +161,8 @@ fn a_worker_process_of_another_version_refuses_its_task_and_names_both() {
     let output = process.wait_with_output().unwrap();
     let answer: Value = serde_json::from_str(&stdout(&output, 0)).unwrap();
     let failure = &answer["record"]["result"]["Err"];
-    let own = stdout(&program().arg("--version").output().unwrap(), 0);
-    let version = own.split_whitespace().nth(1).unwrap().split('+').next().unwrap();
+    let version_line = stdout(&program().arg("--version").output().unwrap(), 0);
+    let version = version_line.split_whitespace().nth(1).unwrap().split('+').next().unwrap();
     let message = failure["message"].as_str().unwrap();
     assert_eq!((failure["kind"].as_str(), answer["is_last"].as_bool()), (Some("refused"), Some(true)));
     assert!(
@@ -170,7 +171,8 @@ fn a_worker_process_of_another_version_refuses_its_task_and_names_both() {
     );
 }
 
-/// Runs a campaign in one folder with a controller that is named by a relative path, and repeats a sample from another folder.
+/// Runs a campaign in one folder with a controller that is named by a relative path, and repeats a
+/// sample from another folder.
 fn replay_elsewhere(folder: &Path, controller: &str) {
     let words =
         ["campaign", "low-thw-overtake", "-n", "4", "--seed", "3", "--sensors", "object", "--no-gate", "--out", "out"];

@@ -1,7 +1,8 @@
-//! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in images that are rendered for the test.
+//! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in images that are
+//! rendered for the test.
 //!
-//! Python reads the whole image. Rust reads the pixels of it that the network samples. The test is a program of its own, because a process
-//! has one inference backend.
+//! Python reads the whole image. Rust reads only the pixels that the network samples. The test is a
+//! separate program, because a process has one inference backend.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -16,7 +17,8 @@ use serde_json::Value;
 /// Folder of the repository.
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-/// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of two masks.
+/// Maximum differences of a box's sides (px) and of a score, and minimum intersection over union of
+/// two masks.
 const BOX_PX: f64 = 0.5;
 const SCORE: f64 = 1e-3;
 const MASK_OVERLAP: f64 = 0.98;
@@ -77,25 +79,29 @@ fn answers(python: &Path, files: &[PathBuf]) -> Vec<Answer> {
     text.lines().map(answer).collect()
 }
 
-fn mask_overlap(one: &Mask, other: &Mask) -> f64 {
-    let (one, other) = (one.pixels(), other.pixels());
-    let count = |both: fn(bool, bool) -> bool| one.iter().zip(&other).filter(|(a, b)| both(**a, **b)).count();
+fn mask_overlap(first: &Mask, second: &Mask) -> f64 {
+    let (first, second) = (first.pixels(), second.pixels());
+    let count = |both: fn(bool, bool) -> bool| first.iter().zip(&second).filter(|(a, b)| both(**a, **b)).count();
     let union = count(|a, b| a || b);
     if union == 0 { 1.0 } else { count(|a, b| a && b) as f64 / union as f64 }
 }
 
-fn assert_same(found: &[Instance], answer: &Answer, image: &Path) {
+fn assert_same(instances: &[Instance], answer: &Answer, image: &Path) {
     let image = image.display();
-    assert_eq!(found.len(), answer.scores.len(), "{image}");
-    for (index, own) in found.iter().enumerate() {
-        assert_eq!(own.class as usize + 1, answer.labels[index], "{image}, instance {index}");
-        let off_px =
-            own.box_px.iter().zip(answer.boxes[index]).map(|(own, other)| (own - other).abs()).fold(0.0, f64::max);
+    assert_eq!(instances.len(), answer.scores.len(), "{image}");
+    for (index, instance) in instances.iter().enumerate() {
+        assert_eq!(instance.class as usize + 1, answer.labels[index], "{image}, instance {index}");
+        let off_px = instance
+            .box_px
+            .iter()
+            .zip(answer.boxes[index])
+            .map(|(instance, other)| (instance - other).abs())
+            .fold(0.0, f64::max);
         assert!(off_px <= BOX_PX, "{image}, instance {index}: boxes differ by {off_px} px");
-        let off = (own.score - answer.scores[index]).abs();
+        let off = (instance.score - answer.scores[index]).abs();
         assert!(off <= SCORE, "{image}, instance {index}: scores differ by {off}");
         let theirs = Mask::new(answer.boxes[index], [CELLS, CELLS], answer.masks[index].clone()).unwrap();
-        let share = mask_overlap(&own.mask, &theirs);
+        let share = mask_overlap(&instance.mask, &theirs);
         assert!(share >= MASK_OVERLAP, "{image}, instance {index}: masks overlap by {share}");
     }
 }
@@ -126,9 +132,9 @@ fn rust_and_python_find_the_same_in_fresh_renders() {
     let mut compared = 0;
     for ((path, rgb), answer) in images.iter().zip(&whole).zip(&answers) {
         let picture = picture(rgb, detector.sampling());
-        let found = detector.detect(&picture).unwrap();
-        assert_same(&found, answer, path);
-        compared += found.iter().filter(|instance| instance.score > 0.5).count();
+        let instances = detector.detect(&picture).unwrap();
+        assert_same(&instances, answer, path);
+        compared += instances.iter().filter(|instance| instance.score > 0.5).count();
     }
     assert!(compared >= MIN_COMPARED, "{compared}");
     // Another image has other instances: the comparison can fail.

@@ -1,4 +1,5 @@
-//! The frontier of a system's settings: what each setting prevents, induces, and costs in speed.
+//! The frontier of a system's settings: the collisions that each setting prevents and induces, and
+//! its cost in speed.
 //!
 //! ```text
 //!  KEY = a, b, c  ┐
@@ -6,8 +7,8 @@
 //!  …              ┘                                                          └─▶ Pareto-optimal combinations
 //! ```
 //!
-//! All combinations run the same samples with the same random numbers. If all keys belong to the margin increase system, the
-//! baseline does not depend on them and runs once.
+//! All combinations run the same samples with the same random numbers. If all keys belong to the
+//! margin increase system, the baseline does not depend on them and runs once.
 
 mod plan;
 mod result;

@@ -23,8 +23,8 @@ use crate::workers::{Samples, Workers};
 /// The part of a key that belongs to the margin increase system, which the baseline does not have.
 const OF_SYSTEM: &str = ".driver.ego-stack.mis.";
 
-/// The settings that are varied unless others are named, below the ego's margin increase system, with their values: those of the
-/// paper, and steps around them.
+/// The settings that are varied by default, with their values: the values of the paper, and steps
+/// around them. The keys are relative to the ego's margin increase system.
 const DEFAULTS: [(&str, &[f64]); 4] = [
     ("max-deceleration-mps2", &[1.0, 1.5, 2.0]),
     ("engage-gap-m", &[100.0, 125.0, 150.0]),
@@ -74,7 +74,7 @@ pub struct FrontierPlan {
     pub sampling: Sampling,
     /// The controllers: the baseline first, the one under test last.
     pub controllers: Vec<ControllerChoice>,
-    /// The sensors; those of the scenario if `None`.
+    /// The sensors; `None` for the sensors of the scenario.
     pub sensors: Option<SensorMode>,
     /// The number of worker threads, and the time limit of a run.
     pub workers: Workers,
@@ -91,7 +91,8 @@ impl FrontierPlan {
         DEFAULTS.iter().map(grid).collect()
     }
 
-    /// Returns every combination of the values, the last key changing fastest, with the scenario that it gives.
+    /// Returns every combination of the values, the last key changing fastest, with the scenario
+    /// that it gives.
     ///
     /// # Errors
     /// [`ScenarioError`] if a value cannot be set, or does not give a valid scenario.
@@ -149,7 +150,8 @@ impl PreparedFrontier<'_> {
         (self.combinations.len() + baselines) as u64 * self.plan.sampling.samples
     }
 
-    /// Runs every combination. `None` if `stop` has ended it early. `on_run` is called after each run.
+    /// Runs every combination. `None` if `stop` has ended it early. `on_run` is called after each
+    /// run.
     ///
     /// # Errors
     /// [`WorkersError`] if no threads can be started.

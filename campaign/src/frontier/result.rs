@@ -1,4 +1,4 @@
-//! What a frontier finds.
+//! The result of a frontier.
 
 use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
 use closecall_traffic::statistics::sensitivity::jackknife::{Estimate, student};
@@ -41,14 +41,16 @@ pub struct Point {
     pub collisions: u64,
     /// Pairs of both arms.
     pub pairs: Pairs,
-    /// Prevented collisions as a share of those in the baseline; `None` if there are none.
+    /// Prevented collisions as a share of the baseline's collisions; `None` if the baseline has
+    /// none.
     pub prevented: Option<Estimate>,
-    /// Samples with an induced collision, as a share of all; `None` of no samples.
+    /// Samples with an induced collision, as a share of all samples; `None` without samples.
     pub induced: Option<Estimate>,
-    /// Mean over the samples of the largest speed deficit to the lead vehicle, more than in the baseline (m/s); `None` of fewer
-    /// than two samples.
+    /// Mean over the samples of the largest speed deficit to the lead vehicle, less the deficit in
+    /// the baseline (m/s); `None` for fewer than two samples.
     pub speed_lost_mps: Option<Estimate>,
-    /// True if no other combination is better in one of prevented, induced and speed lost, and at least as good in the others.
+    /// True if no other combination is better in one of prevented, induced and speed lost, and at
+    /// least as good in the others.
     pub is_optimal: bool,
 }
 
@@ -56,16 +58,16 @@ impl Point {
     pub(super) fn new(values: Vec<String>, baseline: &[Tally], tested: &[Tally]) -> Self {
         let (mut pairs, mut lost_mps, mut without, mut with) = (Pairs::default(), Vec::new(), 0, 0);
         for (baseline, tested) in baseline.iter().zip(tested) {
-            let (Some(one), Some(other)) = (baseline.collided, tested.collided) else { continue };
+            let (Some(collides_without), Some(collides_with)) = (baseline.collided, tested.collided) else { continue };
             pairs.push(baseline, tested);
             lost_mps.push(tested.speed_deficit_mps - baseline.speed_deficit_mps);
-            without += u64::from(one);
-            with += u64::from(other);
+            without += u64::from(collides_without);
+            with += u64::from(collides_with);
         }
         let samples = lost_mps.len() as u64;
-        let share = |hits: u64, of: u64| {
-            let interval_95 = clopper_pearson(hits, of, COVERAGE);
-            (of > 0).then(|| Estimate { value: hits as f64 / of as f64, interval_95 })
+        let share = |hits: u64, trials: u64| {
+            let interval_95 = clopper_pearson(hits, trials, COVERAGE);
+            (trials > 0).then(|| Estimate { value: hits as f64 / trials as f64, interval_95 })
         };
         Self {
             values,
@@ -80,7 +82,8 @@ impl Point {
         }
     }
 
-    /// Returns what is to be small: collisions that stay, induced collisions, speed lost.
+    /// Returns the three costs of a point: remaining collisions, induced collisions, and speed
+    /// lost.
     fn costs(&self) -> Option<[f64; 3]> {
         let value = |estimate: Option<Estimate>| Some(estimate?.value);
         Some([-value(self.prevented)?, value(self.induced)?, value(self.speed_lost_mps)?])
@@ -110,8 +113,8 @@ fn mark_optimal(points: &mut [Point]) {
         let pairs = || one.iter().zip(other);
         pairs().all(|(one, other)| one <= other) && pairs().any(|(one, other)| one < other)
     };
-    for (point, own) in points.iter_mut().zip(&costs) {
-        point.is_optimal = own.is_some_and(|own| !costs.iter().flatten().any(|other| dominates(other, &own)));
+    for (point, cost) in points.iter_mut().zip(&costs) {
+        point.is_optimal = cost.is_some_and(|cost| !costs.iter().flatten().any(|other| dominates(other, &cost)));
     }
 }
 

@@ -1,4 +1,5 @@
-//! Assembles the gates of a campaign: those of the command line, of a preset, and of the project file.
+//! Assembles the gates of a campaign: the gates of the command line, of a preset, and of the
+//! project file.
 
 use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
@@ -43,8 +44,8 @@ pub enum AssemblyError {
 }
 
 impl GateSet {
-    /// Adds the criteria of the command line, then those of a preset, then those of the project file, if there is one in the
-    /// folder of this process or above it.
+    /// Adds the criteria of the command line, then of a preset, then of the project file. The
+    /// project file lies in the folder of this process or above it, if there is one.
     ///
     /// # Errors
     /// [`AssemblyError`] if a gate does not fit the campaign.

@@ -22,7 +22,7 @@ pub enum Answer {
     Open(OpenReason),
 }
 
-/// Why a gate is not decided.
+/// The reason for which a gate is not decided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpenReason {
     /// There are too few samples for the confidence that is asked for.
@@ -66,7 +66,7 @@ impl OpenReason {
     }
 }
 
-/// What else the answer of a gate depends on.
+/// Further facts on which the answer of a gate depends.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence {
     /// Whether the campaign has a baseline.
@@ -75,18 +75,20 @@ pub struct Evidence {
     pub is_varied: bool,
     /// Whether the baseline, and the arm under test, are controllers of this program.
     pub is_built_in: [bool; 2],
-    /// What determines the number of samples.
+    /// The rule that determines the number of samples.
     pub inference: Inference,
     /// Whether the samples have weights: they visit the bins of a coverage item or cross in turn.
     pub is_weighted: bool,
 }
 
-/// Smallest number of samples by which a count, a sum, a mean or an extreme is met (-): an assumption; 10 to 59 are plausible. What no one of 20 samples
-/// shows has a probability of up to 14 %, with 95 % confidence.
+/// Smallest number of samples with which a gate on a count, a sum, a mean or an extreme is met (-):
+/// an assumption; 10 to 59 are plausible. An event that none of 20 samples shows has a probability
+/// of up to 14 %, with 95 % confidence.
 const LEAST_SAMPLES: u64 = 20;
 
-/// Returns the smallest number of samples by which a gate is met. A percentile needs as many as reach beyond it with the confidence of a bound: 59 for the 5th
-/// and the 95th, 299 for the 1st and the 99th. A scenario in which nothing varies has one sample.
+/// Returns the smallest number of samples with which a gate is met. A percentile needs enough
+/// samples to reach beyond it with the confidence of a bound: 59 for the 5th and the 95th, 299 for
+/// the 1st and the 99th. A scenario in which nothing varies has one sample.
 fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
     match aggregate {
         _ if !is_varied => 1,
@@ -101,7 +103,7 @@ fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
     }
 }
 
-/// Largest number of samples that a percentile asks for (-). The 99.99th percentile asks for it.
+/// Largest number of samples that a percentile needs (-): the number for the 99.99th percentile.
 const MOST_ASKED: u64 = 29_956;
 
 /// The value of a gate, with its interval.
@@ -111,12 +113,12 @@ pub struct Evaluation {
     pub value: Option<f64>,
     /// The two-sided 95 % interval of the share, for gates of flags.
     pub interval_95: Option<[f64; 2]>,
-    /// Samples that count: those that have the quantity, and satisfy the condition.
+    /// Samples that have the quantity and satisfy the condition.
     pub samples: u64,
     /// Whether the bound is satisfied.
     pub answer: Answer,
-    /// Number of such samples by which the gate is decided if the rest is like these; `None` if it is decided, or if more than
-    /// 10⁸ would be needed.
+    /// Number of such samples that decide the gate if further samples are like these; `None` if the
+    /// gate is decided, or if more than 10⁸ would be needed.
     pub needed: Option<u64>,
 }
 
@@ -164,13 +166,14 @@ impl Accumulator {
         self.samples += 1;
         self.hits += u64::from(value == 1.0);
         self.sum += value;
-        // A value that is not a number is both the smallest and the largest: it never satisfies a bound.
-        let keep = |known: Option<f64>, is_beyond: fn(f64, f64) -> bool| match known {
-            Some(known) if known.is_nan() || !(value.is_nan() || is_beyond(value, known)) => Some(known),
+        // A value that is not a number is both the smallest and the largest: it never satisfies a
+        // bound.
+        let keep = |extreme: Option<f64>, is_beyond: fn(f64, f64) -> bool| match extreme {
+            Some(extreme) if extreme.is_nan() || !(value.is_nan() || is_beyond(value, extreme)) => Some(extreme),
             _ => Some(value),
         };
-        self.smallest = keep(self.smallest, |value, known| value < known);
-        self.largest = keep(self.largest, |value, known| value > known);
+        self.smallest = keep(self.smallest, |value, extreme| value < extreme);
+        self.largest = keep(self.largest, |value, extreme| value > extreme);
         if matches!(self.expression.aggregate, Aggregate::Percentile(_)) {
             self.values.push(value);
         }
@@ -189,8 +192,12 @@ impl Accumulator {
         if self.expression.needs_pairs() && !is_paired {
             return open(OpenReason::NotPaired);
         }
-        let is_reported =
-            self.expression.reported_by().into_iter().zip(is_built_in).any(|(reported, own)| reported && !own);
+        let is_reported = self
+            .expression
+            .reported_by()
+            .into_iter()
+            .zip(is_built_in)
+            .any(|(reported, built_in)| reported && !built_in);
         if is_reported {
             return open(OpenReason::SelfReported);
         }
@@ -204,11 +211,11 @@ impl Accumulator {
         if is_bound && inference == Inference::Design {
             return open(OpenReason::DependentSamples);
         }
-        let Some(found) = value.filter(|_| samples > 0) else { return open(OpenReason::NoSamples) };
+        let Some(observed) = value.filter(|_| samples > 0) else { return open(OpenReason::NoSamples) };
         let is_enough = samples >= least_samples(aggregate, is_varied);
         let is_percentile = matches!(aggregate, Aggregate::Percentile(_));
-        // Few samples do not show a percentile at all. What they count or reach, they have.
-        let answer = if operator.holds(found, bound) {
+        // Few samples do not show a percentile. Their count or extreme is a fact.
+        let answer = if operator.holds(observed, bound) {
             if is_enough { Answer::Met } else { Answer::Open(OpenReason::TooFewSamples) }
         } else if is_percentile && !is_enough || is_bound && self.is_undecided(inference) {
             Answer::Open(OpenReason::TooFewSamples)
@@ -220,8 +227,8 @@ impl Accumulator {
         Evaluation { value, interval_95, samples, answer, needed: is_open.then(of_bound).flatten() }
     }
 
-    /// Returns true if the gate fails whatever the remaining `rest` samples are: the most favourable of them do not help. Of a sum, a mean and a percentile, it
-    /// does not know.
+    /// Returns true if the gate fails whatever the remaining `rest` samples are, even the most
+    /// favourable ones. Returns false for a sum, a mean and a percentile.
     pub fn is_lost(&self, evidence: &Evidence, rest: u64) -> bool {
         let Expression { aggregate, operator, .. } = self.expression;
         if evidence.inference != Inference::FixedSamples || self.evaluate(evidence).answer != Answer::Missed {
@@ -233,7 +240,7 @@ impl Accumulator {
             Self { hits, samples, ..Self::new(self.expression) }.evaluate(evidence).answer == Answer::Missed
         };
         match (aggregate, operator) {
-            // Neither of them returns behind its bound.
+            // A count or an extreme beyond its bound stays there.
             (Aggregate::Count | Aggregate::Max, Operator::AtMost) | (Aggregate::Min, Operator::AtLeast) => true,
             (Aggregate::Count, Operator::AtLeast) | (Aggregate::Share | Aggregate::Lower | Aggregate::Upper, _) => {
                 favourable()
@@ -242,7 +249,8 @@ impl Accumulator {
         }
     }
 
-    /// Returns the number of samples that decides a gate on a bound of a share, if the share stays as it is.
+    /// Returns the number of samples that decides a gate on a bound of a share, if the share stays
+    /// as it is.
     fn needed(&self, inference: Inference) -> Option<u64> {
         let share = self.hits as f64 / self.samples as f64;
         let is_decided = |samples: u64| {
@@ -259,7 +267,8 @@ impl Accumulator {
         first_that_holds(self.samples, MAX_SAMPLES, is_decided)
     }
 
-    /// Returns true if the bound of the share on the other side still satisfies the gate: more samples may decide.
+    /// Returns true if the bound of the share on the other side still satisfies the gate: more
+    /// samples may decide.
     fn is_undecided(&self, inference: Inference) -> bool {
         let other = match self.expression.aggregate {
             Aggregate::Lower => inference.upper_bound(self.hits, self.samples, CONFIDENCE),
@@ -301,24 +310,24 @@ fn percentile(values: &[f64], percent: f64) -> Option<f64> {
 
 /// Returns the value of a quantity in one sample; `None` if the sample does not have it.
 ///
-/// Collisions of the ego are those that are judged: if the validity checks flipped a verdict, the one that speaks worse for
-/// the system under test.
+/// Collisions of the ego count as judged: if the validity checks flipped a verdict, the verdict
+/// that is worse for the system under test counts.
 pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
     let is = |holds: bool| if holds { 1.0 } else { 0.0 };
     let tested = record.arms.len().checked_sub(1)?;
     let collided = |index: usize| record.tallies().get(index)?.collided;
-    let of = |index: usize, measure: &Measure| match record.arms.get(index)?.result.as_ref() {
+    let measured = |index: usize, measure: &Measure| match record.arms.get(index)?.result.as_ref() {
         Ok(_) if measure.name == EGO_COLLIDED => collided(index).map(is),
         Ok(outcome) => measure.of(outcome),
         Err(_) => None,
     };
     match quantity {
-        Quantity::Tested(measure) => of(tested, measure),
-        Quantity::Baseline(measure) if tested > 0 => of(0, measure),
+        Quantity::Tested(measure) => measured(tested, measure),
+        Quantity::Baseline(measure) if tested > 0 => measured(0, measure),
         Quantity::Compared(comparison) if !comparison.in_baseline => {
-            Some(comparison.of(of(tested, comparison.measure)?))
+            Some(comparison.of(measured(tested, comparison.measure)?))
         }
-        Quantity::Compared(comparison) if tested > 0 => Some(comparison.of(of(0, comparison.measure)?)),
+        Quantity::Compared(comparison) if tested > 0 => Some(comparison.of(measured(0, comparison.measure)?)),
         Quantity::Pair(flag) if tested > 0 => {
             let tallies = record.tallies();
             let fate = PairFate::of(tallies.first()?, tallies.get(tested)?)?;
@@ -416,7 +425,10 @@ mod tests {
         let least = |percent| least_samples(Aggregate::Percentile(percent), true);
         assert_eq!([least(99.0), least(1.0), least(95.0), least(5.0), least(50.0)], [299, 299, 59, 59, 20]);
         assert_eq!([least(100.0), least(0.0), least(99.999)], [20, 20, MOST_ASKED]);
-        assert_eq!([Aggregate::Count, Aggregate::Max, Aggregate::Min].map(|of| least_samples(of, true)), [20; 3]);
+        assert_eq!(
+            [Aggregate::Count, Aggregate::Max, Aggregate::Min].map(|aggregate| least_samples(aggregate, true)),
+            [20; 3]
+        );
         assert_eq!(least_samples(Aggregate::Percentile(99.0), false), 1, "nothing varies");
     }
 }

@@ -34,7 +34,7 @@ impl Gate {
     }
 }
 
-/// What is judged of one scenario.
+/// The judged parts of one scenario.
 #[derive(Clone, Debug)]
 struct Judged {
     scenario: String,
@@ -49,7 +49,7 @@ struct Judged {
     happened: u64,
     samples: u64,
     overridden: Vec<String>,
-    /// Whether the scenario asks what the system under test prevents.
+    /// Whether the scenario asks for collisions that the system under test prevents.
     asks_for_action: bool,
     /// The function that the scenario judges.
     function: Function,
@@ -73,8 +73,9 @@ pub struct Judge {
     scenarios: Vec<Judged>,
 }
 
-/// Returns what stands in place of the baseline of the scenario's function, if a check compares with it: it may be weaker, and what
-/// it does not prevent would count for the system under test. A controller from outside is somebody's own baseline.
+/// Returns a message if a weaker controller stands in for the baseline of the scenario's function,
+/// and a check compares with the baseline. The collisions that it fails to prevent would count for
+/// the system under test. A controller from outside is the user's own baseline.
 fn other_baseline(work: &Work) -> Option<String> {
     let config = work.file.config();
     let [baseline, _] = ControllerChoice::of_function(config.function);
@@ -141,7 +142,8 @@ impl Judge {
         self.is_measurement
     }
 
-    /// Returns the samples of a scenario that repeat the parameters or the outcome of an earlier one, and are not counted as evidence.
+    /// Returns the samples of a scenario that repeat the parameters or the outcome of an earlier
+    /// one, and are not counted as evidence.
     pub fn repeated(&self, scenario: &str) -> u64 {
         self.scenarios.iter().find(|judged| judged.scenario == scenario).map_or(0, |judged| judged.repeated)
     }
@@ -152,8 +154,8 @@ impl Judge {
         judged.map(|judged| (judged.scenario.as_str(), judged.overridden.as_slice()))
     }
 
-    /// Returns the scenarios that ask what the system under test prevents, and in which it never acted, with the action that is missing and their numbers of
-    /// samples.
+    /// Returns the scenarios that ask what the system under test prevents, and in which it never
+    /// acted, with the action that is missing and their numbers of samples.
     pub fn without_action(&self) -> impl Iterator<Item = (&str, &'static str, u64)> {
         let is_told = |judged: &Judged| self.is_paired || judged.function == Function::Mis;
         let idle = move |judged: &&Judged| {
@@ -169,7 +171,7 @@ impl Judge {
             .map(move |judged| (judged.scenario.as_str(), missing(judged), judged.samples))
     }
 
-    /// Returns what each scenario samples beyond trajectory data, in words.
+    /// Returns the values that each scenario samples beyond trajectory data, in words.
     pub fn extrapolations(&self) -> impl Iterator<Item = (&str, &[String])> {
         let judged = self.scenarios.iter().filter(|judged| !judged.extrapolations.is_empty());
         judged.map(|judged| (judged.scenario.as_str(), judged.extrapolations.as_slice()))
@@ -222,7 +224,8 @@ impl Judge {
         Evidence { is_paired, is_varied, is_built_in, inference, is_weighted }
     }
 
-    /// Returns how each requirement fares in each scenario that names it, in the order of the marks.
+    /// Returns how each requirement fares in each scenario that names it, in the order of the
+    /// marks.
     pub fn requirements(&self, gates: &[GateResult]) -> Vec<RequirementResult> {
         let mut results = Vec::new();
         for judged in &self.scenarios {
@@ -236,11 +239,11 @@ impl Judge {
                 });
             }
         }
-        results.sort_by(|one, other| (&one.mark, &one.scenario).cmp(&(&other.mark, &other.scenario)));
+        results.sort_by(|a, b| (&a.mark, &a.scenario).cmp(&(&b.mark, &b.scenario)));
         results
     }
 
-    /// Returns whether what the scenarios expect of their runs happened.
+    /// Returns whether the expectations of the scenarios happened.
     pub fn expectations(&self) -> Vec<ExpectationResult> {
         let result = |judged: &Judged| ExpectationResult {
             scenario: judged.scenario.clone(),
@@ -268,8 +271,8 @@ fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String>
 }
 
 impl Judged {
-    /// A run that the ego's collision ended counts as one in which everything happened: what it would have come to is not
-    /// known, and it is no pass.
+    /// A run that the ego's collision ended counts as one in which everything happened. Its further
+    /// course is unknown, and the collision itself is no pass.
     fn observe_expectations(&mut self, record: &Record) {
         if record.arms.iter().any(|arm| arm.result.is_err()) {
             return;

@@ -5,17 +5,17 @@ use closecall_scenarios::criteria::Expression;
 /// The options, each `None` if it is not given. All bounds are inclusive.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GateOptions {
-    /// Most samples in which the ego collides of any scenario.
+    /// Largest number of samples in which the ego collides, in any scenario.
     pub max_collisions: Option<u64>,
-    /// Most samples in which vehicles other than the ego collide in any scenario.
+    /// Largest number of samples in which vehicles other than the ego collide, in any scenario.
     pub max_other_collisions: Option<u64>,
-    /// Most induced collisions in any scenario.
+    /// Largest number of induced collisions, in any scenario.
     pub max_induced: Option<u64>,
-    /// Least share of the baseline's collisions that is prevented, with 95 % confidence.
+    /// Smallest share of the baseline's collisions that the system prevents, with 95 % confidence.
     pub min_prevented: Option<f64>,
-    /// Most harm (expected driver deaths).
+    /// Largest harm (expected driver deaths).
     pub max_harm: Option<f64>,
-    /// Least time headway of the rear vehicle (s).
+    /// Smallest time headway of the rear vehicle (s).
     pub min_rear_thw: Option<f64>,
     /// Largest share of the samples in which the margin increase system engages.
     pub max_engagement_rate: Option<f64>,

@@ -1,4 +1,5 @@
-//! The project file, `closecall.toml`: gates for every campaign that is run in a folder or below it.
+//! The project file, `closecall.toml`: gates for every campaign that is run in a folder or below
+//! it.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -38,7 +39,8 @@ pub struct ProjectFile {
 }
 
 impl ProjectFile {
-    /// Reads the project file of `folder`, or of the nearest folder above it. Returns `None` if there is none.
+    /// Reads the project file of `folder`, or of the nearest folder above it. Returns `None` if
+    /// there is none.
     ///
     /// # Errors
     /// [`ProjectError`] if the file cannot be read, or has an unknown key or an invalid criterion.
@@ -46,7 +48,7 @@ impl ProjectFile {
         for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
             match path.metadata() {
                 Ok(file) if file.is_file() => return Self::read(&path).map(Some),
-                // Gates that may be there must not be left out.
+                // A file that cannot be read may hold gates: they must not be left out.
                 Err(error)
                     if !matches!(
                         error.kind(),
@@ -68,7 +70,8 @@ impl ProjectFile {
         Ok(Self { path: path.to_owned(), gate: config.gate })
     }
 
-    /// Says so if the file belongs to another user, as in a folder that others can write to.
+    /// Returns a message if the file belongs to another user, for example in a folder that others
+    /// can write to.
     pub fn foreign_owner(&self) -> Option<String> {
         #[cfg(unix)]
         {
@@ -82,7 +85,8 @@ impl ProjectFile {
         None
     }
 
-    /// Adds the gates that no gate of the set, which are those of the command line and of a preset, replaces.
+    /// Adds the gates of the file that no gate of the set replaces. The set holds the gates of the
+    /// command line and of a preset.
     ///
     /// # Errors
     /// [`ProjectError`] if the largest probability or its confidence is out of range.

@@ -39,7 +39,7 @@ pub struct GateResult {
     pub scenario: String,
     /// The criterion.
     pub expression: Expression,
-    /// Where it comes from.
+    /// The origin of the gate.
     pub source: GateSource,
     /// Its value and answer.
     pub evaluation: Evaluation,
@@ -138,14 +138,15 @@ pub struct RequirementResult {
     pub standing: Standing,
 }
 
-/// Whether what a scenario expects of its runs happened.
+/// Whether the expectation of a scenario happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpectationResult {
     /// The scenario.
     pub scenario: String,
-    /// What is expected.
+    /// The expected flags.
     pub expects: Vec<FlagName>,
-    /// Samples in which all of it happened, in every arm; a run that the ego's collision ended counts.
+    /// Samples in which all of it happened, in every arm; a run that the ego's collision ended
+    /// counts.
     pub happened: u64,
     /// Samples with an outcome in every arm.
     pub samples: u64,

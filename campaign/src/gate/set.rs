@@ -15,7 +15,7 @@ use closecall_scenarios::criteria::Expression;
 
 use crate::probability::ProbabilityGate;
 
-/// Where a gate comes from.
+/// The origin of a gate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GateSource {
     /// The command line.
@@ -42,12 +42,13 @@ impl fmt::Display for GateSource {
     }
 }
 
-/// One criterion with its origin. It is judged on the samples of each scenario, one scenario at a time.
+/// One criterion with its origin. It is judged on the samples of each scenario, one scenario at a
+/// time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateSpec {
     /// The criterion.
     pub expression: Expression,
-    /// Where it comes from.
+    /// The origin of the criterion.
     pub source: GateSource,
 }
 
@@ -56,14 +57,15 @@ pub struct GateSpec {
 pub struct ProbabilitySpec {
     /// The gate.
     pub gate: ProbabilityGate,
-    /// Where it comes from.
+    /// The origin of the gate.
     pub source: GateSource,
 }
 
-/// The gates that hold for every scenario of a campaign; those of the scenario files come on top.
+/// The gates that hold for every scenario of a campaign. The gates of the scenario files come on
+/// top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GateSet {
-    /// The criteria, those that win first.
+    /// The criteria. The first ones win.
     pub specs: Vec<GateSpec>,
     /// The gate on the probability of a collision.
     pub probability: Option<ProbabilitySpec>,
@@ -73,7 +75,7 @@ pub struct GateSet {
     pub max_flip_rate: f64,
     /// Most flaky samples; any number if `None`.
     pub max_flaky: Option<u64>,
-    /// What a reader should know of the origin of the gates.
+    /// Remarks on the origin of the gates, for the reader.
     pub notes: Vec<String>,
 }
 
@@ -100,19 +102,19 @@ impl GateSet {
         set
     }
 
-    /// Adds a criterion, unless one with the same left-hand side is there already: what is added first wins.
+    /// Adds a criterion, unless the set has one with the same left-hand side: the first one wins.
     pub fn push(&mut self, spec: GateSpec) {
         let subject = spec.expression.subject();
-        let is_known = |known: &GateSpec| {
-            known.expression.subject() == subject && known.expression.operator == spec.expression.operator
+        let is_known = |gate: &GateSpec| {
+            gate.expression.subject() == subject && gate.expression.operator == spec.expression.operator
         };
         if !self.specs.iter().any(is_known) {
             self.specs.push(spec);
         }
     }
 
-    /// Returns the gates of one scenario: those of the campaign, those of its file that these do not replace, and the checks
-    /// of its requirements.
+    /// Returns the gates of one scenario: the gates of the campaign, the gates of its file that
+    /// these do not replace, and the checks of its requirements.
     pub fn of_scenario(&self, file: &ScenarioFile) -> Vec<GateSpec> {
         let mut set = Self { specs: self.specs.clone(), ..Self::default() };
         for &expression in &file.config().gate.require {

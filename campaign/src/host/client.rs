@@ -23,7 +23,8 @@ pub(super) trait Peer {
     /// Sends a line and waits for its answer. Returns `None` if there is none within `limit`.
     ///
     /// # Errors
-    /// [`ExecError`] if the process ends, writes what nobody has asked for, or does not keep to its limits.
+    /// [`ExecError`] if the process ends, writes what nobody has asked for, or does not keep to its
+    /// limits.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError>;
 
     /// Lets the process be killed without time to end by itself.
@@ -45,7 +46,8 @@ pub(super) trait World {
     /// A process.
     type Peer: Peer;
 
-    /// Starts a worker process for an arm, gives it its task, and returns it with the identity of the task.
+    /// Starts a worker process for an arm, gives it its task, and returns it with the identity of
+    /// the task.
     ///
     /// # Errors
     /// [`ExecError`] if it cannot be started.
@@ -60,7 +62,7 @@ pub(super) trait World {
     }
 }
 
-/// A worker process, and what it is asked.
+/// A worker process, and its task.
 struct Worker<P> {
     peer: P,
     /// The identity of its task.
@@ -72,8 +74,8 @@ struct Worker<P> {
 /// The worker processes of a thread.
 pub(super) struct Client<W: World> {
     world: W,
-    /// The processes by the address of the work and the index of the arm. A thread of a campaign serves one work, and keeps
-    /// it alive.
+    /// The processes by the address of the work and the index of the arm. A thread of a campaign
+    /// serves one work, and keeps it alive.
     workers: BTreeMap<(usize, usize), Worker<W::Peer>>,
 }
 
@@ -81,15 +83,16 @@ thread_local! {
     static CLIENT: RefCell<Client<OperatingSystem>> = RefCell::new(Client::new(OperatingSystem(Instant::now())));
 }
 
-/// Why a process has not run a sample. The process is gone.
+/// The reason for which a process has not run a sample. The process is gone.
 pub(super) enum Trouble {
-    /// It crashed or hung: another process may not.
+    /// The process crashed or hung. Another process may succeed.
     Crash(SampleFailure),
-    /// It is not to be trusted, or the time of the sample is over.
+    /// The process cannot be trusted, or the time of the sample is over.
     Other(SampleFailure),
 }
 
-/// Runs one sample of an isolated arm in a worker process of this thread. `limit` is the time limit of the sample.
+/// Runs one sample of an isolated arm in a worker process of this thread. `limit` is the time limit
+/// of the sample.
 pub(crate) fn run(work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
     CLIENT.with_borrow_mut(|client| client.run(work, arm, sample, limit))
 }
@@ -102,8 +105,8 @@ impl<W: World> Client<W> {
 
     /// Runs one sample in a worker process.
     ///
-    /// A process that crashes or hangs costs the sample that it runs. Only if the work says so is the sample run again in a
-    /// new process, and its record then says that it is flaky.
+    /// A process that crashes or hangs costs the sample that it runs. Only if the work says so is
+    /// the sample run again in a new process, and its record then says that it is flaky.
     pub(super) fn run(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
         let started = self.world.now();
         let mut first: Option<SampleFailure> = None;
@@ -132,8 +135,8 @@ impl<W: World> Client<W> {
         }
     }
 
-    /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process that has answered is
-    /// kept.
+    /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process
+    /// that has answered is kept.
     fn ask(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> Result<Answer, Trouble> {
         let key = (std::ptr::from_ref(work) as usize, arm);
         let mut worker = match self.workers.remove(&key) {
@@ -165,8 +168,8 @@ impl<W: World> Client<W> {
 
 /// Reads the answer to a question, and checks that it is one.
 pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answer, Trouble> {
-    let wrong = |what: String| {
-        let message = format!("the answer of the controller's process is not that of the sample: {what}");
+    let wrong = |difference: String| {
+        let message = format!("the answer of the controller's process does not belong to the sample: {difference}");
         Trouble::Other(SampleFailure { kind: KIND.to_owned(), message })
     };
     let answer: Answer = serde_json::from_slice(line).map_err(|error| wrong(format!("it cannot be read: {error}")))?;
@@ -179,21 +182,22 @@ pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answ
         return Ok(answer);
     }
     if answer.question != *question {
-        return Err(wrong(format!("it answers {}, asked was {question}", answer.question)));
+        return Err(wrong(format!("it answers {} instead of {question}", answer.question)));
     }
     let name = work.arms[question.arm].controller.name();
     if answer.record.controller != name {
-        return Err(wrong(format!("it is of the controller `{}`, asked was `{name}`", answer.record.controller)));
+        return Err(wrong(format!("it comes from the controller `{}` instead of `{name}`", answer.record.controller)));
     }
     work.identity().check_arm(&answer.record, question.sample, &mut None).map_err(wrong)?;
     match (&answer.record.result, answer.is_last) {
-        // It hangs in a call, and ends after this answer.
+        // The process hangs in a call, and ends after this answer.
         (Err(failure), true) => Err(Trouble::Crash(failure.clone())),
         _ => Ok(answer),
     }
 }
 
-/// The processes and the clock of the operating system. The moment is the one from which the clock counts.
+/// The processes and the clock of the operating system. The moment is the one from which the clock
+/// counts.
 struct OperatingSystem(Instant);
 
 impl World for OperatingSystem {
@@ -240,7 +244,8 @@ fn line(message: &impl serde::Serialize) -> Vec<u8> {
     line
 }
 
-/// Returns the failure of a sample whose process has ended. Its message does not depend on the samples before.
+/// Returns the failure of a sample whose process has ended. Its message does not depend on the
+/// samples before.
 fn failure(error: &ExecError) -> SampleFailure {
     let wrote = |stderr: &str| if stderr.is_empty() { String::new() } else { format!("; it last wrote: {stderr}") };
     let message = match error {

@@ -1,5 +1,5 @@
-//! Worker processes that run whole samples with a controller that may crash or hang: a library, an FMU, or an object of the
-//! program that has Closecall as a library.
+//! Worker processes that run whole samples with a controller that may crash or hang: a library, an
+//! FMU, or an object of the program that has Closecall as a library.
 //!
 //! ```text
 //!  campaign, one thread per job                         worker process: `closecall host samples`
@@ -8,18 +8,21 @@
 //!              ◀── the question, record of the arm ◀─ standard output
 //! ```
 //!
-//! A thread keeps its process for all its samples, so that a control step costs a function call. A process that crashes, ends,
-//! hangs or outgrows its memory costs the sample that it runs: the record says how, and the next sample starts a new process.
-//! Only if the campaign asks for it is such a sample run again, and its record then says that it is flaky.
+//! A thread keeps its process for all its samples, so that a control step costs a function call. A
+//! process that crashes, ends, hangs or outgrows its memory costs the sample that it runs: the
+//! record says how, and the next sample starts a new process. Only if the campaign asks for it is
+//! such a sample run again, and its record then says that it is flaky.
 //!
-//! An answer repeats its question. Foreign code can copy its process (`fork`) and so answer twice: an answer to another question, an
-//! answer of a copy, and a line that is left over before the next question each end the process and the sample with an error.
+//! An answer repeats its question. Foreign code can copy its process (`fork`) and so answer twice:
+//! an answer to another question, an answer of a copy, and a line that is left over before the next
+//! question each end the process and the sample with an error.
 //!
-//! A process that starts late may find another file, or be another version of this program. It then refuses its task, which ends
-//! the campaign.
+//! A process that starts late may find another file, or be another version of this program. It then
+//! refuses its task, which ends the campaign.
 //!
-//! Records travel as lines of JSON, whose numbers read back to the same bits. A message says nothing about earlier samples of
-//! the same process, so that it does not depend on the number of jobs.
+//! Records travel as lines of JSON, whose numbers read back to the same bits. A message says
+//! nothing about earlier samples of the same process, so that it does not depend on the number of
+//! jobs.
 
 mod client;
 mod serve;
@@ -40,13 +43,13 @@ use super::record::{ArmRecord, Record, SampleFailure};
 use super::sampling::Sampling;
 use super::validity::CheckPlan;
 
-/// The kind of the failure of a sample that a worker process has refused to run, because the program or a file is another one
-/// than at the start.
+/// The kind of a sample's failure if a worker process has refused to run it, because the program or
+/// a file differs from the start of the campaign.
 const CHANGED: &str = "refused";
 /// The kind of the failure of a sample whose controller a worker process cannot read.
 const UNREADABLE: &str = "unreadable";
 
-/// Why a worker process has refused to run a sample.
+/// A worker process's refusal to run a sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Refusal<'a> {
     /// The reason.
@@ -56,7 +59,8 @@ pub(crate) struct Refusal<'a> {
 }
 
 impl<'a> Refusal<'a> {
-    /// Returns why a worker process has refused to run a sample; `None` if the failure is another one.
+    /// Returns why a worker process has refused to run a sample; `None` if the failure is another
+    /// one.
     fn of(failure: &'a SampleFailure) -> Option<Self> {
         let has_changed = failure.kind == CHANGED;
         (has_changed || failure.kind == UNREADABLE).then_some(Self { reason: &failure.message, has_changed })
@@ -68,7 +72,7 @@ pub(crate) fn refusal(record: &Record) -> Option<Refusal<'_>> {
     record.arms.iter().filter_map(|arm| arm.result.as_ref().err()).find_map(Refusal::of)
 }
 
-/// What a worker process has to know before its first sample.
+/// The task of a worker process, which it needs before its first sample.
 #[derive(Serialize, Deserialize)]
 struct Task {
     /// The version of the program that gives the task.
@@ -85,13 +89,14 @@ struct Task {
     onnxruntime: Option<PathBuf>,
 }
 
-/// Returns the identity of a task: a hash of its line, which holds the scenario, the seed, the checks and the controller.
+/// Returns the identity of a task: a hash of its line, which holds the scenario, the seed, the
+/// checks and the controller.
 fn task_identity(line: &[u8]) -> String {
     const DIGITS: usize = 16;
     blake3::hash(line).to_hex()[..DIGITS].to_owned()
 }
 
-/// What a worker process is asked, and what its answer repeats.
+/// A question to a worker process, which its answer repeats.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Question {
     /// The identity of the task: [`task_identity`].
@@ -116,7 +121,8 @@ impl fmt::Display for Question {
 struct Answer<Q = Question> {
     /// The question as it was asked.
     question: Q,
-    /// The number of the process that was copied, if the answer comes from a copy; `None` otherwise.
+    /// The number of the process that was copied, if the answer comes from a copy; `None`
+    /// otherwise.
     copied_from: Option<u32>,
     record: ArmRecord,
     /// Wall time, without the validity checks (s).

@@ -1,4 +1,4 @@
-//! What a worker process does: `closecall host …`.
+//! The work of a worker process: `closecall host …`.
 
 use std::fs::File;
 use std::io::{self, BufRead, Write};
@@ -24,10 +24,10 @@ use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
 use crate::workers::Samples;
 
-/// What a process answers that has loaded ONNX Runtime.
+/// The answer of a process that has loaded ONNX Runtime.
 pub(crate) const ONNXRUNTIME_WORKS: &str = "onnxruntime";
 
-/// Number of tracks of the measurement of a control step: those of dense traffic.
+/// Number of tracks in the measurement of a control step: dense traffic.
 const COST_TRACKS: usize = 12;
 /// Number of control steps of the measurement.
 const COST_STEPS: u32 = 200_000;
@@ -94,12 +94,14 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
     }
 }
 
-/// Returns the standard output, to which from now on nothing but the returned file writes: what is printed goes to standard error.
+/// Returns the standard output as a file. From now on, only this file writes to it. Everything else
+/// that the process prints goes to standard error.
 fn take_output() -> io::Result<File> {
-    // A process that the library starts must not hold it open, since its end reports the end of this process.
-    let own = rustix::io::fcntl_dupfd_cloexec(io::stdout(), 3)?;
+    // A process that the library starts must not hold the output open: the end of the output
+    // reports the end of this process.
+    let output = rustix::io::fcntl_dupfd_cloexec(io::stdout(), 3)?;
     rustix::stdio::dup2_stdout(io::stderr())?;
-    Ok(File::from(own))
+    Ok(File::from(output))
 }
 
 fn file(controller: &str) -> Result<(Kind, &str), String> {
@@ -156,7 +158,8 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
                     ArmRun { record, wall_s: limit.as_secs_f64(), check_s: 0.0 }
                 }
             };
-            // The process ends after this. If the answer is lost, its end is the error of the sample.
+            // The process ends after this. If the answer is lost, its end is the error of the
+            // sample.
             answering.answer(question, run, true).ok();
         }
     };
@@ -195,8 +198,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Answers the first question, if there is one, with the reason for which this process runs no sample, and its kind. The
-/// question of another version may have any form.
+/// Answers the first question, if there is one, with the reason for which this process runs no
+/// sample, and its kind. The question of another version may have any form.
 fn refuse(
     answers: &Arc<Mutex<File>>,
     question: Option<io::Result<String>>,
@@ -214,11 +217,12 @@ fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, String> {
     serde_json::from_str(line).map_err(|error| format!("failed to read a message: {error}"))
 }
 
-/// Where the answers go, and which process gives them.
+/// The output of the answers, and the process that gives them.
 #[derive(Clone)]
 struct Answering {
     answers: Arc<Mutex<File>>,
-    /// The number of the process when it got its task. A copy that the controller has made of it (`fork`) has another one.
+    /// The number of the process when it got its task. A copy that the controller has made of it
+    /// (`fork`) has another one.
     process: u32,
 }
 

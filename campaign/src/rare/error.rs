@@ -5,7 +5,7 @@ use closecall_traffic::atomic::WriteError;
 use crate::campaign_error::{CampaignError, WorkersError};
 use crate::folder::FolderError;
 
-/// Why a rare event has no result.
+/// The reason for which a rare event has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum RareError {
     /// The folder or the workers cannot be used.

@@ -1,8 +1,10 @@
 //! An estimate with its interval.
 //!
-//! Both methods end with independent values whose mean is the probability: the weighted values of single runs, or the estimates of independent
-//! repetitions. Their mean is unbiased, and its error is nearly normal. The interval of a probability is symmetric in its logarithm, because weights
-//! and products of shares are skewed to the right: the interval reaches further up than down, and not below 0.
+//! Both methods end with independent values whose mean is the probability: the weighted values of
+//! single runs, or the estimates of independent repetitions. Their mean is unbiased, and its error
+//! is nearly normal. The interval of a probability is symmetric in its logarithm, because weights
+//! and products of shares are skewed to the right: the interval reaches further up than down, and
+//! not below 0.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -31,7 +33,7 @@ impl Mean {
         }
         let count = values.len() as f64;
         let value = values.iter().sum::<f64>() / count;
-        let variance = values.iter().map(|one| (one - value) * (one - value)).sum::<f64>() / (count - 1.0);
+        let variance = values.iter().map(|sample| (sample - value) * (sample - value)).sum::<f64>() / (count - 1.0);
         Some(Self { value, standard_error: (variance / count).sqrt(), degrees_of_freedom: count - 1.0 })
     }
 
@@ -46,7 +48,8 @@ impl Mean {
         self.value > 0.0 && self.standard_error > 0.0
     }
 
-    /// Returns the two-sided interval of a probability; `None` if the mean is not above 0, or the values do not scatter.
+    /// Returns the two-sided interval of a probability; `None` if the mean is not above 0, or the
+    /// values do not scatter.
     pub fn interval_of_probability(&self, coverage: f64) -> Option<[f64; 2]> {
         let one_sided = 0.5 * (1.0 + coverage);
         Some([self.lower_bound(one_sided)?, self.upper_bound(one_sided)?])

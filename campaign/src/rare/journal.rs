@@ -1,4 +1,5 @@
-//! The folder of a campaign that samples a rare event: a manifest, a journal of the responses, and the result.
+//! The folder of a campaign that samples a rare event: a manifest, a journal of the responses, and
+//! the result.
 //!
 //! ```text
 //!  rare-manifest.json   how the campaign was made
@@ -7,7 +8,8 @@
 //!  lock                 locked while the campaign runs
 //! ```
 //!
-//! The files have names of their own, so that no command takes the weighted runs for the independent samples of a plain campaign.
+//! The files have names of their own, so that no command takes the weighted runs for the
+//! independent samples of a plain campaign.
 
 use std::fs::{self, OpenOptions};
 use std::io::{BufReader, Seek as _, SeekFrom, Write as _};

@@ -45,7 +45,7 @@ impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(word: &str) -> Result<Self, UnknownMethod> {
-        let known = Self::ALL.into_iter().find(|method| method.name() == word);
-        known.ok_or_else(|| UnknownMethod { word: word.to_owned() })
+        let method = Self::ALL.into_iter().find(|method| method.name() == word);
+        method.ok_or_else(|| UnknownMethod { word: word.to_owned() })
     }
 }

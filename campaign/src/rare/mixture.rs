@@ -1,4 +1,5 @@
-//! Mixtures of normal distributions, relative to the standard normal distribution, and their fit to weighted points.
+//! Mixtures of normal distributions, relative to the standard normal distribution, and their fit to
+//! weighted points.
 //!
 //! ```text
 //!                    ╭╮                    ╭╮
@@ -6,14 +7,17 @@
 //!        ─────────────────────────────────────▶ z
 //! ```
 //!
-//! A component has its own mean and standard deviation in each dimension. Most dimensions do not matter for a region. There the fit of few points would only
-//! add noise, which multiplies in the weights over all dimensions. So a mean or a standard deviation stays that of the standard normal distribution unless
-//! the points contradict it ([`SIGNIFICANCE`]).
+//! A component has its own mean and standard deviation in each dimension. Most dimensions do not
+//! matter for a region. There the fit of few points would only add noise, which multiplies in the
+//! weights over all dimensions. So a mean or a standard deviation stays standard normal unless the
+//! points contradict it ([`SIGNIFICANCE`]).
 //!
-//! The number of components is that of the smallest Bayesian information criterion (G. Schwarz, *Estimating the dimension of a model*, Annals of Statistics 6
-//! (1978) 461–464), in which a mean or a standard deviation counts only if it differs from the standard normal distribution. Expectation and maximization
-//! alternate (A. P. Dempster, N. M. Laird and D. B. Rubin, Journal of the Royal Statistical Society B 39 (1977) 1–38), from starts that lie apart as in
-//! k-means++ (D. Arthur and S. Vassilvitskii, SODA 2007, 1027–1035).
+//! The smallest Bayesian information criterion determines the number of components (G. Schwarz,
+//! *Estimating the dimension of a model*, Annals of Statistics 6 (1978) 461–464). In it, a mean or
+//! a standard deviation counts only if it differs from the standard normal distribution.
+//! Expectation and maximization alternate (A. P. Dempster, N. M. Laird and D. B. Rubin, Journal of
+//! the Royal Statistical Society B 39 (1977) 1–38), from starts that lie apart as in k-means++ (D.
+//! Arthur and S. Vassilvitskii, SODA 2007, 1027–1035).
 
 use closecall_traffic::Stream;
 use closecall_traffic::maths::{exp, ln};
@@ -24,15 +28,17 @@ use super::problem::{Point, draw_noise};
 
 /// Largest number of components that a fit tries (-): an assumption; 2 to 10 are plausible.
 const MOST_COMPONENTS: usize = 4;
-/// Number of standard errors by which a mean or a standard deviation has to differ from the standard normal distribution (-): an assumption; 2 to 4 are
-/// plausible.
+/// Number of standard errors by which a mean or a standard deviation has to differ from the
+/// standard normal distribution (-): an assumption; 2 to 4 are plausible.
 const SIGNIFICANCE: f64 = 2.5;
-/// Standard deviations that a component may have (-). A component is nowhere narrower than the distribution of the scenario. Its tails are then nowhere
-/// lighter, so that no weight grows with the distance from the component. The larger one is an assumption; 2 to 5 are plausible.
+/// Standard deviations that a component may have (-). A component is nowhere narrower than the
+/// distribution of the scenario. Its tails are then nowhere lighter, so that no weight grows with
+/// the distance from the component. The larger one is an assumption; 2 to 5 are plausible.
 const SD: [f64; 2] = [1.0, 3.0];
 /// Smallest effective number of points of a component (-): an assumption; 4 to 20 are plausible.
 const LEAST_POINTS: f64 = 8.0;
-/// Rounds of expectation and maximization, and starts of each number of components (-): assumptions.
+/// Rounds of expectation and maximization, and starts of each number of components (-):
+/// assumptions.
 const ROUNDS: usize = 30;
 const STARTS: usize = 3;
 
@@ -67,7 +73,8 @@ impl Component {
         z.iter().zip(&self.mean).map(|(z, mean)| z * mean).sum::<f64>() > 0.0
     }
 
-    /// Returns the number of means and standard deviations that differ from the standard normal distribution.
+    /// Returns the number of means and standard deviations that differ from the standard normal
+    /// distribution.
     fn moved(&self) -> usize {
         self.mean.iter().filter(|mean| **mean != 0.0).count() + self.sd.iter().filter(|sd| **sd != 1.0).count()
     }
@@ -94,15 +101,16 @@ impl Mixture {
         Self { defensive: 0.5, components: vec![component] }
     }
 
-    /// Returns the density at a point, relative to the standard normal density: the inverse of the likelihood weight.
+    /// Returns the density at a point, relative to the standard normal density: the inverse of the
+    /// likelihood weight.
     pub fn ratio(&self, z: &[f64]) -> f64 {
-        let one = |component: &Component| component.weight * exp(component.log_ratio(z).min(MOST_LOG));
-        self.defensive + (1.0 - self.defensive) * self.components.iter().map(one).sum::<f64>()
+        let density = |component: &Component| component.weight * exp(component.log_ratio(z).min(MOST_LOG));
+        self.defensive + (1.0 - self.defensive) * self.components.iter().map(density).sum::<f64>()
     }
 
     /// Returns the density of the components alone, relative to the standard normal density.
     pub fn ratio_of_components(&self, z: &[f64]) -> f64 {
-        self.components.iter().map(|one| one.weight * exp(one.log_ratio(z).min(MOST_LOG))).sum()
+        self.components.iter().map(|component| component.weight * exp(component.log_ratio(z).min(MOST_LOG))).sum()
     }
 
     /// Draws a point.
@@ -137,7 +145,8 @@ impl Mixture {
     }
 }
 
-/// Largest logarithm of a ratio of densities (-). Beyond it the weight of the point is 0 to every digit.
+/// Largest logarithm of a ratio of densities (-). Beyond it the weight of the point is 0 to every
+/// digit.
 const MOST_LOG: f64 = 600.0;
 
 /// Weighted points.
@@ -174,7 +183,8 @@ impl Weighted<'_> {
         best.map(|(_, components)| Mixture { defensive, components })
     }
 
-    /// Returns the Bayesian information criterion, with the likelihood relative to the standard normal distribution.
+    /// Returns the Bayesian information criterion, with the likelihood relative to the standard
+    /// normal distribution.
     fn criterion(&self, components: &[Component], size: f64) -> f64 {
         let total: f64 = self.weights.iter().sum();
         let mixture = Mixture { defensive: 0.0, components: components.to_vec() };
@@ -217,23 +227,26 @@ impl Weighted<'_> {
                 pull[index] = self.weights[index] * nearest[index];
             }
         }
-        let is_of = |centre: usize| owner.iter().map(|own| if *own == centre { 1.0 } else { 0.0 }).collect();
+        let is_of = |centre: usize| {
+            owner.iter().map(|nearest_centre| if *nearest_centre == centre { 1.0 } else { 0.0 }).collect()
+        };
         Some((0..count).map(is_of).collect())
     }
 
     fn maximize(&self, shares: &[Vec<f64>]) -> Option<Vec<Component>> {
         let total: f64 = self.weights.iter().sum();
-        let of = |share: &Vec<f64>| {
+        let component = |share: &Vec<f64>| {
             let weights: Vec<f64> = self.weights.iter().zip(share).map(|(weight, share)| weight * share).collect();
             (effective(&weights) >= LEAST_POINTS).then(|| self.component(&weights, weights.iter().sum::<f64>() / total))
         };
-        shares.iter().map(of).collect()
+        shares.iter().map(component).collect()
     }
 
     fn expect(&self, components: &[Component]) -> Vec<Vec<f64>> {
         let mut shares = vec![vec![0.0; self.points.len()]; components.len()];
         for (index, point) in self.points.iter().enumerate() {
-            let logs: Vec<f64> = components.iter().map(|one| ln(one.weight) + one.log_ratio(point)).collect();
+            let logs: Vec<f64> =
+                components.iter().map(|component| ln(component.weight) + component.log_ratio(point)).collect();
             let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let total: f64 = logs.iter().map(|log| exp(log - largest)).sum();
             for (share, log) in shares.iter_mut().zip(&logs) {
@@ -250,8 +263,9 @@ impl Weighted<'_> {
         let dimensions = self.points.first().map_or(0, |point| point.len());
         let mut component = Component { weight: share, mean: vec![0.0; dimensions], sd: vec![1.0; dimensions] };
         for axis in 0..dimensions {
-            let moment = |of: &dyn Fn(f64) -> f64| {
-                self.points.iter().zip(weights).map(|(point, weight)| weight * of(point[axis])).sum::<f64>() / total
+            let moment = |function: &dyn Fn(f64) -> f64| {
+                self.points.iter().zip(weights).map(|(point, weight)| weight * function(point[axis])).sum::<f64>()
+                    / total
             };
             let mean = moment(&|z| z);
             let about = |centre: f64| moment(&|z| (z - centre) * (z - centre)).sqrt();
@@ -281,9 +295,9 @@ fn choose(pull: &[f64], rng: &mut Stream) -> Option<usize> {
         return None;
     }
     let mut rest = rng.random::<f64>() * total;
-    let chosen = pull.iter().position(|one| {
-        rest -= one;
+    let chosen = pull.iter().position(|weight| {
+        rest -= weight;
         rest < 0.0
     });
-    chosen.or_else(|| pull.iter().rposition(|one| *one > 0.0))
+    chosen.or_else(|| pull.iter().rposition(|weight| *weight > 0.0))
 }

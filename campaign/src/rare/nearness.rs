@@ -1,8 +1,9 @@
 //! How near a sample came to an event: the score that guides a search.
 //!
-//! A score decides how many runs a search needs, and nothing else: no estimate and no interval depends on it. A bound of a number is its own guide. A
-//! collision of the ego is guided by its smallest gap, and `induced` and `prevented` by the smallest gap in the arm that is to collide, plus the change of
-//! velocity of a collision in the arm that is not to.
+//! A score decides how many runs a search needs, and nothing else: no estimate and no interval
+//! depends on it. A bound of a number is its own guide. A collision of the ego is guided by its
+//! smallest gap, and `induced` and `prevented` by the smallest gap in the arm that is to collide,
+//! plus the change of velocity of a collision in the arm that is not to.
 
 use closecall_scenarios::criteria::{EGO_COLLIDED, Event, EventExpression, Guide, Measure, PairFlag, Quantity};
 use closecall_scenarios::outcome::Outcome;
@@ -11,7 +12,7 @@ use super::problem::Response;
 use crate::gate::value;
 use crate::record::Record;
 
-/// The events of a campaign, with what leads to them.
+/// The events of a campaign, with the number that leads to each of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearness {
     expression: EventExpression,
@@ -54,7 +55,8 @@ impl Nearness {
         self.guide
     }
 
-    /// Returns what a sample tells of the events. A sample without an outcome has none, and is as far from them as any.
+    /// Returns how near a sample came to the events. A sample without an outcome has no event, and
+    /// is farthest from all of them.
     pub fn response(&self, record: &Record) -> Response {
         let EventExpression { first, second } = self.expression;
         let happened = |event: Event| value(event.quantity, record).is_some_and(|value| event.happens(value));
@@ -92,11 +94,12 @@ impl Nearness {
     }
 }
 
-/// Gap of a sample in which no vehicle is near the ego in its lane (m): beyond the range of the sensors.
+/// Gap of a sample in which no vehicle is near the ego in its lane (m): beyond the range of the
+/// sensors.
 const NO_GAP_M: f64 = 200.0;
 
 /// Returns the smallest gap of the ego to the vehicle ahead or behind.
 fn smallest_gap_m(outcome: &Outcome) -> f64 {
-    let of = |name: &str| Measure::named(name).and_then(|measure| measure.of(outcome)).unwrap_or(NO_GAP_M);
-    of("min_gap_front_m").min(of("min_gap_rear_m"))
+    let gap_m = |name: &str| Measure::named(name).and_then(|measure| measure.of(outcome)).unwrap_or(NO_GAP_M);
+    gap_m("min_gap_front_m").min(gap_m("min_gap_rear_m"))
 }

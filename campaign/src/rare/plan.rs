@@ -29,7 +29,8 @@ pub struct RarePlan {
 }
 
 impl RarePlan {
-    /// Samples the events of a scenario. The runs of `journal` are not run again. `on_run` is called after each run.
+    /// Samples the events of a scenario. The runs of `journal` are not run again. `on_run` is
+    /// called after each run.
     ///
     /// # Errors
     /// [`RareError`] if there is no result. The campaign can go on from its journal.
@@ -61,8 +62,8 @@ impl RarePlan {
         };
         let mut report = match self.method {
             Method::Importance => {
-                let found = importance(&mut runs, dimensions, Seed(seed), self.goal)?;
-                RareReport::of_importance(self, &found)
+                let result = importance(&mut runs, dimensions, Seed(seed), self.goal)?;
+                RareReport::of_importance(self, &result)
             }
             Method::Subset => RareReport::of_subset(self, &subset(&mut runs, dimensions, Seed(seed), self.goal)?),
         };

@@ -1,26 +1,30 @@
-//! What the methods of this module know of a simulation: points that go in, and responses that come out.
+//! What the methods of this module know of a simulation: points that go in, and responses that come
+//! out.
 //!
 //! ```text
 //!  Point { normals, noise } ─▶ Simulator ─▶ Response { score, events }
 //! ```
 //!
-//! A method never sees a scenario. Its next points depend only on its seed and on the responses so far, so that a journal of responses is all that
-//! a method needs to go on.
+//! A method never sees a scenario. Its next points depend only on its seed and on the responses so
+//! far, so that a journal of responses is all that a method needs to go on.
 
 use closecall_traffic::{ActorId, StandardNormal, Stream, stream};
 use rand::{Rng, RngExt};
 
-/// Key of the random streams of the methods. Their channels contain a `/`, which the name of a component never does.
+/// Key of the random streams of the methods. Their channels contain a `/`, which the name of a
+/// component never does.
 const OWNER: &str = "scenario";
 /// Bits of a noise key: a whole number that JSON and every reader of it keeps exactly.
 const NOISE_BITS: u32 = 53;
 
-/// A point of the input space: an independent standard normal number for each parameter that varies, and the key of all random streams.
+/// A point of the input space: an independent standard normal number for each parameter that
+/// varies, and the key of all random streams.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// The numbers, in the order of the parameters.
     pub normals: Vec<f64>,
-    /// The key of the random streams of drivers and sensors. It is drawn anew or kept, never moved: streams have no distance.
+    /// The key of the random streams of drivers and sensors. It is drawn anew or kept, never moved:
+    /// streams have no distance.
     pub noise: u64,
 }
 
@@ -42,10 +46,11 @@ pub(super) fn draw_noise(rng: &mut Stream) -> u64 {
     rng.next_u64() >> (u64::BITS - NOISE_BITS)
 }
 
-/// What a run tells of the event.
+/// The response of a run to the event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
-    /// How near the run came to the event: a larger number is nearer. It guides the search, and no estimate depends on it.
+    /// How near the run came to the event: a larger number is nearer. It guides the search, and no
+    /// estimate depends on it.
     pub score: f64,
     /// Whether the first and the second of the events happened.
     pub events: [bool; 2],
@@ -57,7 +62,8 @@ impl Response {
         self.events[0] || self.events[1]
     }
 
-    /// Returns the score, above which no other lies if an event happened. A score that is not a number is the lowest.
+    /// Returns the score. No score is above the score of an event. A score that is not a number is
+    /// the lowest.
     pub fn level(&self) -> f64 {
         match self.is_event() {
             true => f64::INFINITY,
@@ -73,9 +79,9 @@ impl Response {
     }
 }
 
-/// What runs points.
+/// A simulator, which runs points.
 pub trait Simulator {
-    /// Why it cannot.
+    /// Why points cannot run.
     type Error;
 
     /// Runs points, and returns their responses in the same order.

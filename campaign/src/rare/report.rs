@@ -1,4 +1,4 @@
-//! What is reported of a rare event, for people and for programs.
+//! The report on a rare event, for people and for programs.
 
 use std::fmt;
 
@@ -13,10 +13,12 @@ use super::subset::{Level, SubsetResult};
 use crate::gate::rounded_up;
 use crate::record::SampleFailure;
 
-/// Least effective number of runs for which the report does not warn that a few of them carry the estimate (-), and largest share of one run: assumptions.
+/// Least effective number of runs for which the report does not warn that a few of them carry the
+/// estimate (-), and largest share of one run: assumptions.
 const FEW_EFFECTIVE: f64 = 50.0;
 const LARGE_SHARE: f64 = 0.1;
-/// Share of the estimate outside every component above which the report warns (-): an assumption; 0.02 to 0.2 are plausible.
+/// Share of the estimate outside every component above which the report warns (-): an assumption;
+/// 0.02 to 0.2 are plausible.
 const LARGE_OUTSIDE: f64 = 0.1;
 
 /// An estimate with its interval.
@@ -40,7 +42,7 @@ pub struct Nearest {
     pub distance_sd: f64,
     /// The key of its random streams: the number of its sample.
     pub noise: u64,
-    /// Which of the events happened.
+    /// The events that happened.
     pub events: [bool; 2],
     /// Its parameters.
     pub parameters: Parameters,
@@ -66,7 +68,7 @@ pub struct RareReport {
     pub first_error: Option<SampleFailure>,
     /// The estimates: the event, and of a difference the second event and the difference.
     pub estimates: Vec<Estimate>,
-    /// Why there are none.
+    /// The reason for which there are no estimates.
     pub no_interval: Option<NoInterval>,
     /// Upper 95 % bound of the probability of the event, if no run had it and there is one.
     pub upper_bound_without_event: Option<f64>,
@@ -85,11 +87,11 @@ pub struct RareReport {
 /// Details of importance sampling.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportanceDetails {
-    /// The runs on which the estimate rests.
+    /// The final runs, on which the estimate rests.
     pub final_runs: u64,
-    /// Those with an event.
+    /// Final runs with an event.
     pub events: u64,
-    /// Effective number of those with an event.
+    /// Effective number of final runs with an event.
     pub effective_events: f64,
     /// Largest share of the estimate that rests on one run.
     pub largest_share: f64,
@@ -97,7 +99,8 @@ pub struct ImportanceDetails {
     pub outside: f64,
     /// Searches that came to the event.
     pub searches: usize,
-    /// Components of the mixture: each has a weight, and a mean and a standard deviation for each parameter.
+    /// Components of the mixture: each has a weight, and a mean and a standard deviation for each
+    /// parameter.
     pub components: Vec<super::mixture::Component>,
 }
 
@@ -150,27 +153,27 @@ impl RareReport {
         }
     }
 
-    pub(super) fn of_importance(plan: &RarePlan, found: &ImportanceResult) -> Self {
+    pub(super) fn of_importance(plan: &RarePlan, result: &ImportanceResult) -> Self {
         let details = ImportanceDetails {
-            final_runs: found.final_runs,
-            events: found.events,
-            effective_events: found.effective,
-            largest_share: found.largest_share,
-            outside: found.outside,
-            searches: found.searches,
-            components: found.mixture.components.clone(),
+            final_runs: result.final_runs,
+            events: result.events,
+            effective_events: result.effective,
+            largest_share: result.largest_share,
+            outside: result.outside,
+            searches: result.searches,
+            components: result.mixture.components.clone(),
         };
         Self {
-            upper_bound_without_event: found.upper_bound_without_event,
+            upper_bound_without_event: result.upper_bound_without_event,
             importance: Some(details),
-            ..Self::new(plan, found.runs, found.means, found.no_interval)
+            ..Self::new(plan, result.runs, result.means, result.no_interval)
         }
     }
 
-    pub(super) fn of_subset(plan: &RarePlan, found: &SubsetResult) -> Self {
+    pub(super) fn of_subset(plan: &RarePlan, result: &SubsetResult) -> Self {
         let details =
-            SubsetDetails { levels: found.levels.clone(), repetitions: found.repetitions, extinct: found.extinct };
-        Self { subset: Some(details), ..Self::new(plan, found.runs, found.means, found.no_interval) }
+            SubsetDetails { levels: result.levels.clone(), repetitions: result.repetitions, extinct: result.extinct };
+        Self { subset: Some(details), ..Self::new(plan, result.runs, result.means, result.no_interval) }
     }
 
     /// Returns the estimate that the goal is about: the event, or the difference.

@@ -7,20 +7,28 @@
 //!         └ ●●●●●●●●●●●●● particles
 //! ```
 //!
-//! Subset simulation (S. K. Au and J. L. Beck, Probabilistic Engineering Mechanics 16 (2001) 263–277) chooses its levels from the particles that it then counts
-//! against them. Its estimate is biased by the order of 1/N, and the chains of one run depend on each other, so that no interval follows from a single run.
-//! Here a pilot run chooses levels and step widths, and nothing of it is counted. Then independent repetitions run at these fixed levels. With fixed levels
-//! the product of the shares is an unbiased estimate for any number of particles (P. Del Moral, *Feynman-Kac Formulae*, Springer 2004, theorem 7.4.2; F. Cérou,
-//! P. Del Moral, T. Furon and A. Guyader, Statistics and Computing 22 (2012) 795–808). The mean of independent unbiased estimates has Student's interval.
-//! The variant whose levels adapt and which is unbiased, too (C.-E. Bréhier, M. Gazeau, L. Goudenège, T. Lelièvre and M. Rousset, Annals of Applied Probability 26
-//! (2016) 3559–3601), needs repetitions for its interval as well, and care with equal scores, which are frequent here: fixed levels do not mind them.
+//! Subset simulation (S. K. Au and J. L. Beck, Probabilistic Engineering Mechanics 16 (2001)
+//! 263–277) chooses its levels from the particles that it then counts against them. Its estimate is
+//! biased by the order of 1/N, and the chains of one run depend on each other, so that no interval
+//! follows from a single run. Here a pilot run chooses levels and step widths, and nothing of it is
+//! counted. Then independent repetitions run at these fixed levels. With fixed levels the product
+//! of the shares is an unbiased estimate for any number of particles (P. Del Moral, *Feynman-Kac
+//! Formulae*, Springer 2004, theorem 7.4.2; F. Cérou, P. Del Moral, T. Furon and A. Guyader,
+//! Statistics and Computing 22 (2012) 795–808). The mean of independent unbiased estimates has
+//! Student's interval. The variant whose levels adapt and which is unbiased, too (C.-E. Bréhier, M.
+//! Gazeau, L. Goudenège, T. Lelièvre and M. Rousset, Annals of Applied Probability 26 (2016)
+//! 3559–3601), needs repetitions for its interval as well, and care with equal scores, which are
+//! frequent here: fixed levels do not mind them.
 //!
-//! The number of repetitions follows C. Stein (Annals of Mathematical Statistics 16 (1945) 243–258): the variance of the first [`FIRST`] determines it,
-//! and the interval keeps that variance and its degrees of freedom, so that a small variance by chance does not end the sampling with a short interval.
+//! The number of repetitions follows C. Stein (Annals of Mathematical Statistics 16 (1945)
+//! 243–258): the variance of the first [`FIRST`] determines it, and the interval keeps that
+//! variance and its degrees of freedom, so that a small variance by chance does not end the
+//! sampling with a short interval.
 //!
-//! A particle moves as in the conditional sampling of I. Papaioannou, W. Betz, K. Zwirglmaier and D. Straub (Probabilistic Engineering Mechanics 41 (2015)
-//! 89–103): z' = √(1 − s²)·z + s·ξ, which keeps the standard normal distribution, and is accepted if it stays in the level. The key of the random streams is
-//! drawn anew in half of the moves, and kept in the others.
+//! A particle moves as in the conditional sampling of I. Papaioannou, W. Betz, K. Zwirglmaier and
+//! D. Straub (Probabilistic Engineering Mechanics 41 (2015) 89–103): z' = √(1 − s²)·z + s·ξ, which
+//! keeps the standard normal distribution, and is accepted if it stays in the level. The key of the
+//! random streams is drawn anew in half of the moves, and kept in the others.
 
 use rand::RngExt;
 use serde::Serialize;
@@ -34,22 +42,24 @@ use super::problem::{Point, Response, Seed, Simulator, draw_noise};
 
 /// Number of particles (-): an assumption; 100 to 1,000 are plausible.
 const PARTICLES: usize = 200;
-/// Share of the particles that reach the next level (-). Au and Beck use 0.1; 0.1 to 0.3 are plausible (K. M. Zuev et al., Computers & Structures 92–93 (2012)
-/// 283–296).
+/// Share of the particles that reach the next level (-). Au and Beck use 0.1; 0.1 to 0.3 are
+/// plausible (K. M. Zuev et al., Computers & Structures 92–93 (2012) 283–296).
 const SHARE: f64 = 0.2;
 /// Moves of a particle in a level (-): an assumption; 1 to 5 are plausible.
 const MOVES: usize = 3;
-/// Number of repetitions that determine the number of all (-). Student's factor is then 7 % above that of infinitely many.
+/// Number of repetitions that determine the number of all (-). Student's factor is then 7 % above
+/// the factor of infinitely many.
 const FIRST: usize = 20;
 /// Largest number of levels (-): they reach a probability of 1e-21.
 const MOST_LEVELS: usize = 30;
-/// Share of accepted moves at which the step width stays (-): 0.44 is the optimum in one dimension, 0.23 in many (A. Gelman, G. O. Roberts and W. R. Gilks,
-/// Bayesian Statistics 5 (1996) 599–607).
+/// Share of accepted moves at which the step width stays (-): 0.44 is the optimum in one dimension,
+/// 0.23 in many (A. Gelman, G. O. Roberts and W. R. Gilks, Bayesian Statistics 5 (1996) 599–607).
 const ACCEPTED: f64 = 0.3;
 /// Step width of the first move, and its limits (-).
 const FIRST_STEP: f64 = 0.6;
 const STEP: [f64; 2] = [0.05, 0.98];
-/// Share of the moves that draw the key of the random streams anew (-): an assumption; 0.2 to 0.8 are plausible.
+/// Share of the moves that draw the key of the random streams anew (-): an assumption; 0.2 to 0.8
+/// are plausible.
 const REDRAWN: f64 = 0.5;
 
 /// A level of the repetitions.
@@ -61,12 +71,12 @@ pub struct Level {
     pub step: f64,
 }
 
-/// What subset simulation has found.
+/// The result of subset simulation.
 #[derive(Clone, Debug)]
 pub struct SubsetResult {
     /// The means of [`Response::values`] over the repetitions.
     pub means: Option<[Mean; 3]>,
-    /// Why there are none.
+    /// The reason for which there are no means.
     pub no_interval: Option<NoInterval>,
     /// All runs, with the runs of the pilot.
     pub runs: u64,
@@ -100,7 +110,8 @@ impl<S: Simulator> Run<'_, S> {
         self.respond(points)
     }
 
-    /// Makes [`PARTICLES`] of the survivors of a level, and moves all of them. Returns the share of accepted moves.
+    /// Makes [`PARTICLES`] of the survivors of a level, and moves all of them. Returns the share of
+    /// accepted moves.
     fn populate(
         &mut self,
         survivors: &[Particle],
@@ -144,14 +155,16 @@ impl<S: Simulator> Run<'_, S> {
             let level = Level { score, step };
             let (next, accepted) = self.populate(&survivors, level, rng)?;
             (particles, last) = (next, score);
-            // The width of the next level follows from the acceptance in this one: nothing of the repetitions enters it.
+            // The width of the next level follows from the acceptance in this one: nothing of the
+            // repetitions enters it.
             step = (step * exp(accepted - ACCEPTED)).clamp(STEP[0], STEP[1]);
             levels.push(level);
         }
         Ok(None)
     }
 
-    /// Runs one repetition. Returns unbiased estimates of the means, and the number of particles with the event.
+    /// Runs one repetition. Returns unbiased estimates of the means, and the number of particles
+    /// with the event.
     fn repetition(&mut self, levels: &[Level], rng: &mut Stream) -> Result<([f64; 3], u64), S::Error> {
         let mut particles = self.start(rng)?;
         let mut product = 1.0;
@@ -175,10 +188,11 @@ impl<S: Simulator> Run<'_, S> {
     }
 }
 
-/// Returns the score of the next level: infinite if enough particles have the event; `None` if none is above the last level.
+/// Returns the score of the next level: infinite if enough particles have the event; `None` if none
+/// is above the last level.
 fn next_score(particles: &[Particle], last: f64) -> Option<f64> {
     let mut scores: Vec<f64> = particles.iter().map(|(_, response)| response.level()).collect();
-    scores.sort_by(|one, other| other.total_cmp(one));
+    scores.sort_by(|a, b| b.total_cmp(a));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
     let kept = (SHARE * scores.len() as f64).ceil() as usize;
     let score = *scores.get(kept - 1)?;
@@ -186,7 +200,8 @@ fn next_score(particles: &[Particle], last: f64) -> Option<f64> {
     if score > last { Some(score) } else { scores.into_iter().filter(|score| *score > last).min_by(f64::total_cmp) }
 }
 
-/// Returns which of `count` survivors have one copy more: `rest` of them, each with the same probability.
+/// Returns which of `count` survivors have one copy more: `rest` of them, each with the same
+/// probability.
 fn lucky(count: usize, rest: usize, rng: &mut Stream) -> Vec<bool> {
     let mut left = rest;
     (0..count)
@@ -238,7 +253,8 @@ pub fn subset<S: Simulator>(
     let Some(levels) = run.pilot(&mut seed.stream("pilot", 0), goal.budget)? else {
         return Ok(without(run.runs, Vec::new(), NoInterval::NotReached));
     };
-    // The number of repetitions must not depend on how many runs each of them takes, which its outcome decides: the largest number counts.
+    // The number of repetitions must not depend on how many runs each of them takes, which its
+    // outcome decides: the largest number counts.
     let affordable = usize::try_from((goal.budget - run.runs) / most_runs(levels.len())).unwrap_or(usize::MAX);
     if affordable < FIRST {
         return Ok(without(run.runs, levels, NoInterval::Budget));
@@ -257,7 +273,8 @@ pub fn subset<S: Simulator>(
             planned = needed(&columns[goal.value], goal).min(affordable);
         }
     }
-    // At most half of the repetitions without the event, as long as the mean of the others is to be nearly normal.
+    // At most half of the repetitions without the event, as long as the mean of the others is to be
+    // nearly normal.
     let no_interval = match events {
         0 => Some(NoInterval::NotReached),
         _ if 2 * extinct > planned => Some(NoInterval::TooFewEvents),
@@ -286,8 +303,9 @@ fn needed(values: &[f64], goal: Goal) -> usize {
     if factor.is_finite() { needed.max(FIRST) } else { usize::MAX }
 }
 
-/// Returns the mean of all values with the variance of the first, or with that of all if it is larger: estimates that are products are skewed, and the
-/// variance of a few of them is small where their mean is, too.
+/// Returns the mean of all values with the variance of the first, or with the variance of all if it
+/// is larger. Estimates that are products are skewed, and the variance of a few small ones is
+/// small, too.
 fn stein(values: &[f64]) -> Mean {
     let count = values.len() as f64;
     let value = values.iter().sum::<f64>() / count;

@@ -34,7 +34,7 @@ fn one_region(probability: f64) -> impl Fn(&Point) -> Response {
     }
 }
 
-/// Two regions on opposite sides, of which the first has `share` of the probability.
+/// Two regions on opposite sides. The first has `share` of the probability.
 fn two_regions(probability: f64, share: f64) -> impl Fn(&Point) -> Response {
     let [up, down] = [share, 1.0 - share].map(|share| beyond(share * probability));
     move |point| {
@@ -43,7 +43,8 @@ fn two_regions(probability: f64, share: f64) -> impl Fn(&Point) -> Response {
     }
 }
 
-/// Two regions of which the score of the second rises so much faster that the first attracts nearly every run: at z = 1, the second seems nearer.
+/// Two regions. The score of the second rises much faster, and the first attracts nearly every run:
+/// at z = 1, the second seems nearer.
 fn misleading(probability: f64) -> impl Fn(&Point) -> Response {
     let limit = beyond(0.5 * probability);
     move |point| {
@@ -56,22 +57,24 @@ const GOAL: Goal = Goal { relative_width: 0.5, budget: 200_000, value: 0 };
 /// Runs that plain sampling needs for that width, times the probability: (2·1.96 / 0.5)².
 const PLAIN: f64 = 61.47;
 
-/// Number of repetitions of a test, and the least share of them that covers the truth: more than four standard errors below 95 %.
+/// Number of repetitions of a test, and the least share of them that covers the truth: more than
+/// four standard errors below 95 %.
 const REPETITIONS: u64 = 40;
 const LEAST_COVERED: f64 = 0.8;
 
-/// Returns the share of repetitions whose interval contains the probability, and their mean number of runs.
+/// Returns the share of repetitions whose interval contains the probability, and their mean number
+/// of runs.
 fn coverage(event: impl Fn(&Point) -> Response, dimensions: usize, probability: f64, by_subset: bool) -> (f64, f64) {
     let mut simulator = Function(event);
     let repetitions = if by_subset { REPETITIONS / 3 } else { REPETITIONS };
     let (mut covered, mut runs) = (0, 0);
     for seed in 0..repetitions {
         let (means, used) = if by_subset {
-            let found = subset(&mut simulator, dimensions, Seed(seed), GOAL).unwrap();
-            (found.means, found.runs)
+            let result = subset(&mut simulator, dimensions, Seed(seed), GOAL).unwrap();
+            (result.means, result.runs)
         } else {
-            let found = importance(&mut simulator, dimensions, Seed(seed), GOAL).unwrap();
-            (found.means, found.runs)
+            let result = importance(&mut simulator, dimensions, Seed(seed), GOAL).unwrap();
+            (result.means, result.runs)
         };
         let interval = means.and_then(|means| means[0].interval_of_probability(0.95));
         covered += u64::from(interval.is_some_and(|[low, high]| low <= probability && probability <= high));
@@ -106,10 +109,11 @@ fn importance_finds_the_region_that_the_score_hides() {
 
 #[test]
 fn a_search_that_stops_at_the_first_region_would_be_caught() {
-    // What one region alone would give: half of the probability, which no interval of the test above may contain.
+    // What one region alone would give: half of the probability, which no interval of the test
+    // above may contain.
     let mut simulator = Function(two_regions(1e-5, 0.5));
-    let found = importance(&mut simulator, 2, Seed(1), GOAL).unwrap();
-    let [low, _] = found.means.unwrap()[0].interval_of_probability(0.95).unwrap();
+    let result = importance(&mut simulator, 2, Seed(1), GOAL).unwrap();
+    let [low, _] = result.means.unwrap()[0].interval_of_probability(0.95).unwrap();
     assert!(low > 0.5e-5, "{low}");
 }
 
@@ -151,11 +155,11 @@ fn an_event_of_the_random_streams_alone_is_estimated_although_they_are_not_moved
         Response { score: z, events: [z > 3.0 && point.noise.is_multiple_of(16), false] }
     };
     let truth = 1.349_898e-3 / 16.0;
-    let found = importance(&mut Function(event), 2, Seed(5), GOAL).unwrap().means.unwrap();
-    let [low, high] = found[0].interval_of_probability(0.99).unwrap();
+    let means = importance(&mut Function(event), 2, Seed(5), GOAL).unwrap().means.unwrap();
+    let [low, high] = means[0].interval_of_probability(0.99).unwrap();
     assert!(low <= truth && truth <= high, "{truth}: {low} to {high}");
-    let found = subset(&mut Function(event), 2, Seed(5), GOAL).unwrap().means.unwrap();
-    let [low, high] = found[0].interval_of_probability(0.99).unwrap();
+    let means = subset(&mut Function(event), 2, Seed(5), GOAL).unwrap().means.unwrap();
+    let [low, high] = means[0].interval_of_probability(0.99).unwrap();
     assert!(low <= truth && truth <= high, "{truth}: {low} to {high}");
 }
 
@@ -163,14 +167,14 @@ fn an_event_of_the_random_streams_alone_is_estimated_although_they_are_not_moved
 fn an_impossible_event_has_a_bound_and_no_interval() {
     let event = |point: &Point| Response { score: point.normals[0], events: [false, false] };
     let goal = Goal { budget: 5_000, ..GOAL };
-    let found = importance(&mut Function(event), 2, Seed(0), goal).unwrap();
-    assert_eq!((found.means, found.no_interval), (None, Some(NoInterval::NotReached)));
+    let result = importance(&mut Function(event), 2, Seed(0), goal).unwrap();
+    assert_eq!((result.means, result.no_interval), (None, Some(NoInterval::NotReached)));
     // A bound by plain sampling: three over the number of final runs.
-    let bound = found.upper_bound_without_event.unwrap();
-    assert!((bound * found.final_runs as f64 - 3.0).abs() < 0.01, "{bound}");
-    assert!(found.runs <= goal.budget);
-    let found = subset(&mut Function(event), 2, Seed(0), goal).unwrap();
-    assert!(found.means.is_none() && found.runs <= goal.budget);
+    let bound = result.upper_bound_without_event.unwrap();
+    assert!((bound * result.final_runs as f64 - 3.0).abs() < 0.01, "{bound}");
+    assert!(result.runs <= goal.budget);
+    let result = subset(&mut Function(event), 2, Seed(0), goal).unwrap();
+    assert!(result.means.is_none() && result.runs <= goal.budget);
 }
 
 #[test]
@@ -178,10 +182,10 @@ fn a_score_without_any_information_is_no_estimate_that_looks_safe() {
     // Every run has the same score: nothing leads to the event.
     let event = |point: &Point| Response { score: 0.0, events: [point.normals[0] > 6.0, false] };
     let goal = Goal { budget: 20_000, ..GOAL };
-    let found = importance(&mut Function(event), 6, Seed(0), goal).unwrap();
-    assert!(found.means.is_none() && found.no_interval.is_some());
-    let found = subset(&mut Function(event), 6, Seed(0), goal).unwrap();
-    assert_eq!((found.means, found.no_interval), (None, Some(NoInterval::NotReached)));
+    let result = importance(&mut Function(event), 6, Seed(0), goal).unwrap();
+    assert!(result.means.is_none() && result.no_interval.is_some());
+    let result = subset(&mut Function(event), 6, Seed(0), goal).unwrap();
+    assert_eq!((result.means, result.no_interval), (None, Some(NoInterval::NotReached)));
 }
 
 #[test]
@@ -211,11 +215,11 @@ proptest! {
             let event = one_region(1e-2);
             let mut simulator = Recording(|point: &Point| { points.push(point.clone()); event(point) });
             let (means, runs) = if by_subset {
-                let found = subset(&mut simulator, dimensions, Seed(seed), goal).unwrap();
-                (found.means, found.runs)
+                let result = subset(&mut simulator, dimensions, Seed(seed), goal).unwrap();
+                (result.means, result.runs)
             } else {
-                let found = importance(&mut simulator, dimensions, Seed(seed), goal).unwrap();
-                (found.means, found.runs)
+                let result = importance(&mut simulator, dimensions, Seed(seed), goal).unwrap();
+                (result.means, result.runs)
             };
             (points, means, runs)
         };
@@ -239,7 +243,7 @@ proptest! {
     }
 }
 
-/// A function that changes what it refers to.
+/// A function that changes a value outside.
 struct Recording<F>(F);
 
 impl<F: FnMut(&Point) -> Response> Simulator for Recording<F> {

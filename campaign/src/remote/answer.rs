@@ -1,4 +1,4 @@
-//! The results of a block as bytes, and what is checked of them.
+//! The results of a block as bytes, and their checks.
 //!
 //! ```text
 //!  {"closecall_version":…,"configuration":…,"wall_s":[[…],…],"check_s":[…]}
@@ -40,7 +40,7 @@ pub(super) fn encode(version: &str, configuration: &str, results: &[Finished]) -
     Ok(bytes)
 }
 
-/// What the answer to a block must be.
+/// The expected answer to a block.
 pub(super) struct Expected<'a> {
     pub(super) version: &'a str,
     pub(super) configuration: &'a str,
@@ -49,8 +49,8 @@ pub(super) struct Expected<'a> {
 }
 
 impl Expected<'_> {
-    /// Returns the results of a block in the order of its samples. Returns what is wrong if a sample is missing, or if
-    /// one is of another campaign.
+    /// Returns the results of a block in the order of its samples. Returns the fault if a sample is
+    /// missing, or if one is of another campaign.
     pub(super) fn decode(&self, bytes: &[u8]) -> Result<Vec<Finished>, String> {
         let mut lines = bytes.split_inclusive(|byte| *byte == b'\n');
         let header: Header = serde_json::from_slice(lines.next().unwrap_or_default())

@@ -32,7 +32,8 @@ const BACKEND_VARIABLE: &str = "ORT_DYLIB_PATH";
 pub struct BlockRunner {
     works: Vec<Arc<Work>>,
     workers: Workers,
-    /// The thread of the latest scenario, with the scenario's index. It keeps its worker processes from block to block.
+    /// The thread of the latest scenario, with the scenario's index. It keeps its worker processes
+    /// from block to block.
     pool: Mutex<Option<(usize, WorkerPool<Work>)>>,
     version: String,
     configuration: String,
@@ -47,8 +48,8 @@ impl fmt::Debug for BlockRunner {
 }
 
 impl BlockRunner {
-    /// Prepares the campaign of a shipment, and checks that this machine runs the same one: the same version of the program,
-    /// scenarios, networks and controllers.
+    /// Prepares the campaign of a shipment, and checks that this machine runs the same one: the
+    /// same version of the program, scenarios, networks and controllers.
     ///
     /// # Errors
     /// [`RemoteError`] with what differs.
@@ -78,12 +79,12 @@ impl BlockRunner {
         plan.workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout };
         plan.retry_crashed = sent.retry_crashed;
         plan.without_effect.clone_from(&sent.without_effect);
-        let own = plan.manifest_in(sent.command.clone(), local.controller_folder())?;
-        let differences = sent.differences(&own);
+        let manifest = plan.manifest_in(sent.command.clone(), local.controller_folder())?;
+        let differences = sent.differences(&manifest);
         if !differences.is_empty() {
             return Err(RemoteError::Different { differences });
         }
-        let configuration = Manifest { working_folder: sent.working_folder, ..own }.configuration();
+        let configuration = Manifest { working_folder: sent.working_folder, ..manifest }.configuration();
         let pool = Mutex::default();
         Ok(Self { works, workers: plan.workers, pool, version: here, configuration, _folder: folder })
     }
@@ -93,12 +94,13 @@ impl BlockRunner {
     /// # Errors
     /// [`RemoteError`] if there is no such scenario or sample, or no thread can be started.
     pub fn run(&self, work: usize, samples: &[u64]) -> Result<Vec<u8>, RemoteError> {
-        let Some(found) = self.works.get(work).filter(|work| samples.iter().all(|&sample| sample < work.count()))
+        let Some(scenario_work) =
+            self.works.get(work).filter(|work| samples.iter().all(|&sample| sample < work.count()))
         else {
             return Err(RemoteError::NoBlock { work });
         };
         let mut results: Vec<Finished> = Vec::with_capacity(samples.len());
-        let done = self.run_in_pool((work, found), samples, |finished| results.push(finished));
+        let done = self.run_in_pool((work, scenario_work), samples, |finished| results.push(finished));
         done.map_err(|error| super::EngineError { message: error.to_string(), is_input: false })?;
         if let Some(Refusal { reason, .. }) = results.iter().find_map(|finished| refusal(&finished.record)) {
             return Err(super::EngineError { message: reason.to_owned(), is_input: true }.into());

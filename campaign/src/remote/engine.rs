@@ -1,4 +1,4 @@
-//! What an engine does, and the one that the program has.
+//! The interface of an engine, and the engine of the program.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -23,7 +23,8 @@ pub trait Engine: Send + Sync {
 
 /// The machines that run the blocks of one campaign.
 pub trait Cluster: Send + Sync {
-    /// Returns the number of blocks that can run at the same time now. More are submitted, so that the cluster can grow.
+    /// Returns the number of blocks that can run at the same time now. More are submitted, so that
+    /// the cluster can grow.
     ///
     /// # Errors
     /// [`EngineError`] if the cluster cannot be reached.
@@ -35,7 +36,8 @@ pub trait Cluster: Send + Sync {
     /// [`EngineError`] if the cluster cannot be reached.
     fn submit(&self, block: u64, work: usize, samples: &[u64]) -> Result<(), EngineError>;
 
-    /// Waits for at most `timeout`, and returns the blocks that are done, each with what [`BlockRunner::run`] has returned.
+    /// Waits for at most `timeout`, and returns the blocks that are done, each with what
+    /// [`BlockRunner::run`] has returned.
     ///
     /// # Errors
     /// [`EngineError`] if a block has failed for good, or the cluster cannot be reached.
@@ -59,7 +61,8 @@ pub fn set_engine(engine: Arc<dyn Engine>) {
 /// Connects to the cluster at `address`, if one is given.
 ///
 /// # Errors
-/// [`RemoteError`] if the program has no engine, a file cannot be shipped, or the cluster cannot be used.
+/// [`RemoteError`] if the program has no engine, a file cannot be shipped, or the cluster cannot be
+/// used.
 pub fn connect(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<dyn SampleRunner>>, RemoteError> {
     let Some(address) = address else { return Ok(None) };
     let engine = ENGINE.lock().unwrap_or_else(PoisonError::into_inner).clone().ok_or(RemoteError::NoEngine)?;

@@ -90,7 +90,8 @@ pub enum RemoteError {
 }
 
 impl RemoteError {
-    /// Returns true if what was given cannot be used as it is. Otherwise something has failed.
+    /// Returns true if the given files or controllers cannot be used as they are. Otherwise
+    /// something has failed.
     pub const fn is_input(&self) -> bool {
         match self {
             Self::Engine(error) => error.is_input,
@@ -112,8 +113,9 @@ impl RemoteError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct EngineError {
-    /// What has failed.
+    /// The failure.
     pub message: String,
-    /// True if the cluster cannot be used as it is: another version of the program, a missing file. False if it has failed.
+    /// True if the cluster cannot be used as it is: another version of the program, a missing file.
+    /// False if it has failed.
     pub is_input: bool,
 }

@@ -1,5 +1,6 @@
-//! Campaigns whose samples run elsewhere, such as on a cluster. The campaign itself stays where it was started: its folder, its
-//! journal, its gates and its reports are those of a campaign on one machine, byte for byte.
+//! Campaigns whose samples run elsewhere, such as on a cluster. The campaign itself stays where it
+//! was started. Its folder, its journal, its gates and its reports equal those of a campaign on one
+//! machine, byte for byte.
 //!
 //! ```text
 //!  Campaign::run ─▶ RemoteWorkers ─▶ blocks of samples ─▶ Engine ─▶ BlockRunner on some machine
@@ -15,9 +16,10 @@
 //! | `answer` | the results of a block, and what is checked of them |
 //! | `workers` | cuts a campaign into blocks, and puts their results in order |
 //!
-//! An engine may run a block several times, since machines fail. Equal samples give equal results, and only one answer of each
-//! block counts. An answer that lacks a sample, or has one of another seed, of other values, or of another version of the
-//! program, ends the campaign with an error; the journal keeps what came before.
+//! An engine may run a block several times, since machines fail. Equal samples give equal results,
+//! and only one answer of each block counts. An answer that lacks a sample, or has one of another
+//! seed, of other values, or of another version of the program, ends the campaign with an error;
+//! the journal keeps what came before.
 
 mod answer;
 mod block;

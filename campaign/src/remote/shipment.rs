@@ -1,5 +1,5 @@
-//! What a machine needs to run blocks of a campaign: the manifest, which holds the scenarios with their recorded traffic, and
-//! the files that the commands of controllers name.
+//! What a machine needs to run blocks of a campaign: the manifest, which holds the scenarios with
+//! their recorded traffic, and the files that the commands of controllers name.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -11,7 +11,7 @@ use super::error::RemoteError;
 use crate::fingerprint::named_files;
 use crate::manifest::Manifest;
 
-/// What a machine needs to run blocks of a campaign.
+/// The data that a machine needs to run blocks of a campaign.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shipment {
     /// The version of the program that has started the campaign.
@@ -20,7 +20,7 @@ pub struct Shipment {
     pub manifest: String,
     /// The controllers of the program that has Closecall as a library. The engine ships them.
     pub controllers: Vec<String>,
-    /// The files that controllers name by a relative path: those of commands, libraries and FMUs.
+    /// The files that controllers name by a relative path: files of commands, libraries and FMUs.
     pub files: Vec<ShippedFile>,
 }
 
@@ -31,12 +31,12 @@ pub struct ShippedFile {
     pub name: String,
     /// The content.
     pub content: Vec<u8>,
-    /// Whether it is a program.
+    /// Whether the file is a program.
     pub is_executable: bool,
 }
 
 impl Shipment {
-    /// Returns what a machine needs for this campaign.
+    /// Returns the shipment of this campaign.
     ///
     /// # Errors
     /// [`RemoteError::File`] if a file of a controller cannot be read.
@@ -59,7 +59,8 @@ impl Shipment {
         })
     }
 
-    /// Writes the files into a new folder, which is removed when the value is dropped; `None` if there are none.
+    /// Writes the files into a new folder, which is removed when the value is dropped; `None` if
+    /// there are none.
     pub(super) fn unpack(&self) -> Result<Option<TempDir>, RemoteError> {
         if self.files.is_empty() {
             return Ok(None);

@@ -1,7 +1,8 @@
 //! Cuts a campaign into blocks of samples, and puts their results in order.
 //!
-//! The number of samples in a block follows from how long the samples before have taken: a block takes about a second, so that
-//! little is lost with a machine, and the cost of a block is small beside it. No result depends on it.
+//! The number of samples in a block follows from how long the samples before have taken: a block
+//! takes about a second, so that little is lost with a machine, and the cost of a block is small
+//! beside it. No result depends on it.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -24,13 +25,14 @@ const BLOCK_S: f64 = 1.0;
 const FIRST_BLOCK: usize = 4;
 /// Largest number of samples in a block.
 const LARGEST_BLOCK: usize = 1_000;
-/// Number of blocks that are submitted for each that can run at the same time. Those that wait show the cluster that it may
-/// grow.
+/// Number of blocks that are submitted for each that can run at the same time. Those that wait show
+/// the cluster that it may grow.
 const BLOCKS_PER_SLOT: usize = 2;
 /// Number of blocks that are submitted in addition, so that a cluster without machines grows, too.
 const SPARE_BLOCKS: usize = 16;
-/// Number of samples, and of further ones for each block that can run at the same time, that may be ahead of the last result
-/// returned. They wait in memory if a machine has failed and its block runs again.
+/// Number of samples, and of further ones for each block that can run at the same time, that may be
+/// ahead of the last result returned. They wait in memory if a machine has failed and its block
+/// runs again.
 const WINDOW: usize = 20_000;
 const WINDOW_PER_SLOT: usize = 1_000;
 /// Longest time between two looks at the request to stop.

@@ -33,7 +33,8 @@ struct Entry {
     source: String,
 }
 
-/// Returns the factors of the list that apply to a scenario, and those that do not. `named` are the keys that the user varies.
+/// Returns the factors of the list that apply to a scenario, and those that do not. `named` are the
+/// keys that the user varies.
 pub(super) fn factors_of(file: &ScenarioFile, named: &[FactorRange]) -> (Vec<FactorRange>, Vec<LeftOut>) {
     let (mut ranges, mut left_out) = (Vec::new(), Vec::new());
     let Ok(document) = toml::from_str::<toml::Value>(file.text()) else { return (ranges, left_out) };

@@ -1,4 +1,4 @@
-//! The factors of a study: what is varied, and over which range.
+//! The factors of a study: the varied quantities and their ranges.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use closecall_scenarios::{Setting, SettingError};
 /// The name of the factor that stands for all that the parameters of a sample leave open.
 pub const CHANCE: &str = "chance";
 
-/// What a factor belongs to.
+/// The owner of a factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FactorKind {
     /// A sampled parameter of the scenario.
@@ -51,11 +51,11 @@ impl FactorKind {
 pub struct Factor {
     /// The name of a parameter, the path of a key, or [`CHANCE`].
     pub name: String,
-    /// What it belongs to.
+    /// The owner of the factor.
     pub kind: FactorKind,
     /// The smallest and the largest value; `None` for labels and chance.
     pub range: Option<[f64; 2]>,
-    /// Where the range or the distribution comes from.
+    /// The origin of the range or of the distribution.
     pub source: String,
 }
 
@@ -80,9 +80,9 @@ pub struct FactorRange {
     pub low: f64,
     /// The largest value.
     pub high: f64,
-    /// What it belongs to.
+    /// The owner of the factor.
     pub kind: FactorKind,
-    /// Where the range comes from.
+    /// The origin of the range.
     pub source: String,
 }
 

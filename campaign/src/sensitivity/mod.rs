@@ -1,4 +1,5 @@
-//! Sensitivity of the result of a scenario: which assumption moves prevented, induced and harm most.
+//! Sensitivity of the result of a scenario: which assumption moves prevented, induced and harm
+//! most.
 //!
 //! ```text
 //!  parameters of the scenario ┐
@@ -9,10 +10,12 @@
 //!  decomposition (Sobol')  the factors that matter; the rest is one group, whose index shows what screening has hidden
 //! ```
 //!
-//! *Chance* is what the parameters of a sample leave open: weaving, the noise of speeds and sensors, lapses. It is a factor of its
-//! own, the number that keys the random streams of a run (as the seed variable of B. Iooss and M. Ribatet, *Global sensitivity
-//! analysis of computer models with functional inputs*, Reliability Engineering & System Safety 94 (2009) 1194–1204). All points
-//! that do not differ in this factor share their random numbers, and both arms always do.
+//! *Chance* is everything that the parameters of a sample leave open: weaving, the noise of speeds
+//! and sensors, lapses. It is a separate factor, the number that keys the random streams of a run
+//! (as the seed variable of B. Iooss and M. Ribatet, *Global sensitivity analysis of computer
+//! models with functional inputs*, Reliability Engineering & System Safety 94 (2009) 1194–1204).
+//! All points that do not differ in this factor share their random numbers, and both arms always
+//! do.
 
 mod defaults;
 mod factor;

@@ -60,7 +60,8 @@ impl Output {
     }
 }
 
-/// Returns the outputs of a sample, in the order of [`Output::of_study`]; `None` if an arm ended in an error.
+/// Returns the outputs of a sample, in the order of [`Output::of_study`]; `None` if an arm ended in
+/// an error.
 pub fn values(record: &Record) -> Option<Vec<f64>> {
     let tallies: Vec<_> = record.arms.iter().map(|arm| arm.tally()).collect();
     let tested = tallies.last()?;

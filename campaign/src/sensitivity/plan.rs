@@ -121,9 +121,9 @@ impl fmt::Debug for SensitivityPlan {
 }
 
 impl SensitivityPlan {
-    /// Returns the plan of a study of `file`. The factors are the parameters that vary, the `named` keys, if `with_defaults` those
-    /// of the list for driver, sensor and controller, and chance. The last controller is the one under test; one before it is the
-    /// baseline.
+    /// Returns the plan of a study of `file`. The factors are the varying parameters, the `named`
+    /// keys, the list for driver, sensor and controller if `with_defaults`, and chance. The last
+    /// controller is the one under test; one before it is the baseline.
     ///
     /// # Errors
     /// [`PlanFailure`] if a factor cannot be used, or there is none.
@@ -198,7 +198,8 @@ impl SensitivityPlan {
         }
     }
 
-    /// Returns the number of groups of a decomposition that follows a screening: the factors that are kept, chance, and the rest.
+    /// Returns the number of groups of a decomposition that follows a screening: the factors that
+    /// are kept, chance, and the rest.
     pub(super) fn groups_after_screening(&self) -> usize {
         let factors = self.factors.len() - 1;
         if factors > self.top { self.top + 2 } else { factors + 1 }

@@ -19,7 +19,8 @@ use crate::runner::{ArmRun, OnOutcome, guarded, run_guarded};
 use crate::stop::StopFlag;
 use crate::workers::{Samples, Workers};
 
-/// Number of random numbers that the factor `chance` distinguishes: those of the designs have no more bits.
+/// Number of random numbers that the factor `chance` distinguishes. The numbers of the designs have
+/// no more bits.
 const CHANCES: f64 = (1_u64 << 24) as f64;
 
 /// The errors of runs, by kind.
@@ -41,8 +42,8 @@ impl RunErrors {
     }
 }
 
-/// The mapping from points of the unit cube to runs. The coordinates are those of the parameters that vary, then the ranges, then
-/// chance.
+/// The mapping from points of the unit cube to runs. The coordinates are the varying parameters,
+/// then the ranges, then chance.
 #[derive(Clone, Debug)]
 pub(super) struct Cube {
     /// The scenario, with every range at its middle.
@@ -104,7 +105,7 @@ impl<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static> Samples for Points<P> {
     }
 }
 
-/// What the runs of a design have given.
+/// The results of the runs of a design.
 #[derive(Debug, Default)]
 pub(super) struct Ran {
     /// The outputs of each point; `None` if an arm ended in an error.
@@ -119,7 +120,8 @@ impl Ran {
     }
 }
 
-/// Runs the first `count` points. `None` if `stop` has ended the runs early. `on_point` is called after each point.
+/// Runs the first `count` points. `None` if `stop` has ended the runs early. `on_point` is called
+/// after each point.
 ///
 /// # Errors
 /// [`WorkersError`] if no threads can be started.

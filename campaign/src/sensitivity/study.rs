@@ -1,4 +1,4 @@
-//! Runs a study, and what it finds.
+//! Runs a study, and holds its results.
 
 use std::sync::Arc;
 
@@ -13,7 +13,8 @@ use super::plan::{Method, PlanFailure, SensitivityPlan};
 use super::runs::{Cube, Points, Ran, RunErrors, run};
 use crate::stop::StopFlag;
 
-/// Least number of effects other than zero with which an output takes part in the choice of factors.
+/// Least number of effects other than zero with which an output takes part in the choice of
+/// factors.
 const MIN_EFFECTS: usize = 10;
 
 /// The result of a study.
@@ -94,7 +95,8 @@ pub struct OutputIndices {
     pub mean: Option<f64>,
     /// The indices, in the order of the groups.
     pub of_groups: Vec<Indices>,
-    /// How each factor moves the mean, in the order of the factors, also of those that are in a group.
+    /// How each factor moves the mean, in the order of the factors, also of those that are in a
+    /// group.
     pub main_effects: Vec<Option<MainEffect>>,
 }
 
@@ -107,7 +109,8 @@ impl OutputIndices {
         order
     }
 
-    /// Returns the numbers of the groups, the one with the largest total index first, then those without one.
+    /// Returns the numbers of the groups, the one with the largest total index first, then those
+    /// without one.
     pub fn order(&self) -> Vec<usize> {
         let total = |group: &usize| self.of_groups[*group].total.map_or(f64::NEG_INFINITY, |total| total.value);
         let mut order: Vec<usize> = (0..self.of_groups.len()).collect();
@@ -117,11 +120,14 @@ impl OutputIndices {
 }
 
 impl Sensitivity {
-    /// Returns the number of the factor that moves the mean of the first output most: by its main effect, else by its elementary
-    /// effects. Chance is no assumption, and is not returned. `None` if nothing was seen to move the output.
+    /// Returns the number of the factor that moves the mean of the first output most: by its main
+    /// effect, else by its elementary effects. Chance is no assumption, and is not returned. `None`
+    /// if nothing was seen to move the output.
     pub fn greatest(&self) -> Option<usize> {
         let moves = |factor: usize| match (&self.decomposition, &self.screening) {
-            (Some(found), _) => found.indices.first()?.main_effects[factor].map(|effect| effect.index.value),
+            (Some(decomposition), _) => {
+                decomposition.indices.first()?.main_effects[factor].map(|effect| effect.index.value)
+            }
             (None, Some(screening)) => {
                 screening.effects.first()?.of_factors[factor].mu_star.map(|mu_star| mu_star.value)
             }
@@ -138,7 +144,7 @@ impl Sensitivity {
     pub fn errors(&self) -> RunErrors {
         let mut errors = RunErrors::default();
         self.screening.iter().for_each(|screening| errors.add(&screening.errors));
-        self.decomposition.iter().for_each(|found| errors.add(&found.errors));
+        self.decomposition.iter().for_each(|decomposition| errors.add(&decomposition.errors));
         errors
     }
 }
@@ -153,14 +159,14 @@ impl SensitivityPlan {
         let cube = Arc::new(Cube { seed: self.seed, ..(*self.cube).clone() });
         let mut screening = None;
         if self.method != Method::Sobol {
-            let Some(found) = self.screen(&cube, outputs, stop, on_point)? else { return Ok(None) };
-            screening = Some(found);
+            let Some(stage) = self.screen(&cube, outputs, stop, on_point)? else { return Ok(None) };
+            screening = Some(stage);
         }
         let mut decomposition = None;
         if self.method != Method::Morris {
             let groups = self.groups(screening.as_ref());
-            let Some(found) = self.decompose(&cube, groups, outputs, stop, on_point)? else { return Ok(None) };
-            decomposition = Some(found);
+            let Some(stage) = self.decompose(&cube, groups, outputs, stop, on_point)? else { return Ok(None) };
+            decomposition = Some(stage);
         }
         Ok(Some(Sensitivity {
             scenario: cube.file.config().name.clone(),
@@ -217,7 +223,8 @@ impl SensitivityPlan {
         Ok(Some(Decomposition { rows: design.rows(), points, errors, groups, indices }))
     }
 
-    /// Returns the groups of the decomposition: each factor that the screening found to matter, chance, and the rest together.
+    /// Returns the groups of the decomposition: each factor that the screening found to matter,
+    /// chance, and the rest together.
     fn groups(&self, screening: Option<&Screening>) -> Vec<Group> {
         let chance = self.factors.len() - 1;
         let single = |factor: usize| Group { factors: vec![factor], label: self.factors[factor].label() };
@@ -241,8 +248,9 @@ impl SensitivityPlan {
     }
 }
 
-/// Returns how much each factor matters: its μ* as a share of the largest one, for the output for which this share is largest.
-/// Outputs with few effects other than zero say too little, unless all are such.
+/// Returns how much each factor matters: its μ* as a share of the largest one, for the output for
+/// which this share is largest. Outputs with few effects other than zero say too little, unless all
+/// are such.
 fn scores(screening: &Screening) -> Vec<f64> {
     let mu_star = |effects: &Effects| effects.mu_star.map_or(0.0, |mu_star| mu_star.value);
     let count = |output: &OutputEffects| {
@@ -270,10 +278,10 @@ fn scores(screening: &Screening) -> Vec<f64> {
 }
 
 fn of_output(output: Output, design: &Design, factors: usize, outputs: &[Option<f64>]) -> OutputIndices {
-    let known: Vec<f64> = outputs.iter().flatten().copied().collect();
+    let values: Vec<f64> = outputs.iter().flatten().copied().collect();
     OutputIndices {
         output,
-        mean: (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64),
+        mean: (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64),
         of_groups: design.indices(outputs),
         main_effects: (0..factors).map(|factor| design.main_effect(factor, outputs)).collect(),
     }

@@ -37,7 +37,7 @@ impl Invariance {
         }
     }
 
-    /// Returns what a failure of the check means, as a sentence.
+    /// Returns the meaning of a failure of the check, as a sentence.
     pub const fn finding(self) -> &'static str {
         match self {
             Self::Repetition => "the same run gave another outcome when repeated",
@@ -68,7 +68,7 @@ pub struct ArmChecks {
 pub struct CheckCounts {
     /// Number of runs that were checked: samples times arms.
     pub runs: u64,
-    /// Number of runs of which at least one check has no result, because it took too long.
+    /// Number of runs with at least one check without a result, because it took too long.
     pub not_checked: u64,
     /// Number of runs whose verdict (collision or none) flipped at half the time step.
     pub flips: u64,
@@ -78,21 +78,21 @@ pub struct CheckCounts {
 
 impl CheckCounts {
     /// Adds the findings about one run. `collided` says whether the ego collided in that run.
-    pub fn push(&mut self, found: &ArmChecks, collided: bool) {
-        match found.not_checked {
+    pub fn push(&mut self, checks: &ArmChecks, collided: bool) {
+        match checks.not_checked {
             Some(_) => self.not_checked += 1,
             None => self.runs += 1,
         }
-        self.flips += u64::from(found.collided_at_half_step.is_some_and(|halved| halved != collided));
-        for &check in &found.broken {
+        self.flips += u64::from(checks.collided_at_half_step.is_some_and(|halved| halved != collided));
+        for &check in &checks.broken {
             self.count(check);
         }
     }
 
     /// Counts a failure of a check.
     pub fn count(&mut self, check: Invariance) {
-        for (count, known) in self.counts.iter_mut().zip(Invariance::ALL) {
-            *count += u64::from(known == check);
+        for (count, kind) in self.counts.iter_mut().zip(Invariance::ALL) {
+            *count += u64::from(kind == check);
         }
     }
 

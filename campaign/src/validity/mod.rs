@@ -1,4 +1,5 @@
-//! Validity checks of the simulator: some samples of each campaign run again under changes that must not matter.
+//! Validity checks of the simulator: some samples of each campaign run again under changes that
+//! must not matter.
 //!
 //! | check       | what is changed                                      | what must hold                          |
 //! | ----------- | ---------------------------------------------------- | --------------------------------------- |
@@ -9,14 +10,16 @@
 //! | mirror      | left and right are exchanged, object-level sensors   | the mirror image of the outcome         |
 //! | clustering  | `linfa-clustering` clusters each scan a second time  | the same clusters                       |
 //!
-//! The mirror check is skipped on a curved road, which has no mirror image: positions along the road are measured on
-//! its left edge.
+//! The mirror check is skipped on a curved road, which has no mirror image: positions along the
+//! road are measured on its left edge.
 //!
-//! Time is no defect of the simulator: a check whose run takes too long has no result (*not checked*).
+//! Time is no defect of the simulator: a check whose run takes too long has no result (*not
+//! checked*).
 //!
-//! If halving the step flips the verdict of a sample, the sample lies at the limit of what the step can resolve. It
-//! stays in the campaign, with the verdict that is worse for the system under test. More than a few flips make the
-//! campaign invalid. Any other difference is an error of the simulator and makes the campaign invalid at once.
+//! If halving the step flips the verdict of a sample, the sample lies at the limit of the step's
+//! resolution. It stays in the campaign, with the verdict that is worse for the system under test.
+//! More than a few flips make the campaign invalid. Any other difference is an error of the
+//! simulator and makes the campaign invalid at once.
 
 mod counts;
 mod mirror;

@@ -1,10 +1,11 @@
 //! The choice of the samples that are checked for validity.
 //!
-//! The first samples of each scenario are checked, so that a small campaign is checked, too. They are few, so that their
-//! checks do not dominate its time. After that, one sample in each block of equal length is checked. The seed determines
-//! its index in the block; a constant index could coincide with the period of a regular design. The seed and the plan
-//! alone determine the checked samples. The number of samples, the number of machines, and the progress of the campaign
-//! do not matter.
+//! The first samples of each scenario are checked, so that a small campaign is checked, too. They
+//! are few, so that their checks do not dominate its time. After that, one sample in each block of
+//! equal length is checked. The seed determines its index in the block; a constant index could
+//! coincide with the period of a regular design. The seed and the plan alone determine the checked
+//! samples. The number of samples, the number of machines, and the progress of the campaign do not
+//! matter.
 
 use closecall_simulation::RunKey;
 use closecall_traffic::{ActorId, stream};
@@ -14,7 +15,8 @@ use serde::{Deserialize, Serialize};
 /// Number of samples at the beginning of each scenario that are always checked.
 const FIRST: u64 = 2;
 
-/// Owner of the random stream that the checked samples are drawn from. It is not an actor of any scenario.
+/// Owner of the random stream that the checked samples are drawn from. It is not an actor of any
+/// scenario.
 const OWNER: &str = "validity";
 
 /// A share of samples that is out of range.
@@ -42,8 +44,8 @@ impl CheckPlan {
     /// Default of the largest number of checked samples of each scenario, besides the first.
     pub const AT_MOST: u64 = 1_000;
 
-    /// Returns a plan that checks the first samples of each scenario, then about `share` of the samples, but not more
-    /// than `at_most` besides the first.
+    /// Returns a plan that checks the first samples of each scenario, then about `share` of the
+    /// samples, but not more than `at_most` besides the first.
     ///
     /// # Errors
     /// [`CheckPlanError`] if `share` is not above 0 and up to 1.
@@ -75,7 +77,8 @@ impl CheckPlan {
         if key.sample < FIRST {
             return true;
         }
-        // Each block has one checked sample, so that the block's number is the number of checked samples before it.
+        // Each block has one checked sample, so that the block's number is the number of checked
+        // samples before it.
         if block >= self.at_most {
             return false;
         }

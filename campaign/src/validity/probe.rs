@@ -61,7 +61,8 @@ impl CheckedRun<'_> {
         run_guarded(scenario, self.key, arm, &mut NoObserver)
     }
 
-    /// Returns the change that makes the outcome differ. If no single change does so again, the run is not repeatable.
+    /// Returns the change that makes the outcome differ. If no single change does so again, the run
+    /// is not repeatable.
     fn cause(&self, clustering: ClusteringCheck, outcome: &Outcome) -> Invariance {
         // A run that took too long says nothing.
         let differs = |run: Run| in_time(run).is_ok_and(|run| !is_same(&run, outcome));
@@ -78,9 +79,11 @@ impl CheckedRun<'_> {
         }
     }
 
-    /// Returns true if the mirrored scenario has the mirrored outcome, or if the scenario has no mirror image.
+    /// Returns true if the mirrored scenario has the mirrored outcome, or if the scenario has no
+    /// mirror image.
     ///
-    /// Object-level sensors replace the full sensor simulation, since the LiDAR's scan pattern has no mirror image.
+    /// Object-level sensors replace the full sensor simulation, since the LiDAR's scan pattern has
+    /// no mirror image.
     ///
     /// # Errors
     /// The error of a run that took too long.
@@ -111,8 +114,8 @@ fn is_same(run: &Run, outcome: &Outcome) -> bool {
     run.as_ref().is_ok_and(|again| again.has_same_bits(outcome))
 }
 
-/// Runs `there` on a new thread and then `here` on this one, so that a check keeps one processor busy. If no thread can
-/// be started, this thread runs both.
+/// Runs `there` on a new thread and then `here` on this one, so that a check keeps one processor
+/// busy. If no thread can be started, this thread runs both.
 fn on_new_thread<T: Send, U>(there: impl Fn() -> T + Sync, here: impl FnOnce() -> U) -> (T, U) {
     thread::scope(|scope| {
         let handle = thread::Builder::new().name("check".to_owned()).spawn_scoped(scope, &there);

@@ -3,7 +3,8 @@
 use super::*;
 use crate::ledger::Tally;
 
-/// Returns what 10 samples decide. In some of them the system under test is not available, and engages.
+/// Returns what 10 samples decide. In some of them the system under test is not available, and
+/// engages.
 fn availability(unavailable: u64, engaged: u64) -> Findings {
     let mut summary = Summary::new(vec!["acc+mis".to_owned()], ["close".to_owned()]);
     for sample in 0..10 {

@@ -51,14 +51,14 @@ pub(super) fn write_arm_pairs(path: &Path, summary: &Summary) -> Result<(), Writ
 }
 
 fn columns(rows: &[(&String, PairResult<'_>)]) -> Vec<ArrayRef> {
-    let count = |of: fn(&PairResult<'_>) -> u64| -> ArrayRef {
-        Arc::new(UInt64Array::from_iter_values(rows.iter().map(|(_, result)| of(result))))
+    let count = |value: fn(&PairResult<'_>) -> u64| -> ArrayRef {
+        Arc::new(UInt64Array::from_iter_values(rows.iter().map(|(_, result)| value(result))))
     };
-    let number = |of: fn(&PairResult<'_>) -> f64| -> ArrayRef {
-        Arc::new(Float64Array::from_iter_values(rows.iter().map(|(_, result)| of(result))))
+    let number = |value: fn(&PairResult<'_>) -> f64| -> ArrayRef {
+        Arc::new(Float64Array::from_iter_values(rows.iter().map(|(_, result)| value(result))))
     };
-    let optional = |of: fn(&PairResult<'_>) -> Option<f64>| -> ArrayRef {
-        Arc::new(rows.iter().map(|(_, result)| of(result)).collect::<Float64Array>())
+    let optional = |value: fn(&PairResult<'_>) -> Option<f64>| -> ArrayRef {
+        Arc::new(rows.iter().map(|(_, result)| value(result)).collect::<Float64Array>())
     };
     vec![
         Arc::new(StringArray::from_iter_values(rows.iter().map(|(name, _)| name))),

@@ -13,7 +13,8 @@ use maud::{Markup, html};
 /// The name of the report.
 const REPORT: &str = "report.html";
 
-/// Writes the causes of a campaign's failures: as a file of their own, and into the report, if there is one. Returns the paths.
+/// Writes the causes of a campaign's failures: as a separate file, and into the report, if there is
+/// one. Returns the paths.
 ///
 /// # Errors
 /// [`WriteError`] if a file cannot be written. Existing files then stay as they are.
@@ -38,11 +39,12 @@ pub fn write_causes(
     Ok(written)
 }
 
-/// Returns the table of causes of a campaign, and its cost where nothing happens. A folder that cannot be read again has none.
+/// Returns the table of causes of a campaign, and its cost where nothing happens. A folder that
+/// cannot be read again has none.
 pub(super) fn table(folder: &Folder, command_for: CommandFor) -> Markup {
     let saved = SavedCampaign::of(folder.clone()).ok();
-    let found = saved.as_ref().and_then(|saved| campaign_failures(saved).ok()).unwrap_or_default();
+    let failures = saved.as_ref().and_then(|saved| campaign_failures(saved).ok()).unwrap_or_default();
     let cost = saved.as_ref().and_then(|saved| cost(saved).ok());
     let is_named = saved.is_some_and(|saved| saved.manifest().scenarios.len() > 1);
-    html! { (section(&found, is_named, command_for)) (cost.map_or_else(Markup::default, |cost| cost_section(&cost))) }
+    html! { (section(&failures, is_named, command_for)) (cost.map_or_else(Markup::default, |cost| cost_section(&cost))) }
 }

@@ -14,7 +14,7 @@ const MAX_LISTED: usize = 12;
 pub struct ComparisonText<'a> {
     /// The scenarios.
     pub scenarios: &'a [ScenarioComparison],
-    /// What the manifests differ in.
+    /// The differences of the manifests.
     pub differences: &'a [String],
     /// Share by which a quantile of a margin may fall (-).
     pub tolerance: f64,

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::html::{number, number_heads, table, text_heads};
 
-/// What the members are not, for readers.
+/// A note for readers: the members are no sample.
 const NOTE: &str = "Members are ways in which humans drive, not a sample of drivers: no weights are assumed. Of an even number, \
                     the less favourable of the two in the middle is the median.";
 
@@ -19,7 +19,7 @@ pub fn ensemble_json(summary: &Summary, manifest: &Manifest) -> Value {
 }
 
 fn verdict_json(verdict: &EnsembleVerdict) -> Value {
-    let member = |of: &MemberValue| json!({ "member": of.member, "value": of.value, "interval_95": of.interval_95 });
+    let member = |member_value: &MemberValue| json!({ "member": member_value.member, "value": member_value.value, "interval_95": member_value.interval_95 });
     let spreads: Map<String, Value> = verdict
         .spreads
         .iter()
@@ -126,11 +126,11 @@ pub(super) fn ensemble_html(summary: &Summary, manifest: &Manifest) -> Markup {
 }
 
 /// Returns the value of a member with its interval and its name.
-fn shown(spread: &Spread, of: &MemberValue) -> String {
-    let value = value_text(spread.quantity, of.value);
-    match of.interval_95 {
-        Some([low, high]) => format!("{value} ({} to {}, {})", percent(low), percent(high), of.member),
-        None => format!("{value} ({})", of.member),
+fn shown(spread: &Spread, member: &MemberValue) -> String {
+    let value = value_text(spread.quantity, member.value);
+    match member.interval_95 {
+        Some([low, high]) => format!("{value} ({} to {}, {})", percent(low), percent(high), member.member),
+        None => format!("{value} ({})", member.member),
     }
 }
 

@@ -4,8 +4,8 @@
 //!  journal ─▶ verdict on the console ─▶ junit.xml ─▶ summary of the CI server ─▶ tables ─▶ report ─▶ recordings ─▶ links to them
 //! ```
 //!
-//! What matters most is written first. A file that cannot be written costs no other, and never the verdict: it is an
-//! [`ArtifactError`], which the caller shows.
+//! The most important files are written first. A file that cannot be written costs no other file,
+//! and never the verdict: it is an [`ArtifactError`], which the caller shows.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -39,25 +39,26 @@ use super::timings::{Timing, write_timings};
 
 /// Number of samples that are listed as the slowest.
 const SLOWEST: usize = 10;
-/// The environment variable with the path of the file that GitHub's runners show as the summary of a step.
+/// The environment variable with the path of the file that GitHub's runners show as the summary of
+/// a step.
 const STEP_SUMMARY: &str = "GITHUB_STEP_SUMMARY";
 
 /// A file that a campaign could not write. The verdict stands, and so do all other files.
 #[derive(Debug, thiserror::Error)]
 #[error("{artifact} is missing: {source}")]
 pub struct ArtifactError {
-    /// What is missing: the name of the file, or which recording.
+    /// The missing file: its name, or the recording.
     pub artifact: String,
     /// Why.
     pub source: ReportError,
 }
 
-/// What a campaign has written at its end.
+/// The files that a campaign has written at its end.
 #[derive(Debug, Default)]
 pub struct Written {
     /// The recordings.
     pub recorded: Vec<RecordedSample>,
-    /// What could not be written.
+    /// The files that could not be written.
     pub failures: Vec<ArtifactError>,
 }
 
@@ -76,7 +77,7 @@ pub struct CampaignReport<'a> {
     pub manifest: &'a Manifest,
     /// The scenarios with their arms.
     pub works: &'a [Arc<Work>],
-    /// The counts, and what the reports show beside them.
+    /// The counts, and the further data of the reports.
     pub tally: &'a Tally,
     /// The verdict.
     pub judged: &'a Judgement,
@@ -84,7 +85,7 @@ pub struct CampaignReport<'a> {
     pub command_for: CommandFor,
 }
 
-/// What reports show of single samples.
+/// The data of single samples in reports.
 #[derive(Clone, Copy)]
 struct Looks<'a> {
     /// The recordings.
@@ -96,7 +97,8 @@ struct Looks<'a> {
 }
 
 impl CampaignReport<'_> {
-    /// Writes every file into the folder, with recordings of the selected samples. A file that cannot be written costs no other.
+    /// Writes every file into the folder, with recordings of the selected samples. A file that
+    /// cannot be written costs no other.
     pub fn write(&self, folder: &Folder, selection: Selection) -> Written {
         let mut written = Written::default();
         let files = self.scenario_files();
@@ -235,7 +237,8 @@ impl CampaignReport<'_> {
     }
 }
 
-/// Looks at a campaign's folder: its manifest, its journal, and whether the table of outcomes is the one that the journal makes.
+/// Looks at a campaign's folder: its manifest, its journal, and whether the table of outcomes is
+/// the one that the journal makes.
 pub fn check_folder(folder: &Folder, command_for: CommandFor) -> Integrity {
     const TABLE: &str = "outcomes.parquet";
     let mut integrity = Integrity::of(folder, command_for);
@@ -253,7 +256,8 @@ pub fn check_folder(folder: &Folder, command_for: CommandFor) -> Integrity {
     integrity
 }
 
-/// Returns true if the table has the bytes that the journal makes. Another release may write other bytes.
+/// Returns true if the table has the bytes that the journal makes. Another release may write other
+/// bytes.
 fn is_table_of_journal(folder: &Folder, table: &str) -> Result<bool, ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let release = |version: &str| version.split('+').next().unwrap_or_default().to_owned();
@@ -274,7 +278,7 @@ fn is_table_of_journal(folder: &Folder, table: &str) -> Result<bool, ReportError
 /// The wall time of each scenario (s), by name.
 type WallTimes = Vec<(String, f64)>;
 
-/// Returns what the file of the CI server is called in messages.
+/// Returns the name of the CI server's file in messages.
 fn step_summary_name() -> String {
     format!("the summary for the CI server ({STEP_SUMMARY})")
 }

@@ -1,4 +1,4 @@
-//! What the reports for people are made of.
+//! The data of the reports for people.
 
 use std::collections::BTreeMap;
 
@@ -12,8 +12,8 @@ use closecall_campaign::summary::Summary;
 use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::ScenarioFile;
 
-/// The recordings of samples: (scenario, sample, controller) to the path of the Rerun file, relative to the campaign's
-/// folder.
+/// The recordings of samples: (scenario, sample, controller) to the path of the Rerun file,
+/// relative to the campaign's folder.
 pub type Recordings = BTreeMap<(String, u64, String), String>;
 
 /// The results of a campaign.
@@ -52,14 +52,16 @@ impl<'a> Findings<'a> {
         self.files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns the recording of a sample, in any arm. If arms have recordings of their own, the last one is returned.
+    /// Returns the recording of a sample, in any arm. If arms have recordings of their own, the
+    /// last one is returned.
     pub(super) fn recording(&self, scenario: &str, sample: u64) -> Option<&'a str> {
         let from = (scenario.to_owned(), sample, String::new());
         let of_sample = |key: &(String, u64, String)| key.0 == scenario && key.1 == sample;
         self.recordings.range(from..).take_while(|(key, _)| of_sample(key)).last().map(|(_, path)| path.as_str())
     }
 
-    /// Returns the pictures of the worst samples, failures first, each with the path of its recording.
+    /// Returns the pictures of the worst samples, failures first, each with the path of its
+    /// recording.
     pub(super) fn worst_stills(&self) -> Vec<(&'a Still, &'a str)> {
         let mut stills: Vec<&Still> = self.stills.iter().collect();
         stills.sort_by_key(|still| !still.is_failure());
@@ -69,8 +71,8 @@ impl<'a> Findings<'a> {
 
     /// Returns the command that runs a sample again, from within the campaign's folder.
     pub(super) fn replay(&self, scenario: &str, sample: u64) -> String {
-        let of = SavedSample { folder: ".", sample, scenario: (self.files.len() > 1).then_some(scenario) };
+        let saved_sample = SavedSample { folder: ".", sample, scenario: (self.files.len() > 1).then_some(scenario) };
         let recording = format!("../sample-{sample}.rrd");
-        (self.command_for)(&Action::Replay(Replay { recording: Some(&recording), ..Replay::new(of) }))
+        (self.command_for)(&Action::Replay(Replay { recording: Some(&recording), ..Replay::new(saved_sample) }))
     }
 }

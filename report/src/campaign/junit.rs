@@ -1,5 +1,5 @@
-//! The verdict of a campaign as JUnit XML, which CI servers show: one suite for each scenario, one case for each gate and each
-//! check of a requirement.
+//! The verdict of a campaign as JUnit XML, which CI servers show: one suite for each scenario, one
+//! case for each gate and each check of a requirement.
 //!
 //! | case | passes | fails | error | skipped |
 //! |---|---|---|---|---|
@@ -8,10 +8,11 @@
 //! | `at most N flaky samples` | met | not met | | the campaign is only measured |
 //! | `verdict` | PASS, measured | | ERROR, INVALID, INCONCLUSIVE, NOT JUDGED, OVERRIDDEN | FAIL: the gates say it |
 //!
-//! The failures are the failed gates and requirement checks, and nothing else. Samples stand in `samples.xml`.
+//! The failures are the failed gates and requirement checks, and nothing else. Samples stand in
+//! `samples.xml`.
 //!
 //! Both files are valid by the schema of Jenkins' plugin xUnit (`junit-10.xsd`). The library
-//! `quick-junit` does not write them: version 0.8.0 adds `skipped` to `testsuites`, which that
+//! `quick-junit` does not write them: version 0.8.0 adds `skipped` to `testsuites`, which the
 //! schema refuses, and holds all cases of a file in memory.
 
 use std::io::{self, Write};
@@ -151,7 +152,7 @@ fn totals<'a>(element: &'a str, name: &'a str, cases: &[&Case], wall_s: f64) -> 
     start
 }
 
-/// Writes what a suite rests on: seed, settings, and the counts of each controller.
+/// Writes the basis of a suite: seed, settings, and the counts of each controller.
 fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &str) -> io::Result<()> {
     let manifest = findings.manifest;
     let mut properties = vec![
@@ -192,9 +193,9 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
     xml.write_event(Event::End(BytesEnd::new("properties")))
 }
 
-/// Returns the counts of all pairs of arms: `FROM.TO.prevented` and the like.
+/// Returns the counts of all pairs of arms, such as `FROM.TO.prevented`.
 fn arm_pair_properties(findings: &Findings<'_>, counts: &Counts) -> Vec<(String, String)> {
-    let of = |result: PairResult<'_>| {
+    let properties = |result: PairResult<'_>| {
         let pairs = result.pairs;
         let p_value = result.corrected_p.map_or_else(|| "-".to_owned(), |p| p.to_string());
         let values = [
@@ -206,7 +207,7 @@ fn arm_pair_properties(findings: &Findings<'_>, counts: &Counts) -> Vec<(String,
         ];
         values.map(|(name, value)| (format!("{}.{}.{name}", result.baseline, result.tested), value))
     };
-    pair_results(findings.summary, counts).into_iter().flat_map(of).collect()
+    pair_results(findings.summary, counts).into_iter().flat_map(properties).collect()
 }
 
 fn write_case<W: Write>(xml: &mut Writer<W>, case: &Case) -> io::Result<()> {

@@ -179,7 +179,7 @@ fn influence(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
     };
     text.push_str(" (share of the variance that a parameter explains alone)\n\n");
     for event in events {
-        let found = match &event.parameters {
+        let parameters = match &event.parameters {
             Some(parameters) => {
                 let strongest = parameters.iter().take(LISTED).map(|(name, influence)| {
                     let [low, high] = influence.index.interval_95;
@@ -190,7 +190,7 @@ fn influence(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
             }
             None => FEW_EVENTS.to_owned(),
         };
-        text.push_str(&format!("- {}, {} of {}: {found}\n", event.event.title(), event.events, event.samples));
+        text.push_str(&format!("- {}, {} of {}: {parameters}\n", event.event.title(), event.events, event.samples));
     }
     text.push('\n');
     text
@@ -234,7 +234,8 @@ fn in_line(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace(['\n', '\r'], " ")
 }
 
-/// Returns text in one line, in which nothing starts HTML, an image or a link: a controller's message may hold all of them.
+/// Returns text in one line, in which nothing starts HTML, an image or a link: a controller's
+/// message may hold all of them.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut characters = text.chars().map(|c| if matches!(c, '\n' | '\r') { ' ' } else { c }).peekable();

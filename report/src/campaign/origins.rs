@@ -1,6 +1,8 @@
-//! Where the scenarios of a campaign come from, if they were made from recorded traffic: the recorded seconds beside the result.
+//! Where the scenarios of a campaign come from, if they were made from recorded traffic: the
+//! recorded seconds beside the result.
 //!
-//! `closecall traffic chain` writes [`Origins`] into the folder of its campaign, and the report has a section of it.
+//! `closecall traffic chain` writes [`Origins`] into the folder of its campaign, and the report has
+//! a section of it.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -19,7 +21,7 @@ use super::html::{number, number_heads, table, text_heads};
 /// The file in the folder of the campaign.
 pub const ORIGINS: &str = "origins.json";
 
-/// Where the scenarios of a campaign come from.
+/// The origins of the scenarios of a campaign.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origins {
     /// The trajectory files.
@@ -47,7 +49,7 @@ pub struct OriginFile {
     pub flaws: BTreeMap<String, usize>,
     /// Number of lane changes.
     pub lane_changes: usize,
-    /// Number of those that are critical by at least one metric.
+    /// Number of lane changes that are critical by at least one metric.
     pub critical: usize,
 }
 
@@ -78,11 +80,11 @@ pub struct Origin {
     pub front_thw_s: Option<f64>,
     /// The metrics that are critical.
     pub critical: Vec<String>,
-    /// Distance to the nearest encounter that was chosen before, in standard deviations.
+    /// Distance to the nearest encounter that precedes it in the choice, in standard deviations.
     pub distance_sd: Option<f64>,
     /// Picture of the recorded lane change, relative to the folder.
     pub picture: Option<String>,
-    /// Recording (Rerun file) of it, relative to the folder.
+    /// Recording (Rerun file) of the recorded lane change, relative to the folder.
     pub recording: Option<String>,
     /// Whether the system engages, once the campaign is over.
     pub engagement: Option<Engagement>,
@@ -109,10 +111,10 @@ impl Origins {
     pub fn engagement(&self) -> Option<Engagement> {
         let mut sum = Engagement::default();
         for origin in &self.encounters {
-            let one = origin.engagement.as_ref()?;
-            sum.engaged += one.engaged;
-            sum.before_braking += one.before_braking;
-            for (reason, count) in &one.missing {
+            let engagement = origin.engagement.as_ref()?;
+            sum.engaged += engagement.engaged;
+            sum.before_braking += engagement.before_braking;
+            for (reason, count) in &engagement.missing {
                 *sum.missing.entry(reason.clone()).or_default() += count;
             }
         }
@@ -121,7 +123,8 @@ impl Origins {
 }
 
 impl Origin {
-    /// Returns the most frequent reason for which the system does not engage, with the number of its samples.
+    /// Returns the most frequent reason for which the system does not engage, with the number of
+    /// its samples.
     fn reason(&self) -> Option<(&str, u64)> {
         let most = self.engagement.as_ref()?.missing.iter().max_by_key(|(_, count)| **count)?;
         Some((most.0, *most.1))
@@ -131,15 +134,16 @@ impl Origin {
 /// The encounters with their results, as a table for human readers.
 #[derive(Clone, Copy, Debug)]
 pub struct OriginsText<'a> {
-    /// Where they come from.
+    /// The origins of the encounters.
     pub origins: &'a Origins,
-    /// What became of them.
+    /// The results of the encounters.
     pub summary: &'a Summary,
 }
 
 impl fmt::Display for OriginsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = self.origins.encounters.iter().map(|one| one.scenario.len()).max().unwrap_or_default().max(9);
+        let width =
+            self.origins.encounters.iter().map(|encounter| encounter.scenario.len()).max().unwrap_or_default().max(9);
         writeln!(
             f,
             "{:<width$}  recorded          closing  headway   prevented induced both neither  engaged  mostly missing where not",
@@ -147,7 +151,8 @@ impl fmt::Display for OriginsText<'_> {
         )?;
         for origin in &self.origins.encounters {
             let pairs = counts_of(self.summary, &origin.scenario).map(|counts| counts.pairs).unwrap_or_default();
-            let engaged = origin.engagement.as_ref().map(|one| format!("{}/{}", one.engaged, one.samples()));
+            let engaged =
+                origin.engagement.as_ref().map(|engagement| format!("{}/{}", engagement.engaged, engagement.samples()));
             writeln!(
                 f,
                 "{:<width$}  {:>6.1} to {:>6.1} s {:>4.1} m/s {:>6.2} s {:>10} {:>7} {:>4} {:>7} {:>8}  {}",
@@ -168,7 +173,8 @@ impl fmt::Display for OriginsText<'_> {
     }
 }
 
-/// Returns in which share the system engages, and what is missing in the rest.
+/// Returns the share of the samples in which the system engages, and the missing conditions in the
+/// rest.
 fn engaged_sentence(all: &Engagement) -> String {
     let (engaged, samples) = (all.engaged, all.samples());
     let share = 100.0 * engaged as f64 / samples.max(1) as f64;
@@ -177,7 +183,7 @@ fn engaged_sentence(all: &Engagement) -> String {
     let rest: Vec<String> = missing.iter().map(|(reason, count)| format!("{reason} ({count})")).collect();
     let rest = match rest.is_empty() {
         true => String::new(),
-        false => format!("; what is missing when it comes closest in the rest: {}", rest.join(", ")),
+        false => format!("; in the rest, missing at the closest approach: {}", rest.join(", ")),
     };
     let before = all.before_braking;
     format!(
@@ -186,10 +192,11 @@ fn engaged_sentence(all: &Engagement) -> String {
 }
 
 fn counts_of<'a>(summary: &'a Summary, name: &str) -> Option<&'a Counts> {
-    summary.scenarios.iter().find(|(known, _)| known == name).map(|(_, counts)| counts)
+    summary.scenarios.iter().find(|(scenario, _)| scenario == name).map(|(_, counts)| counts)
 }
 
-/// Returns the section of the report. A campaign whose scenarios do not come from recorded traffic has none.
+/// Returns the section of the report. A campaign whose scenarios do not come from recorded traffic
+/// has none.
 pub(super) fn section(findings: &Findings<'_>) -> Markup {
     let Some((folder, origins)) = findings.folder.and_then(|folder| Some((folder, Origins::of(folder)?))) else {
         return html! {};
@@ -247,7 +254,7 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
                 (number(origin.front_thw_s.map_or_else(|| "drawn".to_owned(), |thw_s| format!("{thw_s:.2}"))))
                 (number(pairs.prevented)) (number(pairs.induced)) (number(pairs.both)) (number(pairs.neither))
                 @match &origin.engagement {
-                    Some(one) => { (number(one.engaged)) (number(one.before_braking)) },
+                    Some(engagement) => { (number(engagement.engaged)) (number(engagement.before_braking)) },
                     None => { (number("-")) (number("-")) },
                 }
                 td { (origin.reason().map_or_else(|| "-".to_owned(), |(reason, count)| format!("{reason} ({count})"))) }
@@ -265,7 +272,7 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
     table(&head, &rows)
 }
 
-/// Returns the recorded seconds of an encounter, and what was recorded of its samples.
+/// Returns the recorded seconds of an encounter, and the recordings of its samples.
 fn encounter(findings: &Findings<'_>, folder: &Folder, origin: &Origin) -> Markup {
     let picture = origin.picture.as_ref().and_then(|path| std::fs::read_to_string(folder.file(path)).ok());
     let of_scenario = findings.recordings.iter().filter(|((name, _, _), _)| *name == origin.scenario);

@@ -1,9 +1,10 @@
 //! The table of a campaign's outcomes, as Parquet: one row for each sample and controller.
 //!
-//! The file depends on the rows alone: the same rows give the same bytes, however they were computed. It does not state
-//! when or where it was written. The units are in the metadata of the columns, and the manifest in that of the file. The
-//! names of the columns consist of lower-case letters, digits and underscores, so that SQL needs no quotes. A margin that does not exist is null, and
-//! the column `<margin>_absent` gives the reason.
+//! The file depends on the rows alone: the same rows give the same bytes, however they were
+//! computed. It states neither time nor place. The metadata of the columns hold the units, and the
+//! metadata of the file hold the manifest. The names of the columns consist of lower-case letters,
+//! digits and underscores, so SQL needs no quotes. A margin that does not exist is null, and the
+//! column `<margin>_absent` gives the reason.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -83,7 +84,8 @@ pub fn parameter_columns<'a>(
 /// The key under which the metadata of the file holds the manifest, as JSON.
 pub const MANIFEST_KEY: &str = "closecall:manifest";
 
-/// Writes the table, with the `manifest` of the campaign in its metadata. The rows are encoded in batches, so that memory is bounded.
+/// Writes the table, with the `manifest` of the campaign in its metadata. The rows are encoded in
+/// batches, so that memory is bounded.
 ///
 /// # Errors
 /// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
@@ -125,8 +127,9 @@ pub fn write_outcomes<E: From<WriteError>>(
     }
 }
 
-/// Returns the metadata of the file: the units, and the manifest as far as it determines the outcomes. A part of a
-/// campaign, or another command line, would change the bytes, but not the outcomes.
+/// Returns the metadata of the file: the units, and the part of the manifest that determines the
+/// outcomes. A part of a campaign, or another command line, would change the bytes, but not the
+/// outcomes.
 fn metadata(columns: &[Column], manifest: Option<&Manifest>) -> Vec<KeyValue> {
     let mut entries = units(columns);
     if let Some(text) = manifest.and_then(Manifest::determining_json) {
@@ -135,7 +138,8 @@ fn metadata(columns: &[Column], manifest: Option<&Manifest>) -> Vec<KeyValue> {
     entries
 }
 
-/// Returns the units once more, for readers that do not decode Arrow's own schema: one entry for each column with a unit.
+/// Returns the units once more, for readers that do not decode Arrow's own schema: one entry for
+/// each column with a unit.
 fn units(columns: &[Column]) -> Vec<KeyValue> {
     let unit =
         |column: &Column| column.unit.map(|unit| KeyValue::new(format!("unit:{}", column.name), unit.to_owned()));
@@ -179,33 +183,33 @@ impl Column {
     /// Returns the value of a row.
     pub(super) fn value(&self, row: &OutcomeRow) -> Option<CellValue> {
         match &self.cells {
-            Cells::Text(of) => of(row).map(CellValue::Word),
-            Cells::Number(of) => of(row).map(CellValue::Number),
-            Cells::Count(of) => of(row).map(|count| CellValue::Number(count as f64)),
-            Cells::Flag(of) => of(row).map(|flag| CellValue::Word(if flag { "yes" } else { "no" }.to_owned())),
+            Cells::Text(value) => value(row).map(CellValue::Word),
+            Cells::Number(value) => value(row).map(CellValue::Number),
+            Cells::Count(value) => value(row).map(|count| CellValue::Number(count as f64)),
+            Cells::Flag(value) => value(row).map(|flag| CellValue::Word(if flag { "yes" } else { "no" }.to_owned())),
         }
     }
 
     fn field(&self) -> Field {
-        let of = match self.cells {
+        let data_type = match self.cells {
             Cells::Text(_) => DataType::Utf8,
             Cells::Number(_) => DataType::Float64,
             Cells::Count(_) => DataType::UInt64,
             Cells::Flag(_) => DataType::Boolean,
         };
         if REQUIRED.contains(&self.name.as_str()) {
-            required(&self.name, of, self.unit)
+            required(&self.name, data_type, self.unit)
         } else {
-            field(&self.name, of, self.unit)
+            field(&self.name, data_type, self.unit)
         }
     }
 
     fn array(&self, rows: &[OutcomeRow]) -> ArrayRef {
         match &self.cells {
-            Cells::Text(of) => Arc::new(rows.iter().map(of).collect::<StringArray>()),
-            Cells::Number(of) => Arc::new(rows.iter().map(of).collect::<Float64Array>()),
-            Cells::Count(of) => Arc::new(rows.iter().map(of).collect::<UInt64Array>()),
-            Cells::Flag(of) => Arc::new(rows.iter().map(of).collect::<BooleanArray>()),
+            Cells::Text(value) => Arc::new(rows.iter().map(value).collect::<StringArray>()),
+            Cells::Number(value) => Arc::new(rows.iter().map(value).collect::<Float64Array>()),
+            Cells::Count(value) => Arc::new(rows.iter().map(value).collect::<UInt64Array>()),
+            Cells::Flag(value) => Arc::new(rows.iter().map(value).collect::<BooleanArray>()),
         }
     }
 }
@@ -215,31 +219,31 @@ impl Column {
 struct Columns(Vec<Column>);
 
 impl Columns {
-    fn text(&mut self, name: &str, of: impl Fn(&OutcomeRow) -> Option<String> + 'static) {
-        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Text(Box::new(of)) });
+    fn text(&mut self, name: &str, value: impl Fn(&OutcomeRow) -> Option<String> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Text(Box::new(value)) });
     }
 
-    fn count(&mut self, name: &str, of: impl Fn(&OutcomeRow) -> Option<u64> + 'static) {
-        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Count(Box::new(of)) });
+    fn count(&mut self, name: &str, value: impl Fn(&OutcomeRow) -> Option<u64> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Count(Box::new(value)) });
     }
 
-    fn flag(&mut self, name: &str, of: impl Fn(&OutcomeRow) -> Option<bool> + 'static) {
-        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Flag(Box::new(of)) });
+    fn flag(&mut self, name: &str, value: impl Fn(&OutcomeRow) -> Option<bool> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Flag(Box::new(value)) });
     }
 
-    fn number(&mut self, name: &str, unit: &'static str, of: impl Fn(&OutcomeRow) -> Option<f64> + 'static) {
-        self.0.push(Column { name: name.to_owned(), unit: Some(unit), cells: Cells::Number(Box::new(of)) });
+    fn number(&mut self, name: &str, unit: &'static str, value: impl Fn(&OutcomeRow) -> Option<f64> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: Some(unit), cells: Cells::Number(Box::new(value)) });
     }
 
     /// Adds a column for a value, and one for the reason of its absence.
-    fn measured(&mut self, name: &str, unit: &'static str, of: fn(&Outcome) -> Measured) {
-        self.number(name, unit, move |row| of(row.outcome()?).ok());
-        self.text(&format!("{name}_absent"), move |row| of(row.outcome()?).err().map(|absent| absent.to_string()));
+    fn measured(&mut self, name: &str, unit: &'static str, value: fn(&Outcome) -> Measured) {
+        self.number(name, unit, move |row| value(row.outcome()?).ok());
+        self.text(&format!("{name}_absent"), move |row| value(row.outcome()?).err().map(|absent| absent.to_string()));
     }
 
     /// Adds the same two columns for a value of the margin increase system.
-    fn mis(&mut self, name: &str, unit: &'static str, of: fn(&MisSummary) -> Measured) {
-        let measured = move |outcome: &Outcome| outcome.mis.as_ref().map_err(|absent| *absent).and_then(of);
+    fn mis(&mut self, name: &str, unit: &'static str, value: fn(&MisSummary) -> Measured) {
+        let measured = move |outcome: &Outcome| outcome.mis.as_ref().map_err(|absent| *absent).and_then(value);
         self.number(name, unit, move |row| measured(row.outcome()?).ok());
         self.text(&format!("{name}_absent"), move |row| {
             measured(row.outcome()?).err().map(|absent| absent.to_string())
@@ -287,11 +291,11 @@ fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: Parameter
     let name = name.clone();
     match kind {
         ParameterKind::Number => {
-            let of = move |row: &OutcomeRow| match row.outcome()?.parameters.get(&name)? {
+            let value = move |row: &OutcomeRow| match row.outcome()?.parameters.get(&name)? {
                 Value::Number(value) => Some(*value),
                 Value::Label(_) => None,
             };
-            columns.0.push(Column { name: column, unit, cells: Cells::Number(Box::new(of)) });
+            columns.0.push(Column { name: column, unit, cells: Cells::Number(Box::new(value)) });
         }
         ParameterKind::Label => {
             columns.text(&column, move |row| row.outcome()?.parameters.get(&name).map(ToString::to_string));
@@ -316,26 +320,27 @@ fn collision_columns(columns: &mut Columns) {
     columns.0.push(Column { name: "harm".to_owned(), unit: None, cells: Cells::Number(Box::new(harm_of)) });
     let first = |row: &OutcomeRow| row.outcome()?.collisions.first().cloned();
     columns.number("collision_time_s", "s", move |row| Some(first(row)?.time.s()));
-    for (index, which) in ["first", "second"].into_iter().enumerate() {
-        columns.text(&format!("collision_between_{which}"), move |row| Some(first(row)?.between[index].to_string()));
-        columns.text(&format!("collision_struck_side_{which}"), move |row| word(&first(row)?.struck_side[index]));
-        columns
-            .number(&format!("collision_delta_v_{which}_mps"), "m/s", move |row| Some(first(row)?.delta_v_mps[index]));
+    for (index, vehicle) in ["first", "second"].into_iter().enumerate() {
+        columns.text(&format!("collision_between_{vehicle}"), move |row| Some(first(row)?.between[index].to_string()));
+        columns.text(&format!("collision_struck_side_{vehicle}"), move |row| word(&first(row)?.struck_side[index]));
+        columns.number(&format!("collision_delta_v_{vehicle}_mps"), "m/s", move |row| {
+            Some(first(row)?.delta_v_mps[index])
+        });
     }
     columns.text("collision_closed_by", move |row| word(&first(row)?.closed_by));
     columns.text("collision_phase", move |row| word(&first(row)?.phase));
     columns.number("collision_relative_speed_mps", "m/s", move |row| Some(first(row)?.relative_speed_mps));
 }
 
-/// What happened in the encounter, from the ground truth.
+/// The events of the encounter, from the ground truth.
 fn encounter_columns(columns: &mut Columns) {
     for name in ["rear_near", "rear_cut_out", "rear_crossed", "hazard", "rear_critical", "rear_passed", "lead_braked"] {
         columns.flag(name, move |row| Some(Measure::named(name)?.of(row.outcome()?)? == 1.0));
     }
 }
 
-fn ahead(outcome: &Outcome, of: fn(&Ahead) -> Measured) -> Measured {
-    outcome.ahead.as_ref().map_or(Err(Absent::NotRecorded), of)
+fn ahead(outcome: &Outcome, value: fn(&Ahead) -> Measured) -> Measured {
+    outcome.ahead.as_ref().map_or(Err(Absent::NotRecorded), value)
 }
 
 fn margin_columns(columns: &mut Columns) {
@@ -379,8 +384,8 @@ fn mis_columns(columns: &mut Columns) {
 }
 
 /// Returns the name of an enum's variant, as JSON writes it too.
-fn word(of: &impl Serialize) -> Option<String> {
-    serde_json::to_value(of).ok()?.as_str().map(str::to_owned)
+fn word(variant: &impl Serialize) -> Option<String> {
+    serde_json::to_value(variant).ok()?.as_str().map(str::to_owned)
 }
 
 #[cfg(test)]

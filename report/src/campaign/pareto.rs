@@ -1,28 +1,31 @@
-//! What the arm under test adds to its references: whether one of them does at least as much at no higher cost.
+//! The use of the arm under test beyond its references: whether a reference does at least as much
+//! at no higher cost.
 
 use std::fmt;
 
 use closecall_campaign::summary::{Counts, Summary};
 
-/// What an arm does, and what it costs.
+/// The effects and the cost of an arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Standing<'a> {
     arm: &'a str,
     prevented: u64,
     induced: u64,
-    /// Means over the samples of the time lost (s), of the largest speed deficit (m/s), and of the hardest braking of the vehicle behind (m/s²).
+    /// Means over the samples of the time lost (s), of the largest speed deficit (m/s), and of the
+    /// hardest braking of the vehicle behind (m/s²).
     cost: [f64; 3],
 }
 
 impl Standing<'_> {
-    /// Returns true if this arm prevents as much as `other`, induces no more, and costs no more. What is not a number decides nothing.
+    /// Returns true if this arm prevents as much as `other`, induces no more, and costs no more. A
+    /// value that is not a number makes the answer false.
     fn is_as_good_as(&self, other: &Self) -> bool {
-        let costs_no_more = self.cost.iter().zip(other.cost).all(|(own, other)| *own <= other);
+        let costs_no_more = self.cost.iter().zip(other.cost).all(|(cost, other)| *cost <= other);
         self.prevented >= other.prevented && self.induced <= other.induced && costs_no_more
     }
 }
 
-/// Writes what each arm prevents, induces and costs.
+/// Writes the prevented and induced collisions and the cost of each arm.
 impl fmt::Display for Standing<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [lost_s, slower_mps, imposed_mps2] = self.cost;

@@ -25,7 +25,7 @@ pub struct RecordedSample {
     pub scenario: String,
     /// The sample's number.
     pub sample: u64,
-    /// Why it was recorded, in words.
+    /// The reasons for its recording, in words.
     pub reasons: Vec<&'static str>,
     /// The file.
     pub path: PathBuf,
@@ -40,7 +40,7 @@ pub struct Still {
     pub sample: u64,
     /// The verdict on the pair, or on the only run.
     pub verdict: &'static str,
-    /// What happened in the arm under test and why, in one sentence.
+    /// The event in the arm under test and its cause, in one sentence.
     pub sentence: String,
     /// The picture, as SVG.
     pub svg: String,
@@ -64,21 +64,21 @@ pub(super) fn card_beside(recording: &str) -> String {
     recording.strip_suffix(".rrd").map_or_else(String::new, |stem| format!("{stem}.html"))
 }
 
-/// What has been recorded.
+/// The results of the recording.
 #[derive(Default)]
 pub(super) struct Recorded {
-    /// Where the reports find the recordings.
+    /// The paths of the recordings, for the reports.
     pub(super) paths: Recordings,
     /// The recordings in the order of the page.
     pub(super) samples: Vec<RecordedSample>,
     /// Pictures of the recorded samples, in the same order.
     pub(super) stills: Vec<Still>,
-    /// What could not be recorded, in words, and why.
+    /// The recordings that failed, in words, and the reasons.
     pub(super) failures: Vec<(String, ReportError)>,
 }
 
-/// Runs the selected samples again, records all arms of each in one file, and writes the page. A sample that cannot be recorded costs
-/// no other.
+/// Runs the selected samples again, records all arms of each in one file, and writes the page. A
+/// sample that cannot be recorded costs no other.
 pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
@@ -87,7 +87,7 @@ pub(super) fn record(
 ) -> Result<Recorded, ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
-    // An earlier, identical campaign may have recorded other samples.
+    // A previous identical campaign may have recorded other samples.
     if path.try_exists().map_err(|source| WriteError::new(&path, source))? {
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
@@ -125,7 +125,8 @@ pub(super) fn record(
     Ok(recorded)
 }
 
-/// Returns the selected samples with their scenarios: the worst of each kind first, then those of each scenario.
+/// Returns the selected samples with their scenarios: first the worst of each kind, then the
+/// samples of each scenario.
 fn choose<'a>(
     saved: &SavedCampaign,
     scenarios: &[&'a ScenarioFile],
@@ -151,8 +152,8 @@ fn choose<'a>(
     for (file, chooser) in &choosers {
         let (name, Some(ego)) = (&file.config().name, file.ego_id()) else { continue };
         for chosen in chooser.choose(saved.manifest().sampling.seed, ego) {
-            match all.iter_mut().find(|(known, one)| known == name && one.sample == chosen.sample) {
-                Some((_, known)) => known.reasons.extend(chosen.reasons),
+            match all.iter_mut().find(|(scenario, recorded)| scenario == name && recorded.sample == chosen.sample) {
+                Some((_, recorded)) => recorded.reasons.extend(chosen.reasons),
                 None => all.push((name, chosen)),
             }
         }
@@ -175,10 +176,10 @@ fn record_one(
     let films: Vec<Film> = films.into_iter().map(named).collect();
     let file = format!("{scenario}-{sample}.rrd");
     let is_paired = films.len() > 1;
-    // The folder may be moved: the command names it from the folder of the page.
+    // The folder may be moved, so the command names it relative to the folder of the page.
     let replay_from = |folder| {
-        let of = SavedSample { folder, sample, scenario: Some(scenario) };
-        command_for(&Action::Replay(Replay { is_paired, recording: Some(&file), ..Replay::new(of) }))
+        let saved_sample = SavedSample { folder, sample, scenario: Some(scenario) };
+        command_for(&Action::Replay(Replay { is_paired, recording: Some(&file), ..Replay::new(saved_sample) }))
     };
     let replay = replay_from("..");
     let story = films.iter().flat_map(|film| {

@@ -1,9 +1,10 @@
-//! The samples of a campaign as JUnit XML: one suite for each scenario, one case for each sample and controller. A collision of
-//! the ego in the arm under test is a failure, a sample without an outcome is an error. A collision in the baseline is what
-//! the system under test is compared with, and no failure. The verdict stands in `junit.xml`.
+//! The samples of a campaign as JUnit XML: one suite for each scenario, one case for each sample
+//! and controller. A collision of the ego in the arm under test is a failure, a sample without an
+//! outcome is an error. A collision in the baseline is no failure: the system under test is
+//! compared with it. `junit.xml` has the verdict.
 //!
-//! The file is written case by case, so that memory does not grow with the number of cases. It depends on the outcomes
-//! alone and holds no wall-clock times.
+//! The file is written case by case, so that memory does not grow with the number of cases. It
+//! depends on the outcomes alone and holds no wall-clock times.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -30,8 +31,9 @@ pub struct SuiteTotals {
     pub errors: usize,
 }
 
-/// Writes the file. Each row has the path of its recording, if there is one, relative to the file's folder. The rows are
-/// grouped by scenario, in the order of `suites`; `tested` is the controller under test.
+/// Writes the file. Each row has the path of its recording, if there is one, relative to the file's
+/// folder. The rows are grouped by scenario, in the order of `suites`; `tested` is the controller
+/// under test.
 ///
 /// # Errors
 /// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
@@ -61,7 +63,7 @@ fn report(
 ) -> io::Result<()> {
     let mut xml = Writer::new_with_indent(file, b' ', 4);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-    let sum = |of: fn(&SuiteTotals) -> usize| suites.iter().map(of).sum::<usize>();
+    let sum = |count: fn(&SuiteTotals) -> usize| suites.iter().map(count).sum::<usize>();
     let all = SuiteTotals {
         scenario: "closecall".to_owned(),
         tests: sum(|suite| suite.tests),
@@ -112,7 +114,8 @@ fn case<W: Write>(xml: &mut Writer<W>, row: &OutcomeRow, recording: Option<&str>
     xml.write_event(Event::End(BytesEnd::new("testcase")))
 }
 
-/// Returns the name, the type and the message of the element for a failure or an error, or `None` if the case passes.
+/// Returns the name, the type and the message of the element for a failure or an error, or `None`
+/// if the case passes.
 fn problem(row: &OutcomeRow, tested: &str) -> Option<(&'static str, String, String)> {
     match (&row.result, row.ego_collision()) {
         (Err(error), _) => Some(("error", error.kind.clone(), error.message.clone())),
@@ -123,7 +126,8 @@ fn problem(row: &OutcomeRow, tested: &str) -> Option<(&'static str, String, Stri
     }
 }
 
-/// Returns the text without control characters of others, and without what XML does not allow, not even escaped.
+/// Returns the text without control characters, and without the characters that XML does not allow
+/// even in escaped form.
 pub(super) fn legal_xml(text: &str) -> String {
     let is_legal = |c: char| matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{fffd}' | '\u{10000}'..);
     shown(text).chars().map(|c| if is_legal(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()

@@ -12,7 +12,7 @@ use closecall_campaign::verdict::{Allowed, Judgement, judge};
 
 use super::overview::Overview;
 
-/// The counts of a campaign, and what its reports show beside them.
+/// The counts of a campaign, and the further data of its reports.
 #[derive(Clone, Debug)]
 pub struct Tally {
     /// The counts that the gates judge.

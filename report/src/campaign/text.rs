@@ -44,7 +44,8 @@ impl fmt::Display for CountsText<'_> {
     }
 }
 
-/// The flaky samples of each scenario and arm, with the message of the first crash. Empty if there are none.
+/// The flaky samples of each scenario and arm, with the message of the first crash. Empty if there
+/// are none.
 #[derive(Clone, Copy, Debug)]
 pub struct FlakyText<'a>(pub &'a Overview);
 
@@ -64,7 +65,7 @@ impl fmt::Display for FlakyText<'_> {
     }
 }
 
-/// The verdict in one sentence, with its reasons: what is not met first, in plain words.
+/// The verdict in one sentence, with its reasons in plain words: first the gates that are not met.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictText<'a> {
     /// The verdict.
@@ -140,17 +141,17 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
     Ok(())
 }
 
-/// Returns why the system under test did not prevent the collisions that it did not, the most frequent reason first; `None` if there
-/// are none.
+/// Returns the reasons for which the system under test did not prevent collisions, the most
+/// frequent first; `None` if there are none.
 pub(super) fn not_prevented(counts: &Counts) -> Option<String> {
-    let of = |(hindrance, times): &(_, u64)| format!("{hindrance} in {times}");
-    let texts: Vec<String> = counts.not_prevented.iter().map(of).collect();
+    let reason = |(hindrance, times): &(_, u64)| format!("{hindrance} in {times}");
+    let texts: Vec<String> = counts.not_prevented.iter().map(reason).collect();
     let all = counts.pairs.prevented + counts.pairs.both;
     (!texts.is_empty())
         .then(|| format!("prevented {} of {all}; of the others: {}", counts.pairs.prevented, texts.join(", ")))
 }
 
-/// Returns what became of the method's goal, the most frequent case first; `None` if there was none.
+/// Returns the results for the method's goal, the most frequent first; `None` if there was none.
 pub(super) fn goals(counts: &Counts) -> Option<String> {
     let all: u64 = counts.goals.iter().map(|(_, times)| times).sum();
     let texts: Vec<String> = counts.goals.iter().map(|(goal, times)| format!("{} in {times}", goal.text())).collect();
@@ -159,7 +160,7 @@ pub(super) fn goals(counts: &Counts) -> Option<String> {
 
 /// Returns in how many samples each arm makes the vehicle behind brake hard; `None` if none does.
 pub(super) fn imposed(summary: &Summary, counts: &Counts) -> Option<String> {
-    let of = |(name, arm): (&String, &ArmCounts)| {
+    let braking = |(name, arm): (&String, &ArmCounts)| {
         let [.., mean_mps2] = arm.mean_cost()?;
         Some(format!(
             "{name} {} of {} ({}, mean {mean_mps2:.1} m/s²)",
@@ -168,7 +169,7 @@ pub(super) fn imposed(summary: &Summary, counts: &Counts) -> Option<String> {
             percent(arm.imposed_share()?)
         ))
     };
-    let texts: Vec<String> = summary.controllers.iter().zip(&counts.arms).filter_map(of).collect();
+    let texts: Vec<String> = summary.controllers.iter().zip(&counts.arms).filter_map(braking).collect();
     counts.arms.iter().any(|arm| arm.imposed > 0).then(|| {
         format!(
             "the vehicle behind brakes harder than {IMPOSED_BRAKING_MPS2:.0} m/s² before the lead vehicle brakes (UN Regulation 157): {}",

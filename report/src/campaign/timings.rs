@@ -1,5 +1,5 @@
-//! The wall times of a campaign's samples, as Parquet. They have a file of their own because they differ in each
-//! repetition.
+//! The wall times of a campaign's samples, as Parquet. They have a file of their own because they
+//! differ in each repetition.
 
 use std::io;
 use std::path::Path;
@@ -25,7 +25,8 @@ pub struct Timing {
     pub wall_s: f64,
 }
 
-/// Writes the table, one row for each sample and controller. The rows are written in groups, so that memory is bounded.
+/// Writes the table, one row for each sample and controller. The rows are written in groups, so
+/// that memory is bounded.
 ///
 /// # Errors
 /// [`WriteError`] if the file cannot be written. An existing file then stays as it is.

@@ -1,4 +1,5 @@
-//! The verdict in words that a release manager can sign, and the gates in plain words, the worst first.
+//! The verdict in words that a release manager can sign, and the gates in plain words, the worst
+//! first.
 //!
 //! ```text
 //!  FAIL: 2 of 14 scenarios miss a requirement: cut-in-into-margin (MIS-6), busy-overtake (MIS-1)
@@ -20,11 +21,11 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     let because = |decided: Standing, verb: &str| {
         let names = scenarios_of(judged, decided);
         let listed: Vec<String> = names.iter().map(|(name, marks)| named(name, marks)).collect();
-        let what = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
+        let subject = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
         (!listed.is_empty()).then(|| match names.len() {
-            1 if scenarios == 1 => format!("{word}: the scenario {} {what}: {}", singular(verb), listed.join(", ")),
-            1 => format!("{word}: 1 of {scenarios} scenarios {} {what}: {}", singular(verb), listed.join(", ")),
-            count => format!("{word}: {count} of {scenarios} scenarios {verb} {what}: {}", listed.join(", ")),
+            1 if scenarios == 1 => format!("{word}: the scenario {} {subject}: {}", singular(verb), listed.join(", ")),
+            1 => format!("{word}: 1 of {scenarios} scenarios {} {subject}: {}", singular(verb), listed.join(", ")),
+            count => format!("{word}: {count} of {scenarios} scenarios {verb} {subject}: {}", listed.join(", ")),
         })
     };
     let first_reason = || {
@@ -55,7 +56,7 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     told.unwrap_or_else(|| word.to_owned())
 }
 
-/// The beginning of what a verdict says of an expectation that is met.
+/// The beginning of a sentence about an expectation that is met.
 const AS_EXPECTED: &str = "happened as expected: ";
 
 /// Returns a verb as one scenario has it.
@@ -63,12 +64,13 @@ fn singular(verb: &str) -> String {
     if verb == "miss" { "misses".to_owned() } else { verb.replacen("do not", "does not", 1) }
 }
 
-/// Returns the scenarios with a gate of this standing, in the order of the gates, each with the marks of its requirements.
+/// Returns the scenarios with a gate of this standing, in the order of the gates, each with the
+/// marks of its requirements.
 fn scenarios_of(judged: &Judgement, standing: Standing) -> Vec<(String, Vec<String>)> {
     let mut names: Vec<(String, Vec<String>)> = Vec::new();
     for gate in worst_first(judged).into_iter().filter(|gate| gate.standing() == standing) {
         let name = gate.scenario.clone();
-        let index = names.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
+        let index = names.iter().position(|(scenario, _)| *scenario == name).unwrap_or_else(|| {
             names.push((name, Vec::new()));
             names.len() - 1
         });
@@ -85,27 +87,27 @@ fn named(name: &str, marks: &[String]) -> String {
     if marks.is_empty() { name.to_owned() } else { format!("{name} ({})", marks.join(", ")) }
 }
 
-/// Returns the gates: those that are not met first, and of these the one first that misses its bound by the largest share.
+/// Returns the gates, first the gates that are not met. Of these, the gate that misses its bound by
+/// the largest share comes first.
 pub(crate) fn worst_first(judged: &Judgement) -> Vec<&GateResult> {
     let mut gates: Vec<&GateResult> = judged.gates.iter().collect();
-    gates.sort_by(|one, other| {
-        other.standing().cmp(&one.standing()).then_with(|| missed_by(other).total_cmp(&missed_by(one)))
-    });
+    gates.sort_by(|a, b| b.standing().cmp(&a.standing()).then_with(|| missed_by(b).total_cmp(&missed_by(a))));
     gates
 }
 
 /// Smallest magnitude of a bound to which a distance is related.
 const LEAST_BOUND: f64 = 0.001;
 
-/// Returns the distance of the value from the bound, as a share of the bound; 0 if the bound is met or there is no value.
+/// Returns the distance of the value from the bound, as a share of the bound; 0 if the bound is met
+/// or there is no value.
 fn missed_by(gate: &GateResult) -> f64 {
     let (Some(value), Answer::Missed) = (gate.evaluation.value, gate.evaluation.answer) else { return 0.0 };
     let bound = gate.expression.bound;
     (value - bound).abs() / bound.abs().max(LEAST_BOUND)
 }
 
-/// Returns a gate in one line, as terminal and summary have it: standing, scenario, requirement, what was found and what is
-/// required, and the criterion.
+/// Returns a gate in one line for terminal and summary: standing, scenario, requirement, the value
+/// and the required one, and the criterion.
 pub(crate) fn gate_line(gate: &GateResult) -> String {
     let scenario = &gate.scenario;
     let mark = match &gate.source {
@@ -119,12 +121,13 @@ pub(crate) fn gate_line(gate: &GateResult) -> String {
     format!("{}: {scenario}: {mark}{} [{}{source}]", gate.standing().word(), gate_words(gate), gate.expression)
 }
 
-/// Returns what a gate found and what it requires, in plain words.
+/// Returns the value of a gate and its required value, in plain words.
 pub(crate) fn gate_words(gate: &GateResult) -> String {
     let expression = &gate.expression;
     let Evaluation { value, interval_95, samples, .. } = gate.evaluation;
     let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
-    let of = expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
+    let condition =
+        expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
     let unit = match (&expression.quantity, is_share) {
         (Quantity::Tested(measure) | Quantity::Baseline(measure), false) if !expression.aggregate.is_of_flag() => {
             unit_of(measure.name)
@@ -149,10 +152,13 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
     let interval = interval_95
         .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
     let open = gate.evaluation.undecided().map_or_else(String::new, |why| format!("; {why}"));
-    format!("{subject}{of}: {is} ({samples} samples{interval}{open}); required: {sides} {}", shown(expression.bound))
+    format!(
+        "{subject}{condition}: {is} ({samples} samples{interval}{open}); required: {sides} {}",
+        shown(expression.bound)
+    )
 }
 
-/// Returns what is judged in words, and whether it is a share.
+/// Returns the judged quantity in words, and whether it is a share.
 fn subject(aggregate: Aggregate, quantity: &Quantity) -> (String, bool) {
     let words = flag_words(quantity);
     match aggregate {
@@ -191,8 +197,8 @@ fn number(value: f64) -> String {
     if short.is_empty() || short == "-0" { "0".to_owned() } else { short.to_owned() }
 }
 
-/// Returns the reasons of a verdict in the order in which they are read: what is not met or open, what else there is to say, what is
-/// met. Gates are in plain words.
+/// Returns the reasons of a verdict in the order in which they are read: reasons that are not met
+/// or open, further remarks, and met ones. Gates are in plain words.
 pub(crate) fn reasons(judged: &Judgement) -> Vec<String> {
     let texts: Vec<String> = judged.gates.iter().map(ToString::to_string).collect();
     let others = judged.reasons.iter().filter(|reason| !texts.contains(reason)).cloned();
@@ -244,9 +250,9 @@ mod tests {
             gate("b", "upper(induced) <= 0.03", Some("MIS-2"), 0.02, Answer::Met),
             gate("c", "lower(prevented | baseline.ego_collided) >= 0.5", Some("MIS-1"), 0.05, Answer::Missed),
         ];
-        let found = judged(Decision::Fail, gates);
-        assert_eq!(sentence(&found, 14), "FAIL: 2 of 14 scenarios miss a requirement: c (MIS-1), a (MIS-1)");
-        let lines = reasons(&found);
+        let judgement = judged(Decision::Fail, gates);
+        assert_eq!(sentence(&judgement, 14), "FAIL: 2 of 14 scenarios miss a requirement: c (MIS-1), a (MIS-1)");
+        let lines = reasons(&judgement);
         assert!(lines[0].starts_with("NOT MET: c: MIS-1: share of the samples in which a collision is prevented, where the ego collides in the baseline: at least 5"), "{lines:?}");
         assert!(
             lines[0].contains("required: at least 50")
@@ -263,9 +269,9 @@ mod tests {
     #[test]
     fn what_is_open_or_met_is_said_so() {
         let open = Answer::Open(OpenReason::TooFewSamples);
-        let found = judged(Decision::Inconclusive, vec![gate("a", "p1(min_ttc_rear_s) >= 1", None, 0.9, open)]);
-        assert_eq!(sentence(&found, 1), "INCONCLUSIVE: the scenario does not decide a gate: a");
-        let words = gate_words(&found.gates[0]);
+        let judgement = judged(Decision::Inconclusive, vec![gate("a", "p1(min_ttc_rear_s) >= 1", None, 0.9, open)]);
+        assert_eq!(sentence(&judgement, 1), "INCONCLUSIVE: the scenario does not decide a gate: a");
+        let words = gate_words(&judgement.gates[0]);
         assert_eq!(
             words,
             "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20 % to 40 %; too few \

@@ -9,7 +9,7 @@ struct Element {
     name: &'static str,
     /// The elements that it may hold.
     children: &'static [&'static str],
-    /// The attributes that it must have, and the further ones that it may have.
+    /// The required attributes, and the optional ones.
     attributes: [&'static [&'static str]; 2],
 }
 
@@ -37,7 +37,7 @@ const SCHEMA: [Element; 9] = [
     Element { name: "skipped", children: &[], attributes: [&[], &["type", "message"]] },
 ];
 
-/// Returns what the schema refuses in a file.
+/// Returns the parts of a file that the schema refuses.
 pub(super) fn against_schema(xml: &str) -> Vec<String> {
     let mut reader = Reader::from_str(xml);
     let (mut open, mut refused) = (vec![String::new()], Vec::new());
@@ -55,7 +55,7 @@ pub(super) fn against_schema(xml: &str) -> Vec<String> {
     }
 }
 
-/// Returns what is wrong with an element within those that are open.
+/// Returns the fault of an element within the open elements.
 fn wrong(open: &[String], start: &BytesStart<'_>) -> Vec<String> {
     let name = String::from_utf8(start.name().as_ref().to_vec()).unwrap();
     let element = |name: &str| SCHEMA.iter().find(|element| element.name == name);

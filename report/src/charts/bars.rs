@@ -19,7 +19,8 @@ const SCALE_PX: f64 = 220.0;
 /// Opacity of an interval.
 const INTERVAL_OPACITY: f64 = 0.4;
 
-/// Draws the rate of an arm as a dot on its 95 % interval. The scale ends at the probability `most`.
+/// Draws the rate of an arm as a dot on its 95 % interval. The scale ends at the probability
+/// `most`.
 pub(crate) fn rate(rate: Option<f64>, [low, high]: [f64; 2], most: f64, is_tested: bool) -> io::Result<Markup> {
     let x_px = |probability: f64| SIDE_PX + if most > 0.0 { SCALE_PX * probability / most } else { 0.0 };
     let colour = arm_colour(is_tested);
@@ -34,8 +35,8 @@ pub(crate) fn rate(rate: Option<f64>, [low, high]: [f64; 2], most: f64, is_teste
     })
 }
 
-/// Draws the prevented collisions to the left of the middle, and the induced ones to the right. The longest bar of the
-/// table stands for `most` collisions.
+/// Draws the prevented collisions to the left of the middle, and the induced ones to the right. The
+/// longest bar of the table stands for `most` collisions.
 pub(crate) fn balance(prevented: u64, induced: u64, most: u64) -> io::Result<Markup> {
     let middle_px = SIDE_PX + 0.5 * SCALE_PX;
     let width_px = |count: u64| 0.5 * SCALE_PX * count as f64 / most as f64;

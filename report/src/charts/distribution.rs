@@ -97,7 +97,8 @@ pub(super) fn parameter_axis<'a>(axis: &'a Axis, name: &'a str, labels: usize) -
     ChartAxis { name, range: low..high, labels, text, has_grid: false }
 }
 
-/// Returns the label that stands at a position of the axis; empty if the position is between two labels.
+/// Returns the label that stands at a position of the axis; empty if the position is between two
+/// labels.
 fn label_near(labels: &[String], position: f64) -> String {
     let nearest = position.round();
     let is_near = (position - nearest).abs() < 0.25 && nearest >= 0.0;

@@ -18,9 +18,8 @@ const SMALL_POINT_PX: i32 = 2;
 /// Width over which the points at one label are spread, in steps between labels.
 const SPREAD: f64 = 0.6;
 
-/// Draws the map of two parameters. The shade of a cell is the share of its samples with a collision in the arm under
-/// test. Points
-/// are samples.
+/// Draws the map of two parameters. The shade of a cell is the share of its samples with a
+/// collision in the arm under test. Points are samples.
 pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::Result<Markup> {
     let [across, up] = pair.axes.map(|index| &scenario.axes[index]);
     inline(LARGE_PX, |canvas| {
@@ -39,7 +38,8 @@ pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::R
     })
 }
 
-/// Returns the colour of a cell with this share of samples with a collision, as a style sheet writes it.
+/// Returns the colour of a cell with this share of samples with a collision, as a style sheet
+/// writes it.
 pub(crate) fn cell_css(share: f64) -> String {
     let RGBColor(red, green, blue) = COLLISIONS;
     format!("rgba({red}, {green}, {blue}, {:.2})", LARGEST_OPACITY * share)
@@ -62,13 +62,15 @@ fn draw_cells(plot: &mut Plot<'_, '_>, pair: &PairBins, across: &Axis, up: &Axis
     Ok(())
 }
 
-/// Returns the position of a sample along an axis; `salt` makes the spread of the two axes independent.
+/// Returns the position of a sample along an axis; `salt` makes the spread of the two axes
+/// independent.
 fn position(axis: &Axis, point: &Point, salt: u64) -> Option<f64> {
     let value = point.parameters.iter().find(|(name, _)| name.as_str() == axis.name())?.1;
     Some(axis.position(value)? + spread(axis, point.sample ^ salt))
 }
 
-/// Returns the distance of a point from its label: points at one label are spread by a hash of the sample's number.
+/// Returns the distance of a point from its label: points at one label are spread by a hash of the
+/// sample's number.
 fn spread(axis: &Axis, number: u64) -> f64 {
     match axis {
         Axis::Numbers { .. } => 0.0,

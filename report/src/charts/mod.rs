@@ -1,4 +1,4 @@
-//! Charts, drawn with plotters: those of a campaign's page, and the style of all.
+//! Charts, drawn with plotters: the charts of a campaign's page, and the style of all charts.
 //!
 //! * `bars`: bars in the cells of a table
 //! * `distribution`: distributions of margins and of sampled values

@@ -31,7 +31,7 @@ const LABEL_PX: (i32, i32) = (7, -14);
 /// Free space at the ends of an axis, as a share of its range.
 const MARGIN: f64 = 0.06;
 
-/// Returns the SVG of the points. `names` are those of the axes.
+/// Returns the SVG of the points. `names` are the names of the axes.
 pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) -> io::Result<String> {
     let [across, up] = [0, 1].map(|axis| range(points, axis));
     let axis = |name, range: &Range<f64>| ChartAxis {

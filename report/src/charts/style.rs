@@ -1,6 +1,7 @@
-//! What all charts share: their sizes, fonts and colours, their axes, and how a chart becomes SVG.
+//! The common parts of all charts: sizes, fonts, colours, axes, and the conversion of a chart to
+//! SVG.
 //!
-//! SVG carries its own text, so that no font has to be installed. Equal values give equal bytes.
+//! SVG carries its own text, so no font has to be installed. Equal values give equal bytes.
 
 use std::io;
 use std::ops::Range;
@@ -30,7 +31,7 @@ pub(crate) const FILE_PX: (u32, u32) = (860, 520);
 
 /// Margin around a chart (px).
 const MARGIN_PX: u32 = 8;
-/// Margin on the right, where half of the last label of the horizontal axis stands (px).
+/// Margin on the right, for half of the last label of the horizontal axis (px).
 const RIGHT_MARGIN_PX: u32 = 20;
 /// Font of all text, as in the figures of encounters.
 const FONT: &str = "DejaVu Sans, sans-serif";
@@ -57,8 +58,8 @@ const ORANGE: RGBColor = RGBColor(0xe6, 0x7e, 0x22);
 const RED: RGBColor = RGBColor(0xb0, 0x00, 0x20);
 const NEARLY_BLACK: RGBColor = RGBColor(0x11, 0x11, 0x11);
 
-/// Returns the colour of a fate. The colours differ in lightness too, and none differs from another by red against
-/// green alone.
+/// Returns the colour of a fate. The colours also differ in lightness, and no two colours differ by
+/// red against green alone.
 pub(crate) const fn fate_colour(fate: Fate) -> RGBColor {
     match fate {
         Fate::Passed => GREY,
@@ -74,8 +75,8 @@ pub(crate) const fn arm_colour(is_tested: bool) -> RGBColor {
     if is_tested { BLUE } else { ORANGE }
 }
 
-/// Returns the colour of a series, from a set that colour-blind readers can tell apart: M. Okabe and K. Ito, Color
-/// Universal Design (2008).
+/// Returns the colour of a series, from a set that colour-blind readers can tell apart: M. Okabe
+/// and K. Ito, Color Universal Design (2008).
 pub(crate) const fn series_colour(index: usize) -> RGBColor {
     match index % 7 {
         0 => RGBColor(0, 114, 178),
@@ -106,7 +107,7 @@ pub(super) fn label_text<'a>(is_head: bool) -> TextStyle<'a> {
 
 /// One axis of a chart.
 pub(crate) struct ChartAxis<'a> {
-    /// What the axis shows, with its unit; empty if nothing is written beside the axis.
+    /// The quantity on the axis, with its unit; empty if nothing is written beside the axis.
     pub(crate) name: &'a str,
     /// The values at its ends.
     pub(crate) range: Range<f64>,
@@ -126,7 +127,8 @@ impl ChartAxis<'_> {
     }
 }
 
-/// Returns a text for values between `low` and `high`, with as many digits as a hundredth of the range needs.
+/// Returns a text for values between `low` and `high`, with as many digits as a hundredth of the
+/// range needs.
 pub(crate) fn number_text(low: f64, high: f64) -> impl Fn(&f64) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few digits")]
     let digits = (2.0 - maths::log10(high - low).floor()).clamp(0.0, 6.0) as usize;
@@ -188,7 +190,8 @@ pub(crate) fn svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn)
     drawn.map(|()| text)
 }
 
-/// Returns a chart that stands inside a page: it shrinks with the page, and is at most this large (px).
+/// Returns a chart that stands inside a page: it shrinks with the page, and is at most this large
+/// (px).
 pub(super) fn inline(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> io::Result<Markup> {
     sized(size_px, &format!("style=\"max-width:{}px\"", size_px.0), paint)
 }
@@ -200,8 +203,8 @@ pub(super) fn sized(
     paint: impl FnOnce(&Canvas<'_>) -> Drawn,
 ) -> io::Result<Markup> {
     let text = svg(size_px, paint).map_err(|error| io::Error::other(error.to_string()))?;
-    let own = format!("width=\"{}\" height=\"{}\"", size_px.0, size_px.1);
-    Ok(PreEscaped(text.replacen(&own, attributes, 1)))
+    let written_size = format!("width=\"{}\" height=\"{}\"", size_px.0, size_px.1);
+    Ok(PreEscaped(text.replacen(&written_size, attributes, 1)))
 }
 
 #[cfg(test)]

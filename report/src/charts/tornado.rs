@@ -21,7 +21,7 @@ pub(crate) struct TornadoBar {
     pub(crate) intervals_95: [[f64; 2]; 2],
     /// The text behind the bar.
     pub(crate) note: String,
-    /// True for a bar that is no assumption, or may have no length.
+    /// True for a bar without an assumption, or one that may have no length.
     pub(crate) is_grey: bool,
 }
 

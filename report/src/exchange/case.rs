@@ -21,9 +21,10 @@ pub enum Form {
     OpenLoop,
     /// Starts and manoeuvres of one sample; a controller drives the ego.
     ClosedLoop,
-    /// The same with parameters, beside their values and distributions.
+    /// The same file with parameters, beside their values and distributions.
     Logical,
-    /// The other vehicles as they drove, and a planning problem for the ego, as CommonRoad XML 2020a.
+    /// The other vehicles as they drove, and a planning problem for the ego, as CommonRoad XML
+    /// 2020a.
     CommonRoad,
 }
 
@@ -79,7 +80,7 @@ pub struct Case<'a> {
 pub struct CaseFiles {
     /// Each file with its text.
     pub files: Vec<(PathBuf, String)>,
-    /// What each form cannot say.
+    /// The properties that each form cannot express.
     pub unsaid: Vec<(Form, Vec<String>)>,
 }
 
@@ -87,7 +88,8 @@ impl Case<'_> {
     /// Returns the files of these forms.
     pub fn files(&self, forms: &[Form]) -> CaseFiles {
         let (config, scenario) = (self.file.config(), self.scenario);
-        // A player drives the closed loop itself: each vehicle gets as far as it would at the speed of its start.
+        // A player drives the closed loop itself: each vehicle gets as far as it would at its
+        // initial speed.
         let starts = scenario
             .actors
             .iter()
@@ -137,7 +139,8 @@ impl Case<'_> {
     }
 }
 
-/// Writes the files of a case into a folder, which is created if it does not exist. Each appears whole, or not at all.
+/// Writes the files of a case into a folder, which is created if it does not exist. Each appears
+/// whole, or not at all.
 ///
 /// # Errors
 /// [`WriteError`] if a folder or a file cannot be written.

@@ -1,8 +1,9 @@
-//! The closed-loop and the logical form: starts, and what the human drivers do as actions with triggers. The ego is left to
-//! a controller that the file names.
+//! The closed-loop and the logical form: starts, and the human drivers' behaviour as actions with
+//! triggers. The file names a controller, which drives the ego.
 //!
-//! A manoeuvre of a human driver depends on its model, which OpenSCENARIO cannot say. Each is replaced by an action that
-//! begins where the model would begin it if all vehicles kept their speeds:
+//! A manoeuvre of a human driver depends on its model, which OpenSCENARIO cannot say. Each is
+//! replaced by an action that begins where the model would begin it if all vehicles kept their
+//! speeds:
 //!
 //! | driver | action | begins |
 //! |---|---|---|
@@ -34,7 +35,8 @@ const FOLLOWING_BRAKING_MPS2: f64 = 2.0;
 const AFTER_ENCOUNTER_S: f64 = 6.0;
 /// Duration of a lane change of an overtaker if the file gives none (s), as in a scenario file.
 const LANE_CHANGE_S: f64 = 6.3;
-/// Speed of a follower that its constraints do not limit (m/s): the highest speed of a scenario file.
+/// Speed of a follower that its constraints do not limit (m/s): the highest speed of a scenario
+/// file.
 const MAX_SPEED_MPS: f64 = 100.0;
 
 /// Who drives a vehicle.
@@ -107,7 +109,8 @@ impl Writer<'_> {
         self.scenario.actors.iter().position(|actor| actor.id == *id)
     }
 
-    /// Returns the entry of a vehicle in the catalogue: the class itself where it is a parameter.
+    /// Returns the entry of a vehicle in the catalogue: the class itself if the class is a
+    /// parameter.
     fn entry(&self, index: usize) -> String {
         match self.config_of(index).map(|config| &config.vehicle.class) {
             Some(Choice::Parameter(name)) if self.values.are_named => format!("${}", parameter_name(name)),
@@ -143,10 +146,11 @@ impl Writer<'_> {
     }
 
     fn relative_position(&self, index: usize, start: &RelativeStartConfig, sign: f64) -> Element {
-        let Some(of) = self.index_of(&start.of) else { return Element::new("LanePosition") };
-        let lanes = [index, of].map(|actor| self.scenario.road.lane_at(self.scenario.actors[actor].start.d_m));
-        let (front, back) = if sign > 0.0 { (index, of) } else { (of, index) };
-        // From rear axle to rear axle: the gap, the vehicle behind ahead of its axle, the vehicle ahead behind its axle.
+        let Some(reference) = self.index_of(&start.of) else { return Element::new("LanePosition") };
+        let lanes = [index, reference].map(|actor| self.scenario.road.lane_at(self.scenario.actors[actor].start.d_m));
+        let (front, back) = if sign > 0.0 { (index, reference) } else { (reference, index) };
+        // From rear axle to rear axle: the gap, the distance from the rear vehicle's axle to its
+        // front, and the distance from the lead vehicle's rear to its axle.
         let behind_m =
             0.5 * self.vehicle(front).dimensions.length_m - axle_to_centre_m(&self.vehicle(front).dimensions);
         let ahead_m = 0.5 * self.vehicle(back).dimensions.length_m + axle_to_centre_m(&self.vehicle(back).dimensions);
@@ -186,7 +190,9 @@ impl Writer<'_> {
         };
         match (&relative.speed_mps, &relative.closing_mps, self.index_of(&relative.of)) {
             (Some(speed), _, _) => self.values.expression(speed),
-            (None, Some(closing), Some(of)) => self.speed(of) + self.values.expression(closing) * sign.into(),
+            (None, Some(closing), Some(reference)) => {
+                self.speed(reference) + self.values.expression(closing) * sign.into()
+            }
             _ => of_sample,
         }
     }
@@ -194,10 +200,10 @@ impl Writer<'_> {
     /// Returns the vehicle ahead in the same lane at the start.
     fn vehicle_ahead(&self, index: usize) -> Option<usize> {
         let actors = &self.scenario.actors;
-        let (own, road) = (&actors[index].start, &self.scenario.road);
-        let lane = road.lane_at(own.d_m);
+        let (start, road) = (&actors[index].start, &self.scenario.road);
+        let lane = road.lane_at(start.d_m);
         (0..actors.len())
-            .filter(|other| road.lane_at(actors[*other].start.d_m) == lane && actors[*other].start.s_m > own.s_m)
+            .filter(|other| road.lane_at(actors[*other].start.d_m) == lane && actors[*other].start.s_m > start.s_m)
             .min_by(|a, b| actors[*a].start.s_m.total_cmp(&actors[*b].start.s_m))
     }
 
@@ -257,7 +263,7 @@ impl Writer<'_> {
 
     fn following(&self, index: usize, gap_m: impl Fn(Expression) -> Expression) -> Option<Element> {
         let ahead = self.vehicle_ahead(index)?;
-        let [name, of] = [index, ahead].map(|actor| self.scenario.actors[actor].id.as_str());
+        let [name, lead] = [index, ahead].map(|actor| self.scenario.actors[actor].id.as_str());
         let kept_m = gap_m(self.speed(ahead));
         let approaches = self.closing_mps(index, ahead) > 0.0;
         let closing = self.speed(index) - self.speed(ahead);
@@ -271,7 +277,7 @@ impl Writer<'_> {
             .with("maxDeceleration", performance.max_deceleration_mps2)
             .with("maxSpeed", MAX_SPEED_MPS);
         let action = Element::new("LongitudinalDistanceAction")
-            .with("entityRef", of)
+            .with("entityRef", lead)
             .with("distance", kept_m)
             .with("continuous", "true")
             .with("freespace", "true")
@@ -279,7 +285,7 @@ impl Writer<'_> {
             .with("displacement", "trailingReferencedEntity")
             .child(limits)
             .within("LongitudinalAction");
-        let when = gap_below(&format!("{name}-is-near-{of}"), (name, of), begins_m);
+        let when = gap_below(&format!("{name}-is-near-{lead}"), (name, lead), begins_m);
         Some(event(&format!("{name}-follows"), "override", action, when))
     }
 
@@ -287,10 +293,11 @@ impl Writer<'_> {
         let ahead = self.vehicle_ahead(index)?;
         let side = self.scenario.road.overtaking_side();
         let lane = self.scenario.road.beside(self.start_lane(index), side)?;
-        let [name, of] = [index, ahead].map(|actor| self.scenario.actors[actor].id.as_str());
+        let [name, lead] = [index, ahead].map(|actor| self.scenario.actors[actor].id.as_str());
         let duration = self.values.or(config.lane_change_duration_s.as_ref(), LANE_CHANGE_S);
         let speed = self.speed(index);
-        // The driver crosses the marking at the requested headway, or at that of its safe gap if it is larger.
+        // The driver crosses the marking at the requested headway, or at the headway of its safe
+        // gap if that is larger.
         let requested = self.values.expression(&config.cut_out_thw_s);
         let (safe, safe_s) = self.safe_thw(index, &config.follow);
         let crossing = if self.values.of_sample(&config.cut_out_thw_s) >= safe_s { requested } else { safe };
@@ -298,11 +305,12 @@ impl Writer<'_> {
             true => crossing + (speed.clone() - self.speed(ahead)) * duration.clone() * 0.5.into() / speed,
             false => crossing,
         };
-        let when = headway_below(&format!("{name}-comes-close-to-{of}"), (name, of), begins_s);
+        let when = headway_below(&format!("{name}-comes-close-to-{lead}"), (name, lead), begins_s);
         Some(event(&cut_out_name(name), "override", change_lanes(lane, duration), when))
     }
 
-    /// Returns the time headway of the safe gap of a car-following model (s), and its value in the sample.
+    /// Returns the time headway of the safe gap of a car-following model (s), and its value in the
+    /// sample.
     fn safe_thw(&self, index: usize, follow: &FollowConfig) -> (Expression, f64) {
         let (standstill, headway, defaults) = match follow {
             FollowConfig::Wiedemann99(model) => (model.cc0_m.as_ref(), model.cc1_s.as_ref(), [1.5, 0.9]),
@@ -376,7 +384,8 @@ impl Writer<'_> {
         Some(profile.within("LongitudinalAction"))
     }
 
-    /// Returns an event of the scenario file, or `None` if its trigger refers to a manoeuvre that is not in the file.
+    /// Returns an event of the scenario file, or `None` if its trigger refers to a manoeuvre that
+    /// is not in the file.
     fn event(&self, index: usize, config: &EventConfig, number: usize) -> Option<Element> {
         let name = config.id.as_str();
         let action = match &config.then {
@@ -424,7 +433,8 @@ impl Writer<'_> {
         }
     }
 
-    /// Returns the time of an event relative to the nominal encounter (s); `of_sample` is its time in the sample.
+    /// Returns the time of an event relative to the nominal encounter (s); `of_sample` is its time
+    /// in the sample.
     fn nominal_time(&self, config: &NominalEncounterConfig, of_sample: Time) -> Expression {
         if !self.values.are_named {
             return of_sample.s().into();
@@ -456,7 +466,8 @@ fn cut_out_name(actor: &str) -> String {
     format!("{actor}-changes-lanes")
 }
 
-/// Returns the entries of the catalogue for actors whose class is a parameter: one for each class, with its name.
+/// Returns the entries of the catalogue for actors whose class is a parameter: one for each class,
+/// with its name.
 pub(super) fn classes(config: &ScenarioConfig) -> Vec<(String, Vehicle)> {
     let is_drawn = config.actors.iter().any(|actor| matches!(actor.vehicle.class, Choice::Parameter(_)));
     let typical = |class: VehicleClass| (class.name().to_owned(), Vehicle::typical(class));
@@ -481,7 +492,8 @@ fn speed_action([shape, dimension]: [&str; 2], value: Expression, speed_mps: Exp
     Element::new("SpeedAction").child(how).child(target).within("LongitudinalAction")
 }
 
-/// Returns the action of a lane change. The shape is the nearest to a quintic path that the standard has.
+/// Returns the action of a lane change. Its shape is the shape of the standard that is nearest to a
+/// quintic path.
 fn change_lanes(lane: Lane, duration_s: Expression) -> Element {
     let how = Element::new("LaneChangeActionDynamics")
         .with("dynamicsShape", "sinusoidal")
@@ -491,7 +503,7 @@ fn change_lanes(lane: Lane, duration_s: Expression) -> Element {
     Element::new("LaneChangeAction").child(how).child(target).within("LateralAction")
 }
 
-/// Returns what the closed-loop forms cannot say of this scenario.
+/// Returns the properties of this scenario that the closed-loop forms cannot express.
 pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bool) -> Vec<String> {
     let mut list = vec![
         "the ego's sensors, tracks and their errors, and the stack that reads them: a controller drives the ego"
@@ -551,7 +563,7 @@ pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bo
     list
 }
 
-/// Returns what no form can say of the road and of the vehicles.
+/// Returns the properties of the road and of the vehicles that no form can express.
 pub(super) fn unsaid_of_world(config: &ScenarioConfig, scenario: &Scenario) -> Vec<String> {
     let mut list = vec!["paint, registration plates, brake lights and indicators".to_owned()];
     if scenario.road.has_guard_rails() {

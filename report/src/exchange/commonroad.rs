@@ -1,6 +1,8 @@
-//! A sample as CommonRoad XML 2020a: the lanes, the other vehicles as they drove, and a planning problem for the ego.
+//! A sample as CommonRoad XML 2020a: the lanes, the other vehicles as they drove, and a planning
+//! problem for the ego.
 //!
-//! (M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: Composable benchmarks for motion planning on roads", IV 2017.)
+//! (M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: Composable benchmarks for motion planning on
+//! roads", IV 2017.)
 
 use closecall_scenarios::Scenario;
 use closecall_simulation::CONTROL_STEP;
@@ -11,7 +13,8 @@ use super::motion::Motion;
 use super::road::UsedRoad;
 use crate::date::today;
 
-/// Distance between the points of a bound (m). In the tightest curve, with a radius of 400 m, it deviates by 3 cm.
+/// Distance between the points of a bound (m). In the tightest curve, with a radius of 400 m, it
+/// deviates by 3 cm.
 const POINT_SPACING_M: f64 = 10.0;
 /// Number of the first dynamic obstacle. Lanelets have lower numbers, and each number is used once.
 const FIRST_OBSTACLE: usize = 1_000;
@@ -104,14 +107,14 @@ fn obstacle(scenario: &Scenario, motion: &Motion, index: usize) -> Option<Elemen
         VehicleClass::Motorcycle => "motorcycle",
     };
     let mut states = motion.steps.iter().enumerate().filter_map(|(step, (_, states))| Some((step, states.get(index)?)));
-    let with_acceleration = |name, (step, one): (usize, &VehicleState)| {
-        state(scenario, name, (step, one)).child(exact("acceleration", one.acceleration_mps2))
+    let with_acceleration = |name, (step, vehicle): (usize, &VehicleState)| {
+        state(scenario, name, (step, vehicle)).child(exact("acceleration", vehicle.acceleration_mps2))
     };
     let initial = with_acceleration("initialState", states.next()?);
     let rectangle = Element::new("rectangle")
         .child(text("length", vehicle.dimensions.length_m))
         .child(text("width", vehicle.dimensions.width_m));
-    let later: Vec<_> = states.map(|one| with_acceleration("state", one)).collect();
+    let later: Vec<_> = states.map(|numbered_state| with_acceleration("state", numbered_state)).collect();
     let trajectory = (!later.is_empty()).then(|| Element::new("trajectory").children(later));
     Some(
         Element::new("dynamicObstacle")
@@ -123,7 +126,8 @@ fn obstacle(scenario: &Scenario, motion: &Motion, index: usize) -> Option<Elemen
     )
 }
 
-/// Returns the problem: the ego's start, and the time at which the run ends. What the ego did is no part of it.
+/// Returns the problem: the ego's start, and the time at which the run ends. The ego's motion is no
+/// part of it.
 fn planning_problem(scenario: &Scenario, motion: &Motion) -> Option<Element> {
     let (_, states) = motion.steps.first()?;
     let start = states.get(scenario.ego)?;

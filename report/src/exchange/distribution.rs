@@ -68,21 +68,23 @@ fn distribution(name: &ParameterName, config: &ParameterConfig) -> Option<Elemen
     Some(Element::new("StochasticDistribution").with("parameterName", parameter_name(name)).child(inner))
 }
 
-/// Returns a log-normal distribution. Its expected value and variance are those of the value itself before truncation, not
-/// those of its logarithm: m·exp(σ²/2) and (exp(σ²) − 1)·exp(σ²)·m² for a median m.
+/// Returns a log-normal distribution. Its expected value and variance belong to the value itself
+/// before truncation, and not to the logarithm: m·exp(σ²/2) and (exp(σ²) − 1)·exp(σ²)·m² for a
+/// median m.
 fn log_normal_element(config: &LogNormalConfig) -> Option<Element> {
     let growth = maths::exp(config.sigma * config.sigma);
     let expected = config.median * growth.sqrt();
     let element = Element::new("LogNormalDistribution")
         .with("expectedValue", expected)
         .with("variance", (growth - 1.0) * expected * expected);
-    // A range has both limits. Where one is open, its probability of 10⁻¹⁶ bounds the distribution.
+    // A range has both limits. If one limit is open, its probability of 10⁻¹⁶ bounds the
+    // distribution.
     let [low, high] = Distribution::log_normal(config).ok()?.bounds()?;
     let is_cut = config.min.is_some() || config.max.is_some();
     Some(element.children(is_cut.then(|| range(config.min.unwrap_or(low.min(0.0)), high))))
 }
 
-/// Returns a histogram whose bins have the same probability: those between the quantiles.
+/// Returns a histogram whose bins, between the quantiles, have the same probability.
 fn histogram(config: &EmpiricalConfig) -> Element {
     let bins =
         config.quantiles.windows(2).map(|pair| Element::new("Bin").with("weight", 1).child(range(pair[0], pair[1])));

@@ -1,4 +1,4 @@
-//! Elements of an XML document, which are built first and written then.
+//! Elements of an XML document, which are built before they are written.
 
 use std::fmt::Display;
 use std::io::{self, Write};

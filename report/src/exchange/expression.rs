@@ -1,7 +1,7 @@
 //! Values of attributes: numbers, parameters, and expressions of both.
 //!
-//! OpenSCENARIO names a parameter `$name` and writes an expression `${$name * 2}`. Names have underscores where those of
-//! Closecall have hyphens.
+//! OpenSCENARIO names a parameter `$name` and writes an expression `${$name * 2}`. Names have
+//! underscores in place of Closecall's hyphens.
 
 use std::fmt;
 use std::ops::{Add, Div, Mul, Sub};
@@ -92,7 +92,7 @@ pub(super) struct Values<'a> {
 }
 
 impl Values<'_> {
-    /// Returns what is written for a number of the scenario file.
+    /// Returns the text for a number of the scenario file.
     pub(super) fn expression(&self, num: &Num) -> Expression {
         match num {
             Num::Fixed(value) => Expression::Number(*value),
@@ -101,7 +101,7 @@ impl Values<'_> {
         }
     }
 
-    /// Returns what is written for a number, or for the default of an absent key.
+    /// Returns the text for a number, or for the default of an absent key.
     pub(super) fn or(&self, num: Option<&Num>, default: f64) -> Expression {
         num.map_or(Expression::Number(default), |num| self.expression(num))
     }

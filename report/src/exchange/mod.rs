@@ -10,8 +10,8 @@
 //!
 //! `osi` writes the run itself as ASAM Open Simulation Interface 3.8.
 //!
-//! The files follow ASAM OpenSCENARIO XML 1.3 and ASAM OpenDRIVE 1.8. The reference point of a vehicle is the middle of its
-//! rear axle in OpenSCENARIO, and the centre of its box in Closecall.
+//! The files follow ASAM OpenSCENARIO XML 1.3 and ASAM OpenDRIVE 1.8. The reference point of a
+//! vehicle is the middle of its rear axle in OpenSCENARIO, and the centre of its box in Closecall.
 
 mod case;
 mod closed_loop;

@@ -13,7 +13,7 @@ use super::trigger::{at, event};
 use super::vehicles::axle_to_centre_m;
 use closecall_scenarios::ScenarioConfig;
 
-/// Returns the document. `motion` is that of a run of `scenario`, with the same order of vehicles.
+/// Returns the document. `motion` comes from a run of `scenario`, with the same order of vehicles.
 pub(super) fn document(
     (config, scenario): (&ScenarioConfig, &Scenario),
     motion: &Motion,

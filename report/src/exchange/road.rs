@@ -10,7 +10,8 @@ use closecall_traffic::Road;
 use super::element::Element;
 use crate::date::today;
 
-/// Length of the road before the first and behind the last position that is used (m): a player looks ahead.
+/// Length of the road before the first and behind the last position that is used (m): a player
+/// looks ahead.
 const MARGIN_M: f64 = 500.0;
 /// Width of a marking of a motorway lane (m): the narrow line of RMS-1 (FGSV 1993).
 const MARKING_WIDTH_M: f64 = 0.15;

@@ -1,4 +1,4 @@
-//! What all forms of a scenario share: header, entities, and the frame of the storyboard.
+//! The common parts of all forms of a scenario: header, entities, and the frame of the storyboard.
 
 use super::closed_loop::Role;
 use super::element::Element;
@@ -11,9 +11,10 @@ pub(super) const CATALOG_FOLDER: &str = "catalogs/vehicles";
 /// Name of the road's file in a case.
 pub(super) const ROAD_FILE: &str = "road.xodr";
 
-/// Returns a header that lists what the file cannot say. `source` is the scenario file that it was made from, as text.
+/// Returns a header that lists what the file cannot express. `source` is the text of the scenario
+/// file.
 pub(super) fn header(description: &str, unsaid: &[String], source: Option<&str>) -> Element {
-    let numbered = |(index, what): (usize, &String)| property(&format!("not-said-{}", index + 1), what);
+    let numbered = |(index, statement): (usize, &String)| property(&format!("not-said-{}", index + 1), statement);
     let header = Element::new("FileHeader")
         .with("revMajor", 1)
         .with("revMinor", 3)

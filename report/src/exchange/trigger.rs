@@ -14,7 +14,8 @@ pub(super) fn at(name: &str, time_s: Expression) -> Element {
     condition(name, 0.0.into(), time.within("ByValueCondition"))
 }
 
-/// Returns the condition that the time headway of `from` to `to`, bumper to bumper, is below a value (s).
+/// Returns the condition that the time headway of `from` to `to`, bumper to bumper, is below a
+/// value (s).
 pub(super) fn headway_below(name: &str, (from, to): (&str, &str), thw_s: Expression) -> Element {
     let headway = Element::new("TimeHeadwayCondition")
         .with("entityRef", to)
@@ -59,7 +60,7 @@ pub(super) fn trigger(name: &'static str, condition: Element) -> Element {
     condition.within("ConditionGroup").within(name)
 }
 
-/// Returns an event that does something once. `priority` says what becomes of the events that are under way.
+/// Returns an event that happens once. `priority` determines the fate of running events.
 pub(super) fn event(name: &str, priority: &str, action: Element, condition: Element) -> Element {
     Element::new("Event")
         .with("name", name)

@@ -10,12 +10,14 @@ use super::scenario::header;
 pub(super) const CATALOG: &str = "VehicleCatalog";
 /// Speed that no vehicle exceeds (m/s): the highest speed of a scenario file.
 const MAX_SPEED_MPS: f64 = 100.0;
-/// Wheel diameter (m), by class: assumptions; 0.6 to 0.7, 0.9 to 1.1, and 0.6 to 0.7 are plausible. No run depends on it.
+/// Wheel diameter (m), by class: assumptions; 0.6 to 0.7, 0.9 to 1.1, and 0.6 to 0.7 are plausible.
+/// No run depends on it.
 const WHEEL_DIAMETER_M: [(VehicleClass, f64); 3] =
     [(VehicleClass::Car, 0.65), (VehicleClass::Truck, 1.0), (VehicleClass::Motorcycle, 0.63)];
 /// Largest steering angle (rad): an assumption; 0.5 to 0.7 are plausible. No run depends on it.
 const MAX_STEERING_RAD: f64 = 0.6;
-/// Track width as a share of the width of the vehicle: an assumption; 0.8 to 0.9 are plausible. No run depends on it.
+/// Track width as a share of the width of the vehicle: an assumption; 0.8 to 0.9 are plausible. No
+/// run depends on it.
 const TRACK_SHARE: f64 = 0.85;
 
 /// Returns the distance from the rear axle forwards to the centre of the box (m).

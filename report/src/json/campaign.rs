@@ -17,8 +17,8 @@ use crate::campaign::overview::{ErrorGroup, Overview, ScenarioOverview};
 use crate::campaign::words::reasons;
 use crate::campaign::{CampaignReport, ensemble_json};
 
-/// Returns the result of a campaign: its counts, its verdict, what moves its result, and how it was made. `wall_s` is its wall time
-/// (s), `None` for a merged campaign.
+/// Returns the result of a campaign: its counts, its verdict, the influence of parameters, and its
+/// origin. `wall_s` is its wall time (s), `None` for a merged campaign.
 pub fn campaign_report(report: &CampaignReport<'_>, wall_s: Option<f64>) -> Value {
     let (tally, manifest) = (report.tally, report.manifest);
     let mut value = campaign(&tally.summary, report.judged, wall_s);
@@ -48,7 +48,8 @@ fn flaky_samples(overview: &Overview) -> Value {
     json!(overview.scenarios.iter().flat_map(of_scenario).collect::<Vec<_>>())
 }
 
-/// Returns the counts of a campaign and its verdict. `wall_s` is its wall time (s), `None` for a merged campaign.
+/// Returns the counts of a campaign and its verdict. `wall_s` is its wall time (s), `None` for a
+/// merged campaign.
 pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();
     let mut object = counts(summary, &total);
@@ -74,8 +75,8 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
     Value::Object(object)
 }
 
-/// Replaces what would treat several scenarios as one sample. The rate is the mean over the scenarios, each with the same
-/// weight; an interval and a test stand with each scenario.
+/// Replaces values that would treat several scenarios as one sample. The rate is the mean over the
+/// scenarios, each with the same weight. An interval and a test belong to each scenario.
 fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
     const REASON: &str = "scenarios are not pooled into one sample: see each scenario";
     if let Some(Value::Object(controllers)) = object.get_mut("controllers") {

@@ -3,10 +3,10 @@
 use closecall_campaign::compare::ScenarioComparison;
 use serde_json::{Map, Value, json};
 
-/// Returns what changed from one campaign to a later one, by scenario. `differences` are those of the two manifests,
-/// `tolerance` is the share by which a quantile of a margin may fall, and `is_pass` says whether the later campaign is
-/// accepted.
-pub fn comparison(found: &[ScenarioComparison], differences: &[String], tolerance: f64, is_pass: bool) -> Value {
+/// Returns the changes from one campaign to a later one, by scenario. `differences` are the
+/// differences of the two manifests, `tolerance` is the share by which a quantile of a margin may
+/// fall, and `is_pass` says whether the later campaign is accepted.
+pub fn comparison(scenarios: &[ScenarioComparison], differences: &[String], tolerance: f64, is_pass: bool) -> Value {
     let scenario = |scenario: &ScenarioComparison| {
         let margins: Map<String, Value> = scenario
             .margins
@@ -40,6 +40,6 @@ pub fn comparison(found: &[ScenarioComparison], differences: &[String], toleranc
         "verdict": if is_pass { "PASS" } else { "FAIL" },
         "differences": differences,
         "tolerance": tolerance,
-        "scenarios": found.iter().map(scenario).collect::<Map<String, Value>>(),
+        "scenarios": scenarios.iter().map(scenario).collect::<Map<String, Value>>(),
     })
 }

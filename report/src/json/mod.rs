@@ -1,6 +1,7 @@
 //! Results as JSON with stable keys, as the command line prints them.
 //!
-//! An absent value is `null`, and the key `…_absent` beside it states the reason. The units are part of the keys.
+//! An absent value is `null`, and the key `…_absent` beside it states the reason. The units are
+//! part of the keys.
 
 mod campaign;
 mod comparison;

@@ -113,12 +113,12 @@ fn promise(promise: &Promise, outcome: &Outcome) -> Value {
 
 fn mis(mis: &Result<MisSummary, Absent>) -> Value {
     let mut object = Map::new();
-    let of = |value: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(value);
-    insert(&mut object, "engaged_at_s", of(|mis| mis.engaged_at_s));
-    insert(&mut object, "released_at_s", of(|mis| mis.released_at_s));
-    insert(&mut object, "thw_front_at_engagement_s", of(|mis| mis.thw_front_at_engagement_s));
-    insert(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
-    insert(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
+    let measured = |value: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(value);
+    insert(&mut object, "engaged_at_s", measured(|mis| mis.engaged_at_s));
+    insert(&mut object, "released_at_s", measured(|mis| mis.released_at_s));
+    insert(&mut object, "thw_front_at_engagement_s", measured(|mis| mis.thw_front_at_engagement_s));
+    insert(&mut object, "thw_front_at_critical_s", measured(|mis| mis.thw_front_at_critical_s));
+    insert(&mut object, "mean_deceleration_mps2", measured(|mis| mis.mean_deceleration_mps2));
     object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
     if let Some(unavailable) = mis.as_ref().ok().and_then(|mis| mis.unavailable.as_ref()) {
         let Unavailability { from_s, lasted_s, reason } = unavailable;

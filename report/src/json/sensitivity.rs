@@ -8,9 +8,9 @@ use closecall_traffic::statistics::sensitivity::morris::Effects;
 use closecall_traffic::statistics::sensitivity::saltelli::MainEffect;
 use serde_json::{Map, Value, json};
 
-/// Why an index is absent.
+/// The reason for which an index is absent.
 const NO_INDEX: &str = "the output does not vary, or changes in too few rows";
-/// Why an effect is absent.
+/// The reason for which an effect is absent.
 const NO_EFFECT: &str = "too few runs have an output";
 
 /// Returns the result of a sensitivity study.

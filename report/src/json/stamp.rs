@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 /// The version of the keys. It changes if a key changes its meaning, not if one is added.
 const SCHEMA_VERSION: u32 = 1;
 
-/// Adds how an output was made: to an object, or to each object of a list. Keys that are there already stay. `seed` and
-/// `settings` are `None` for an output that does not depend on them.
+/// Adds the origin of an output: to an object, or to each object of a list. Existing keys stay.
+/// `seed` and `settings` are `None` for an output that does not depend on them.
 pub fn stamped(mut value: Value, seed: Option<u64>, settings: Option<&[Setting]>) -> Value {
     let objects = match &mut value {
         Value::Array(list) => list.iter_mut().collect(),
-        one => vec![one],
+        value => vec![value],
     };
     let version = version();
     for object in objects.into_iter().filter_map(Value::as_object_mut) {

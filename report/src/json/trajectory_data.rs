@@ -1,4 +1,4 @@
-//! What was found in trajectory data as JSON.
+//! Results from trajectory data as JSON.
 
 use closecall_recorded::fit::{FittedDistributions, FittedQuantity, Quantity, RankCorrelation};
 use closecall_recorded::lane_change::{LaneChange, Score};
@@ -6,7 +6,7 @@ use closecall_recorded::robustness::Robustness;
 use closecall_recorded::trajectory_data::{QualityInspector, Tracks};
 use serde_json::{Value, json};
 
-/// Returns the flaws of a trajectory file. `inspector` has seen all of `tracks`.
+/// Returns the flaws of a trajectory file. `inspector` has read all of `tracks`.
 pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
     let quality = inspector.count_flaws();
     let span = inspector.span();
@@ -31,28 +31,30 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
     })
 }
 
-/// Returns lane changes; with a score, an object of both.
+/// Returns lane changes; with a score, an object with both.
 pub fn lane_changes(changes: &[LaneChange], score: Option<&Score>) -> Value {
     score.map_or_else(|| json!(changes), |score| json!({ "lane_changes": changes, "score": score }))
 }
 
-/// Returns the results of a robustness study, with the lowest level of noise at which each criterion fails.
-pub fn robustness(found: &Robustness) -> Value {
-    let fails = found.criteria.iter().enumerate();
+/// Returns the results of a robustness study, with the lowest level of noise at which each
+/// criterion fails.
+pub fn robustness(study: &Robustness) -> Value {
+    let fails = study.criteria.iter().enumerate();
     let fails =
-        fails.map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_m_per_sqrt_s(column).into()));
-    let by_draw = found.criteria.iter().enumerate();
+        fails.map(|(column, criterion)| (criterion.name().to_owned(), study.failing_noise_m_per_sqrt_s(column).into()));
+    let by_draw = study.criteria.iter().enumerate();
     let by_draw = by_draw
-        .map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_by_repetition(column).into()));
-    let mut value = json!(found);
+        .map(|(column, criterion)| (criterion.name().to_owned(), study.failing_noise_by_repetition(column).into()));
+    let mut value = json!(study);
     value["noise_draws"] = value["noise"].take();
-    value["noise"] = json!(found.mean_noise());
+    value["noise"] = json!(study.mean_noise());
     value["fails_from_noise_by_draw"] = Value::Object(by_draw.collect());
     value["fails_from_noise_m_per_sqrt_s"] = Value::Object(fails.collect());
     value
 }
 
-/// Returns the median and the quantiles of each fitted quantity, and the quantities with too few values to fit.
+/// Returns the median and the quantiles of each fitted quantity, and the quantities with too few
+/// values to fit.
 pub fn fitted(fitted: &FittedDistributions) -> Value {
     let quantity = |quantity: &FittedQuantity| {
         json!({
@@ -66,7 +68,7 @@ pub fn fitted(fitted: &FittedDistributions) -> Value {
             }),
         })
     };
-    let correlation = |one: &RankCorrelation| json!({ "of": one.of.name(), "with": one.with.name(), "n": one.n, "spearman": one.spearman });
+    let correlation = |correlation: &RankCorrelation| json!({ "of": correlation.of.name(), "with": correlation.with.name(), "n": correlation.n, "spearman": correlation.spearman });
     let too_few = |(quantity, n): &(Quantity, usize)| json!({ "name": quantity.name(), "n": n });
     json!({
         "trajectory_data": fitted.data_sets.iter().map(|(name, _)| name).collect::<Vec<_>>(),

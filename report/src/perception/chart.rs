@@ -16,8 +16,8 @@ const MARGINS_PX: [f64; 4] = [46.0, 12.0, 28.0, 40.0];
 pub(super) const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 /// Dashes of the lines of the second study, and of the lines beyond the colours.
 const DASHES: [&str; 4] = ["", "6 3", "2 3", "8 3 2 3"];
-/// Width of the last line that is drawn (px), what each one below it is wider, and the greatest width: of lines that coincide, each
-/// shows at the edges of the next.
+/// Width of the last line that is drawn (px), the additional width of each line below it, and the
+/// greatest width. If lines coincide, each line shows at the edges of the next.
 const WIDTHS_PX: [f64; 3] = [1.6, 0.8, 5.6];
 /// Number of intervals between the ticks of the vertical axis.
 const TICKS: u8 = 4;
@@ -44,7 +44,7 @@ impl Line<'_> {
     }
 }
 
-/// What a chart shows.
+/// The content of a chart.
 pub(super) struct Chart {
     /// Its title, with the unit.
     pub(super) title: &'static str,
@@ -58,21 +58,25 @@ impl Chart {
     /// Returns the chart of the probability of a track.
     pub(super) const PROBABILITY: Self = Self {
         title: "probability of a confirmed track",
-        value: |it| Some(it.confirmed.value),
-        interval: |it| Some(it.confirmed.interval_95),
+        value: |point| Some(point.confirmed.value),
+        interval: |point| Some(point.confirmed.interval_95),
     };
 
     /// Returns the charts of the errors: bias, root mean square and 95 % quantile of each.
     pub(super) const ERRORS: [Self; 9] = [
-        Self::of_errors("along the road: bias (m)", |it| error(it, 0, |of| of.bias)),
-        Self::of_errors("along the road: root mean square error (m)", |it| error(it, 0, |of| of.rmse)),
-        Self::of_errors("along the road: 95 % of the errors are below (m)", |it| error(it, 0, |of| of.q95)),
-        Self::of_errors("across the road: bias (m)", |it| error(it, 1, |of| of.bias)),
-        Self::of_errors("across the road: root mean square error (m)", |it| error(it, 1, |of| of.rmse)),
-        Self::of_errors("across the road: 95 % of the errors are below (m)", |it| error(it, 1, |of| of.q95)),
-        Self::of_errors("speed: bias (m/s)", |it| error(it, 2, |of| of.bias)),
-        Self::of_errors("speed: root mean square error (m/s)", |it| error(it, 2, |of| of.rmse)),
-        Self::of_errors("speed: 95 % of the errors are below (m/s)", |it| error(it, 2, |of| of.q95)),
+        Self::of_errors("along the road: bias (m)", |point| error(point, 0, |errors| errors.bias)),
+        Self::of_errors("along the road: root mean square error (m)", |point| error(point, 0, |errors| errors.rmse)),
+        Self::of_errors("along the road: 95 % of the errors are below (m)", |point| {
+            error(point, 0, |errors| errors.q95)
+        }),
+        Self::of_errors("across the road: bias (m)", |point| error(point, 1, |errors| errors.bias)),
+        Self::of_errors("across the road: root mean square error (m)", |point| error(point, 1, |errors| errors.rmse)),
+        Self::of_errors("across the road: 95 % of the errors are below (m)", |point| {
+            error(point, 1, |errors| errors.q95)
+        }),
+        Self::of_errors("speed: bias (m/s)", |point| error(point, 2, |errors| errors.bias)),
+        Self::of_errors("speed: root mean square error (m/s)", |point| error(point, 2, |errors| errors.rmse)),
+        Self::of_errors("speed: 95 % of the errors are below (m/s)", |point| error(point, 2, |errors| errors.q95)),
     ];
 
     const fn of_errors(title: &'static str, value: fn(&CurvePoint) -> Option<f64>) -> Self {
@@ -177,8 +181,8 @@ impl Frame {
     }
 }
 
-fn error(point: &CurvePoint, index: usize, of: fn(&PointErrors) -> f64) -> Option<f64> {
-    point.errors.map(|errors| of(&errors[index]))
+fn error(point: &CurvePoint, index: usize, figure: fn(&PointErrors) -> f64) -> Option<f64> {
+    point.errors.map(|errors| figure(&errors[index]))
 }
 
 /// Returns the legend of the charts of these lines.

@@ -26,8 +26,8 @@ pub(super) fn page(studies: &[Study]) -> Markup {
             p { (name) ": " (study.runs) " approaches of each case, seed " (study.seed) ". A vehicle comes from "
                 (GAPS_M[0]) " m behind the ego to " (GAPS_M[1]) " m, at 10 to 50 km/h more. No controller acts." }
         }
-        p { "Bars are 95 % intervals (Clopper and Pearson). Errors are those of the position of the front along the road, of the position across \
-             it, and of the speed. An error has no value at a distance at which fewer than two approaches have a track." }
+        p { "Bars are 95 % intervals (Clopper and Pearson). There are three errors: of the position of the front along the road, of the \
+             position across it, and of the speed. An error has no value at a distance at which fewer than two approaches have a track." }
         @for factor in factors {
             h2 { (heading(factor)) }
             @for names in groups(studies, factor) {
@@ -59,7 +59,8 @@ fn heading(factor: &str) -> &'static str {
     }
 }
 
-/// Returns the names of the cases of a factor, in groups of as many as a chart can show beside the usual one.
+/// Returns the names of the cases of a factor, in groups. A chart has room for one group beside the
+/// standard case.
 fn groups<'a>(studies: &'a [Study], factor: &str) -> Vec<Vec<&'a str>> {
     let mut names: Vec<&str> = Vec::new();
     for (case, _) in studies.iter().flat_map(|study| &study.cases).filter(|(case, _)| case.factor == factor) {
@@ -70,7 +71,7 @@ fn groups<'a>(studies: &'a [Study], factor: &str) -> Vec<Vec<&'a str>> {
     names.chunks(COLOURS.len() - 1).map(<[&str]>::to_vec).collect()
 }
 
-/// Returns the lines of some cases beside the usual one, of each study.
+/// Returns the lines of some cases beside the standard case, of each study.
 fn lines<'a>(studies: &'a [Study], names: &[&str]) -> Vec<Line<'a>> {
     let mut lines = Vec::new();
     for (number, study) in studies.iter().enumerate() {
@@ -97,8 +98,8 @@ fn charts(lines: &[Line<'_>]) -> Markup {
 }
 
 /// Returns a value with its interval.
-fn with_interval(of: Option<Estimate>, decimals: usize) -> String {
-    let Some(Estimate { value, interval_95: [low, high] }) = of else { return "-".to_owned() };
+fn with_interval(estimate: Option<Estimate>, decimals: usize) -> String {
+    let Some(Estimate { value, interval_95: [low, high] }) = estimate else { return "-".to_owned() };
     match low.is_finite() && high.is_finite() {
         true => format!("{value:.decimals$} ({low:.decimals$} to {high:.decimals$})"),
         false => format!("{value:.decimals$}"),
@@ -115,39 +116,42 @@ fn figures(study: &Study) -> Markup {
             "id switches", "not available (%)", "GOSPA (m)", "class right (%)", "calibration error", "NEES (4)",
         ]))
     };
-    let percent = |of: Option<Estimate>| {
-        of.map(|it| Estimate { value: 100.0 * it.value, interval_95: it.interval_95.map(|bound| 100.0 * bound) })
+    let percent = |estimate: Option<Estimate>| {
+        estimate.map(|estimate| Estimate {
+            value: 100.0 * estimate.value,
+            interval_95: estimate.interval_95.map(|bound| 100.0 * bound),
+        })
     };
-    let row = |(case, of): &(Case, Figures)| {
-        let mut cells = vec![with_interval(Some(of.range_m), 0)];
+    let row = |(case, figures): &(Case, Figures)| {
+        let mut cells = vec![with_interval(Some(figures.range_m), 0)];
         for index in 0..3 {
-            let errors = of.errors.map(|errors| errors[index]);
-            cells.push(with_interval(errors.map(|it| it.bias), 2));
-            cells.push(with_interval(errors.map(|it| it.rmse), 2));
-            cells.push(number(errors.map(|it| it.q95), 2));
+            let errors = figures.errors.map(|errors| errors[index]);
+            cells.push(with_interval(errors.map(|error| error.bias), 2));
+            cells.push(with_interval(errors.map(|error| error.rmse), 2));
+            cells.push(number(errors.map(|error| error.q95), 2));
         }
-        cells.push(with_interval(of.confirmed_after_s, 2));
-        cells.push(with_interval(percent(Some(of.confirms)), 0));
-        cells.push(with_interval(Some(of.false_tracks_per_h), 0));
-        cells.push(with_interval(Some(of.id_switches), 2));
-        cells.push(with_interval(percent(Some(of.unavailable)), 0));
-        cells.push(with_interval(Some(of.gospa_m), 2));
-        cells.push(with_interval(percent(of.class_accuracy), 0));
-        cells.push(number(of.calibration_error, 3));
-        cells.push(with_interval(of.nees, 1));
+        cells.push(with_interval(figures.confirmed_after_s, 2));
+        cells.push(with_interval(percent(Some(figures.confirms)), 0));
+        cells.push(with_interval(Some(figures.false_tracks_per_h), 0));
+        cells.push(with_interval(Some(figures.id_switches), 2));
+        cells.push(with_interval(percent(Some(figures.unavailable)), 0));
+        cells.push(with_interval(Some(figures.gospa_m), 2));
+        cells.push(with_interval(percent(figures.class_accuracy), 0));
+        cells.push(number(figures.calibration_error, 3));
+        cells.push(with_interval(figures.nees, 1));
         html! { tr { td { (case.name) } @for cell in &cells { td.number { (cell) } } } }
     };
     table(&heads, &html! { @for case in &study.cases { (row(case)) } })
 }
 
-/// Returns the calibration of the class scores of the usual case, of each study.
+/// Returns the calibration of the class scores of the standard case, of each study.
 fn calibrations(studies: &[Study]) -> Markup {
     let heads =
         html! { (text_heads(&["configuration", "case"])) (number_heads(&["mean score", "share right", "steps"])) };
     let rows = html! {
         @for study in studies {
-            @for (case, of) in study.cases.iter().filter(|(case, _)| matches!(case.factor, "usual" | "class" | "light")) {
-                @for bin in &of.calibration {
+            @for (case, figures) in study.cases.iter().filter(|(case, _)| matches!(case.factor, "usual" | "class" | "light")) {
+                @for bin in &figures.calibration {
                     tr {
                         td { (study.name) } td { (case.name) }
                         td.number { (format!("{:.3}", bin.confidence)) }

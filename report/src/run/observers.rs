@@ -30,12 +30,12 @@ impl Observer for RunObservers<'_> {
         }
     }
 
-    fn event(&mut self, time: Time, what: &RunEvent) {
+    fn event(&mut self, time: Time, event: &RunEvent) {
         if let Some(recorder) = &mut self.recorder {
-            recorder.event(time, what);
+            recorder.event(time, event);
         }
         if let Some(tables) = &mut self.tables {
-            tables.event(time, what);
+            tables.event(time, event);
         }
     }
 }

@@ -47,7 +47,7 @@ pub(super) fn reason_text(mis: &MisSummary) -> String {
 pub struct OutcomeText<'a> {
     /// The outcome.
     pub outcome: &'a Outcome,
-    /// What happened and why, in one sentence.
+    /// The event and its cause, in one sentence.
     pub sentence: &'a str,
 }
 

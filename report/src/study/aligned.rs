@@ -53,7 +53,7 @@ pub(super) fn mean(output: Output, value: Option<f64>) -> String {
 }
 
 /// Returns the errors as lines: nothing if there are none.
-pub(super) fn error_lines(errors: &RunErrors, what: &str) -> Vec<String> {
+pub(super) fn error_lines(errors: &RunErrors, runs: &str) -> Vec<String> {
     let kinds = errors
         .kinds
         .iter()
@@ -62,6 +62,6 @@ pub(super) fn error_lines(errors: &RunErrors, what: &str) -> Vec<String> {
         return Vec::new();
     }
     let head =
-        format!("{} {what} ended in an ERROR and have no result; they are left out of every figure", errors.points);
+        format!("{} {runs} ended in an ERROR and have no result; they are left out of every figure", errors.points);
     std::iter::once(head).chain(kinds).collect()
 }

@@ -16,7 +16,7 @@ use super::tornado::charts as tornado_charts;
 use crate::campaign::html::page::{document, number, table, text_heads};
 use crate::json;
 
-/// A study that is shown: as text (`Display`), as JSON, and as files.
+/// A study with its outputs: text (`Display`), JSON, and files.
 #[derive(Clone, Debug)]
 pub enum Study {
     /// A sensitivity study.
@@ -53,7 +53,8 @@ impl Study {
     }
 }
 
-/// Writes the page, the charts and the JSON of a study into a folder, which is created if it does not exist. Returns their paths.
+/// Writes the page, the charts and the JSON of a study into a folder, which is created if it does
+/// not exist. Returns their paths.
 ///
 /// # Errors
 /// [`WriteError`] if a chart cannot be drawn or a file cannot be written.
@@ -74,7 +75,7 @@ pub fn write_study(folder: &Path, study: &Study) -> Result<Vec<PathBuf>, WriteEr
     std::fs::create_dir_all(folder).map_err(fail)?;
     let mut files =
         vec![(format!("{name}.html"), page.into_string()), (format!("{name}.json"), format!("{:#}\n", study.json()))];
-    files.extend(charts.into_iter().map(|(of, svg)| (format!("{chart_name}-{of}.svg"), svg)));
+    files.extend(charts.into_iter().map(|(name, svg)| (format!("{chart_name}-{name}.svg"), svg)));
     let write = |(name, text): (String, String)| {
         let path = folder.join(name);
         write_file(&path, |file| file.write_all(text.as_bytes())).map(|()| path)
@@ -84,8 +85,8 @@ pub fn write_study(folder: &Path, study: &Study) -> Result<Vec<PathBuf>, WriteEr
 
 type Charts = Vec<(&'static str, String)>;
 
-fn errors(errors: &RunErrors, what: &str) -> Markup {
-    html! { @for line in error_lines(errors, what) { p.failure { (line) } } }
+fn errors(errors: &RunErrors, runs: &str) -> Markup {
+    html! { @for line in error_lines(errors, runs) { p.failure { (line) } } }
 }
 
 fn head(title: &str, settings: &[String], line: &str) -> Markup {
@@ -116,10 +117,10 @@ fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
             section {
                 h2 { (output.title()) }
                 @if let Some((_, svg)) = charts.get(index) { figure { (PreEscaped(svg)) } }
-                @if let Some(found) = &study.decomposition {
-                    @let of_output = &found.indices[index];
+                @if let Some(decomposition) = &study.decomposition {
+                    @let of_output = &decomposition.indices[index];
                     p.note {
-                        "Mean " (mean(*output, of_output.mean)) " over " (found.points) " points. The bars show the smallest and the "
+                        "Mean " (mean(*output, of_output.mean)) " over " (decomposition.points) " points. The bars show the smallest and the "
                         "largest mean over the quarters of a factor's distribution, with 95 % intervals; grey: chance, or an index of "
                         "the quarters whose interval reaches 0. The table says what moves single samples: the total index is the share of "
                         "the variance that would be left if only this factor were unknown, the first-order index the share that it "
@@ -128,7 +129,7 @@ fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
                     (table(&text_heads(&["factor", "total index (95 %)", "first-order index (95 %)"]), &html! {
                         @for group in of_output.order() {
                             tr {
-                                td { (found.groups[group].label) }
+                                td { (decomposition.groups[group].label) }
                                 (number(with_interval(of_output.of_groups[group].total)))
                                 (number(with_interval(of_output.of_groups[group].first)))
                             }
@@ -173,8 +174,8 @@ fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
         (errors(&frontier.errors, "runs"))
         p.note {
             "Marked combinations are Pareto-optimal: no other one prevents more, induces less or loses less speed without being worse "
-            "in another of the three. All combinations run the same samples. Lines are 95 % intervals; those that overlap do not tell "
-            "two combinations apart."
+            "in another of the three. All combinations run the same samples. Lines are 95 % intervals. Overlapping "
+            "intervals do not tell two combinations apart."
         }
         @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
         section {

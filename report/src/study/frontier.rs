@@ -16,11 +16,11 @@ const OPTIMAL: &str = "◆";
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrontierText<'a>(pub(super) &'a Frontier);
 
-/// The names of the columns behind those of the keys.
+/// The names of the columns that follow the keys.
 pub(super) const HEADS: [&str; 5] =
     ["collisions without", "with", "prevented (95 %)", "induced (95 %)", "speed lost (95 %)"];
 
-/// Returns the cells of a combination behind those of its values.
+/// Returns the cells of a combination that follow the cells of its values.
 pub(super) fn cells(point: &Point) -> [String; 5] {
     let lost = point.speed_lost_mps.map_or_else(
         || "-".to_owned(),
@@ -74,9 +74,9 @@ pub(super) fn charts(frontier: &Frontier) -> io::Result<Vec<(&'static str, Strin
         estimate.map(|Estimate { value, interval_95 }| (100.0 * value, interval_95.map(|bound| 100.0 * bound)))
     };
     let plain = |estimate: Option<Estimate>| estimate.map(|estimate| (estimate.value, estimate.interval_95));
-    let points = |of: &dyn Fn(&Point) -> Option<[Placed; 2]>| -> Vec<ScatterPoint> {
+    let points = |axes: &dyn Fn(&Point) -> Option<[Placed; 2]>| -> Vec<ScatterPoint> {
         let of_point = |point: &Point| {
-            let [(x, across), (y, up)] = of(point)?;
+            let [(x, across), (y, up)] = axes(point)?;
             let label = point.values.join(" · ");
             Some(ScatterPoint { at: [x, y], intervals_95: [across, up], label, is_marked: point.is_optimal })
         };

@@ -31,8 +31,8 @@ impl Display for SensitivityText<'_> {
         if let Some(screening) = &study.screening {
             write_screening(f, study, screening)?;
         }
-        if let Some(found) = &study.decomposition {
-            write_decomposition(f, study, found)?;
+        if let Some(decomposition) = &study.decomposition {
+            write_decomposition(f, study, decomposition)?;
         }
         for line in error_lines(&study.errors(), "points") {
             writeln!(f, "{line}")?;
@@ -47,7 +47,7 @@ pub(super) fn conclusion(study: &Sensitivity) -> String {
     let Some(greatest) = study.greatest() else {
         return format!("No assumption was seen to move the {}.", output.title());
     };
-    let by = match study.decomposition.as_ref().and_then(|found| found.indices.first()) {
+    let by = match study.decomposition.as_ref().and_then(|decomposition| decomposition.indices.first()) {
         Some(first) => by_main_effect(study, first, greatest),
         None => "by its elementary effects".to_owned(),
     };
@@ -55,27 +55,27 @@ pub(super) fn conclusion(study: &Sensitivity) -> String {
 }
 
 fn by_main_effect(study: &Sensitivity, output: &OutputIndices, greatest: usize) -> String {
-    let of = |factor: usize| output.main_effects[factor].map(|effect| effect.index);
+    let effect = |factor: usize| output.main_effects[factor].map(|effect| effect.index);
     let is_other = |factor: &usize| *factor != greatest && study.factors[*factor].kind != FactorKind::Chance;
     let runner_up = output.strongest().into_iter().find(is_other);
-    let doubt = match (of(greatest), runner_up.and_then(|other| Some((other, of(other)?)))) {
-        (Some(own), _) if own.interval_95[0] <= 0.0 => {
+    let doubt = match (effect(greatest), runner_up.and_then(|other| Some((other, effect(other)?)))) {
+        (Some(greatest_effect), _) if greatest_effect.interval_95[0] <= 0.0 => {
             "; its interval reaches 0, so that chance may explain it".to_owned()
         }
-        (Some(own), Some((other, next))) if own.interval_95[0] <= next.interval_95[1] => {
+        (Some(greatest_effect), Some((other, next))) if greatest_effect.interval_95[0] <= next.interval_95[1] => {
             format!("; its interval overlaps that of {}", study.factors[other].name)
         }
         _ => String::new(),
     };
-    let index = with_interval(of(greatest));
+    let index = with_interval(effect(greatest));
     format!("{} from its lowest to its highest quarter, index {index}{doubt}", from_to(output, greatest))
 }
 
 /// Returns the means of an output in the lowest and in the highest quarter of a factor.
 pub(super) fn from_to(output: &OutputIndices, factor: usize) -> String {
     let Some(MainEffect { means, .. }) = output.main_effects[factor] else { return "-".to_owned() };
-    let of = |quarter: usize| mean(output.output, Some(means[quarter].value));
-    format!("{} → {}", of(0), of(means.len() - 1))
+    let mean_text = |quarter: usize| mean(output.output, Some(means[quarter].value));
+    format!("{} → {}", mean_text(0), mean_text(means.len() - 1))
 }
 
 fn write_screening(f: &mut Formatter<'_>, study: &Sensitivity, screening: &Screening) -> fmt::Result {
@@ -111,9 +111,9 @@ fn write_screening(f: &mut Formatter<'_>, study: &Sensitivity, screening: &Scree
     Ok(())
 }
 
-fn write_decomposition(f: &mut Formatter<'_>, study: &Sensitivity, found: &Decomposition) -> fmt::Result {
-    writeln!(f, "\nDecomposition (Sobol'): {} rows, {} points", found.rows, found.points)?;
-    for output in &found.indices {
+fn write_decomposition(f: &mut Formatter<'_>, study: &Sensitivity, decomposition: &Decomposition) -> fmt::Result {
+    writeln!(f, "\nDecomposition (Sobol'): {} rows, {} points", decomposition.rows, decomposition.points)?;
+    for output in &decomposition.indices {
         writeln!(f, "\n{}: mean {}", output.output.title(), mean(output.output, output.mean))?;
         if output.of_groups.iter().all(|indices| indices.total.is_none()) {
             writeln!(f, "  The output does not vary, or changes too seldom: nothing can be said.")?;
@@ -130,7 +130,7 @@ fn write_decomposition(f: &mut Formatter<'_>, study: &Sensitivity, found: &Decom
         let mut rows = vec![heads.map(str::to_owned).to_vec()];
         rows.extend(output.order().into_iter().map(|group| {
             let indices = &output.of_groups[group];
-            vec![found.groups[group].label.clone(), with_interval(indices.total), with_interval(indices.first)]
+            vec![decomposition.groups[group].label.clone(), with_interval(indices.total), with_interval(indices.first)]
         }));
         writeln!(f)?;
         write_rows(f, &rows)?;

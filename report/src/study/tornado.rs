@@ -11,11 +11,12 @@ use crate::charts::{TornadoBar, TornadoTexts, tornado};
 /// Largest number of bars in a chart.
 const BARS: usize = 14;
 
-/// Returns the charts of a study, with the name of the output of each: of the decomposition if there is one.
+/// Returns the charts of a study, with the name of the output of each: of the decomposition if
+/// there is one.
 pub(super) fn charts(study: &Sensitivity) -> io::Result<Vec<(&'static str, String)>> {
     let chart = |output: &OutputIndices| Ok((output.output.name(), of_effects_on_mean(study, output)?));
-    if let Some(found) = &study.decomposition {
-        return found.indices.iter().map(chart).collect();
+    if let Some(decomposition) = &study.decomposition {
+        return decomposition.indices.iter().map(chart).collect();
     }
     let effects = |screening: &Screening| {
         screening.effects.iter().map(|output| Ok((output.output.name(), of_effects(study, output)?))).collect()

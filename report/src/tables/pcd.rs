@@ -1,7 +1,8 @@
 //! The scans of a run as point clouds: a folder with one PCD file for each scan.
 //!
-//! The files are `SENSOR-FRAME.pcd`, such as `rear-lidar-00012.pcd`, in the format PCD 0.7 of the Point Cloud Library (*The PCD (Point
-//! Cloud Data) file format*), with binary data in little-endian order:
+//! The files are `SENSOR-FRAME.pcd`, such as `rear-lidar-00012.pcd`, in the format PCD 0.7 of the
+//! Point Cloud Library (*The PCD (Point Cloud Data) file format*), with binary data in
+//! little-endian order:
 //!
 //! | field | type | meaning |
 //! |---|---|---|
@@ -10,8 +11,8 @@
 //! | `beam` | U 2 | as in the table |
 //! | `time` | F 8 | time of measurement (s) |
 //!
-//! The points are in the ego's frame already, so that the viewpoint of each file is the identity. Columns that the format has no place
-//! for (direction, range, box, truth) are those of the table only.
+//! The points are already in the ego's frame, so the viewpoint of each file is the identity. The
+//! format has no place for some columns (direction, range, box, truth): only the table has them.
 
 use std::fs;
 use std::io::{self, Write};
@@ -86,13 +87,14 @@ impl PcdFolder {
         check_free(path)?;
         let complete: PathBuf = self.folder.keep();
         fs::rename(&complete, path).inspect_err(|_| {
-            // The folder has no other use. An error of the removal says nothing that the first one does not.
+            // The folder has no other use. The first error says all that an error of the removal
+            // could say.
             let _ = fs::remove_dir_all(&complete);
         })
     }
 }
 
-/// Checks that there is nothing at `path` that the folder would replace.
+/// Checks that `path` has nothing that the folder would replace.
 fn check_free(path: &Path) -> io::Result<()> {
     let message = "exists, and is not an empty folder: scans *.pcd are a new folder with a file for each scan";
     match fs::read_dir(path).map(|mut entries| entries.next().is_none()) {

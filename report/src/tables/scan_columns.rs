@@ -12,8 +12,8 @@ use closecall_sensors::lidar::{MirrorSide, PointSource, RearLidar};
 
 use crate::tables::table::{field, required};
 
-/// Returns the factor of x and y in the ego's frame. The points of a LiDAR that looks ahead are those of an ego that is turned by half
-/// a turn.
+/// Returns the factor of x and y in the ego's frame. The points of a LiDAR that looks ahead lie in
+/// the frame of an ego that is turned by half a turn.
 pub(crate) const fn sign(lidar: &MountedLidar<'_>) -> f32 {
     if lidar.looks_ahead { -1.0 } else { 1.0 }
 }

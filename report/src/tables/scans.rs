@@ -1,4 +1,5 @@
-//! The points of the LiDARs of a run: a Parquet table with one row per return, or a folder of point clouds (`crate::tables::pcd`).
+//! The points of the LiDARs of a run: a Parquet table with one row per return, or a folder of point
+//! clouds (`crate::tables::pcd`).
 //!
 //! | column | meaning |
 //! |---|---|
@@ -43,7 +44,7 @@ pub struct ScanWriter {
     failed: Option<io::Error>,
 }
 
-/// What the scans are written to.
+/// The destination of the scans.
 enum Sink {
     /// A table, with the rows that are not written yet.
     Table(Box<ArrowWriter<File>>, Box<ScanColumns>),
@@ -52,10 +53,12 @@ enum Sink {
 }
 
 impl ScanWriter {
-    /// Creates a writer of the Parquet file or of the folder `path`, which ends in `.parquet` or `.pcd`.
+    /// Creates a writer of the Parquet file or of the folder `path`, which ends in `.parquet` or
+    /// `.pcd`.
     ///
     /// # Errors
-    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is another, or if no file can be created there.
+    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is another, or if
+    /// no file can be created there.
     pub fn new(path: &Path, mode: SensorMode) -> Result<Self, WriteError> {
         let fail = |error| WriteError::new(path, error);
         if mode != SensorMode::Full {
@@ -82,7 +85,8 @@ impl ScanWriter {
     /// Completes the file or the folder.
     ///
     /// # Errors
-    /// [`WriteError`] if a scan could not be completed, or if the file cannot be written completely. An existing file then stays as it is.
+    /// [`WriteError`] if a scan could not be completed, or if the file cannot be written
+    /// completely. An existing file then stays as it is.
     pub fn finish(mut self) -> Result<(), WriteError> {
         let path = self.path.clone();
         let fail = |error| WriteError::new(&path, error);

@@ -12,18 +12,21 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
-/// Number of rows in a row group: the unit that a writer holds in memory and that a reader can skip.
+/// Number of rows in a row group: the unit that a writer holds in memory and that a reader can
+/// skip.
 pub const ROWS_PER_GROUP: usize = 8_192;
 
-/// Number of rows that are encoded at once: a batch of outcomes takes about 4 kB of memory for each row. It divides the group.
+/// Number of rows that are encoded at once: a batch of outcomes takes about 4 kB of memory for each
+/// row. It divides the group.
 pub const ROWS_PER_BATCH: usize = 256;
 
-/// Size from which on a column's dictionary is given up (bytes). Most columns hold numbers that hardly repeat: 2,048 of them fill it.
+/// Size from which on a column has no dictionary (bytes). Most columns hold numbers that hardly
+/// repeat: 2,048 of them fill it.
 const DICTIONARY_BYTES: usize = 16_384;
 
 /// Returns the writer properties of every table.
 ///
-/// The file names neither a time nor a place nor a library version, so that equal rows give equal bytes.
+/// The file names neither a time nor a place nor a library version, so equal rows give equal bytes.
 pub fn properties() -> WriterProperties {
     WriterProperties::builder()
         .set_created_by("closecall".to_owned())
@@ -56,7 +59,8 @@ pub enum Column {
 /// Writes a small table, whose columns have a name and a unit (empty if they have none).
 ///
 /// # Errors
-/// [`WriteError`] if the columns differ in length or the file cannot be written. An existing file then stays as it is.
+/// [`WriteError`] if the columns differ in length or the file cannot be written. An existing file
+/// then stays as it is.
 pub fn write_columns(path: &Path, columns: Vec<(&str, &str, Column)>) -> Result<(), WriteError> {
     let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
     for (name, unit, column) in columns {

@@ -32,7 +32,8 @@ impl Format {
     }
 }
 
-/// Observes a run and writes its trace. A value that does not exist is an empty cell in CSV and null in Parquet.
+/// Observes a run and writes its trace. A value that does not exist is an empty cell in CSV and
+/// null in Parquet.
 pub struct TraceWriter {
     path: PathBuf,
     format: Format,
@@ -43,7 +44,8 @@ impl TraceWriter {
     /// Creates a writer of the file `path`, whose extension gives the format.
     ///
     /// # Errors
-    /// [`WriteError`] if the extension is neither `.csv` nor `.parquet`, or if no file can be created there.
+    /// [`WriteError`] if the extension is neither `.csv` nor `.parquet`, or if no file can be
+    /// created there.
     pub fn new(path: &Path) -> Result<Self, WriteError> {
         let format = Format::from_path(path).map_err(|error| WriteError::new(path, error))?;
         check_writable(path)?;
@@ -70,8 +72,8 @@ impl Observer for TraceWriter {
     fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
-/// Writes the rows as CSV. The names of actors need no quotes, because they consist of letters, digits and hyphens. The
-/// numbers have enough digits to be read back to the same bits.
+/// Writes the rows as CSV. The names of actors need no quotes, because they consist of letters,
+/// digits and hyphens. The numbers have enough digits to be read back to the same bits.
 fn write_csv(file: &mut (impl Write + ?Sized), rows: &[TraceRow]) -> io::Result<()> {
     writeln!(file, "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s")?;
     for row in rows {
@@ -99,8 +101,9 @@ pub fn trace_batch(rows: &[TraceRow]) -> io::Result<RecordBatch> {
         field("gap_front_m", DataType::Float64, Some("m")),
         field("thw_front_s", DataType::Float64, Some("s")),
     ]));
-    let floats =
-        |of: fn(&TraceRow) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
+    let floats = |value: fn(&TraceRow) -> Option<f64>| -> ArrayRef {
+        Arc::new(rows.iter().map(value).collect::<Float64Array>())
+    };
     let columns = vec![
         floats(|row| Some(row.time.s())),
         Arc::new(rows.iter().map(|row| Some(row.actor.as_str())).collect::<StringArray>()),

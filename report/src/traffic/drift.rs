@@ -20,31 +20,29 @@ impl fmt::Display for DriftText<'_> {
         )?;
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
         let count = |value: Option<u64>| value.map_or("-".to_owned(), |value| value.to_string());
-        for one in &self.0.quantities {
-            let cut = one.cut_from.zip(one.cut_to);
-            let cut = cut.map_or_else(String::new, |(from, to)| format!("  {} from {from} to {to}", one.quantity));
-            let mark = if one.corrected_p_value.is_some_and(|p_value| p_value < LEVEL) { "  DRIFTED" } else { "" };
+        for drift in &self.0.quantities {
+            let cut = drift.cut_from.zip(drift.cut_to);
+            let cut = cut.map_or_else(String::new, |(from, to)| format!("  {} from {from} to {to}", drift.quantity));
+            let mark = if drift.corrected_p_value.is_some_and(|p_value| p_value < LEVEL) { "  DRIFTED" } else { "" };
             writeln!(
                 f,
                 "{:<22} {:>4} {:>8.3} {:>6} {:>8} {:>13} {:>7} {:>13} {:>9} {:>6}{cut}{mark}",
-                one.name,
-                one.fitted_n,
-                one.fitted_median,
-                one.n,
-                number(one.median),
-                number(one.distance),
-                number(one.found_from),
-                number(one.corrected_p_value),
-                count(one.needed),
-                count(one.needed_for_five_percent),
+                drift.name,
+                drift.fitted_n,
+                drift.fitted_median,
+                drift.n,
+                number(drift.median),
+                number(drift.distance),
+                number(drift.found_from),
+                number(drift.corrected_p_value),
+                count(drift.needed),
+                count(drift.needed_for_five_percent),
             )?;
         }
         let verdict = match (self.0.is_tested, self.0.has_drifted) {
             (false, _) => "INCONCLUSIVE: no quantity has enough new values",
             (true, true) => "DRIFTED: the new traffic does not match the fitted distributions",
-            (true, false) => {
-                "no drift found: a shift that is smaller than what these numbers of values show is not excluded"
-            }
+            (true, false) => "no drift found: a shift too small for these numbers of values is not excluded",
         };
         writeln!(f, "{verdict} (level {:.0} %, Holm's correction)", 100.0 * LEVEL)
     }

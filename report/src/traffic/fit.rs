@@ -4,7 +4,8 @@ use std::fmt;
 
 use closecall_recorded::fit::FittedDistributions;
 
-/// The quantities with their number of values, median, and the goodness of fit of their parametric form.
+/// The quantities with their number of values, median, and the goodness of fit of their parametric
+/// form.
 #[derive(Clone, Copy, Debug)]
 pub struct FitText<'a>(pub &'a FittedDistributions);
 
@@ -20,9 +21,13 @@ impl fmt::Display for FitText<'_> {
                 None => writeln!(f, "; no parametric form suits these values")?,
             }
         }
-        for one in &self.0.correlations {
-            let (of, with) = (one.of.name(), one.with.name());
-            writeln!(f, "{of:<24} with {with}: rank correlation {:.2}, n = {}", one.spearman, one.n)?;
+        for correlation in &self.0.correlations {
+            let (quantity, with) = (correlation.of.name(), correlation.with.name());
+            writeln!(
+                f,
+                "{quantity:<24} with {with}: rank correlation {:.2}, n = {}",
+                correlation.spearman, correlation.n
+            )?;
         }
         for (quantity, n) in &self.0.too_few {
             writeln!(f, "{:<24} n = {n:>4}, too few to fit", quantity.name())?;

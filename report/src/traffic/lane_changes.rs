@@ -1,4 +1,5 @@
-//! Recorded lane changes as text for human readers: a table, how well they match known ones, and how critical each is.
+//! Recorded lane changes as text for human readers: a table, their agreement with known ones, and
+//! their criticality.
 
 use std::fmt;
 
@@ -33,7 +34,7 @@ impl fmt::Display for LaneChangesText<'_> {
     }
 }
 
-/// How well the lane changes that were found match known ones.
+/// The agreement of detected lane changes with known ones.
 #[derive(Clone, Copy, Debug)]
 pub struct ScoreText<'a>(pub &'a Score);
 
@@ -85,7 +86,8 @@ impl fmt::Display for CriticalityText<'_> {
             writeln!(f, "{}", line(&change.lane_change))?;
             for (name, whole, crossing) in change.named() {
                 let mark = if whole.is_critical() { "  CRITICAL" } else { "" };
-                let number = |found: MetricResult| found.value().map_or("-".to_owned(), |value| format!("{value:.2}"));
+                let number =
+                    |metric: MetricResult| metric.value().map_or("-".to_owned(), |value| format!("{value:.2}"));
                 let (whole, crossing) = (number(whole), number(crossing));
                 writeln!(f, "         {name:<12} {whole:>9}  at the crossing {crossing:>9}{mark}")?;
             }

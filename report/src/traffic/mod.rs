@@ -1,4 +1,4 @@
-//! What was found in trajectory data: texts and charts.
+//! Results from trajectory data: texts and charts.
 
 pub mod drift;
 pub mod fit;

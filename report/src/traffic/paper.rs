@@ -27,7 +27,7 @@ pub struct Picture {
     pub svg: String,
 }
 
-/// The figures, with what they are drawn from.
+/// The figures, and the page that holds them.
 #[derive(Clone, Debug)]
 pub struct Paper {
     /// The pictures, in the order of the figures.
@@ -37,7 +37,8 @@ pub struct Paper {
 }
 
 impl Paper {
-    /// Draws the figures. `robustness` holds the result for each trajectory file, and that of all together.
+    /// Draws the figures. `robustness` holds the result for each trajectory file, and the result
+    /// for all files together.
     ///
     /// # Errors
     /// [`ChartError`] if a figure cannot be drawn.
@@ -46,7 +47,8 @@ impl Paper {
         robustness: Option<&(Vec<Robustness>, Robustness)>,
         speed_limit_mps: Option<f64>,
     ) -> Result<Self, ChartError> {
-        let all: Vec<CriticalLaneChange> = recordings.iter().flat_map(|one| one.changes.iter().cloned()).collect();
+        let all: Vec<CriticalLaneChange> =
+            recordings.iter().flat_map(|recording| recording.changes.iter().cloned()).collect();
         let mut pictures = Vec::new();
         let mut push = |figure: u32, name: &str, svg: String| {
             pictures.push(Picture { figure, name: format!("figure-{figure}-{name}.svg"), svg });
@@ -70,29 +72,30 @@ impl Paper {
 }
 
 fn by_file(recordings: &[RecordedChanges], boxed: &Boxed) -> Vec<BoxSummary> {
-    recordings.iter().filter_map(|one| summary(&one.name, one.changes.iter(), boxed)).collect()
+    recordings.iter().filter_map(|recording| summary(&recording.name, recording.changes.iter(), boxed)).collect()
 }
 
 /// Returns the lowest level of noise at which each criterion fails, for each trajectory file.
 fn failures(recordings: &[RecordedChanges], each: &[Robustness]) -> Vec<Vec<String>> {
-    let row = |(recording, found): (&RecordedChanges, &Robustness)| {
-        let level = |column: usize| match (found.undisturbed[column], found.failing_noise_m_per_sqrt_s(column)) {
-            (0, _) => "finds nothing".to_owned(),
-            (_, Some(level)) => format!("{level} m/√s"),
-            (_, None) => "no level".to_owned(),
-        };
-        std::iter::once(recording.name.clone()).chain((0..found.criteria.len()).map(level)).collect()
+    let row = |(recording, robustness): (&RecordedChanges, &Robustness)| {
+        let level =
+            |column: usize| match (robustness.undisturbed[column], robustness.failing_noise_m_per_sqrt_s(column)) {
+                (0, _) => "finds nothing".to_owned(),
+                (_, Some(level)) => format!("{level} m/√s"),
+                (_, None) => "no level".to_owned(),
+            };
+        std::iter::once(recording.name.clone()).chain((0..robustness.criteria.len()).map(level)).collect()
     };
     recordings.iter().zip(each).map(row).collect()
 }
 
 fn page(
     recordings: &[RecordedChanges],
-    found: &Statistics,
+    statistics: &Statistics,
     robustness: Option<&(Vec<Robustness>, Robustness)>,
     pictures: &[Picture],
 ) -> String {
-    let names: Vec<&str> = recordings.iter().map(|one| one.name.as_str()).collect();
+    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let figure = |number: u32| pictures.iter().filter(move |picture| picture.figure == number);
     let drawn = |number: u32| html! { @for picture in figure(number) { div.picture { (PreEscaped(&picture.svg)) } } };
     html! {
@@ -118,7 +121,7 @@ fn page(
                 }
                 h2 { "Figure 5: durations, peak widths and speeds" }
                 (drawn(5))
-                pre { (StatisticsText(found).to_string()) }
+                pre { (StatisticsText(statistics).to_string()) }
                 h2 { "Figure 6: how often the values of each metric occur" }
                 (drawn(6))
                 h2 { "Figure 7: critical shares to the left and to the right" }

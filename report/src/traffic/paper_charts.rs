@@ -1,5 +1,5 @@
-//! Charts of criticality: how often each value of a metric occurs, with its threshold, and the shares of critical lane
-//! changes to the left and to the right.
+//! Charts of criticality: how often each value of a metric occurs, with its threshold, and the
+//! shares of critical lane changes to the left and to the right.
 
 use std::collections::BTreeMap;
 
@@ -30,8 +30,8 @@ pub(super) const METRICS: [&str; 7] =
 pub const CRITICALITY_CHARTS: [&str; 7] =
     ["distance_m.svg", "speed_mps.svg", "a_lon_mps2.svg", "a_lat_mps2.svg", "thw_s.svg", "dce_m.svg", "ttce_s.svg"];
 
-/// Draws how often the values of each metric occur among complete lane changes, with the thresholds. The charts (SVG) are
-/// in the order of [`CRITICALITY_CHARTS`].
+/// Draws how often the values of each metric occur among complete lane changes, with the
+/// thresholds. The charts (SVG) are in the order of [`CRITICALITY_CHARTS`].
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
@@ -60,7 +60,8 @@ fn is_above(metric: &str) -> bool {
     matches!(metric, "speed_mps" | "a_lon_mps2" | "a_lat_mps2")
 }
 
-/// Draws how often the values of a metric occur among complete lane changes, with the threshold (SVG).
+/// Draws how often the values of a metric occur among complete lane changes, with the threshold
+/// (SVG).
 ///
 /// # Errors
 /// [`ChartError`] if the chart cannot be drawn.
@@ -79,7 +80,8 @@ pub(super) fn histogram(
     file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), (&values, limit), is_above(metric)))
 }
 
-/// Returns the number of values in each bar. Bar 0 begins at the threshold, so that no bar holds critical and other values.
+/// Returns the number of values in each bar. Bar 0 begins at the threshold, so no bar holds
+/// critical and other values.
 fn bars(values: &[f64], limit: f64, width: f64) -> BTreeMap<i32, u32> {
     let mut bars = BTreeMap::new();
     for value in values {
@@ -127,7 +129,8 @@ fn draw_histogram(
         .draw()
 }
 
-/// Draws the shares of critical lane changes by metric, to the left and to the right, with exact 95 % intervals (SVG).
+/// Draws the shares of critical lane changes by metric, to the left and to the right, with exact 95
+/// % intervals (SVG).
 ///
 /// # Errors
 /// [`ChartError`] if the chart cannot be drawn.
@@ -149,18 +152,19 @@ fn draw_shares(canvas: &Canvas<'_>, title: &str, changes: &[CriticalLaneChange])
     for (index, side) in [Side::Left, Side::Right].into_iter().enumerate() {
         let is_on = |change: &&CriticalLaneChange| change.lane_change.direction == side;
         let of_side: Vec<CriticalLaneChange> = changes.iter().filter(is_on).cloned().collect();
-        let found = shares(&of_side, Counted::Complete);
+        let side_shares = shares(&of_side, Counted::Complete);
         let colour = series_colour(index);
         let centre = |metric: usize| metric as f64 + (2.0 * index as f64 - 1.0) * HALF_BAR;
-        let bars = found.metrics.iter().enumerate().filter_map(|(metric, share)| {
+        let bars = side_shares.metrics.iter().enumerate().filter_map(|(metric, share)| {
             let corners = [(centre(metric) - HALF_BAR, 0.0), (centre(metric) + HALF_BAR, 100.0 * share.share?)];
             Some(Rectangle::new(corners, colour.mix(0.6).filled()))
         });
-        let name = format!("to the {} (n = {})", if side == Side::Left { "left" } else { "right" }, found.lane_changes);
+        let name =
+            format!("to the {} (n = {})", if side == Side::Left { "left" } else { "right" }, side_shares.lane_changes);
         plot.draw_series(bars)?
             .label(name)
             .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.mix(0.6).filled()));
-        let intervals = found.metrics.iter().enumerate().filter_map(|(metric, share)| {
+        let intervals = side_shares.metrics.iter().enumerate().filter_map(|(metric, share)| {
             let [low, high] = share.interval_95?;
             let points = [(centre(metric), 100.0 * low), (centre(metric), 100.0 * high)];
             Some(PathElement::new(points, BLACK.stroke_width(1)))
@@ -190,8 +194,8 @@ mod tests {
     #[test]
     fn no_bar_of_a_histogram_holds_critical_and_other_values() {
         // Bars from 0.7 to 0.9 and from 0.9 to 1.1.
-        let found = bars(&[0.05, 0.71, 0.899, 0.9, 1.0, 1.75], 0.9, 0.2);
-        assert_eq!(found, BTreeMap::from([(-5, 1), (-1, 2), (0, 2), (4, 1)]));
+        let counts = bars(&[0.05, 0.71, 0.899, 0.9, 1.0, 1.75], 0.9, 0.2);
+        assert_eq!(counts, BTreeMap::from([(-5, 1), (-1, 2), (0, 2), (4, 1)]));
     }
 
     #[test]

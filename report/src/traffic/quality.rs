@@ -8,7 +8,7 @@ use closecall_recorded::trajectory_data::{QualityInspector, Tracks};
 pub struct QualityText<'a> {
     /// The tracks, which have been read to their end.
     pub tracks: &'a Tracks<'a>,
-    /// What was found in them.
+    /// The flaws of the tracks.
     pub inspector: &'a QualityInspector,
 }
 
@@ -31,8 +31,8 @@ impl fmt::Display for QualityText<'_> {
                 None => writeln!(f, "  {:>8}  {name}", flaw.count)?,
                 Some(first) => {
                     let line = first.line.map(|line| format!("line {line}, ")).unwrap_or_default();
-                    let (track, time_s, what) = (first.track_id, first.time_s, &first.what);
-                    writeln!(f, "  {:>8}  {name}; first: {line}track {track} at {time_s:.2} s: {what}", flaw.count)?;
+                    let (track, time_s, message) = (first.track_id, first.time_s, &first.what);
+                    writeln!(f, "  {:>8}  {name}; first: {line}track {track} at {time_s:.2} s: {message}", flaw.count)?;
                 }
             }
         }
@@ -50,7 +50,7 @@ impl fmt::Display for QualityText<'_> {
         if inspector.unchecked_points() > 0 {
             writeln!(
                 f,
-                "  overlaps were not checked at {} instants: the other vehicles of those times were no longer in memory",
+                "  overlaps were not checked at {} instants: the other vehicles of these times were not in memory",
                 inspector.unchecked_points()
             )?;
         }

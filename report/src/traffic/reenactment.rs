@@ -14,9 +14,9 @@ use crate::run::film::{EncounterComparison, Film};
 pub struct Reenactment<'a> {
     /// The recorded encounter.
     pub encounter: &'a RecordedEncounter,
-    /// Its metrics, and those of the run.
+    /// Its metrics, and the metrics of the run.
     pub comparison: &'a EncounterComparison,
-    /// The film of the recorded traffic, and that of the run.
+    /// The film of the recorded traffic, and the film of the run.
     pub films: &'a [Film; 2],
     /// The outcome of the run.
     pub outcome: &'a Outcome,

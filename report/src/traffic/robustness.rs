@@ -1,4 +1,5 @@
-//! What the robustness study of the lane change criteria found: a table, and charts over the levels.
+//! The results of the robustness study of the lane change criteria: a table, and charts over the
+//! levels.
 
 use std::fmt;
 
@@ -23,8 +24,8 @@ impl fmt::Display for RobustnessText<'_> {
         };
         let Setup { repetitions, seed, .. } = study.setup;
         writeln!(f, "{} lane changes, by {reference}; each criterion without noise and offset:", study.reference)?;
-        for ((criterion, known), confirmed) in study.criteria.iter().zip(&study.undisturbed).zip(&study.confirmed) {
-            writeln!(f, "  {:<9} finds {known}; {confirmed} of them are among these", criterion.name())?;
+        for ((criterion, count), confirmed) in study.criteria.iter().zip(&study.undisturbed).zip(&study.confirmed) {
+            writeln!(f, "  {:<9} finds {count}; {confirmed} of them are among these", criterion.name())?;
         }
         writeln!(f, "\nfound again / false ones, compared with the criterion without noise and offset")?;
         writeln!(f, "noise: mean [least, most] of {repetitions} draws, seed {seed}")?;
@@ -49,7 +50,8 @@ impl fmt::Display for RobustnessText<'_> {
     }
 }
 
-/// Returns the counts of each criterion, with their range over the draws of the noise if there are several.
+/// Returns the counts of each criterion, with their range over the draws of the noise if there are
+/// several.
 fn row(study: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCounts>]) -> String {
     let count = |criterion: usize, value: fn(&CriterionCounts) -> f64| {
         let mean = value(&cells[criterion]);
@@ -68,7 +70,8 @@ fn row(study: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCoun
     (0..cells.len()).map(cell).collect()
 }
 
-/// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that level.
+/// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that
+/// level.
 fn failures(study: &Robustness) -> Vec<String> {
     let or_never = |level: Option<f64>| level.unwrap_or(f64::INFINITY);
     let mut columns: Vec<(usize, Option<f64>)> =
@@ -92,9 +95,9 @@ fn failures(study: &Robustness) -> Vec<String> {
     columns.into_iter().map(line).collect()
 }
 
-/// Draws the lane changes that each criterion finds, over the levels of noise and of offset, with the range over the draws
-/// of the noise and the levels from which on it fails. The charts (SVG) are in the
-/// order of [`ROBUSTNESS_CHARTS`].
+/// Draws the lane changes that each criterion finds, over the levels of noise and of offset, with
+/// the range over the draws of the noise and the levels at which it fails. The charts (SVG) are in
+/// the order of [`ROBUSTNESS_CHARTS`].
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
@@ -138,14 +141,14 @@ struct Axis<'a> {
     failing: Vec<Vec<f64>>,
 }
 
-/// Counts above this multiple of the reference are not shown, so that those that decide are legible.
+/// Counts above this multiple of the reference are not shown. The decisive counts stay legible.
 const MOST: f64 = 1.5;
 
-/// Number of levels that are shown beyond that at which the last criterion fails.
+/// Number of levels that are shown beyond the level at which the last criterion fails.
 const LEVELS_BEYOND: usize = 3;
 
 fn chart(study: &Robustness, axis: &Axis<'_>) -> LineChart {
-    // Far beyond the level at which the last criterion fails, nothing is to be seen.
+    // Far beyond the level at which the last criterion fails, the chart shows nothing new.
     let fails_at = axis.failing.iter().map(|levels| levels.iter().copied().fold(f64::NEG_INFINITY, f64::max));
     let last = fails_at.fold(f64::NEG_INFINITY, f64::max);
     let all_fail = axis.failing.iter().all(|levels| !levels.is_empty());

@@ -1,12 +1,13 @@
-//! A sampled lane change: for each value of the varied parameter the path of the vehicle that changes lanes, and its time
-//! headways to the vehicle that it overtakes (Opp₁) and to the vehicle that has overtaken it (Opp₂), as a table and a
-//! figure.
+//! A sampled lane change: for each value of the varied parameter the path of the vehicle that
+//! changes lanes, and its time headways to the vehicle that it overtakes (Opp₁) and to the vehicle
+//! that has overtaken it (Opp₂), as a table and a figure.
 //!
-//! The headway to Opp₁ counts from the start of the lane change until the centre of the vehicle that changes lanes crosses
-//! the marking, as long as Opp₁ is ahead in the same lane. The headway to Opp₂ counts from the start of the encounter to the
-//! end of the lane change, as soon as Opp₂ is ahead in the other lane. At one instant, both headways shrink by the same time
-//! if the vehicle that changes lanes is further ahead. The smallest one to Opp₂ stays the same if Opp₂ is closest before the
-//! lane change, because it overtakes then and drives away.
+//! The headway to Opp₁ counts from the start of the lane change until the centre of the vehicle
+//! that changes lanes crosses the marking, as long as Opp₁ is ahead in the same lane. The headway
+//! to Opp₂ counts from the start of the encounter to the end of the lane change, as soon as Opp₂ is
+//! ahead in the other lane. At one instant, both headways shrink by the same time if the vehicle
+//! that changes lanes is further ahead. The smallest one to Opp₂ stays the same if Opp₂ is closest
+//! before the lane change, because it overtakes then and drives away.
 
 use std::fmt;
 
@@ -136,13 +137,14 @@ fn headways(own: &Trajectory, other: &Trajectory, lane: Lane, counts: impl Fn(f6
 /// The run of one step: what was measured, and a film of the lane change.
 #[derive(Clone, Debug)]
 pub struct StepRun {
-    /// What was measured.
+    /// The measurements of the run.
     pub run: SampledRun,
     /// The film of the lane change; `None` if the vehicle never changes lanes.
     pub film: Option<Film>,
 }
 
-/// Runs one step of a sampled lane change. The sensors of the ego, which is behind all other vehicles, are not simulated.
+/// Runs one step of a sampled lane change. The sensors of the ego, which is behind all other
+/// vehicles, are not simulated.
 ///
 /// # Errors
 /// [`StepError`] if the scenario cannot be run, or if no road can be drawn from its lanes.
@@ -226,8 +228,8 @@ impl fmt::Display for Sampled {
 impl Sampled {
     /// Creates the sampled lane change of an encounter, without runs.
     pub fn new(encounter: &RecordedEncounter) -> Self {
-        let [opp1, _, own] = encounter.ego_lead_rear().map(|track| track.track_id);
-        let title = format!("{}: lane change of track {own}", encounter.data_name);
+        let [opp1, _, lane_changer] = encounter.ego_lead_rear().map(|track| track.track_id);
+        let title = format!("{}: lane change of track {lane_changer}", encounter.data_name);
         Self {
             title,
             opp1,

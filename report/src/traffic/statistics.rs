@@ -1,4 +1,5 @@
-//! Statistics of recorded lane changes: a table for human readers, and box plots by trajectory file and vehicle class.
+//! Statistics of recorded lane changes: a table for human readers, and box plots by trajectory file
+//! and vehicle class.
 
 use std::fmt;
 
@@ -7,8 +8,8 @@ use closecall_recorded::lane_change::LaneChange;
 
 use super::trajectory_charts::{BoxChart, BoxSummary, ChartError};
 
-/// Names of the charts' files: the durations, the widths of the peaks of lateral speed, and the speeds at
-/// the crossing and at the peak.
+/// Names of the charts' files: the durations, the widths of the peaks of lateral speed, and the
+/// speeds at the crossing and at the peak.
 pub const STATISTICS_CHARTS: [&str; 4] = ["duration.svg", "width.svg", "speed.svg", "peak-speed.svg"];
 
 /// The statistics as a table for human readers.
@@ -17,9 +18,9 @@ pub struct StatisticsText<'a>(pub &'a Statistics);
 
 impl fmt::Display for StatisticsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let found = self.0;
+        let statistics = self.0;
         writeln!(f, "class       lane changes    left   right  complete  overlapping  parts of doubles")?;
-        for class in &found.classes {
+        for class in &statistics.classes {
             let ClassStatistics { vehicle_class, lane_changes, to_the_left, complete, overlapping, double, .. } = class;
             let right = lane_changes - to_the_left;
             writeln!(
@@ -29,13 +30,13 @@ impl fmt::Display for StatisticsText<'_> {
             )?;
         }
         writeln!(f, "\ncomplete ones           n    mean     low      25 %   50 %   75 %    high")?;
-        for class in &found.classes {
+        for class in &statistics.classes {
             write_box(f, class, "duration [s]", class.duration_s.as_ref())?;
             write_box(f, class, "width [s]", class.width_s.as_ref())?;
             write_box(f, class, "speed [m/s]", class.speed_mps.as_ref())?;
         }
         writeln!(f, "\ncorrelation over complete ones                  n   Pearson  Spearman")?;
-        for Correlation { of, with, n, pearson, spearman } in &found.correlations {
+        for Correlation { of, with, n, pearson, spearman } in &statistics.correlations {
             let number = |value: &Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
             writeln!(f, "{of:<20} {with:<20} {n:>7} {:>9} {:>9}", number(pearson), number(spearman))?;
         }
@@ -46,7 +47,7 @@ impl fmt::Display for StatisticsText<'_> {
 fn write_box(
     f: &mut fmt::Formatter<'_>,
     class: &ClassStatistics,
-    what: &str,
+    metric: &str,
     numbers: Option<&BoxPlot>,
 ) -> fmt::Result {
     let name = class.vehicle_class.name();
@@ -55,7 +56,7 @@ fn write_box(
     };
     writeln!(
         f,
-        "{name:<6} {what:<13} {n:>5} {mean:>7.2} {low:>7.2} {quarter:>9.2} {median:>6.2} {three_quarters:>6.2} {high:>7.2}"
+        "{name:<6} {metric:<13} {n:>5} {mean:>7.2} {low:>7.2} {quarter:>9.2} {median:>6.2} {three_quarters:>6.2} {high:>7.2}"
     )
 }
 
@@ -94,17 +95,18 @@ pub(super) const BOXED: [Boxed; 4] = [
     },
 ];
 
-/// Draws the durations, widths and speeds of complete lane changes as box plots with the single values, one box per
-/// trajectory file and vehicle class. The charts (SVG) are in the order of [`STATISTICS_CHARTS`].
+/// Draws the durations, widths and speeds of complete lane changes as box plots with the single
+/// values, one box per trajectory file and vehicle class. The charts (SVG) are in the order of
+/// [`STATISTICS_CHARTS`].
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
 pub fn statistics_charts(recordings: &[RecordedChanges]) -> Result<[String; 4], ChartError> {
     let boxes = |boxed: &Boxed| {
-        let of_file = |one: &RecordedChanges| {
-            let mut boxes = by_class(&one.changes, boxed);
+        let of_file = |recording: &RecordedChanges| {
+            let mut boxes = by_class(&recording.changes, boxed);
             if recordings.len() > 1 {
-                boxes.iter_mut().for_each(|found| found.name = format!("{} {}", one.name, found.name));
+                boxes.iter_mut().for_each(|summary| summary.name = format!("{} {}", recording.name, summary.name));
             }
             boxes
         };

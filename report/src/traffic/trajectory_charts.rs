@@ -1,5 +1,5 @@
-//! Charts of statistics over trajectory data, each in an SVG file of its own: lines over a reference level, and box plots
-//! by vehicle class.
+//! Charts of statistics over trajectory data, each in an SVG file of its own: lines over a
+//! reference level, and box plots by vehicle class.
 
 use std::ops::Range;
 
@@ -47,7 +47,7 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
     /// The index of the colour. Lines that belong together share a colour.
     pub colour: usize,
-    /// True if the line is drawn pale, beside a line that matters more.
+    /// True if the line is drawn pale, beside a more important line.
     pub faint: bool,
 }
 
@@ -101,7 +101,8 @@ pub struct LineChart {
     pub bands: Vec<Band>,
     /// The vertical lines.
     pub marks: Vec<Mark>,
-    /// The largest value of the vertical axis, if larger values do not matter. Lines end where they exceed it.
+    /// The largest value of the vertical axis, if larger values do not matter. Lines end where they
+    /// exceed it.
     pub most: Option<f64>,
 }
 
@@ -194,7 +195,8 @@ impl LineChart {
     }
 }
 
-/// Returns the finite points of a line up to the value `most`, with the point at which the line exceeds it.
+/// Returns the finite points of a line up to the value `most`, with the point at which the line
+/// exceeds it.
 fn below(points: &[(f64, f64)], most: f64) -> Vec<(f64, f64)> {
     let mut shown: Vec<(f64, f64)> = Vec::new();
     for &(x, y) in points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
@@ -216,7 +218,7 @@ impl BoxChart {
     /// # Errors
     /// [`ChartError`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, ChartError> {
-        let longest = self.boxes.iter().map(|one| one.name.chars().count()).max().unwrap_or(0);
+        let longest = self.boxes.iter().map(|summary| summary.name.chars().count()).max().unwrap_or(0);
         let boxes_px = self.boxes.len().saturating_mul(longest.saturating_mul(LETTER_PX));
         let width = FILE_PX.0.max(u32::try_from(boxes_px).unwrap_or(u32::MAX));
         sized_file(&self.title, (width, FILE_PX.1), |canvas| self.draw(canvas))
@@ -230,18 +232,18 @@ impl BoxChart {
             text: Box::new(|x: &f64| self.name_at(*x)),
             has_grid: false,
         };
-        let values = self.boxes.iter().flat_map(|one| one.five.iter().chain(&one.values).copied());
+        let values = self.boxes.iter().flat_map(|summary| summary.five.iter().chain(&summary.values).copied());
         let y = number_axis(&self.y_name, range(values, Some(0.0)));
         let mut plot = axes(canvas, Some(&self.title), &x, &y)?;
-        for (index, one) in self.boxes.iter().enumerate() {
-            plot.draw_series(elements(index, one))?;
-            // The dots lie beside each other, so that equal values do not cover each other.
+        for (index, summary) in self.boxes.iter().enumerate() {
+            plot.draw_series(elements(index, summary))?;
+            // The dots lie beside each other: equal values do not cover each other.
             let beside = |number: usize| DOTS * ((number as f64 * GOLDEN).fract() - 0.5);
             let dot = |(number, value): (usize, &f64)| {
                 let style = series_colour(index).mix(DOT_OPACITY).filled();
                 Circle::new((index as f64 + beside(number), *value), 2, style)
             };
-            plot.draw_series(one.values.iter().enumerate().map(dot))?;
+            plot.draw_series(summary.values.iter().enumerate().map(dot))?;
         }
         Ok(())
     }
@@ -251,17 +253,17 @@ impl BoxChart {
         let nearest = x.round();
         let is_middle = (x - nearest).abs() < 1e-9 && nearest >= 0.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
-        let found = is_middle.then(|| self.boxes.get(nearest as usize)).flatten();
-        found.map_or(String::new(), |one| one.name.clone())
+        let summary = is_middle.then(|| self.boxes.get(nearest as usize)).flatten();
+        summary.map_or(String::new(), |summary| summary.name.clone())
     }
 }
 
 /// Returns the box, its median and its whiskers.
-fn elements<'a>(index: usize, one: &BoxSummary) -> Vec<DynElement<'static, SVGBackend<'a>, (f64, f64)>> {
+fn elements<'a>(index: usize, summary: &BoxSummary) -> Vec<DynElement<'static, SVGBackend<'a>, (f64, f64)>> {
     const HALF_BOX: f64 = 0.22;
     const HALF_CAP: f64 = 0.1;
     let x = index as f64;
-    let [low, quarter, median, three_quarters, high] = one.five;
+    let [low, quarter, median, three_quarters, high] = summary.five;
     let style = BLACK.stroke_width(1);
     let line = |a: (f64, f64), b: (f64, f64)| PathElement::new(vec![a, b], style).into_dyn();
     let corners = [(x - HALF_BOX, quarter), (x + HALF_BOX, three_quarters)];
@@ -292,8 +294,8 @@ fn sized_file(title: &str, size_px: (u32, u32), draw: impl FnOnce(&Canvas<'_>) -
     drawn.map_err(|error| ChartError { title: title.to_owned(), message: error.to_string() })
 }
 
-/// Returns the range from the smallest to the largest finite value, with a margin. The range includes `from` if there is
-/// one, and is never empty.
+/// Returns the range from the smallest to the largest finite value, with a margin. The range
+/// includes `from` if there is one, and is never empty.
 pub(super) fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> Range<f64> {
     const MARGIN: f64 = 0.06;
     let finite = values.filter(|value| value.is_finite()).chain(from);
@@ -345,11 +347,11 @@ mod tests {
 
     #[test]
     fn boxes_are_named_and_a_chart_without_boxes_is_drawn() {
-        let one =
+        let summary =
             BoxSummary { name: "car (n = 9)".to_owned(), five: [1.0, 2.0, 3.0, 4.0, 6.0], values: vec![1.0, 2.0, 9.0] };
         let chart = |boxes| BoxChart { title: "Durations".to_owned(), y_name: "s".to_owned(), boxes }.svg().unwrap();
-        assert!(chart(vec![one.clone()]).contains("car (n = 9)"));
-        assert!(chart(vec![one.clone(), one]).contains("</svg>"));
+        assert!(chart(vec![summary.clone()]).contains("car (n = 9)"));
+        assert!(chart(vec![summary.clone(), summary]).contains("</svg>"));
         assert!(chart(Vec::new()).contains("Durations"));
     }
 }

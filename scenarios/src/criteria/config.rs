@@ -12,12 +12,12 @@ use super::measure::{MEASURES, Measure, MeasureKind};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct GateConfig {
-    /// Criteria that the samples of each scenario must satisfy, such as `count(ego_collided) <= 0` or
-    /// `p1(min_ttc_rear_s) >= 1.0`.
+    /// Criteria that the samples of each scenario must satisfy, such as `count(ego_collided) <= 0`
+    /// or `p1(min_ttc_rear_s) >= 1.0`.
     #[serde(default)]
     pub require: Vec<Expression>,
-    /// Highest probability of a collision of the ego that passes, above 0 and below 1. The exact upper bound of each scenario
-    /// must not exceed it.
+    /// Highest probability of a collision of the ego that passes, above 0 and below 1. The exact
+    /// upper bound of each scenario must not exceed it.
     pub max_probability: Option<f64>,
     /// Confidence of that bound, above 0.5 and below 1; 0.95 if absent.
     pub confidence: Option<f64>,
@@ -47,10 +47,7 @@ impl std::str::FromStr for FlagName {
     fn from_str(text: &str) -> Result<Self, String> {
         match Measure::named(text) {
             Some(measure) if measure.kind == MeasureKind::Flag => Ok(Self(measure)),
-            _ => Err(format!(
-                "`{text}` is not something that can be expected of a run; there are {}",
-                names().join(", ")
-            )),
+            _ => Err(format!("`{text}` cannot be expected of a run; these can: {}", names().join(", "))),
         }
     }
 }

@@ -1,12 +1,13 @@
-//! Events: what may happen in one sample, in the words of gates.
+//! Events that may happen in one sample, in the words of gates.
 //!
 //! ```text
 //!  expression = event [ " - " event ]
 //!  event      = flag | quantity ( "<" | "<=" | ">" | ">=" ) number | "collision"
 //! ```
 //!
-//! `min_ttc_rear_s < 0.3` happens in a sample whose smallest time to collision is below 0.3 s. `prevented - induced` asks for the difference of two
-//! probabilities. `collision` is short for `ego_collided`.
+//! `min_ttc_rear_s < 0.3` happens in a sample whose smallest time to collision is below 0.3 s.
+//! `prevented - induced` asks for the difference of two probabilities. `collision` is short for
+//! `ego_collided`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -32,7 +33,7 @@ impl Comparison {
         [("<=", Self::AtMost), (">=", Self::AtLeast), ("<", Self::Below), (">", Self::Above)];
 
     fn text(self) -> &'static str {
-        Self::ALL.iter().find(|(_, one)| *one == self).map_or("", |(text, _)| text)
+        Self::ALL.iter().find(|(_, event)| *event == self).map_or("", |(text, _)| text)
     }
 
     const fn is_small(self) -> bool {
@@ -40,7 +41,7 @@ impl Comparison {
     }
 }
 
-/// What may happen in one sample.
+/// An event that may happen in one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// The flag, or the number that is compared.
@@ -49,7 +50,8 @@ pub struct Event {
 }
 
 impl Event {
-    /// Returns true if the event happens in a sample with this value of the quantity. A value that is not a number is no event.
+    /// Returns true if the event happens in a sample with this value of the quantity. A value that
+    /// is not a number is no event.
     pub fn happens(&self, value: f64) -> bool {
         match self.bound {
             None => value == 1.0,
@@ -60,7 +62,8 @@ impl Event {
         }
     }
 
-    /// Returns how far a value is beyond the bound, negative where the event does not happen; `None` for a flag.
+    /// Returns how far a value is beyond the bound, negative if the event does not happen; `None`
+    /// for a flag.
     pub fn excess(&self, value: f64) -> Option<f64> {
         let (comparison, bound) = self.bound?;
         Some(if comparison.is_small() { bound - value } else { value - bound })
@@ -154,7 +157,8 @@ fn parse_event(text: &str) -> Result<Event, String> {
     }
 }
 
-/// The number that leads to an event: of the smallest of something, a smaller one is nearer, else a larger one.
+/// The number that leads to an event: of the smallest of something, a smaller one is nearer, else a
+/// larger one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guide(pub &'static Measure);
 

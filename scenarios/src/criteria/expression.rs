@@ -24,7 +24,7 @@ use crate::coverage::CoverageName;
 
 use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
 
-/// What is computed from all samples.
+/// A value that is computed from all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aggregate {
     /// The number of samples in which a flag holds.
@@ -70,16 +70,17 @@ pub enum Side {
 pub struct Comparison {
     /// The number.
     pub measure: &'static Measure,
-    /// Whether it is that of the baseline, and not that of the arm under test.
+    /// Whether the measure is taken in the baseline, instead of the arm under test.
     pub in_baseline: bool,
-    /// Where the flag holds.
+    /// The side of the bound on which the flag holds.
     pub side: Side,
     /// The threshold, at which the flag does not hold.
     pub threshold: f64,
 }
 
 impl Comparison {
-    /// Returns 1 if a value lies beyond the threshold, and 0 if not. What is not a number stays so, and satisfies no gate.
+    /// Returns 1 if a value lies beyond the threshold, and 0 if not. What is not a number stays so,
+    /// and satisfies no gate.
     pub fn of(&self, value: f64) -> f64 {
         let holds = match self.side {
             Side::Above => value > self.threshold,
@@ -114,7 +115,7 @@ impl Quantity {
         }
     }
 
-    /// Returns the measure, and whether it is that of the baseline; `None` for a flag of the pair.
+    /// Returns the measure, and whether it is taken in the baseline; `None` for a flag of the pair.
     pub const fn measure(self) -> Option<(&'static Measure, bool)> {
         match self {
             Self::Tested(measure) => Some((measure, false)),
@@ -155,9 +156,9 @@ impl Operator {
 /// A gate: an aggregate, and the bound that it must satisfy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expression {
-    /// What is computed.
+    /// The aggregate that is computed.
     pub aggregate: Aggregate,
-    /// Of which value of each sample.
+    /// The value of each sample that is aggregated.
     pub quantity: Quantity,
     /// Only samples in which this flag holds count.
     pub condition: Option<Quantity>,
@@ -173,19 +174,21 @@ impl Expression {
         self.quantity.needs_pairs() || self.condition.is_some_and(Quantity::needs_pairs)
     }
 
-    /// Returns the arms of which the gate judges what they report of themselves: the baseline, and the arm under test.
+    /// Returns the arms whose own reports the gate judges: the baseline, and the arm under test.
     pub fn reported_by(&self) -> [bool; 2] {
         let quantities = || std::iter::once(self.quantity).chain(self.condition);
         let reports = |by_baseline: bool| {
-            let reported = |of: Quantity| {
-                of.measure().is_some_and(|(measure, in_baseline)| in_baseline == by_baseline && measure.is_reported())
+            let reported = |quantity: Quantity| {
+                quantity
+                    .measure()
+                    .is_some_and(|(measure, in_baseline)| in_baseline == by_baseline && measure.is_reported())
             };
             quantities().any(reported)
         };
         [reports(true), reports(false)]
     }
 
-    /// Returns the left-hand side, which identifies what is judged.
+    /// Returns the left-hand side, which identifies the judged quantity.
     pub fn subject(&self) -> String {
         let condition = self.condition.map_or_else(String::new, |condition| format!(" | {condition}"));
         format!("{}({}{condition})", self.aggregate, self.quantity)

@@ -1,7 +1,7 @@
 //! Measures of one sample that a gate can judge.
 //!
-//! A measure has one value per sample and arm, or none. A *flag* is a measure that is 0 or 1. Names are those of the columns
-//! of `outcomes.parquet` where there is one.
+//! A measure has one value per sample and arm, or none. A *flag* is a measure that is 0 or 1. If
+//! `outcomes.parquet` has a column for the measure, both have the same name.
 
 use crate::harm::harm;
 use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome, Promise, worse};
@@ -22,9 +22,9 @@ pub enum MeasureKind {
 pub struct Measure {
     /// The name in gates.
     pub name: &'static str,
-    /// Whether it counts or quantifies.
+    /// Whether the measure counts or quantifies.
     pub kind: MeasureKind,
-    /// What it means, for people.
+    /// The meaning of the measure, for people.
     pub meaning: &'static str,
     value: fn(&Outcome) -> Option<f64>,
 }
@@ -47,7 +47,8 @@ impl Measure {
         (self.value)(outcome)
     }
 
-    /// Returns true if the controller reports the measure of itself, so that it is no evidence of a controller from outside.
+    /// Returns true if the controller reports the measure of itself. It is then no evidence of a
+    /// controller from outside.
     pub fn is_reported(&self) -> bool {
         REPORTED.contains(&self.name)
     }
@@ -87,7 +88,7 @@ impl PairFlag {
         }
     }
 
-    /// Returns what the flag means, for people.
+    /// Returns the meaning of the flag, for people.
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::Prevented => "the ego collides in the baseline, and no vehicle collides in the arm under test",
@@ -119,24 +120,24 @@ fn reached(outcome: &Outcome, moment: Moment) -> Option<f64> {
     is(outcome.moment(moment).is_some())
 }
 
-fn margin(outcome: &Outcome, of: fn(&Margins) -> Measured) -> Option<f64> {
-    of(&outcome.margins).ok()
+fn margin(outcome: &Outcome, value: fn(&Margins) -> Measured) -> Option<f64> {
+    value(&outcome.margins).ok()
 }
 
-fn mis(outcome: &Outcome, of: fn(&MisSummary) -> Measured) -> Option<f64> {
-    of(outcome.mis.as_ref().ok()?).ok()
+fn mis(outcome: &Outcome, value: fn(&MisSummary) -> Measured) -> Option<f64> {
+    value(outcome.mis.as_ref().ok()?).ok()
 }
 
-/// Amount by which an ego may be slower than its lead vehicle without a reason (m/s): an assumption, above what a cruise control needs to keep its gap; 0.2
-/// to 1 are plausible.
+/// Amount by which an ego may be slower than its lead vehicle without a reason (m/s): an
+/// assumption, above what a cruise control needs to keep its gap; 0.2 to 1 are plausible.
 const SLOWED_MPS: f64 = 0.5;
 
-fn cost(outcome: &Outcome, of: fn(&Cost) -> f64) -> Option<f64> {
-    outcome.cost.as_ref().map(of)
+fn cost(outcome: &Outcome, value: fn(&Cost) -> f64) -> Option<f64> {
+    outcome.cost.as_ref().map(value)
 }
 
-fn promise(outcome: &Outcome, of: fn(&Promise) -> Measured) -> Option<f64> {
-    of(outcome.promise.as_ref()?).ok()
+fn promise(outcome: &Outcome, value: fn(&Promise) -> Measured) -> Option<f64> {
+    value(outcome.promise.as_ref()?).ok()
 }
 
 /// Front time headway that the ego gained from the engagement to the critical distance (s).

@@ -1,11 +1,13 @@
-//! Pass criteria: what a scenario file, a project file or the command line asks of the outcomes of a campaign.
+//! Pass criteria: the demands of a scenario file, a project file or the command line on the
+//! outcomes of a campaign.
 //!
 //! ```text
 //!  "p99(min_ttc_rear_s) >= 1.0" ─▶ Expression { aggregate, quantity, condition, operator, bound }
 //!                                                  └─▶ Measure: one value per outcome
 //! ```
 //!
-//! This module holds the language and the measures of one run. The crate `closecall-campaign` evaluates criteria over many.
+//! This module holds the language and the measures of one run. The crate `closecall-campaign`
+//! evaluates criteria over many.
 
 mod config;
 mod event;

@@ -7,9 +7,9 @@ const SAMPLES: u64 = 4_000;
 
 fn scenario(rear: &str) -> Scenario {
     let text = library::text("low-thw-overtake").unwrap();
-    let own = "vehicle = { class = \"$rear-class\", fleet = \"germany\" }";
-    assert!(text.contains(own));
-    let file = ScenarioFile::parse(Path::new("own.toml"), &text.replace(own, rear), &[]).unwrap();
+    let library_vehicle = "vehicle = { class = \"$rear-class\", fleet = \"germany\" }";
+    assert!(text.contains(library_vehicle));
+    let file = ScenarioFile::parse(Path::new("own.toml"), &text.replace(library_vehicle, rear), &[]).unwrap();
     file.concrete(&file.space().nominal()).unwrap()
 }
 
@@ -62,10 +62,10 @@ fn looks_have_the_shares_of_the_file() {
     let drawn: Vec<Vehicle> = (0..SAMPLES).map(|sample| rear(&scenario, sample)).collect();
     let fleet = Fleet::named("germany").unwrap();
     let holds = |share: f64, is: &dyn Fn(&Vehicle) -> bool| {
-        let found = drawn.iter().filter(|vehicle| is(vehicle)).count() as f64 / SAMPLES as f64;
+        let drawn_share = drawn.iter().filter(|vehicle| is(vehicle)).count() as f64 / SAMPLES as f64;
         // Four standard deviations of a binomial share.
         let tolerance = 4.0 * (share * (1.0 - share) / SAMPLES as f64).sqrt();
-        assert!((found - share).abs() <= tolerance, "{found} instead of {share}");
+        assert!((drawn_share - share).abs() <= tolerance, "{drawn_share} instead of {share}");
     };
     for (name, share) in &fleet.car.shapes {
         holds(*share, &|vehicle| vehicle.appearance.body_shape.name() == name);

@@ -20,12 +20,13 @@ pub struct ApplyError {
     pub source: Box<ScenarioError>,
 }
 
-/// What a member makes of a scenario.
+/// The result of applying a member to a scenario.
 #[derive(Clone, Debug)]
 pub enum Application {
     /// The scenario with the member's drivers, named SCENARIO@MEMBER.
     Entry(Box<ScenarioFile>),
-    /// The member changes nothing: the scenario has no driver with one of its keys, or the values are the same.
+    /// The member changes nothing: the scenario has no driver with one of its keys, or the values
+    /// are the same.
     NoEffect,
 }
 
@@ -38,8 +39,9 @@ struct Place {
 impl Member {
     /// Applies the member to every human driver of `file` that is not prescribed, and checks the result.
     ///
-    /// A parameter that only the replaced values use keeps its name and gets the member's distribution, so that the other
-    /// parameters keep their values in every sampling design. Any other distribution becomes a new parameter.
+    /// A parameter that only the replaced values use keeps its name and gets the member's
+    /// distribution. The other parameters then keep their values in every sampling design. Any
+    /// other distribution becomes a new parameter.
     ///
     /// # Errors
     /// [`ApplyError`] if a value is not valid for a driver of the scenario.
@@ -67,7 +69,8 @@ impl Member {
         Ok(Application::Entry(Box::new(entry)))
     }
 
-    /// Changes the car-following model of one actor if the member asks for it, and collects the places of the keys to set.
+    /// Changes the car-following model of one actor if the member asks for it, and collects the
+    /// places of the keys to set.
     fn change_actor(&self, document: &mut DocumentMut, index: usize, places: &mut Vec<Place>) {
         let Some(actor) = actor_mut(document, index) else { return };
         let Some(driver) = actor.get_mut("driver").and_then(Item::as_table_like_mut) else { return };
@@ -85,14 +88,15 @@ impl Member {
             let path = ["driver".to_owned(), kind.clone()].into_iter().chain(below).collect();
             Some((path, set))
         };
-        let found: Vec<(Vec<String>, usize)> = sets.into_iter().filter_map(with_path).collect();
-        places.extend(found.into_iter().map(|(path, set)| Place {
+        let paths: Vec<(Vec<String>, usize)> = sets.into_iter().filter_map(with_path).collect();
+        places.extend(paths.into_iter().map(|(path, set)| Place {
             path: ["actor".to_owned(), index.to_string()].into_iter().chain(path).collect(),
             set,
         }));
     }
 
-    /// Replaces the car-following model if the member names another one. Returns the kind of the driver and its model.
+    /// Replaces the car-following model if the member names another one. Returns the kind of the
+    /// driver and its model.
     fn with_model(&self, driver: &mut dyn TableLike, kind: &str) -> (String, String) {
         let holder: &mut dyn TableLike = match kind {
             "overtaker" => {
@@ -149,8 +153,8 @@ impl Member {
     }
 }
 
-/// Returns the table of another model with the keys of `table` that it has: those of both models, and the two that mean the
-/// same.
+/// Returns the table of another model with the keys of `table` that it has: the keys of both
+/// models, and the two keys that mean the same.
 fn converted(table: &dyn TableLike, model: &str) -> InlineTable {
     let mut converted = InlineTable::new();
     for (key, item) in table.iter() {
@@ -166,15 +170,15 @@ fn converted(table: &dyn TableLike, model: &str) -> InlineTable {
             converted.insert(key, value);
         }
     }
-    // The headways that the scenario leaves out are those of its own model.
+    // Headways that the scenario leaves out have the defaults of its own model.
     let defaults = [
         ("idm", "standstill-gap-m", 1.5),
         ("idm", "time-gap-s", 0.9),
         ("wiedemann99", "cc0-m", 2.0),
         ("wiedemann99", "cc1-s", 1.5),
     ];
-    for (of, key, default) in defaults {
-        if of == model && !converted.contains_key(key) {
+    for (from_model, key, default) in defaults {
+        if from_model == model && !converted.contains_key(key) {
             converted.insert(key, Value::from(default));
         }
     }
@@ -185,7 +189,7 @@ fn actor_mut(document: &mut DocumentMut, index: usize) -> Option<&mut Table> {
     document.get_mut("actor")?.as_array_of_tables_mut()?.get_mut(index)
 }
 
-/// Returns the name of the parameter that stands at `path` of the document, if one does.
+/// Returns the name of the parameter at `path` of the document, if there is one.
 fn parameter_at(document: &mut DocumentMut, path: &[String]) -> Option<String> {
     let [_, index, keys @ ..] = path else { return None };
     let mut table: &dyn TableLike = actor_mut(document, index.parse().ok()?)?;
@@ -264,7 +268,7 @@ fn uses_in_value(value: &Value, name: &str) -> usize {
     }
 }
 
-/// Removes the parameters of `names` that no value uses any more.
+/// Removes the parameters of `names` that no value uses.
 fn remove_unused(document: &mut DocumentMut, names: impl Iterator<Item = String>) {
     for name in names {
         if uses(document.as_item(), &name) == 0

@@ -53,13 +53,14 @@ pub enum MemberError {
         /// The name of both.
         name: String,
     },
-    /// There is no member of that name, no such file and no such folder, or the folder has no member.
-    #[error("{what}: expected a file or folder of members (*.toml), or one of {known}{suggestion}")]
+    /// There is no member of that name, no such file and no such folder, or the folder has no
+    /// member.
+    #[error("{place}: expected a file or folder of members (*.toml), or one of {names}{suggestion}")]
     Unknown {
-        /// What was not found.
-        what: String,
+        /// The place that is no member.
+        place: String,
         /// The members that are part of the program.
-        known: String,
+        names: String,
         /// A similar name.
         suggestion: String,
     },
@@ -130,7 +131,7 @@ impl Member {
     /// Reads the text of a member file. `path` appears in messages.
     ///
     /// # Errors
-    /// [`MemberError`] if the text is not that of a member, or if a key or a distribution is not valid.
+    /// [`MemberError`] if the text is no member, or if a key or a distribution is not valid.
     pub fn parse(path: &Path, text: &str) -> Result<Self, MemberError> {
         let config: MemberConfig = toml::from_str(text).map_err(|error| MemberError::Syntax {
             path: path.to_owned(),
@@ -193,7 +194,7 @@ impl Member {
         &self.description
     }
 
-    /// Returns what the member sets, each as `key = value` with its source.
+    /// Returns the settings of the member, each as `key = value` with its source.
     pub fn values(&self) -> Vec<(String, String)> {
         let follow = self.follow.iter().map(|(model, source)| (format!("follow = {model}"), source.clone()));
         let sets = self.sets.iter().map(|set| (format!("{} = {}", set.key, set.value), set.source.clone()));
@@ -220,7 +221,7 @@ impl std::fmt::Display for SetValue {
     }
 }
 
-/// Checks one `[[set]]`. The error is the key within it, and what is wrong.
+/// Checks one `[[set]]`. The error is the key within it, and the reason.
 fn check_set(set: SetText) -> Result<Set, (String, String)> {
     let wrong = |key: &str, message: String| Err((key.to_owned(), message));
     if let Some(allowed) = unknown(&set.key) {

@@ -1,4 +1,4 @@
-//! The keys of a driver table that a member may set, and where they stand in each kind of driver.
+//! The keys of a driver table that a member may set, and their places in each kind of driver.
 
 use closecall_traffic::suggest::hint;
 
@@ -44,18 +44,18 @@ fn all() -> impl Iterator<Item = &'static str> {
     lists.into_iter().flatten().copied()
 }
 
-/// Returns what is allowed if `key` is not a key of any driver.
+/// Returns the allowed keys if `key` is not a key of any driver.
 pub(super) fn unknown(key: &str) -> Option<String> {
-    if all().any(|known| known == key) {
+    if all().any(|key_name| key_name == key) {
         return None;
     }
-    let known: Vec<String> = all().map(|known| format!("`{known}`")).collect();
-    let known = known.join(", ");
-    Some(format!("expected one of {known}{}", hint(key, &known)))
+    let names: Vec<String> = all().map(|key_name| format!("`{key_name}`")).collect();
+    let names = names.join(", ");
+    Some(format!("expected one of {names}{}", hint(key, &names)))
 }
 
-/// Returns the path of `key` below the table of a driver of this kind that follows by `model`, or `None` if such a driver
-/// does not have the key.
+/// Returns the path of `key` below the table of a driver of this kind that follows by `model`, or
+/// `None` if such a driver does not have the key.
 pub(super) fn path_in(kind: &str, model: &str, key: &str) -> Option<Vec<String>> {
     let split = |prefix: &[&str]| prefix.iter().copied().chain(key.split('.')).map(str::to_owned).collect::<Vec<_>>();
     let of_model = OF_MODEL.contains(&key)

@@ -37,7 +37,7 @@ pub struct MemberEntry {
     pub name: String,
     /// How its drivers drive.
     pub description: String,
-    /// What it sets, each as `key = value`.
+    /// The member's settings, each as `key = value`.
     pub sets: Vec<String>,
     /// The source of each value.
     pub sources: Vec<String>,
@@ -68,8 +68,8 @@ pub(super) fn all() -> Result<Vec<Member>, MemberError> {
 /// # Errors
 /// [`MemberError`] if the embedded member is invalid, which is a defect of the program.
 pub(super) fn named(name: &str) -> Result<Option<Member>, MemberError> {
-    let found = SHIPPED.into_iter().find(|(known, _)| *known == name);
-    found.map(|(name, text)| Member::parse(&path(name), text)).transpose()
+    let shipped = SHIPPED.into_iter().find(|(member, _)| *member == name);
+    shipped.map(|(name, text)| Member::parse(&path(name), text)).transpose()
 }
 
 /// Describes every member.
@@ -84,7 +84,8 @@ pub fn entries() -> Result<Vec<MemberEntry>, MemberError> {
     Ok(all()?.iter().map(entry).collect())
 }
 
-/// Returns the path by which messages name a member that is part of the program. No such file is read.
+/// Returns the path by which messages name a member that is part of the program. No such file is
+/// read.
 fn path(name: &str) -> PathBuf {
     PathBuf::from(format!("ensemble/{name}.toml"))
 }

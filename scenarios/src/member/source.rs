@@ -9,11 +9,13 @@ use super::shipped::{all, named, names};
 use super::{Application, ApplyError, Member, MemberError};
 use crate::ScenarioFile;
 
-/// Reads members: `FILE`, `FOLDER` (each `*.toml` in it, in alphabetical order), or `NAME` of a member that is part of the
-/// program. Without arguments, every member that is part of the program is read.
+/// Reads members: `FILE`, `FOLDER` (each `*.toml` in it, in alphabetical order), or `NAME` of a
+/// member that is part of the program. Without arguments, every member that is part of the program
+/// is read.
 ///
 /// # Errors
-/// [`MemberError`] if there is no such member, if a file is not valid, or if two members have the same name.
+/// [`MemberError`] if there is no such member, if a file is not valid, or if two members have the
+/// same name.
 pub fn members(arguments: &[PathBuf]) -> Result<Vec<Member>, MemberError> {
     let mut members = Vec::new();
     for argument in arguments {
@@ -90,8 +92,9 @@ fn read(path: &Path) -> Result<Member, MemberError> {
     Member::parse(path, &text)
 }
 
-fn unknown(what: String, name: &str) -> MemberError {
-    let known: Vec<String> = names().map(|name| format!("`{name}`")).collect();
-    let suggestion = nearest(name, names()).map(|known| format!("; did you mean `{known}`?")).unwrap_or_default();
-    MemberError::Unknown { what, known: known.join(", "), suggestion }
+fn unknown(place: String, name: &str) -> MemberError {
+    let allowed: Vec<String> = names().map(|name| format!("`{name}`")).collect();
+    let suggestion =
+        nearest(name, names()).map(|candidate| format!("; did you mean `{candidate}`?")).unwrap_or_default();
+    MemberError::Unknown { place, names: allowed.join(", "), suggestion }
 }

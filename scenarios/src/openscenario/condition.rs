@@ -44,7 +44,7 @@ impl Storyboard<'_> {
         if is_now && memory.fired_s.is_none() {
             memory.fired_s = Some(time_s);
         }
-        // A condition with a delay stays true once it has been: its value then is that of the past.
+        // A condition with a delay stays true once it has been true: its value is a past value.
         Ok(match delay_s > 0.0 {
             true => memory.fired_s.is_some_and(|fired_s| time_s >= fired_s + delay_s - 1e-9),
             false => is_now,
@@ -112,7 +112,7 @@ impl Storyboard<'_> {
         }
     }
 
-    fn by_entity(&self, own: &Vehicle, node: &Node) -> Result<bool, ImportError> {
+    fn by_entity(&self, vehicle: &Vehicle, node: &Node) -> Result<bool, ImportError> {
         let reader = &self.reader;
         if let Some(kind) = reader.optional(node, "relativeDistanceType")?.filter(|kind| kind != "longitudinal") {
             return Err(reader.error(node, format!("`relativeDistanceType` is `{kind}`: only `longitudinal` is read")));
@@ -120,9 +120,11 @@ impl Storyboard<'_> {
         match node.name.as_str() {
             "TimeHeadwayCondition" => {
                 let other = self.vehicle(node, "entityRef")?;
-                let distance_m = own.distance_m(other, reader.is_true(node, "freespace")?);
+                let distance_m = vehicle.distance_m(other, reader.is_true(node, "freespace")?);
                 // A vehicle behind, or one that stands, has no headway.
-                Ok(distance_m >= 0.0 && own.speed_mps > 0.0 && self.compare(node, distance_m / own.speed_mps)?)
+                Ok(distance_m >= 0.0
+                    && vehicle.speed_mps > 0.0
+                    && self.compare(node, distance_m / vehicle.speed_mps)?)
             }
             "TimeToCollisionCondition" => {
                 let target = reader.child(node, &["TimeToCollisionConditionTarget"])?;
@@ -131,21 +133,21 @@ impl Storyboard<'_> {
                     return Err(reader.error(entity, "the target must be an `EntityRef`"));
                 }
                 let other = self.vehicle(entity, "entityRef")?;
-                let distance_m = own.distance_m(other, reader.is_true(node, "freespace")?);
-                let closing_mps = (own.speed_mps - other.speed_mps) * distance_m.signum();
+                let distance_m = vehicle.distance_m(other, reader.is_true(node, "freespace")?);
+                let closing_mps = (vehicle.speed_mps - other.speed_mps) * distance_m.signum();
                 Ok(closing_mps > 0.0 && self.compare(node, distance_m.abs() / closing_mps)?)
             }
             "RelativeDistanceCondition" => {
                 let other = self.vehicle(node, "entityRef")?;
-                self.compare(node, own.distance_m(other, reader.is_true(node, "freespace")?).abs())
+                self.compare(node, vehicle.distance_m(other, reader.is_true(node, "freespace")?).abs())
             }
-            "SpeedCondition" => self.compare(node, own.speed_mps),
-            "AccelerationCondition" => self.compare(node, own.acceleration_mps2.abs()),
+            "SpeedCondition" => self.compare(node, vehicle.speed_mps),
+            "AccelerationCondition" => self.compare(node, vehicle.acceleration_mps2.abs()),
             "RelativeSpeedCondition" => {
                 let other = self.vehicle(node, "entityRef")?;
-                self.compare(node, own.speed_mps - other.speed_mps)
+                self.compare(node, vehicle.speed_mps - other.speed_mps)
             }
-            "TraveledDistanceCondition" => Ok(own.travelled_m >= reader.number(node, "value")?),
+            "TraveledDistanceCondition" => Ok(vehicle.travelled_m >= reader.number(node, "value")?),
             _ => Err(reader.error(node, "this condition is not read")),
         }
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-/// Largest depth of elements: ten times that of a scenario.
+/// Largest depth of elements: ten times the depth of a scenario.
 const MOST_DEPTH: usize = 200;
 /// Largest number of elements: a road network of a city has some hundred thousand.
 const MOST_ELEMENTS: usize = 2_000_000;
@@ -39,7 +39,7 @@ pub(super) struct Node {
 impl Node {
     /// Returns an attribute as it stands in the file.
     pub(super) fn raw(&self, name: &str) -> Option<&str> {
-        self.attributes.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str())
+        self.attributes.iter().find(|(attribute, _)| attribute == name).map(|(_, value)| value.as_str())
     }
 
     /// Returns the first child of this name.
@@ -65,10 +65,12 @@ impl Node {
 
 /// Parses a document.
 ///
-/// Entities other than those of XML itself are refused: quick-xml expands none, so that no document grows while it is read.
+/// Only the entities of XML itself are accepted: quick-xml expands none, and no document grows
+/// while it is read.
 ///
 /// # Errors
-/// [`ImportError`] if the text is no XML document, has a document type declaration, or is too deep or too large.
+/// [`ImportError`] if the text is no XML document, has a document type declaration, or is too deep
+/// or too large.
 pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;

@@ -57,11 +57,13 @@ fn of_catalog(reader: &Reader, root: &Node, reference: &Node) -> Result<Vehicle,
             let text = input::read_text(&path)
                 .map_err(|error| reader.error(directory, format!("failed to read {}: {error}", path.display())))?;
             let document = parse(&path, &text)?;
-            let Some(found) = document.child("Catalog").filter(|found| found.raw("name") == Some(&catalog)) else {
+            let Some(document_catalog) =
+                document.child("Catalog").filter(|document_catalog| document_catalog.raw("name") == Some(&catalog))
+            else {
                 continue;
             };
             searched.push(path.display().to_string());
-            if let Some(node) = found.children.iter().find(|node| node.raw("name") == Some(&entry)) {
+            if let Some(node) = document_catalog.children.iter().find(|node| node.raw("name") == Some(&entry)) {
                 if node.name != "Vehicle" {
                     let message =
                         format!("`{entry}` is a `{}`: a scenario has cars, trucks and motorcycles", node.name);
@@ -79,7 +81,8 @@ fn of_catalog(reader: &Reader, root: &Node, reference: &Node) -> Result<Vehicle,
     Err(reader.error(reference, format!("no entry `{entry}` in the catalogue `{catalog}` ({places})")))
 }
 
-/// Returns the reader of an entry, with its parameters: their values stand in the reference, or else in the entry.
+/// Returns the reader of an entry with its parameters. The reference gives their values, or else
+/// the entry.
 fn with_declarations(entry: &Reader, node: &Node, reference: &Node, outer: &Reader) -> Result<Reader, ImportError> {
     let mut inner = entry.clone();
     inner.values.clear();

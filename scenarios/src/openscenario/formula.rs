@@ -29,10 +29,10 @@ pub(super) fn resolve(text: &str, values: &Values) -> Result<String, String> {
 }
 
 fn unknown(name: &str, values: &Values) -> String {
-    let known: Vec<_> = values.keys().map(String::as_str).collect();
+    let names: Vec<_> = values.keys().map(String::as_str).collect();
     format!(
         "there is no parameter `{name}`, only {}",
-        if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
     )
 }
 
@@ -45,9 +45,9 @@ struct Parser<'a> {
 impl Parser<'_> {
     fn takes(&mut self, sign: char) -> bool {
         let rest = self.rest.trim_start();
-        let found = rest.strip_prefix(sign);
-        self.rest = found.unwrap_or(rest);
-        found.is_some()
+        let after_sign = rest.strip_prefix(sign);
+        self.rest = after_sign.unwrap_or(rest);
+        after_sign.is_some()
     }
 
     fn sum(&mut self) -> Result<f64, String> {

@@ -4,10 +4,11 @@
 //!  FILE.xosc ─▶ parameters, vehicles, road ─▶ storyboard, played ─▶ speeds and lane changes at times ─▶ scenario file
 //! ```
 //!
-//! The storyboard is played once with vehicles that follow their actions exactly. What the other vehicles do becomes a
-//! prescribed driver: speeds and lane changes at their times. Where a trigger looks at the ego, its time is that of an ego
-//! that keeps the speed of the file, as in a nominal encounter: it is the same for every controller. What a scenario cannot
-//! say is an error with file, line and element, or a note; nothing is left out in silence.
+//! The storyboard is played once with vehicles that follow their actions exactly. The motion of the
+//! other vehicles becomes a prescribed driver: speeds and lane changes at their times. If a trigger
+//! refers to the ego, its time holds for an ego that keeps the speed of the file, as in a nominal
+//! encounter: it is the same for every controller. An element that a scenario cannot express is an
+//! error with file, line and element, or a note; nothing is left out in silence.
 
 mod condition;
 mod dom;
@@ -34,7 +35,8 @@ use self::storyboard::Storyboard;
 use self::world::Vehicle;
 use crate::{ScenarioError, ScenarioFile};
 
-/// Time gap of the ego's cruise control (s): an assumption, as the file has a controller of its own; 1 to 2 are plausible.
+/// Time gap of the ego's cruise control (s): an assumption, as the file has its own controller; 1
+/// to 2 are plausible.
 const TIME_GAP_S: f64 = 1.5;
 /// Allowed durations of a lane change (s), as in a scenario file.
 const LANE_CHANGE_S: [f64; 2] = [1.5, 20.0];
@@ -44,15 +46,16 @@ const SPEED_TOLERANCE_MPS: f64 = 1e-3;
 const AT_START_S: f64 = 0.05;
 /// Change of speed in one step of the storyboard above which no vehicle follows it (m/s).
 const JUMP_MPS: f64 = 0.5;
-/// Friction of the road that a friction scale of 1 stands for: that of a dry road.
+/// Friction of the road with a friction scale of 1: the friction of a dry road.
 const DRY_FRICTION: f64 = 0.9;
 
 /// How a file is imported.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
-    /// Name of the vehicle that the controller under test drives, or `None` for `Ego`, or the only one with a controller.
+    /// Name of the vehicle that the controller under test drives, or `None` for `Ego`, or the only
+    /// one with a controller.
     pub ego: Option<String>,
-    /// Values of parameters that replace those of the file.
+    /// Values of parameters that replace the values of the file.
     pub parameters: Vec<(String, String)>,
 }
 
@@ -61,7 +64,7 @@ pub struct ImportOptions {
 pub struct Imported {
     /// The text of the scenario file.
     pub text: String,
-    /// What the scenario says in another way than the file.
+    /// The parts that the scenario expresses in another way than the file.
     pub notes: Vec<String>,
     /// When events begin and end (s), as the storyboard was played.
     pub events: Vec<(f64, String)>,
@@ -112,23 +115,23 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     if let Some(text) = text_of_closecall(&root) {
         let parsed = ScenarioFile::parse(path, text, &[]).and_then(|file| file.check());
         parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
-        let notes = vec!["Closecall wrote this file: the scenario is the one that stands in it".to_owned()];
+        let notes = vec!["Closecall wrote this file: the scenario in it is used".to_owned()];
         return Ok(Imported { text: text.to_owned(), notes, events: Vec::new() });
     }
     for declaration in root.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
     {
         let name = reader.text(declaration, "name")?;
-        let given = options.parameters.iter().find(|(known, _)| *known == name).map(|(_, value)| value.clone());
-        let value = match given {
+        let stated = options.parameters.iter().find(|(option, _)| *option == name).map(|(_, value)| value.clone());
+        let value = match stated {
             Some(value) => value,
             None => reader.text(declaration, "value")?,
         };
         reader.values.insert(name, value);
     }
     if let Some((unknown, _)) = options.parameters.iter().find(|(name, _)| !reader.values.contains_key(name)) {
-        let known: Vec<_> = reader.values.keys().map(String::as_str).collect();
+        let names: Vec<_> = reader.values.keys().map(String::as_str).collect();
         return Err(reader
-            .error(&root, format!("there is no parameter `{unknown}`, only {}", known.join(", ")))
+            .error(&root, format!("there is no parameter `{unknown}`, only {}", names.join(", ")))
             .into());
     }
     let (vehicles, controlled) = entities::read(&reader, &root)?;
@@ -184,8 +187,9 @@ fn ego_of(
     let position = |name: &str| vehicles.iter().position(|vehicle| vehicle.name == name);
     let names: Vec<_> = vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
     let entities = root.child("Entities").unwrap_or(root);
-    let refuse =
-        |what: String| Err(reader.error(entities, format!("{what}: name one of {} as the ego", names.join(", "))));
+    let refuse = |problem: String| {
+        Err(reader.error(entities, format!("{problem}: name one of {} as the ego", names.join(", "))))
+    };
     match (asked, controlled) {
         (Some(name), _) => position(name).map_or_else(|| refuse(format!("there is no vehicle `{name}`")), Ok),
         (None, controlled) => {
@@ -264,7 +268,7 @@ fn kebab(name: &str) -> String {
     if plain.starts_with(|c: char| c.is_ascii_lowercase()) { plain } else { format!("v-{plain}") }
 }
 
-/// Returns the points of a profile: those of the speeds between which they are linear.
+/// Returns the points of a profile: the speeds between which it is linear.
 fn points(speeds: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = speeds.first().copied().into_iter().collect();
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -403,8 +407,8 @@ mod tests {
             .map(|step| f64::from(step) * 0.01)
             .map(|t| (t, 30.0 - 4.0 * (t - 2.0).clamp(0.0, 3.0)))
             .collect();
-        let found = points(&speeds);
-        let times: Vec<_> = found.iter().map(|(t, _)| (t * 100.0).round()).collect();
+        let profile = points(&speeds);
+        let times: Vec<_> = profile.iter().map(|(t, _)| (t * 100.0).round()).collect();
         assert_eq!(times, [0.0, 200.0, 500.0, 1_000.0]);
         assert_eq!(points(&[(0.0, 30.0), (0.01, 30.0), (9.0, 30.0)]), [(0.0, 30.0)]);
     }

@@ -1,4 +1,5 @@
-//! The part of an OpenDRIVE road that a scenario of parallel lanes has: driving lanes of one direction, width, curvature, speed.
+//! The part of an OpenDRIVE road that a scenario of parallel lanes has: driving lanes of one
+//! direction, width, curvature, speed.
 
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use super::dom::{ImportError, Node, parse};
 /// Names of the lane types on which vehicles drive.
 const DRIVING: [&str; 8] = ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
 
-/// A road of a file, as far as a scenario can use it.
+/// The part of a file's road that a scenario can use.
 #[derive(Clone, Debug)]
 pub(super) struct ImportedRoad {
     /// The lanes of OpenDRIVE on the right of the reference line, from the left.
@@ -17,7 +18,7 @@ pub(super) struct ImportedRoad {
     pub(super) lane_width_m: f64,
     pub(super) curvature_per_m: f64,
     pub(super) speed_limit_mps: Option<f64>,
-    /// What the scenario's road does not have.
+    /// The properties that the scenario's road lacks.
     pub(super) notes: Vec<String>,
 }
 
@@ -31,8 +32,8 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
         return Err(root.error(path, "the root element must be `OpenDRIVE`"));
     }
     let Some(road) = root.all("road").find(|road| road.raw("id") == Some(road_id)) else {
-        let known: Vec<_> = root.all("road").filter_map(|road| road.raw("id")).collect();
-        return Err(root.error(path, format!("there is no road `{road_id}`, only {}", known.join(", "))));
+        let roads: Vec<_> = root.all("road").filter_map(|road| road.raw("id")).collect();
+        return Err(root.error(path, format!("there is no road `{road_id}`, only {}", roads.join(", "))));
     };
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
     let Some(section) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
@@ -56,9 +57,9 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
     }
     driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
     let Some(&(_, lane_width_m)) = driving.iter().find(|(id, _)| *id == lane) else {
-        let known: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
+        let lanes: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
         let message =
-            format!("lane {lane} is no driving lane on the right of road {road_id}, only {}", known.join(", "));
+            format!("lane {lane} is no driving lane on the right of road {road_id}, only {}", lanes.join(", "));
         return Err(right.error(path, message));
     };
     if driving.iter().any(|(_, width)| *width != lane_width_m) {
@@ -82,7 +83,8 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
     Ok(ImportedRoad { lanes, lane_width_m, curvature_per_m, speed_limit_mps, notes })
 }
 
-/// Returns the curvature of a road that is one line or one arc, or that of a straight road with a note.
+/// Returns the curvature of a road that is one line or one arc. For any other road, returns the
+/// curvature of a straight road with a note.
 fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<f64, ImportError> {
     let plan = road.child("planView").ok_or_else(|| road.error(path, "it has no `planView`"))?;
     let shapes: Vec<&Node> = plan.all("geometry").filter_map(|geometry| geometry.children.first()).collect();

@@ -1,7 +1,8 @@
-//! Plays a storyboard with vehicles that follow their actions exactly, and writes down what each does and when.
+//! Plays a storyboard with vehicles that follow their actions exactly, and records the actions of
+//! each with their times.
 //!
-//! The ego keeps the speed of the file: as in a nominal encounter, the times of what the others do depend on the file alone,
-//! and are the same whatever the ego's controller does.
+//! The ego keeps the speed of the file. As in a nominal encounter, the times of the others' actions
+//! depend on the file alone, and are the same for every controller of the ego.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -12,7 +13,7 @@ use super::reader::Reader;
 use super::road::ImportedRoad;
 use super::world::Vehicle;
 
-/// Step of the storyboard (s), that of esmini's tests.
+/// Step of the storyboard (s): the step of esmini's tests.
 pub(super) const STEP_S: f64 = 0.01;
 /// Longest storyboard without a stop trigger that fires (s).
 const LONGEST_S: f64 = 300.0;
@@ -77,7 +78,7 @@ pub(super) struct Storyboard<'a> {
     /// Time and speed of each vehicle in each step.
     pub(super) speeds: Vec<Vec<(f64, f64)>>,
     pub(super) lane_changes: Vec<LaneChange>,
-    /// Times of what happens, for the reader of the result.
+    /// Times of the events, for the reader of the result.
     pub(super) events: Vec<(f64, String)>,
     pub(super) notes: Vec<String>,
     /// Time at which the storyboard ends (s).
@@ -114,8 +115,8 @@ impl<'a> Storyboard<'a> {
     pub(super) fn index(&self, node: &Node, name: &str) -> Result<usize, ImportError> {
         let wanted = self.reader.text(node, name)?;
         self.vehicles.iter().position(|vehicle| vehicle.name == wanted).ok_or_else(|| {
-            let known: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
-            self.reader.error(node, format!("there is no vehicle `{wanted}`, only {}", known.join(", ")))
+            let names: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
+            self.reader.error(node, format!("there is no vehicle `{wanted}`, only {}", names.join(", ")))
         })
     }
 
@@ -328,7 +329,7 @@ impl<'a> Storyboard<'a> {
             }
             "ControllerAction" | "ActivateControllerAction" => {
                 self.notes.push(format!(
-                    "line {}: `{}` of `{}`: a scenario has one controller, that of the ego",
+                    "line {}: `{}` of `{}`: a scenario has one controller, the ego's",
                     node.line, node.name, self.vehicles[actor].name
                 ));
                 Ok(())
@@ -373,7 +374,8 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    /// Returns the duration of a transition (s), and whether it is smooth. `mean_mps` is the mean speed in it.
+    /// Returns the duration of a transition (s), and whether it is smooth. `mean_mps` is the mean
+    /// speed in it.
     fn transition(&self, node: &Node, (from, to): (f64, f64), mean_mps: f64) -> Result<(f64, bool), ImportError> {
         let shape = self.reader.text(node, "dynamicsShape")?;
         // The largest slope of a smooth transition is higher than the mean one.
@@ -440,10 +442,11 @@ impl<'a> Storyboard<'a> {
             "RelativeTargetLane" => self.shifted(self.vehicle(target, "entityRef")?.lane, shift as i32),
             _ => return Err(self.reader.error(target, "this target is not read")),
         };
-        let [from_index, to_index] = [from, to].map(|lane| self.road.lanes.iter().position(|known| *known == lane));
+        let [from_index, to_index] =
+            [from, to].map(|lane| self.road.lanes.iter().position(|candidate| *candidate == lane));
         let Some((from_index, to_index)) = from_index.zip(to_index) else {
-            let known: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
-            let message = format!("lane {to} is no driving lane on the right of the road, only {}", known.join(", "));
+            let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
+            let message = format!("lane {to} is no driving lane on the right of the road, only {}", lanes.join(", "));
             return Err(self.reader.error(target, message));
         };
         if from_index == to_index {
@@ -464,7 +467,8 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    /// Returns the lane that lies some lanes to the left of a lane. The numbers of OpenDRIVE leave out 0.
+    /// Returns the lane that lies some lanes to the left of a lane. The numbers of OpenDRIVE leave
+    /// out 0.
     pub(super) fn shifted(&self, lane: i32, shift: i32) -> i32 {
         let sum = lane.saturating_add(shift);
         if lane < 0 && sum >= 0 { sum + 1 } else { sum }
@@ -526,7 +530,8 @@ impl<'a> Storyboard<'a> {
     pub(super) fn init(&mut self, storyboard: &Node) -> Result<Vec<Node>, ImportError> {
         let actions = self.reader.child(storyboard, &["Init", "Actions"])?.clone();
         let mut globals = Vec::new();
-        // A speed can be relative to a vehicle whose actions stand behind: the positions and speeds are set twice.
+        // A speed can be relative to a vehicle whose actions stand behind: the positions and speeds
+        // are set twice.
         for round in 0..2 {
             for node in &actions.children {
                 match node.name.as_str() {
@@ -602,12 +607,12 @@ impl<'a> Storyboard<'a> {
             }
         };
         let is_free_space = self.reader.is_true(node, "freespace")?;
-        let (own, of) = (&self.vehicles[vehicle], &self.vehicles[other]);
-        let sign = if own.s_m < of.s_m { -1.0 } else { 1.0 };
+        let (follower, leader) = (&self.vehicles[vehicle], &self.vehicles[other]);
+        let sign = if follower.s_m < leader.s_m { -1.0 } else { 1.0 };
         let s_m = match (is_free_space, sign > 0.0) {
-            (false, _) => of.s_m + sign * distance_m,
-            (true, true) => of.front_m() + distance_m - (own.back_m() - own.s_m),
-            (true, false) => of.back_m() - distance_m - (own.front_m() - own.s_m),
+            (false, _) => leader.s_m + sign * distance_m,
+            (true, true) => leader.front_m() + distance_m - (follower.back_m() - follower.s_m),
+            (true, false) => leader.back_m() - distance_m - (follower.front_m() - follower.s_m),
         };
         self.vehicles[vehicle].s_m = s_m;
         Ok(())
@@ -653,8 +658,8 @@ impl<'a> Storyboard<'a> {
             }
         };
         if !self.road.lanes.contains(&lane) {
-            let known: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
-            let message = format!("lane {lane} is no driving lane on the right of the road, only {}", known.join(", "));
+            let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
+            let message = format!("lane {lane} is no driving lane on the right of the road, only {}", lanes.join(", "));
             // The other vehicle may not be placed yet.
             return if round == 0 && node.name != "LanePosition" { Ok(()) } else { Err(reader.error(node, message)) };
         }

@@ -14,7 +14,7 @@ pub(super) struct Vehicle {
     pub(super) centre_m: f64,
     /// Position of the reference point along the road (m).
     pub(super) s_m: f64,
-    /// Lane of OpenDRIVE; that of the target while the vehicle changes lanes.
+    /// Lane of OpenDRIVE; the target lane while the vehicle changes lanes.
     pub(super) lane: i32,
     pub(super) speed_mps: f64,
     pub(super) acceleration_mps2: f64,
@@ -32,8 +32,9 @@ impl Vehicle {
         self.s_m + self.centre_m - 0.5 * self.length_m
     }
 
-    /// Returns the distance to another vehicle along the road, positive ahead (m): between the reference points or, in free
-    /// space, between the bumpers. Vehicles beside each other have none.
+    /// Returns the distance to another vehicle along the road, positive ahead (m): between the
+    /// reference points or, in free space, between the bumpers. Vehicles beside each other have
+    /// none.
     pub(super) fn distance_m(&self, other: &Self, is_free_space: bool) -> f64 {
         let between_m = other.s_m - self.s_m;
         match is_free_space {

@@ -40,8 +40,8 @@ impl ParametersConfig {
 
 /// The configuration of one parameter: exactly one distribution, and its provenance.
 ///
-/// The distributions are optional fields of one struct, not variants of an enum: only this allows further keys beside
-/// them and still refuses unknown keys.
+/// The distributions are optional fields of one struct, not variants of an enum: only this allows
+/// further keys beside them and still refuses unknown keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ParameterConfig {
@@ -70,11 +70,13 @@ pub struct ParameterConfig {
     /// Provenance: the distribution was assumed, for the reason given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed: Option<String>,
-    /// What trajectory data show of the quantity. A verdict says which share of the samples lies beyond it.
+    /// What trajectory data show of the quantity. A verdict says which share of the samples lies
+    /// beyond it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observed: Option<ObservedConfig>,
-    /// Rank correlations (Spearman) with other parameters, by their names: from -0.99 to 0.99. It suffices that one of two
-    /// parameters states theirs. A pair that neither states is independent.
+    /// Rank correlations (Spearman) with other parameters, by their names: from -0.99 to 0.99. It
+    /// suffices that one of two parameters states theirs. A pair that neither states is
+    /// independent.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "finite::correlations")]
     pub spearman: BTreeMap<ParameterName, f64>,
     /// A remark for the reader.
@@ -134,7 +136,8 @@ pub struct TruncatedNormalConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct EmpiricalConfig {
-    /// Quantiles at equally spaced probabilities from 0 to 1, in non-descending order, with linear interpolation.
+    /// Quantiles at equally spaced probabilities from 0 to 1, in non-descending order, with linear
+    /// interpolation.
     #[serde(deserialize_with = "finite::list")]
     pub quantiles: Vec<f64>,
 }
@@ -155,11 +158,12 @@ pub struct FittedConfig {
         deserialize_with = "finite::pair"
     )]
     pub interval_95: Option<[f64; 2]>,
-    /// The quantity of `closecall traffic fit` to which the distribution was fitted, such as `front-thw-s`. Default: the one with
-    /// the name of the parameter.
+    /// The quantity of `closecall traffic fit` to which the distribution was fitted, such as
+    /// `front-thw-s`. Default: the one with the name of the parameter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantity: Option<String>,
-    /// The range of values of the quantity that were fitted: from the first number up to below the second. Default: all.
+    /// The range of values of the quantity that were fitted: from the first number up to below the
+    /// second. Default: all.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::pair")]
     pub cut: Option<[f64; 2]>,
 }
@@ -203,7 +207,8 @@ impl ParameterConfig {
         Self { uniform: Some(UniformConfig { min, max }), ..Self::default() }
     }
 
-    /// Creates a parameter whose distribution is given by quantiles at equally spaced probabilities from 0 to 1.
+    /// Creates a parameter whose distribution is given by quantiles at equally spaced probabilities
+    /// from 0 to 1.
     pub fn empirical(quantiles: Vec<f64>) -> Self {
         Self { empirical: Some(EmpiricalConfig { quantiles }), ..Self::default() }
     }
@@ -226,11 +231,11 @@ impl ParameterConfig {
             ("empirical", self.empirical.as_ref().map(Distribution::empirical)),
             ("fixed", self.fixed.as_ref().map(Distribution::fixed)),
         ];
-        let mut given = candidates.into_iter().filter_map(|(key, candidate)| Some((key, candidate?)));
-        let Some((key, distribution)) = given.next() else {
+        let mut forms = candidates.into_iter().filter_map(|(key, candidate)| Some((key, candidate?)));
+        let Some((key, distribution)) = forms.next() else {
             return Err(ConfigError { path: KeyPath::default(), problem: Problem::Missing { needed: DISTRIBUTIONS } });
         };
-        if let Some((second, _)) = given.next() {
+        if let Some((second, _)) = forms.next() {
             let rule = "a parameter has exactly one distribution".to_owned();
             return Err(ConfigError::new(second, Problem::Contradiction { other: key, rule }));
         }

@@ -1,8 +1,9 @@
 //! Dependence between parameters: a Gaussian copula with given rank correlations.
 //!
-//! Each number u of a coupled parameter becomes a standard normal variate, the variates are mixed by the Cholesky factor of their
-//! correlation matrix, and the result becomes a number u again. Each number stays uniform, so that each parameter keeps its own
-//! distribution. Spearman's ρ of two parameters belongs to the correlation r = 2·sin(π·ρ/6) of their variates (K. Pearson, 1907).
+//! Each number u of a coupled parameter becomes a standard normal variate, the variates are mixed
+//! by the Cholesky factor of their correlation matrix, and the result becomes a number u again.
+//! Each number stays uniform, so that each parameter keeps its own distribution. Spearman's ρ of
+//! two parameters belongs to the correlation r = 2·sin(π·ρ/6) of their variates (K. Pearson, 1907).
 //! Of the coupled parameters, the first in the order of the names keeps its number.
 
 use std::collections::BTreeMap;
@@ -22,7 +23,8 @@ pub(super) const KEY: &str = "spearman";
 /// The dependence between the parameters of a scenario.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Copula {
-    /// Indices of the coupled parameters in the order of the names, with the rows of the lower Cholesky factor.
+    /// Indices of the coupled parameters in the order of the names, with the rows of the lower
+    /// Cholesky factor.
     rows: Vec<(usize, Vec<f64>)>,
 }
 
@@ -30,8 +32,9 @@ impl Copula {
     /// Creates the copula of parameters with the rank correlations that each states.
     ///
     /// # Errors
-    /// [`ConfigError`] for a correlation that is out of range, with a parameter that does not exist or does not vary
-    /// continuously, that is stated twice differently, or for which no joint distribution exists.
+    /// [`ConfigError`] for a correlation that is out of range, with a parameter that does not exist
+    /// or does not vary continuously, that is stated twice differently, or for which no joint
+    /// distribution exists.
     pub(super) fn new(
         entries: &BTreeMap<ParameterName, SpaceEntry>,
         stated: &BTreeMap<ParameterName, BTreeMap<ParameterName, f64>>,
@@ -40,11 +43,11 @@ impl Copula {
         for (name, partners) in stated {
             for (partner, spearman) in partners {
                 let at = |error: ConfigError| error.within(KEY).within(name.as_str());
-                let pair = [name, partner].map(|one| entries.keys().position(|known| known == one));
+                let pair = [name, partner].map(|parameter| entries.keys().position(|previous| previous == parameter));
                 check(entries, (name, partner), *spearman).map_err(at)?;
                 let [Some(a), Some(b)] = pair else { continue };
-                let known = pairs.insert((a.min(b), a.max(b)), *spearman);
-                if known.is_some_and(|known| known != *spearman) {
+                let previous = pairs.insert((a.min(b), a.max(b)), *spearman);
+                if previous.is_some_and(|previous| previous != *spearman) {
                     let rule = format!("`{name}` and `{partner}` state different rank correlations of the two");
                     return Err(at(contradiction(partner.as_str(), rule)));
                 }
@@ -95,12 +98,16 @@ fn check(
         return Err(contradiction(partner.as_str(), "a parameter has no correlation with itself".to_owned()));
     }
     if !entries.contains_key(partner) {
-        let known = entries.keys().map(ParameterName::as_str).collect::<Vec<_>>().join(", ");
-        return Err(ConfigError::new(partner.as_str(), Problem::UnknownParameter { name: partner.clone(), known }));
+        let names = entries.keys().map(ParameterName::as_str).collect::<Vec<_>>().join(", ");
+        return Err(ConfigError::new(
+            partner.as_str(),
+            Problem::UnknownParameter { name: partner.clone(), known: names },
+        ));
     }
-    for one in [name, partner] {
-        if entries.get(one).is_none_or(|entry| entry.distribution.variation() != Variation::Continuous) {
-            let rule = format!("only numbers that vary continuously have a rank correlation, and `{one}` does not");
+    for parameter in [name, partner] {
+        if entries.get(parameter).is_none_or(|entry| entry.distribution.variation() != Variation::Continuous) {
+            let rule =
+                format!("only numbers that vary continuously have a rank correlation, and `{parameter}` does not");
             return Err(contradiction(partner.as_str(), rule));
         }
     }

@@ -1,4 +1,5 @@
-//! Correlated parameters: their distributions stay, their ranks correlate, and wrong correlations are refused.
+//! Correlated parameters: their distributions stay, their ranks correlate, and wrong correlations
+//! are refused.
 
 use closecall_traffic::statistics::normal::TruncatedStandardNormal;
 use closecall_traffic::statistics::quantiles::median;
@@ -39,11 +40,11 @@ fn ranks_correlate_as_stated_and_each_distribution_stays() {
     let (space, free) = (coupled("a = 0.6, c = -0.4").unwrap(), parsed(INDEPENDENT).unwrap());
     for design in [Design::Random, Design::Sobol] {
         let [a, b, c] = ["a", "b", "c"].map(|name| column(&space, design, name));
-        for (found, wanted) in [(spearman(&a, &b), 0.6), (spearman(&b, &c), -0.4), (spearman(&a, &c), 0.0)] {
-            assert!((found.unwrap() - wanted).abs() < 0.04, "{design}: {found:?} instead of {wanted}");
+        for (correlation, wanted) in [(spearman(&a, &b), 0.6), (spearman(&b, &c), -0.4), (spearman(&a, &c), 0.0)] {
+            assert!((correlation.unwrap() - wanted).abs() < 0.04, "{design}: {correlation:?} instead of {wanted}");
         }
-        let (own, others) = (median(c), median(column(&free, design, "c")));
-        assert!((own / others - 1.0).abs() < 0.1, "{design}: {own} {others}");
+        let (median_c, median_free) = (median(c), median(column(&free, design, "c")));
+        assert!((median_c / median_free - 1.0).abs() < 0.1, "{design}: {median_c} {median_free}");
     }
 }
 
@@ -52,15 +53,18 @@ fn parameters_that_state_no_correlation_keep_their_bits() {
     let (space, free) = (coupled("c = 0.9").unwrap(), parsed(INDEPENDENT).unwrap());
     for design in [Design::Random, Design::Sobol, Design::Grid] {
         for index in 0..50 {
-            let (own, others) = (space.sample(design, 3, index, 50), free.sample(design, 3, index, 50));
+            let (correlated, independent) = (space.sample(design, 3, index, 50), free.sample(design, 3, index, 50));
             for name in ["a", "b", "d", "e"].map(|name| ParameterName::new(name).unwrap()) {
                 assert_eq!(
-                    own.get(&name),
-                    others.get(&name),
+                    correlated.get(&name),
+                    independent.get(&name),
                     "{design}: the first of the coupled ones keeps its number"
                 );
             }
-            assert_eq!(own == others, design == Design::Grid || own.get(&ParameterName::new("c").unwrap()).is_none());
+            assert_eq!(
+                correlated == independent,
+                design == Design::Grid || correlated.get(&ParameterName::new("c").unwrap()).is_none()
+            );
         }
     }
 }
@@ -99,8 +103,8 @@ fn independent_standard_normal_numbers_give_the_distribution_of_independent_samp
             let (ours, expected) = (space.at_normals(&normals), space.values(numbers.clone()));
             for name in ["a", "b", "c", "d", "e"].map(|name| ParameterName::new(name).unwrap()) {
                 match (ours.get(&name).unwrap(), expected.get(&name).unwrap()) {
-                    (Value::Number(one), Value::Number(other)) => assert!((one - other).abs() < 1e-6, "{name}"),
-                    (one, other) => assert_eq!(one, other, "{name}"),
+                    (Value::Number(first), Value::Number(second)) => assert!((first - second).abs() < 1e-6, "{name}"),
+                    (first, second) => assert_eq!(first, second, "{name}"),
                 }
             }
         }

@@ -9,8 +9,8 @@ use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value, maths};
 use super::Variation;
 use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, UniformConfig};
 
-/// Largest magnitude of a number in a distribution. It is far above every quantity of a scenario, and sums and products
-/// of such numbers stay finite.
+/// Largest magnitude of a number in a distribution. It is far above every quantity of a scenario,
+/// and sums and products of such numbers stay finite.
 const MAGNITUDE_LIMIT: f64 = 1e12;
 
 /// Range of all numbers up to the largest magnitude.
@@ -24,11 +24,13 @@ pub(super) const fn at_least(low: f64) -> Range {
     Range::closed(low, MAGNITUDE_LIMIT)
 }
 
-/// Smallest probability that is distinguished from 0: half the spacing 2⁻⁵³ of the numbers of the random generator. The
-/// quantile at 0 of an unbounded distribution is its quantile at this probability, and therefore finite.
+/// Smallest probability that is distinguished from 0: half the spacing 2⁻⁵³ of the numbers of the
+/// random generator. The quantile at 0 of an unbounded distribution is its quantile at this
+/// probability, and therefore finite.
 const SMALLEST_PROBABILITY: f64 = f64::EPSILON / 4.0;
 
-/// Largest standard deviation of a logarithm (-), at which the quartiles already differ by a factor of 700,000.
+/// Largest standard deviation of a logarithm (-), at which the quartiles already differ by a factor
+/// of 700,000.
 const LARGEST_SIGMA: f64 = 10.0;
 
 /// Probability of the median, and the middle of a cell of a grid.
@@ -55,7 +57,8 @@ struct WeightedLabels {
     labels: Vec<String>,
     /// Cumulative probability of each label and all before it.
     cumulative: Vec<f64>,
-    /// Indices of the labels, the most probable first; equally probable ones in the order of the labels.
+    /// Indices of the labels, the most probable first; equally probable ones in the order of the
+    /// labels.
     by_weight: Vec<usize>,
 }
 
@@ -72,8 +75,8 @@ impl Distribution {
     /// Creates a normal distribution, truncated at two bounds.
     ///
     /// # Errors
-    /// Returns an error unless all numbers are finite, the standard deviation is positive, the upper bound is larger
-    /// than the lower one, and some probability is left between them.
+    /// Returns an error unless all numbers are finite, the standard deviation is positive, the
+    /// upper bound is larger than the lower one, and some probability is left between them.
     pub fn truncated_normal(config: &TruncatedNormalConfig) -> Result<Self, ConfigError> {
         let mean = FINITE.check(config.mean, "mean")?;
         let sd = POSITIVE.check(config.sd, "sd")?;
@@ -88,8 +91,8 @@ impl Distribution {
     /// Creates a log-normal distribution, which may be truncated at either end.
     ///
     /// # Errors
-    /// Returns an error unless all numbers are finite, all but `min` positive, `min` is not negative, and some
-    /// probability is left between the bounds.
+    /// Returns an error unless all numbers are finite, all but `min` positive, `min` is not
+    /// negative, and some probability is left between the bounds.
     pub fn log_normal(config: &LogNormalConfig) -> Result<Self, ConfigError> {
         let median = POSITIVE.check(config.median, "median")?;
         let sigma = Range::above(0.0, LARGEST_SIGMA).check(config.sigma, "sigma")?;
@@ -112,8 +115,8 @@ impl Distribution {
     /// Creates a choice of one of several labels. A label with weight 0 never occurs.
     ///
     /// # Errors
-    /// Returns an error unless every label contains a visible character, every weight is finite and not negative, and
-    /// at least one weight is positive.
+    /// Returns an error unless every label contains a visible character, every weight is finite and
+    /// not negative, and at least one weight is positive.
     pub fn choice(weights: &BTreeMap<String, f64>) -> Result<Self, ConfigError> {
         for (label, &weight) in weights {
             check_label(label).map_err(|problem| ConfigError::new(label, problem))?;
@@ -139,7 +142,8 @@ impl Distribution {
         })))
     }
 
-    /// Creates a distribution from quantiles at equally spaced probabilities from 0 to 1, with linear interpolation.
+    /// Creates a distribution from quantiles at equally spaced probabilities from 0 to 1, with
+    /// linear interpolation.
     ///
     /// # Errors
     /// Returns an error unless there are two or more finite numbers in non-descending order.
@@ -275,7 +279,8 @@ impl Distribution {
         matches!(self.0, Kind::Fixed(_))
     }
 
-    /// Returns the largest number of levels that a grid can have: 1 if fixed, the number of labels, or no limit.
+    /// Returns the largest number of levels that a grid can have: 1 if fixed, the number of labels,
+    /// or no limit.
     pub(crate) fn max_levels(&self) -> u64 {
         match &self.0 {
             Kind::Choice(weights) => weights.labels.len() as u64,
@@ -284,8 +289,8 @@ impl Distribution {
         }
     }
 
-    /// Returns level number `level` of `count` levels: the medians of as many equally probable parts, or the most
-    /// probable labels.
+    /// Returns level number `level` of `count` levels: the medians of as many equally probable
+    /// parts, or the most probable labels.
     pub(crate) fn level(&self, level: u64, count: u64) -> Value {
         match &self.0 {
             Kind::Choice(weights) => Value::Label(weights.labels[weights.by_weight[level as usize]].clone()),

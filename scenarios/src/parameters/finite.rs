@@ -1,7 +1,7 @@
 //! Deserialization of numbers that must be finite.
 //!
-//! `nan` and `inf` are legal TOML. They are refused while the file is parsed, so that the error states the line and the
-//! value.
+//! `nan` and `inf` are legal TOML. They are refused while the file is parsed, so that the error
+//! states the line and the value.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -95,8 +95,8 @@ pub(super) fn pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<
 pub(super) fn correlations<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<BTreeMap<ParameterName, f64>, D::Error> {
-    let found = BTreeMap::<ParameterName, Finite>::deserialize(deserializer)?;
-    Ok(found.into_iter().map(|(name, value)| (name, value.0)).collect())
+    let entries = BTreeMap::<ParameterName, Finite>::deserialize(deserializer)?;
+    Ok(entries.into_iter().map(|(name, value)| (name, value.0)).collect())
 }
 
 /// Deserializes optional labels with finite weights.

@@ -12,8 +12,8 @@
 //! brake-mps2    = { fixed = 6.0 }
 //! ```
 //!
-//! Every distribution is sampled through its quantile function. A sampling design ([`crate::sampling`]) therefore only
-//! chooses one number in [0, 1) for each parameter.
+//! Every distribution is sampled through its quantile function. A sampling design
+//! ([`crate::sampling`]) therefore only chooses one number in [0, 1) for each parameter.
 
 mod config;
 mod copula;

@@ -34,7 +34,8 @@ pub struct SpaceEntry {
 }
 
 impl SpaceEntry {
-    /// Returns the range that trajectory data show, and the probability of a value beyond it; `None` if no data are stated, or no value lies beyond.
+    /// Returns the range that trajectory data show, and the probability of a value beyond it;
+    /// `None` if no data are stated, or no value lies beyond.
     pub fn beyond_observed(&self) -> Option<(&ObservedConfig, f64)> {
         let observed = self.observed.as_ref()?;
         let beyond = 1.0 - (self.distribution.cdf(observed.max)? - self.distribution.cdf(observed.min)?);
@@ -46,8 +47,8 @@ impl SpaceEntry {
 
 /// The parameters of a scenario with their distributions, in the order of their names.
 ///
-/// The parameters are sampled by the designs of [`crate::sampling`], independently of each other unless they state rank
-/// correlations.
+/// The parameters are sampled by the designs of [`crate::sampling`], independently of each other
+/// unless they state rank correlations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSpace {
     entries: BTreeMap<ParameterName, SpaceEntry>,
@@ -58,18 +59,19 @@ pub struct ParameterSpace {
 /// How much sampled values vary, in rising order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Variation {
-    /// They are always the same.
+    /// The values are always the same.
     None,
-    /// They take finitely many values, so that independent samples repeat each other.
+    /// The parameters take finitely many values, and independent samples repeat each other.
     Discrete,
-    /// They come from a continuum.
+    /// The values come from a continuum.
     Continuous,
 }
 
 /// Probability of the median.
 const HALF: f64 = 0.5;
 
-/// Returns the standard normal probability below `z`, within what a quantile function takes: above 0 and below 1.
+/// Returns the standard normal probability below `z`, within the domain of a quantile function:
+/// above 0 and below 1.
 fn probability_below(z: f64) -> f64 {
     (0.5 * maths::erfc(-z * FRAC_1_SQRT_2)).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)
 }
@@ -79,8 +81,8 @@ impl ParameterSpace {
         Self { entries, copula, strata: Strata::default() }
     }
 
-    /// Returns the values at the numbers u of all parameters, in the order of the names. Correlated parameters are coupled
-    /// first.
+    /// Returns the values at the numbers u of all parameters, in the order of the names. Correlated
+    /// parameters are coupled first.
     pub(crate) fn values(&self, mut numbers: Vec<f64>) -> Parameters {
         self.copula.couple(&mut numbers);
         self.map(|_, index, distribution| distribution.quantile(numbers[index]))
@@ -127,7 +129,8 @@ impl ParameterSpace {
         self.map(|_, _, distribution| distribution.nominal())
     }
 
-    /// Iterates over the parameters whose values differ between samples, in the order of their names.
+    /// Iterates over the parameters whose values differ between samples, in the order of their
+    /// names.
     pub fn varying(&self) -> impl Iterator<Item = (&ParameterName, &SpaceEntry)> {
         self.iter().filter(|(_, entry)| entry.distribution.variation() != Variation::None)
     }
@@ -143,8 +146,9 @@ impl ParameterSpace {
         })
     }
 
-    /// Returns the values at a point of standard normal space, which has a number for each parameter of [`Self::varying`]. Correlated parameters are
-    /// coupled, so that independent standard normal numbers give the distribution from which independent samples are drawn.
+    /// Returns the values at a point of standard normal space, which has a number for each
+    /// parameter of [`Self::varying`]. Correlated parameters are coupled, so that independent
+    /// standard normal numbers give the distribution from which independent samples are drawn.
     pub fn at_normals(&self, normals: &[f64]) -> Parameters {
         let mut coordinates = normals.iter();
         let number = |entry: &SpaceEntry| match entry.distribution.variation() {
@@ -154,9 +158,11 @@ impl ParameterSpace {
         self.values(self.entries.values().map(number).collect())
     }
 
-    /// Returns the nominal values, then variations of them with one parameter at one of its bounds or labels.
+    /// Returns the nominal values, then variations of them with one parameter at one of its bounds
+    /// or labels.
     ///
-    /// If a scenario is valid for all of these, it passes every check that depends on a single parameter.
+    /// If a scenario is valid for all of these, it passes every check that depends on a single
+    /// parameter.
     pub fn extremes(&self) -> impl Iterator<Item = Parameters> {
         let nominal = self.nominal();
         let varied = {
@@ -177,8 +183,8 @@ impl ParameterSpace {
         std::iter::once(nominal).chain(varied)
     }
 
-    /// Maps every parameter to a value. `value` receives its name, its index in the order of the names, and its
-    /// distribution.
+    /// Maps every parameter to a value. `value` receives its name, its index in the order of the
+    /// names, and its distribution.
     pub(crate) fn map(&self, mut value: impl FnMut(&ParameterName, usize, &Distribution) -> Value) -> Parameters {
         let entries = self.entries.iter().enumerate();
         entries.map(|(index, (name, entry))| (name.clone(), value(name, index, &entry.distribution))).collect()

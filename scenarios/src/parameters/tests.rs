@@ -229,7 +229,8 @@ fn labels_are_chosen_in_proportion_to_their_weights() {
     assert_eq!(choice.cdf(0.5), None);
 }
 
-/// Distribution, probability u, and quantile by bisection of the distribution function in mpmath 1.3 with 250 digits.
+/// Distribution, probability u, and quantile by bisection of the distribution function in mpmath
+/// 1.3 with 250 digits.
 const TAIL_REFERENCES: [(&str, f64, f64); 13] = [
     ("truncated-normal = { mean = 0, sd = 1, min = -8, max = 8 }", 1e-06, -4.753424308697181),
     ("truncated-normal = { mean = 0, sd = 1, min = -8, max = 8 }", 0.75, 0.6744897501960808),

@@ -14,13 +14,14 @@ use crate::parameters::{ParameterSpace, Variation};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Design {
-    /// Independent random samples, from which rates and their confidence intervals can be estimated.
+    /// Independent random samples, from which rates and their confidence intervals can be
+    /// estimated.
     #[default]
     Random,
     /// A scrambled Sobol sequence, which covers the space more evenly.
     Sobol,
-    /// All combinations of some levels of each parameter. All points have the same weight, so that a share of them is
-    /// not a probability if labels have different weights.
+    /// All combinations of some levels of each parameter. All points have the same weight, so that
+    /// a share of them is not a probability if labels have different weights.
     Grid,
     /// Random samples that visit in turn the bins which `[coverage]` names under `fill`. A share of them is no probability: each bin
     /// has a weight, the probability that the distributions give it.
@@ -58,14 +59,15 @@ impl fmt::Display for Design {
 impl FromStr for Design {
     type Err = UnknownDesign;
     fn from_str(word: &str) -> Result<Self, UnknownDesign> {
-        let known = Self::ALL.into_iter().find(|design| design.name() == word);
-        known.ok_or_else(|| UnknownDesign { word: word.to_owned() })
+        let design = Self::ALL.into_iter().find(|design| design.name() == word);
+        design.ok_or_else(|| UnknownDesign { word: word.to_owned() })
     }
 }
 
 impl ParameterSpace {
-    /// Returns the number of samples of a design if up to `n` are requested: `n`, or the size of the largest grid
-    /// within `n`. If no parameter varies, all samples are the same encounter, and there is one.
+    /// Returns the number of samples of a design if up to `n` are requested: `n`, or the size of
+    /// the largest grid within `n`. If no parameter varies, all samples are the same encounter, and
+    /// there is one.
     pub fn samples(&self, design: Design, n: u64) -> u64 {
         match design {
             _ if self.variation() == Variation::None => n.min(1),
@@ -76,7 +78,8 @@ impl ParameterSpace {
 
     /// Returns the parameter values of sample `index` in a campaign of up to `n` samples.
     ///
-    /// Only the grid depends on `n`. After its last point ([`Self::samples`]) it starts again from the first.
+    /// Only the grid depends on `n`. After its last point ([`Self::samples`]) it starts again from
+    /// the first.
     pub fn sample(&self, design: Design, seed: u64, index: u64, n: u64) -> Parameters {
         match design {
             Design::Random => random::sample(self, seed, index),

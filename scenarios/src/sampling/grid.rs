@@ -2,10 +2,11 @@
 //!
 //! # Number of levels
 //!
-//! All parameters get the same number of levels: the largest for which the number of combinations does not exceed n. A
-//! choice has at most as many levels as labels, and a fixed value has one. Then each parameter, in the order of the
-//! names, gets one more level if the number of combinations still does not exceed n. The levels of a number are the
-//! medians of as many equally probable parts, and those of a choice are its most probable labels. A single level is the
+//! All parameters get the same number of levels: the largest for which the number of combinations
+//! does not exceed n. A choice has at most as many levels as labels, and a fixed value has one.
+//! Then each parameter, in the order of the names, gets one more level if the number of
+//! combinations still does not exceed n. The levels of a number are the medians of as many equally
+//! probable parts, and the levels of a choice are its most probable labels. A single level is the
 //! nominal value.
 //!
 //! The parameter with the last name varies fastest.
@@ -21,8 +22,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Returns the grid with up to `n` points; see the module documentation. If `n` is 0, its only point is the nominal
-    /// one.
+    /// Returns the grid with up to `n` points; see the module documentation. If `n` is 0, its only
+    /// point is the nominal one.
     pub(super) fn within(space: &ParameterSpace, n: u64) -> Self {
         let max_levels: Vec<u64> = space.iter().map(|(_, entry)| entry.distribution.max_levels()).collect();
         let even = |levels: u64| Self { levels: max_levels.iter().map(|&max| max.min(levels)).collect() };

@@ -1,15 +1,16 @@
 //! Independent random samples.
 //!
-//! Each parameter draws from its own random stream, keyed by its name, so that adding or removing a parameter does not
-//! change the others.
+//! Each parameter draws from its own random stream, keyed by its name, so that adding or removing a
+//! parameter does not change the others.
 
 use closecall_traffic::{ActorId, ParameterName, Parameters, Stream, stream};
 use rand::RngExt;
 
 use crate::parameters::ParameterSpace;
 
-/// Key of the random streams of parameters, which belong to no actor. Their channel names contain a `/`, which the name
-/// of a component never does, so that an actor of the same name shares no stream with them.
+/// Key of the random streams of parameters, which belong to no actor. Their channel names contain a
+/// `/`, which the name of a component never does, so that an actor of the same name shares no
+/// stream with them.
 const OWNER: &str = "scenario";
 
 /// Returns the parameter values of sample `index`.

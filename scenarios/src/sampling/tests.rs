@@ -109,7 +109,8 @@ fn sobol_is_stratified_in_every_dimension() {
     }
 }
 
-/// The first two dimensions are a (0, 2)-sequence: each elementary rectangle of area 2^-m holds one of 2^m points.
+/// The first two dimensions are a (0, 2)-sequence: each elementary rectangle of area 2^-m holds one
+/// of 2^m points.
 #[test]
 fn sobol_is_stratified_in_the_plane() {
     const BITS: u32 = 6;

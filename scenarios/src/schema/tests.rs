@@ -6,7 +6,8 @@ use super::super::library;
 use super::*;
 use crate::criteria::Expression;
 
-/// Returns the first rule of `schema` that `value` breaks, for the keywords that the schema of scenarios uses.
+/// Returns the first rule of `schema` that `value` breaks, for the keywords that the schema of
+/// scenarios uses.
 fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
     let rule = |holds: bool, keyword: &str| (!holds).then(|| format!("{keyword} of {value}"));
     if let Some(target) = schema["$ref"].as_str() {
@@ -16,9 +17,10 @@ fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
         }
     }
     let list = |keyword: &str| schema[keyword].as_array().cloned().unwrap_or_default();
-    let holding = |keyword: &str| list(keyword).iter().filter(|one| broken(root, one, value).is_none()).count();
-    if let Some(one) = list("allOf").iter().find_map(|one| broken(root, one, value)) {
-        return Some(one);
+    let holding =
+        |keyword: &str| list(keyword).iter().filter(|subschema| broken(root, subschema, value).is_none()).count();
+    if let Some(subschema) = list("allOf").iter().find_map(|subschema| broken(root, subschema, value)) {
+        return Some(subschema);
     }
     let number = value.as_f64();
     let bound = |keyword: &str, holds: fn(f64, f64) -> bool| match (number, schema[keyword].as_f64()) {
@@ -116,6 +118,11 @@ fn what_check_refuses_the_schema_refuses() {
 #[test]
 fn most_numbers_have_a_range() {
     let schema = strict_schema();
-    let found = ranges(&schema);
-    assert!(found.len() >= 60, "only {} ranges: {:?}", found.len(), found.keys().collect::<Vec<_>>());
+    let ranges_found = ranges(&schema);
+    assert!(
+        ranges_found.len() >= 60,
+        "only {} ranges: {:?}",
+        ranges_found.len(),
+        ranges_found.keys().collect::<Vec<_>>()
+    );
 }

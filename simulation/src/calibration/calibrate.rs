@@ -7,7 +7,7 @@ use super::follower::{FollowingModel, simulate, squared_error};
 use super::optimise::minimise;
 use super::predictive::Predictive;
 
-/// Of every ten pairs, the number that are held out.
+/// Number of held-out pairs of every ten.
 const HELD_OUT_OF_TEN: u8 = 3;
 
 /// Errors of the gap over some pairs.
@@ -17,8 +17,9 @@ pub struct Errors {
     pub pairs: usize,
     /// Root mean square error of the gap over all instants (m).
     pub rmse_m: f64,
-    /// Relative error √(⟨Δs²/s⟩/⟨s⟩) (-): the mixed measure of Kesting and Treiber, *Calibrating Car-Following Models by
-    /// Using Trajectory Data*, Transportation Research Record 2088 (2008), who report 11 to 29 % for several models.
+    /// Relative error √(⟨Δs²/s⟩/⟨s⟩) (-): the mixed measure of Kesting and Treiber, *Calibrating
+    /// Car-Following Models by Using Trajectory Data*, Transportation Research Record 2088 (2008),
+    /// who report 11 to 29 % for several models.
     pub relative: f64,
 }
 
@@ -38,7 +39,7 @@ pub struct PairResult {
 pub struct Calibration {
     /// The model.
     pub model: FollowingModel,
-    /// The pairs of the calibration, each with parameters of its own.
+    /// The pairs of the calibration, each with its own parameters.
     pub pairs: Vec<PairResult>,
     /// Names of the held-out pairs.
     pub held_out: Vec<String>,
@@ -50,11 +51,12 @@ pub struct Calibration {
     pub errors_of_pooled: Errors,
     /// Errors of the pooled set on the held-out pairs; `None` if none is held out.
     pub errors_of_held_out: Option<Errors>,
-    /// What the population of single sets predicts for the held-out pairs.
+    /// The predictions of the population of single sets for the held-out pairs.
     pub predictive: Option<Predictive>,
 }
 
-/// Returns true if a pair is held out. The hash of its name decides, so that a file always gives the same split.
+/// Returns true if a pair is held out. The hash of its name decides: a file always gives the same
+/// split.
 fn is_held_out(pair: &FollowingPair) -> bool {
     let hash = closecall_recorded::following::name_hash(&pair.name);
     hash % 10 < HELD_OUT_OF_TEN
@@ -78,8 +80,8 @@ pub fn calibrate(model: FollowingModel, data: &FollowingData) -> Option<Calibrat
     let (point, _) = minimise(dimensions, |point| rmse_m(model, &model.values(point), &used));
     let pooled = model.values(&point);
     let single = |pair: &&FollowingPair| {
-        let found = pairs.iter().find(|result| result.name == pair.name);
-        found.map(|result| result.values.clone()).unwrap_or_default()
+        let result = pairs.iter().find(|result| result.name == pair.name);
+        result.map(|result| result.values.clone()).unwrap_or_default()
     };
     Some(Calibration {
         errors_of_single: errors(model, single, &used),
@@ -96,7 +98,7 @@ pub fn calibrate(model: FollowingModel, data: &FollowingData) -> Option<Calibrat
 /// Returns the root mean square error of the gap over all instants of the pairs (m).
 fn rmse_m(model: FollowingModel, values: &[f64], pairs: &[&FollowingPair]) -> f64 {
     let sums = pairs.iter().map(|pair| squared_error(model, values, pair));
-    let (sum, count) = sums.fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1));
+    let (sum, count) = sums.fold((0.0, 0), |all, pair| (all.0 + pair.0, all.1 + pair.1));
     (sum / count as f64).sqrt()
 }
 

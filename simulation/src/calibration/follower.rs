@@ -22,8 +22,8 @@ pub struct ParameterSpec {
     pub min: f64,
     /// Largest value.
     pub max: f64,
-    /// True if the parameter says how closely or how fast the driver follows in the recorded traffic. A scenario asks for
-    /// these itself, so that a member of an ensemble does not set them.
+    /// True if the parameter says how closely or how fast the driver follows in the recorded
+    /// traffic. A scenario sets such a parameter, and a member of an ensemble does not.
     pub is_of_traffic: bool,
 }
 
@@ -44,7 +44,8 @@ const IDM: [ParameterSpec; 5] = [
     spec("comfortable-braking-mps2", 0.1, 6.0),
 ];
 
-/// Parameters of the Wiedemann 99 model. The ranges are limits of the search, after those of the open tool PvcTools.
+/// Parameters of the Wiedemann 99 model. The ranges are limits of the search, after the open tool
+/// PvcTools.
 const WIEDEMANN_99: [ParameterSpec; 11] = [
     of_traffic("desired-speed-mps", 8.0, 45.0),
     of_traffic("cc0-m", 0.5, 10.0),
@@ -145,8 +146,9 @@ pub(super) struct Simulated {
     pub(super) speed_mps: f64,
 }
 
-/// Simulates the follower of a pair with these values of the model's parameters, and passes each instant to `observe`
-/// together with its index. The speed changes linearly within a step; the follower does not roll backwards.
+/// Simulates the follower of a pair with these values of the model's parameters, and passes each
+/// instant to `observe` together with its index. The speed changes linearly within a step; the
+/// follower does not roll backwards.
 pub(super) fn simulate(
     model: FollowingModel,
     values: &[f64],

@@ -1,7 +1,9 @@
-//! The optimiser: the method of Nelder and Mead (crate argmin) from several starts of a low-discrepancy sequence.
+//! The optimiser: the method of Nelder and Mead (crate argmin) from several starts of a
+//! low-discrepancy sequence.
 //!
-//! The method needs no derivative: Wiedemann 99 has none at the thresholds of its regimes. After it has converged, it starts
-//! again with a new simplex around the best point, until that gains nothing. Everything is deterministic.
+//! The method needs no derivative: Wiedemann 99 has none at the thresholds of its regimes. After it
+//! has converged, it starts again with a new simplex around the best point, until that gains
+//! nothing. Everything is deterministic.
 
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::neldermead::NelderMead;
@@ -47,8 +49,8 @@ pub(super) fn minimise(dimensions: usize, cost: impl Fn(&[f64]) -> f64 + Sync) -
         .collect();
     points.sort_by(|a, b| a.1.total_cmp(&b.1));
     points.truncate(STARTS);
-    let found: Vec<(Vec<f64>, f64)> = points.into_par_iter().map(|start| descend(start, &cost)).collect();
-    found.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_else(|| (vec![0.5; dimensions], f64::INFINITY))
+    let minima: Vec<(Vec<f64>, f64)> = points.into_par_iter().map(|start| descend(start, &cost)).collect();
+    minima.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_else(|| (vec![0.5; dimensions], f64::INFINITY))
 }
 
 /// Descends from one start, with smaller and smaller simplices.
@@ -65,7 +67,8 @@ fn descend<F: Fn(&[f64]) -> f64>(start: (Vec<f64>, f64), cost: &F) -> (Vec<f64>,
     (best.0, value)
 }
 
-/// Runs the method of Nelder and Mead from a simplex around `point`. Returns `None` if the optimiser fails.
+/// Runs the method of Nelder and Mead from a simplex around `point`. Returns `None` if the
+/// optimiser fails.
 fn from_simplex<F: Fn(&[f64]) -> f64>(point: &[f64], share: f64, cost: &F) -> Option<(Vec<f64>, f64)> {
     let mut simplex = vec![point.to_vec()];
     for index in 0..point.len() {

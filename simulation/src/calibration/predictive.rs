@@ -1,4 +1,5 @@
-//! Posterior predictive checks: what a population of calibrated drivers predicts for recordings that were held out.
+//! Posterior predictive checks: the predictions of a population of calibrated drivers for held-out
+//! recordings.
 
 use closecall_recorded::following::FollowingPair;
 use closecall_traffic::statistics::quantiles::quantile;
@@ -16,7 +17,7 @@ const MIN_SPEED_MPS: f64 = 2.0;
 /// Largest number of drivers of the population.
 const MAX_DRIVERS: usize = 100;
 
-/// What the population predicts, beside what was recorded.
+/// The predictions of the population, beside the recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Predictive {
     /// Number of drivers in the population.
@@ -27,13 +28,14 @@ pub struct Predictive {
     pub recorded_s: [f64; 5],
     /// Quantiles of the simulated ones (s).
     pub simulated_s: [f64; 5],
-    /// Share of the instants whose recorded gap lies between the 5th and the 95th percentile of the simulated gaps (-). If the
-    /// population describes the recordings, it is about 0.9.
+    /// Share of the instants whose recorded gap lies between the 5th and the 95th percentile of the
+    /// simulated gaps (-). If the population describes the recordings, it is about 0.9.
     pub coverage: f64,
 }
 
 impl Predictive {
-    /// Simulates each pair with the parameters of every calibrated driver. Returns `None` without pairs or drivers.
+    /// Simulates each pair with the parameters of every calibrated driver. Returns `None` without
+    /// pairs or drivers.
     pub(super) fn of(model: FollowingModel, drivers: &[PairResult], pairs: &[&FollowingPair]) -> Option<Self> {
         let drivers = &drivers[..drivers.len().min(MAX_DRIVERS)];
         if drivers.is_empty() || pairs.is_empty() {
@@ -41,11 +43,11 @@ impl Predictive {
         }
         let of_pair: Vec<PairPrediction> = pairs.par_iter().map(|pair| predict(model, drivers, pair)).collect();
         let (mut recorded, mut simulated, mut covered, mut instants) = (Vec::new(), Vec::new(), 0, 0);
-        for one in of_pair {
-            recorded.extend(one.recorded_s);
-            simulated.extend(one.simulated_s);
-            covered += one.covered;
-            instants += one.instants;
+        for pair in of_pair {
+            recorded.extend(pair.recorded_s);
+            simulated.extend(pair.simulated_s);
+            covered += pair.covered;
+            instants += pair.instants;
         }
         if recorded.is_empty() || simulated.is_empty() {
             return None;
@@ -81,7 +83,7 @@ fn predict(model: FollowingModel, drivers: &[PairResult], pair: &FollowingPair) 
     let moving = pair.instants.iter().filter(|instant| instant.follower_mps > MIN_SPEED_MPS);
     let recorded_s = moving.map(|instant| instant.gap_m() / instant.follower_mps).collect();
     let (mut covered, mut instants) = (0, 0);
-    // All simulations begin at the recorded gap, so that the first instant says nothing.
+    // All simulations begin at the recorded gap, and the first instant says nothing.
     for (mut gaps_m, instant) in gaps_m.into_iter().zip(&pair.instants).skip(1) {
         gaps_m.sort_by(f64::total_cmp);
         let [low_m, high_m] = [0.5 - 0.5 * BAND, 0.5 + 0.5 * BAND].map(|u| quantile(&gaps_m, u));

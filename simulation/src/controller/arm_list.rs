@@ -5,8 +5,8 @@ use std::str::FromStr;
 use super::exec::NAME as EXEC;
 use super::{ControllerChoice, UnknownController};
 
-/// Controllers as they are given to one `--arms`: separated by commas. A command may contain commas, so that `exec:COMMAND`
-/// takes the rest of the list.
+/// Controllers as they are given to one `--arms`: separated by commas. A command may contain
+/// commas, so that `exec:COMMAND` takes the rest of the list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ArmList(pub Vec<ControllerChoice>);
 
@@ -37,7 +37,7 @@ pub enum ArmsError {
         /// The controller.
         controller: String,
     },
-    /// One is named twice.
+    /// A controller is named twice.
     #[error("`{controller}` is named twice: every arm needs a controller of its own")]
     Twice {
         /// The controller.
@@ -52,8 +52,8 @@ impl ArmList {
     /// [`ArmsError`] if there is only one controller, or one is named twice.
     pub fn joined(lists: &[Self]) -> Result<Vec<ControllerChoice>, ArmsError> {
         let arms: Vec<ControllerChoice> = lists.iter().flat_map(|list| list.0.clone()).collect();
-        if let [one] = &arms[..] {
-            return Err(ArmsError::One { controller: one.to_string() });
+        if let [single] = &arms[..] {
+            return Err(ArmsError::One { controller: single.to_string() });
         }
         match arms.iter().enumerate().find(|(index, arm)| arms[..*index].contains(arm)) {
             Some((_, twice)) => Err(ArmsError::Twice { controller: twice.to_string() }),

@@ -11,21 +11,24 @@ use crate::run::ControllerFactory;
 /// A built-in controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BuiltIn {
-    /// The scenario's ego stack without its margin increase system: adaptive cruise control and emergency braking.
+    /// The scenario's ego stack without its margin increase system: adaptive cruise control and
+    /// emergency braking.
     Acc,
     /// The scenario's complete ego stack.
     Mis,
-    /// The scenario's complete ego stack, whose margin increase system plans for the time to closest encounter.
+    /// The scenario's complete ego stack, whose margin increase system plans for the time to
+    /// closest encounter.
     MisTtce,
-    /// The scenario's complete ego stack, with a margin increase system that engages earlier and may brake harder.
+    /// The scenario's complete ego stack, with a margin increase system that engages earlier and
+    /// may brake harder.
     MisExtended,
     /// As [`BuiltIn::Acc`], but slowing down gently from the first second on, without looking back.
     Blind,
-    /// As [`BuiltIn::Blind`], twice as hard and twice as far.
+    /// Like [`BuiltIn::Blind`], but twice as strong and over twice the distance.
     Crawl,
     /// The scenario's ego stack with the functions that the arm names.
     Stack(Functions),
-    /// As [`BuiltIn::Acc`], with another constant time gap.
+    /// Like [`BuiltIn::Acc`], with another constant time gap.
     Gap(TimeGap),
     /// As [`BuiltIn::Acc`], with the minimum following distance of UN Regulation 157.
     R157Gap,
@@ -68,7 +71,8 @@ impl BuiltIn {
         Self::R157Fsm,
     ];
 
-    /// Returns true if the controller is a margin increase system, so that it needs a stack that has one.
+    /// Returns true if the controller is a margin increase system, so that it needs a stack that
+    /// has one.
     pub const fn needs_mis(self) -> bool {
         match self {
             Self::Stack(functions) => functions.needs_mis(),
@@ -81,7 +85,7 @@ impl BuiltIn {
         !matches!(self, Self::Blind | Self::Crawl | Self::R157Driver | Self::R157Fsm)
     }
 
-    /// Returns the settings that the controller makes of those of the scenario.
+    /// Returns the controller's settings, made from the settings of the scenario.
     pub(super) fn settings(self, settings: &EgoSettings) -> EgoSettings {
         match self {
             Self::Acc | Self::Blind | Self::Crawl => settings.without_mis(),
@@ -96,7 +100,7 @@ impl BuiltIn {
         }
     }
 
-    /// Returns a controller for one run, with the settings that it makes of those of the scenario.
+    /// Returns a controller for one run, with its settings made from the settings of the scenario.
     pub(super) fn controller(self, settings: EgoSettings) -> Box<dyn EgoController> {
         match self {
             Self::Blind => Box::new(Slower::new(settings, Slowing::BLIND)),
@@ -136,7 +140,8 @@ impl ControllerFactory for BuiltInFactory {
         self.settings(settings).mis().is_some()
     }
 
-    /// Cruise control, emergency braking and the models of UN Regulation 157 look ahead and to the sides.
+    /// Cruise control, emergency braking and the models of UN Regulation 157 look ahead and to the
+    /// sides.
     fn looks_back(&self, settings: &EgoSettings) -> bool {
         self.has_mis(settings)
     }

@@ -22,11 +22,11 @@ use crate::run::ControllerFactory;
 pub enum ControllerChoice {
     /// A controller of this program.
     BuiltIn(BuiltIn),
-    /// The same with settings of its own.
+    /// A built-in controller with its own settings.
     Tuned(Tuned),
     /// A separate process for each sample.
     Exec(ExecSettings),
-    /// A shared library or an FMU, in a process of its own.
+    /// A shared library or an FMU, in a separate process.
     Native(NativeSettings),
     /// A controller of the program that has Closecall as a library.
     Hosted(HostedController),
@@ -45,7 +45,8 @@ impl ControllerChoice {
     /// The scenario's complete ego stack.
     pub const MIS: Self = Self::BuiltIn(BuiltIn::Mis);
 
-    /// Returns the name in reports, if the campaign has no other controller of this name: see [`Self::names`].
+    /// Returns the name in reports, if the campaign has no other controller of this name: see
+    /// [`Self::names`].
     pub fn name(&self) -> String {
         match self {
             Self::BuiltIn(built_in) => built_in.to_string(),
@@ -56,8 +57,8 @@ impl ControllerChoice {
         }
     }
 
-    /// Returns the names of the arms of a campaign. Arms that would have the same name, such as several processes, are
-    /// numbered.
+    /// Returns the names of the arms of a campaign. Arms that would have the same name, such as
+    /// several processes, are numbered.
     pub fn names(arms: &[Self]) -> Vec<String> {
         let names: Vec<String> = arms.iter().map(Self::name).collect();
         let count = |names: &[String], name: &str| names.iter().filter(|other| *other == name).count();
@@ -83,7 +84,8 @@ impl ControllerChoice {
         }
     }
 
-    /// Returns the built-in controller, with settings of its own or without; `None` if this is a process.
+    /// Returns the built-in controller, with settings of its own or without; `None` if this is a
+    /// process.
     pub const fn built_in(&self) -> Option<BuiltIn> {
         match self {
             Self::BuiltIn(built_in) => Some(*built_in),
@@ -117,8 +119,8 @@ impl ControllerChoice {
         if let Self::Native(settings) = self { Some(settings) } else { None }
     }
 
-    /// Returns the same controller with other limits, if it has any: the time limit of each answer (ms), and the memory of the
-    /// process (MiB). `None` leaves a limit as it is.
+    /// Returns the same controller with other limits, if it has any: the time limit of each answer
+    /// (ms), and the memory of the process (MiB). `None` leaves a limit as it is.
     #[must_use]
     pub fn limited(&self, timeout_ms: Option<u64>, memory_mib: Option<u64>) -> Self {
         let mut limited = self.clone();
@@ -141,8 +143,8 @@ impl ControllerChoice {
         }
     }
 
-    /// Tries whether the program of a process can be started, and whether a library or an FMU can be loaded. A relative path is in
-    /// `folder`, or in that of this program.
+    /// Tries whether the program of a process can be started, and whether a library or an FMU can
+    /// be loaded. A relative path is in `folder`, or in the folder of this program.
     ///
     /// # Errors
     /// [`NativeError`] if not.
@@ -160,8 +162,8 @@ impl ControllerChoice {
         self.factory_in(None, self.name())
     }
 
-    /// Returns a factory of this controller. A process runs in the given folder, or in that of this program. All but a built-in
-    /// controller have the given name in reports.
+    /// Returns a factory of this controller. A process runs in the given folder, or in the folder
+    /// of this program. All but a built-in controller have the given name in reports.
     pub fn factory_in(&self, folder: Option<&Path>, name: String) -> Arc<dyn ControllerFactory> {
         match self {
             Self::BuiltIn(built_in) => built_in.factory(),
@@ -223,7 +225,7 @@ pub enum UnknownController {
         /// The text.
         text: String,
     },
-    /// A controller with settings of its own has one that it cannot have.
+    /// A controller has a setting that it cannot have.
     #[error("`{text}` is not a controller: {source}")]
     Setting {
         /// The text.
@@ -272,8 +274,8 @@ impl FromStr for ControllerChoice {
         }
         if let Some((HOSTED, _)) = text.split_once(':') {
             let hosted = HostedController::new(text);
-            let found = hosted.is_registered().then_some(Self::Hosted(hosted));
-            return found.ok_or_else(|| UnknownController::Hosted { text: text.to_owned() });
+            let choice = hosted.is_registered().then_some(Self::Hosted(hosted));
+            return choice.ok_or_else(|| UnknownController::Hosted { text: text.to_owned() });
         }
         if let Some((controller, settings)) = text.split_once(':')
             && let Ok(Self::BuiltIn(base)) = controller.parse()
@@ -282,11 +284,11 @@ impl FromStr for ControllerChoice {
             return Ok(Self::Tuned(Tuned::parse(base, settings).map_err(fail)?));
         }
         if Functions::is_meant(text) {
-            let found = Functions::parse(text).map(|functions| BuiltIn::Stack(functions).into());
-            return found.ok_or_else(|| UnknownController::Functions { text: text.to_owned() });
+            let choice = Functions::parse(text).map(|functions| BuiltIn::Stack(functions).into());
+            return choice.ok_or_else(|| UnknownController::Functions { text: text.to_owned() });
         }
-        if let Some(found) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
-            return Ok(found.into());
+        if let Some(choice) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
+            return Ok(choice.into());
         }
         match text.strip_prefix(GAP) {
             Some(seconds) => seconds
@@ -301,7 +303,8 @@ impl FromStr for ControllerChoice {
     }
 }
 
-/// The form in a manifest: the name of a built-in or hosted controller, or the settings of a process, a library or an FMU.
+/// The form in a manifest: the name of a built-in or hosted controller, or the settings of a
+/// process, a library or an FMU.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum Stored {

@@ -6,8 +6,9 @@
 //!  function  = "aeb" | "mis"
 //! ```
 //!
-//! `acc` alone is the scenario's stack without its margin increase system, with emergency braking if the scenario has it. An arm that names emergency braking
-//! has it or not, whatever the scenario says: with the settings of the scenario, or with its defaults.
+//! `acc` alone is the scenario's stack without its margin increase system, with emergency braking
+//! if the scenario has it. An arm that names emergency braking has it or not, whatever the scenario
+//! says: with the settings of the scenario, or with its defaults.
 
 use std::fmt;
 
@@ -39,7 +40,7 @@ impl Functions {
     pub const ALLOWED: &'static str =
         "`acc` or `cruise`, then `+aeb` or `-aeb`, then `+mis`, as in `acc-aeb`, `acc+aeb` and `cruise+aeb`";
 
-    /// Returns true if a text begins like a list of functions, so that it is no other controller.
+    /// Returns true if a text begins like a list of functions. It then names no other controller.
     pub fn is_meant(text: &str) -> bool {
         BASES.iter().any(|(base, _)| text.strip_prefix(base).is_some_and(|rest| rest.starts_with(['+', '-'])))
             || text == "cruise"
@@ -57,7 +58,7 @@ impl Functions {
         all.filter(is_switched).find(|of| of.to_string() == text)
     }
 
-    /// Returns true if the arm has a margin increase system, so that it needs a stack that has one.
+    /// Returns true if the arm has a margin increase system. It then needs a stack that has one.
     pub const fn needs_mis(self) -> bool {
         self.mis
     }
@@ -97,7 +98,7 @@ mod tests {
             ["acc-aeb", "acc+aeb", "acc+aeb+mis", "acc-aeb+mis", "acc+mis", "cruise", "cruise-aeb", "cruise+aeb"]
         {
             assert!(Functions::is_meant(text), "{text}");
-            assert_eq!(Functions::parse(text).map(|of| of.to_string()).as_deref(), Some(text));
+            assert_eq!(Functions::parse(text).map(|functions| functions.to_string()).as_deref(), Some(text));
         }
         for text in ["acc+mis+aeb", "acc+aeb+aeb", "acc-mis", "acc+", "acc+abs", "cruise+acc", "acc"] {
             assert_eq!(Functions::parse(text), None, "{text}");

@@ -1,13 +1,15 @@
-//! Controllers of the program that has Closecall as a library, such as a Python program: `python:NAME`.
+//! Controllers of the program that has Closecall as a library, such as a Python program:
+//! `python:NAME`.
 //!
-//! The program registers a [`ControllerFactory`] under a name. From then on the name is a controller like any other, on a
-//! command line and in a manifest. A manifest outlives the program: its folder can be read without it, but its samples cannot
-//! be run again.
+//! The program registers a [`ControllerFactory`] under a name. From then on the name is a
+//! controller like any other, on a command line and in a manifest. A manifest outlives the program:
+//! its folder can be read without it, but its samples cannot be run again.
 //!
-//! A name may end with `@VERSION`. Reports leave the version out. A manifest keeps it, so that a campaign is not resumed
-//! with a controller that has changed.
+//! A name may end with `@VERSION`. Reports leave the version out. A manifest keeps it, so that a
+//! campaign is not resumed with a controller that has changed.
 //!
-//! A controller runs in the process of its program, or in worker processes that load it for themselves: see [`HostedProcess`].
+//! A controller runs in the process of its program, or in worker processes that load it for
+//! themselves: see [`HostedProcess`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -26,7 +28,7 @@ pub const PREFIX: &str = "python";
 type Factories = BTreeMap<String, Arc<dyn ControllerFactory>>;
 
 static REGISTRY: Mutex<Factories> = Mutex::new(BTreeMap::new());
-/// Why controllers cannot be loaded in this process, by their names.
+/// The reasons for which controllers cannot be loaded in this process, by their names.
 static REFUSED: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
 
 fn registry() -> MutexGuard<'static, Factories> {
@@ -63,7 +65,8 @@ impl Drop for Registration {
     }
 }
 
-/// Registers a controller. `name` is `python:NAME` or `python:NAME@VERSION`. A controller of the same name is replaced.
+/// Registers a controller. `name` is `python:NAME` or `python:NAME@VERSION`. A controller of the
+/// same name is replaced.
 #[must_use]
 pub fn register(name: &str, factory: Arc<dyn ControllerFactory>) -> Registration {
     let earlier = registry().insert(name.to_owned(), factory);
@@ -92,7 +95,7 @@ impl HostedController {
         registry().contains_key(&self.0)
     }
 
-    /// Returns true if the program has registered the controller for processes of its own.
+    /// Returns true if the program has registered the controller for separate processes.
     pub(super) fn has_processes(&self) -> bool {
         let factory = registry().get(&self.0).cloned();
         factory.is_some_and(|factory| factory.isolated().is_some())
@@ -103,7 +106,8 @@ impl HostedController {
         self.0.split_once('@').map_or(&self.0[..], |(name, _)| name).to_owned()
     }
 
-    /// Returns the factory, under the given name. The controllers of a name that is not registered fail at their first step.
+    /// Returns the factory, under the given name. The controllers of a name that is not registered
+    /// fail at their first step.
     pub(super) fn factory(&self, name: String) -> Arc<dyn ControllerFactory> {
         let factory = registry().get(&self.0).cloned();
         let factory = factory.unwrap_or_else(|| Arc::new(Missing { name: self.name() }));

@@ -7,8 +7,8 @@ use super::exec::ExecSettings;
 /// The hidden command that serves libraries and FMUs.
 pub(super) const COMMAND: &str = "host";
 
-/// A controller of a program that worker processes run, with what starts one. The process registers the controller under its
-/// name, and then runs the hidden command that serves samples.
+/// A controller of a program that worker processes run, with what starts one. The process registers
+/// the controller under its name, and then runs the hidden command that serves samples.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HostedProcess {
     /// The name with its version, under which the process registers the controller.

@@ -10,7 +10,8 @@ impl Isolated {
     /// Returns the factory in a worker process.
     ///
     /// # Errors
-    /// The reason for which this process cannot run the controller that was named: its file has changed, or it cannot be loaded here.
+    /// The reason for which this process cannot run the controller that was named: its file has
+    /// changed, or it cannot be loaded here.
     pub fn in_this_process(self) -> Result<Arc<dyn ControllerFactory>, String> {
         match self {
             Self::Native(native) => {

@@ -1,4 +1,5 @@
-//! Controllers that a worker process runs, together with whole samples: whatever they do costs one sample.
+//! Controllers that a worker process runs, together with whole samples: whatever they do costs one
+//! sample.
 
 use std::path::Path;
 
@@ -42,7 +43,8 @@ impl Isolated {
         }
     }
 
-    /// Returns the settings of a worker process with these arguments, under the limits of the controller.
+    /// Returns the settings of a worker process with these arguments, under the limits of the
+    /// controller.
     pub fn process(&self, arguments: &[&str]) -> ExecSettings {
         match self {
             Self::Native(native) => native.process(arguments),
@@ -50,8 +52,8 @@ impl Isolated {
         }
     }
 
-    /// Checks that every variable of an FMU has its counterpart in a scenario. A relative path is in `folder`, or in that of this
-    /// program.
+    /// Checks that every variable of an FMU has its counterpart in a scenario. A relative path is
+    /// in `folder`, or in the folder of this program.
     ///
     /// # Errors
     /// [`NativeError`] if one has none.

@@ -16,8 +16,9 @@
 //! | `fmu:PATH` | a functional mock-up unit, in a process of its own ([`native`]) |
 //! | `python:NAME` | a controller of the Python program that runs Closecall ([`hosted`]) |
 //!
-//! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A campaign creates it through a
-//! [`ControllerFactory`](crate::run::ControllerFactory). `examples/own_controller.rs` is a complete example.
+//! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A
+//! campaign creates it through a [`ControllerFactory`](crate::run::ControllerFactory).
+//! `examples/own_controller.rs` is a complete example.
 
 mod arm_list;
 mod built_in;

@@ -1,5 +1,5 @@
-//! Controllers that are shared libraries (`lib:PATH`) or FMUs (`fmu:PATH`). A process of its own loads them, so that a crash costs
-//! one sample.
+//! Controllers that are shared libraries (`lib:PATH`) or FMUs (`fmu:PATH`). A separate process
+//! loads them, and a crash costs one sample.
 //!
 //! ```text
 //!  campaign ──▶ worker process: whole samples with the controller inside      (see `closecall_campaign::host`)
@@ -29,13 +29,15 @@ use closecall_traffic::Time;
 /// The word of the hidden command before the folder of an unpacked FMU.
 pub const UNPACKED: &str = "unpacked";
 
-/// Time limit for loading a library or an FMU, at least. It may first have to read its files or to start an interpreter.
+/// Time limit for loading a library or an FMU, at least. It may first have to read its files or to
+/// start an interpreter.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The words that start this program.
 static PROGRAM: OnceLock<Vec<String>> = OnceLock::new();
 
-/// Sets the words that start this program, to which the hidden command is added. The first call counts.
+/// Sets the words that start this program, to which the hidden command is added. The first call
+/// counts.
 pub fn set_program(words: Vec<String>) {
     PROGRAM.get_or_init(|| words);
 }
@@ -44,8 +46,9 @@ pub fn set_program(words: Vec<String>) {
 pub fn command(arguments: &[&str]) -> Vec<String> {
     let words = PROGRAM.get_or_init(|| {
         // The running program, even if its file has been replaced.
-        let own = Path::new("/proc/self/exe");
-        let path = if own.exists() { own.to_owned() } else { std::env::current_exe().unwrap_or_default() };
+        let executable = Path::new("/proc/self/exe");
+        let path =
+            if executable.exists() { executable.to_owned() } else { std::env::current_exe().unwrap_or_default() };
         vec![path.display().to_string()]
     });
     words.iter().cloned().chain([COMMAND.to_owned()]).chain(arguments.iter().map(ToString::to_string)).collect()
@@ -55,7 +58,7 @@ pub fn command(arguments: &[&str]) -> Vec<String> {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeSettings {
-    /// What the file is.
+    /// The kind of the file.
     pub kind: Kind,
     /// The file.
     pub path: String,
@@ -82,8 +85,10 @@ impl NativeSettings {
         format!("{}:{}", self.kind, stem.unwrap_or_default())
     }
 
-    /// Returns the settings of a process of this program with these arguments, under the limits of the controller. A relative path of the
-    /// controller is in `folder`, or in that of this program. An FMU is unpacked before, so that the time for this is not that of the process.
+    /// Returns the settings of a process of this program with these arguments, under the limits of
+    /// the controller. A relative path of the controller is in `folder`, or in the folder of this
+    /// program. An FMU is unpacked before the process starts: the unpacking does not count against
+    /// the time of the process.
     pub fn process(&self, folder: Option<&Path>, arguments: &[&str]) -> ExecSettings {
         let unpacked =
             unpack_for_children(self.kind, &path_in(folder, self)).map(|folder| folder.display().to_string());
@@ -94,8 +99,8 @@ impl NativeSettings {
         ExecSettings { command, timeout_ms: self.timeout_ms, memory_mib: self.memory_mib }
     }
 
-    /// Loads the file in a process of its own, and returns what the controller states about itself. A relative path is in
-    /// `folder`, or in that of this program.
+    /// Loads the file in a separate process, and returns the statements of the controller. A
+    /// relative path is in `folder`, or in the folder of this program.
     ///
     /// # Errors
     /// [`NativeError`] if the file cannot be used.
@@ -103,7 +108,8 @@ impl NativeSettings {
         self.try_with(folder, None)
     }
 
-    /// Checks that every variable of an FMU has its counterpart in a scenario. A relative path is in `folder`, or in that of this program.
+    /// Checks that every variable of an FMU has its counterpart in a scenario. A relative path is
+    /// in `folder`, or in the folder of this program.
     ///
     /// # Errors
     /// [`NativeError`] if one has none.
@@ -135,13 +141,13 @@ impl NativeSettings {
     }
 }
 
-/// What a process answers that has tried to load a library or an FMU.
+/// The answer of a process that has tried to load a library or an FMU.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Probe {
-    /// It can be used.
+    /// The file can be used.
     Identity(Identity),
-    /// It cannot be used.
+    /// The file cannot be used.
     Refused {
         /// The reason.
         reason: String,
@@ -151,7 +157,8 @@ pub enum Probe {
 }
 
 impl Probe {
-    /// Loads a library or an FMU in this process, and checks the variables of an FMU, if they are given.
+    /// Loads a library or an FMU in this process, and checks the variables of an FMU, if they are
+    /// given.
     pub fn of(kind: Kind, path: &Path, variables: Option<&Variables>) -> Self {
         match Loaded::open(kind, path) {
             Ok(loaded) => match variables.map_or(Ok(()), |variables| loaded.check(variables)) {
@@ -166,7 +173,7 @@ impl Probe {
 /// A library, an FMU or a process that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NativeError {
-    /// The file is not what is expected.
+    /// The file is not of the expected kind.
     #[error("failed to use the controller `{controller}`: {reason}")]
     Refused {
         /// The controller.
@@ -189,7 +196,7 @@ pub enum NativeError {
     Start {
         /// The controller.
         controller: String,
-        /// Why it cannot be started.
+        /// The reason for which it cannot be started.
         reason: String,
     },
 }
@@ -223,7 +230,8 @@ pub struct NativeFactory {
 }
 
 impl NativeFactory {
-    /// Creates a factory. A relative path is in the given folder, or in that of this program. `name` is the name in reports.
+    /// Creates a factory. A relative path is in the given folder, or in the folder of this program.
+    /// `name` is the name in reports.
     pub fn new(settings: &NativeSettings, folder: Option<&Path>, name: String) -> Self {
         let (settings, folder) = (settings.clone(), folder.map(Path::to_owned));
         let blake3 = file_hash(&path_in(folder.as_deref(), &settings));
@@ -252,7 +260,8 @@ impl NativeFactory {
         Self { is_worker: true, ..self }
     }
 
-    /// Returns the settings of a process of this program with these arguments, under the limits of the controller.
+    /// Returns the settings of a process of this program with these arguments, under the limits of
+    /// the controller.
     pub fn process(&self, arguments: &[&str]) -> ExecSettings {
         self.settings.process(self.folder.as_deref(), arguments)
     }
@@ -268,7 +277,8 @@ impl ControllerFactory for NativeFactory {
         &self.name
     }
 
-    /// The outcome summarises the states that the controller answers if the scenario has a margin increase system.
+    /// The outcome summarises the states that the controller answers if the scenario has a margin
+    /// increase system.
     fn has_mis(&self, settings: &EgoSettings) -> bool {
         settings.mis().is_some()
     }

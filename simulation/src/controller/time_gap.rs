@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 /// A time gap in steps of 0.1 s, from 0.8 to 2.5 s.
 ///
-/// 0.8 s is the shortest time gap that ISO 15622 allows. About 2.5 s is the longest that the manual of a production system
-/// offers (Volvo, five steps from about 1 to about 2.5 s).
+/// 0.8 s is the shortest time gap that ISO 15622 allows. About 2.5 s is the longest that the manual
+/// of a production system offers (Volvo, five steps from about 1 to about 2.5 s).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TimeGap {
     tenths: u16,

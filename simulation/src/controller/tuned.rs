@@ -1,6 +1,7 @@
-//! A built-in controller with settings of its own: `acc+aeb:aeb.trigger-mps2=5`.
+//! A built-in controller with its own settings: `acc+aeb:aeb.trigger-mps2=5`.
 //!
-//! The settings of a scenario act on every arm. These act on one, so that two settings of a function can be compared on the same samples.
+//! The settings of a scenario act on every arm. These settings act on one arm: two settings of a
+//! function can be compared on the same samples.
 
 use std::fmt;
 use std::sync::Arc;
@@ -12,7 +13,8 @@ use crate::run::ControllerFactory;
 
 /// Separates the controller and its settings.
 const SEPARATOR: char = ':';
-/// The path of keys under which a scenario has the settings of the ego stack, behind `actor` and the actor's name.
+/// The path of keys under which a scenario has the settings of the ego stack, behind `actor` and
+/// the actor's name.
 const STACK: [&str; 2] = ["driver", "ego-stack"];
 
 /// A built-in controller with settings of its own.
@@ -35,7 +37,8 @@ pub struct TunedError {
 }
 
 impl Tuned {
-    /// Returns the controller with one more setting, which is below the ego stack, or below the whole scenario. It replaces one of the same key.
+    /// Returns the controller with one more setting, which is below the ego stack, or below the
+    /// whole scenario. It replaces one of the same key.
     ///
     /// # Errors
     /// [`TunedError`] if the ego stack has no such key, or the value is out of range.
@@ -50,7 +53,7 @@ impl Tuned {
             all => all,
         };
         let key = below.join(".");
-        let is_other = |known: &String| known.split_once('=').is_none_or(|(other, _)| other != key);
+        let is_other = |setting: &String| setting.split_once('=').is_none_or(|(other, _)| other != key);
         self.settings.retain(is_other);
         self.settings.push(format!("{key}={}", value.trim()));
         self.patch().map_err(fail)?;
@@ -63,7 +66,7 @@ impl Tuned {
         settings.split(SEPARATOR).try_fold(untuned, |tuned, setting| tuned.with(setting))
     }
 
-    /// Returns a controller without settings of its own.
+    /// Returns a controller without its own settings.
     pub const fn new(base: BuiltIn) -> Self {
         Self { base, settings: Vec::new() }
     }

@@ -12,36 +12,40 @@ use crate::controller::isolated::Isolated;
 pub trait ControllerFactory: Send + Sync {
     /// Returns the name under which outcomes are reported.
     fn name(&self) -> &str;
-    /// Returns the settings that the controller makes of those of the scenario. If it keeps another gap to the lead vehicle,
-    /// the ego starts as much further back.
+    /// Returns the controller's settings, made from the settings of the scenario. If it keeps
+    /// another gap to the lead vehicle, the ego starts further back by the difference.
     fn settings(&self, settings: &EgoSettings) -> EgoSettings {
         *settings
     }
-    /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
+    /// Returns whether the controller has a margin increase system whose actions the outcome
+    /// summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
-    /// Returns whether the controller is one of this program, so that the states that it reports are those of its code. What another one reports of itself
-    /// is never evidence.
+    /// Returns whether the controller is one of this program. Its reported states are then the
+    /// states of its code. The reports of another controller about itself are never evidence.
     fn is_built_in(&self) -> bool {
         false
     }
-    /// Returns whether the controller uses the sensors that look back. If it does not, their tracks do not reach it, and mode
-    /// [`SensorMode::Full`] simulates them only for an observer of the steps.
+    /// Returns whether the controller uses the sensors that look back. If it does not, their tracks
+    /// do not reach it, and mode [`SensorMode::Full`] simulates them only for an observer of the
+    /// steps.
     fn looks_back(&self, _: &EgoSettings) -> bool {
         true
     }
-    /// Returns the controller that a worker process is to run, together with the whole sample; `None` for every controller that
-    /// runs in this process, or brings a process of its own.
+    /// Returns the controller that a worker process is to run, together with the whole sample;
+    /// `None` for every controller that runs in this process, or brings its own process.
     fn isolated(&self) -> Option<Isolated> {
         None
     }
-    /// Calls `run` once, which makes a run with a controller of this factory. A controller that needs something in its thread for a
-    /// whole run prepares it before, and gives it back afterwards.
+    /// Calls `run` once, which makes a run with a controller of this factory. A controller that
+    /// needs something in its thread for a whole run prepares it before, and gives it back
+    /// afterwards.
     fn in_thread(&self, run: &mut (dyn FnMut() + Send)) {
         run();
     }
     /// Creates a new controller with the settings of the scenario's ego stack.
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController>;
-    /// Creates a new controller as [`Self::build`] does, with the scenario's names of the variables of an FMU.
+    /// Creates a new controller as [`Self::build`] does, with the scenario's names of the variables
+    /// of an FMU.
     fn build_with(&self, settings: &EgoSettings, _: &VariableTable) -> Box<dyn EgoController> {
         self.build(settings)
     }

@@ -5,8 +5,8 @@ use closecall_traffic::Time;
 
 use super::{Observer, RunEvent, StepView};
 
-/// An observer that audits the confirmed rear tracks of a run. It stops at the first collision, since no motion model
-/// describes a wreck.
+/// An observer that audits the confirmed rear tracks of a run. It stops at the first collision,
+/// since no motion model describes a wreck.
 #[derive(Debug, Default)]
 pub struct TrackAuditor {
     audit: TrackAudit,
@@ -44,7 +44,7 @@ impl Observer for TrackAuditor {
         self.error = self.audit.observe(view.tracks, &scene).err();
     }
 
-    fn event(&mut self, _: Time, what: &RunEvent) {
-        self.has_collided |= matches!(what, RunEvent::Collision(_));
+    fn event(&mut self, _: Time, event: &RunEvent) {
+        self.has_collided |= matches!(event, RunEvent::Collision(_));
     }
 }

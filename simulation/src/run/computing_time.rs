@@ -1,14 +1,16 @@
 //! The computing time of a controller from outside.
 //!
-//! A command is valid from the instant of its input on: the loop waits for it. A controller that computes for longer than the control period could not do so in a
-//! vehicle. Such a run is an error. The mean over the run decides, because a machine with other work delays single steps.
+//! A command is valid from the instant of its input on: the loop waits for it. A controller that
+//! computes for longer than the control period could not do so in a vehicle. Such a run is an
+//! error. The mean over the run decides, because a machine with other work delays single steps.
 
 use std::time::{Duration, Instant};
 
 use closecall_controllers::ControllerError;
 use closecall_traffic::{CONTROL_STEP, Time};
 
-/// Number of steps from which on the mean counts (-): five seconds of a run. An assumption; 25 to 250 are plausible.
+/// Number of steps from which on the mean counts (-): five seconds of a run. An assumption; 25 to
+/// 250 are plausible.
 const LEAST_STEPS: u32 = 125;
 
 /// Adds up the computing time of a run.
@@ -23,7 +25,8 @@ impl ComputingTime {
     /// Calls `step`, and adds the time that it takes.
     ///
     /// # Errors
-    /// The error of `step`, or [`ControllerError::Own`] if the mean computing time exceeds the control period.
+    /// The error of `step`, or [`ControllerError::Own`] if the mean computing time exceeds the
+    /// control period.
     pub(super) fn of<T>(
         &mut self,
         time: Time,

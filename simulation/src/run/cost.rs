@@ -1,20 +1,24 @@
-//! What the ego costs itself and the vehicle behind it, before anything happens ahead.
+//! The cost of the ego's driving for itself and for the vehicle behind it, before anything happens
+//! ahead.
 //!
 //! ```text
 //!   start ───────────▶ R meets the conditions ────────────▶ F brakes, or the ego collides
 //!   │ slowing is unprompted │      slowing has a reason       │ the meter has ended
 //! ```
 //!
-//! R is the vehicle behind the ego in its lane, F the lead vehicle. The conditions are those of the system: R is within 100 m, and approaches at
-//! 10 km/h or more. An ego that slows down makes R approach, so that the closing speed counts against the lead vehicle's speed if that is higher: nobody
-//! gives the reason for his own slowing. All values are true states, whatever a controller says of itself.
+//! R is the vehicle behind the ego in its lane, F the lead vehicle. The conditions are the
+//! system's: R is within 100 m, and approaches at 10 km/h or more. An ego that slows down makes R
+//! approach. So the closing speed is relative to the lead vehicle's speed if that is higher: the
+//! ego's own braking gives no reason for itself. All values are true states; the reports of a
+//! controller do not count.
 
 use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M};
 
 use closecall_scenarios::outcome::Cost;
 
-/// Error of a tracked closing speed that is not held against a controller (m/s): an assumption; 0.2 to 1 are plausible. A system that engages at 10 km/h as
-/// it measures them engages at a little less now and then.
+/// Error of a tracked closing speed that is not held against a controller (m/s): an assumption; 0.2
+/// to 1 are plausible. A system that engages at 10 km/h as it measures them engages at a little
+/// less now and then.
 const CLOSING_TOLERANCE_MPS: f64 = 0.5;
 
 /// The vehicle behind the ego in its lane.
@@ -28,12 +32,12 @@ pub(super) struct Rear {
     pub(super) acceleration_mps2: f64,
 }
 
-/// What the meter sees of one physics step.
+/// The meter's view of one physics step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Instant {
     /// Speed of the ego (m/s).
     pub(super) own_mps: f64,
-    /// Speed with which that of the ego is compared (m/s), if there is one.
+    /// Speed with which the ego's speed is compared (m/s), if there is one.
     pub(super) reference_mps: Option<f64>,
     /// Whether the brake light of the lead vehicle is on.
     pub(super) lead_brakes: bool,
@@ -49,7 +53,7 @@ pub(super) struct CostMeter {
     has_ended: bool,
     late_s: f64,
     step_s: f64,
-    /// The last speed with which that of the ego was compared, or its own at the start (m/s).
+    /// The last speed with which the ego's speed was compared, or its own speed at the start (m/s).
     last_reference_mps: Option<f64>,
 }
 
@@ -71,7 +75,8 @@ impl CostMeter {
         if self.has_ended {
             return;
         }
-        // A lead vehicle counts after a second only. Until then an ego that slows down would give itself the reason.
+        // A lead vehicle counts only after a second. Until then, an ego that slows down would give
+        // itself the reason.
         let last_mps = *self.last_reference_mps.get_or_insert(now.own_mps);
         let reference_mps = now.reference_mps.unwrap_or(last_mps);
         self.last_reference_mps = Some(reference_mps);
@@ -132,7 +137,7 @@ mod tests {
 
     #[test]
     fn an_ego_that_slows_down_does_not_give_itself_the_reason() {
-        // The rear vehicle closes at 10 m/s, of which 9 are the ego's own.
+        // The rear vehicle closes at 10 m/s. The ego's own part is 9 m/s.
         assert_eq!(cost_of(&[at(21.0, 50.0, 31.0)]).unprompted_deficit_mps, 9.0);
     }
 

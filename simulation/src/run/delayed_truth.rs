@@ -1,10 +1,11 @@
-//! True tracks that are as late as those of the sensors: what remains of the perception if only its latency is wrong.
+//! True tracks with the delay of the sensors: perception whose only fault is its latency.
 //!
 //! ```text
 //!  state at t − L ─▶ prediction by L at constant speed along the road ─▶ tracks at t
 //! ```
 //!
-//! L is the latency of the sensor that sees the vehicle: ahead, around or behind. The sensors predict in the same way.
+//! L is the latency of the sensor that sees the vehicle: ahead, around or behind. The sensors
+//! predict in the same way.
 
 use std::collections::VecDeque;
 
@@ -22,8 +23,8 @@ pub(super) struct DelayedTruth {
 }
 
 impl DelayedTruth {
-    /// Creates the perception of one run. `latency_steps` are those of the sensors ahead, around and behind, in control
-    /// steps.
+    /// Creates the perception of one run. `latency_steps` are the latencies of the sensors ahead,
+    /// around and behind, in control steps.
     pub(super) fn new(latency_steps: [usize; 3]) -> Self {
         Self { latency_steps, truth: GroundTruth::new(), history: VecDeque::new(), tracks: Vec::new() }
     }
@@ -36,7 +37,7 @@ impl Perception for DelayedTruth {
         self.history.truncate(longest + 1);
         self.tracks.clear();
         for (steps, source) in self.latency_steps.into_iter().zip([Source::Front, Source::Surround, Source::Rear]) {
-            // Before the latency has elapsed, nothing is known.
+            // Before the latency has elapsed, there is no track.
             let Some(then) = self.history.get(steps) else { continue };
             let others: Vec<SceneVehicle> = then.iter().map(|vehicle| predicted(vehicle, steps, scene)).collect();
             let now = Scene { others: &others, ..*scene };
@@ -75,7 +76,7 @@ mod tests {
     fn a_speed_change_is_seen_after_the_latency_and_constant_speed_at_once() {
         let road = Road::straight(3);
         let mut perception = DelayedTruth::new([2, 1, 3]);
-        let mut seen = Vec::new();
+        let mut positions_m = Vec::new();
         for step in 0..8_i64 {
             let time = CONTROL_STEP * step;
             // The rear vehicle drives at 30 m/s, and stands from step 4 on.
@@ -85,9 +86,9 @@ mod tests {
             let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
             let tracks = perception.step(&scene).unwrap();
             assert_eq!(tracks.len(), usize::from(step >= 3), "step {step}");
-            seen.extend(tracks.iter().map(|track| (track.x_m() * 10.0).round() / 10.0));
+            positions_m.extend(tracks.iter().map(|track| (track.x_m() * 10.0).round() / 10.0));
         }
         // From step 3 on. The standstill is seen at step 7.
-        assert_eq!(seen, [-96.4, -95.2, -94.0, -92.8, -95.2]);
+        assert_eq!(positions_m, [-96.4, -95.2, -94.0, -92.8, -95.2]);
     }
 }

@@ -6,7 +6,8 @@ use closecall_sensors::{Health, Perception};
 use crate::world::World;
 use closecall_scenarios::Scenario;
 
-/// Returns the ego's own motion, its position in its lane, and its size, as its odometry and its map give them.
+/// Returns the ego's own motion, its position in its lane, and its size, as its odometry and its
+/// map give them.
 pub(super) fn odometry(scenario: &Scenario, world: &World) -> Odometry {
     let state = world.state(scenario.ego);
     let errors = scenario.sensors.odometry_errors().at(world.time());

@@ -8,7 +8,8 @@ use super::suppressed::Suppressed;
 use super::{Arm, RunKey};
 use closecall_scenarios::Scenario;
 
-/// Returns the sensors of the arm in a run. The run needs those that look back only if `needs_rear`.
+/// Returns the sensors of the arm in a run. The run needs the sensors that look back only if
+/// `needs_rear`.
 pub(super) fn perception(
     scenario: &Scenario,
     arm: &Arm,

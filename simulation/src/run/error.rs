@@ -4,7 +4,8 @@ use closecall_controllers::{ControllerError, DriverError};
 use closecall_sensors::SensorError;
 use closecall_traffic::{ActorId, ConfigError, Time};
 
-/// A run that could not be completed. It is an error of this sample: it is counted and reported, and never passes.
+/// A run that could not be completed. It is an error of this sample: it is counted and reported,
+/// and never passes.
 ///
 /// Only the key of the run remains; the same sample can be run again.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -12,7 +13,8 @@ pub enum SampleError {
     /// The sampled parameter values do not result in a valid scenario.
     #[error("failed to make the concrete scenario: {0}")]
     Scenario(ConfigError),
-    /// The ego cannot start in balance with the gap of its controller, because another vehicle is in the way.
+    /// The ego cannot start in balance with the gap of its controller, because another vehicle is
+    /// in the way.
     #[error(
         "failed to start the ego at the gap of `{controller}`: it is {moved_m:.1} m from where the scenario places the ego, and \
          `{actor}` leaves {room_m:.1} m"
@@ -64,7 +66,8 @@ pub enum SampleError {
 }
 
 impl SampleError {
-    /// Returns true if the wall clock caused the error: the same run may have an outcome on another machine.
+    /// Returns true if the wall clock caused the error: the same run may have an outcome on another
+    /// machine.
     pub const fn is_late(&self) -> bool {
         matches!(self, Self::Timeout { .. } | Self::Controller(ControllerError::Late { .. }))
     }

@@ -1,4 +1,5 @@
-//! The scenario's events in a run: when they are triggered, and which acceleration or lane change they then request.
+//! The scenario's events in a run: when they are triggered, and which acceleration or lane change
+//! they then request.
 
 use closecall_controllers::LaneChange;
 use closecall_traffic::metrics::time_headway_s;
@@ -44,7 +45,8 @@ impl Events {
         self.cut_outs[actor].get_or_insert(time);
     }
 
-    /// Triggers every event whose condition holds for the first time, and calls `on_trigger` with its name.
+    /// Triggers every event whose condition holds for the first time, and calls `on_trigger` with
+    /// its name.
     pub(super) fn update(&mut self, world: &World, mut on_trigger: impl FnMut(&str)) {
         let now = world.time();
         for state in &mut self.states {
@@ -55,8 +57,8 @@ impl Events {
         }
     }
 
-    /// Returns the acceleration that the triggered events of `actor` request (m/s²): the strongest braking among them.
-    /// Returns `None` if no such event of `actor` has been triggered.
+    /// Returns the acceleration that the triggered events of `actor` request (m/s²): the strongest
+    /// braking among them. Returns `None` if no such event of `actor` has been triggered.
     pub(super) fn requested_mps2(&self, actor: usize, world: &World) -> Option<f64> {
         self.states
             .iter()
@@ -68,7 +70,8 @@ impl Events {
             .min_by(f64::total_cmp)
     }
 
-    /// Returns the lane change that an event of `actor` requests now. Returns `None` if there is none, or no such lane.
+    /// Returns the lane change that an event of `actor` requests now. Returns `None` if there is
+    /// none, or no such lane.
     pub(super) fn lane_change(&self, actor: usize, world: &World, road: &Road) -> Option<LaneChange> {
         let is_now = |state: &&EventState| state.actor == actor && state.triggered_at == Some(world.time());
         self.states.iter().filter(is_now).find_map(|state| match state.event.then {
@@ -96,7 +99,8 @@ fn holds(when: &Trigger, world: &World, cut_outs: &[Option<Time>], now: Time) ->
     }
 }
 
-/// Returns the acceleration of a braking event (m/s²): constant, and fading out as the final speed is approached.
+/// Returns the acceleration of a braking event (m/s²): constant, and fading out as the final speed
+/// is approached.
 fn braking_mps2(brake: &Brake, speed_mps: f64) -> f64 {
     let left_mps = speed_mps - brake.to_speed_mps;
     if brake.to_speed_mps == 0.0 {

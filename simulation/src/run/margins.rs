@@ -20,12 +20,13 @@ pub(crate) struct Widths {
 }
 
 impl CurrentMargins {
-    /// Computes the margins of a vehicle with the state `own` among its neighbours.
+    /// Computes the margins of the ego among its neighbours.
     ///
-    /// A neighbour counts as being in the lane if the lateral distance of the two centres is below half a lane width. An
-    /// overtaking vehicle thus counts as behind until it crosses the marking, and as ahead once it has pulled in. A
-    /// neighbour that the vehicle would hit by driving straight on also counts as ahead.
-    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, widths: Widths) -> Self {
+    /// A neighbour counts as being in the lane if the lateral distance of the two centres is below
+    /// half a lane width. An overtaking vehicle thus counts as behind until it crosses the marking,
+    /// and as ahead once it has pulled in. A neighbour that the vehicle would hit by driving
+    /// straight on also counts as ahead.
+    pub(crate) fn new(ego: &VehicleState, neighbours: &Neighbours, widths: Widths) -> Self {
         let in_lane = |other: &&Neighbour| other.lateral_offset_m.abs() < 0.5 * widths.lane_m;
         let overlaps = |other: &&Neighbour| other.lateral_offset_m.abs() < 0.5 * (widths.vehicle_m + other.width_m);
         let in_path = neighbours.in_path.as_ref().filter(|path| path.gap_m >= 0.0 && overlaps(path));
@@ -45,14 +46,14 @@ impl CurrentMargins {
             },
             follower: behind.ok().map(|behind| behind.actor),
             gap_front_m,
-            thw_front_s: gap_front_m.and_then(|gap_m| time_headway_s(gap_m, own.speed_mps)),
+            thw_front_s: gap_front_m.and_then(|gap_m| time_headway_s(gap_m, ego.speed_mps)),
             gap_rear_m,
             thw_rear_s: behind.and_then(|behind| time_headway_s(behind.gap_m, behind.speed_mps)),
             ttc_front_s: ahead.ok_or(Absent::NoLead).and_then(|ahead| {
                 let gap_m = ahead.gap_m.max(0.0);
-                time_to_collision_s(gap_m, own.speed_mps, ahead.speed_mps)
+                time_to_collision_s(gap_m, ego.speed_mps, ahead.speed_mps)
             }),
-            ttc_rear_s: behind.and_then(|behind| time_to_collision_s(behind.gap_m, behind.speed_mps, own.speed_mps)),
+            ttc_rear_s: behind.and_then(|behind| time_to_collision_s(behind.gap_m, behind.speed_mps, ego.speed_mps)),
         }
     }
 }
@@ -101,9 +102,10 @@ impl MarginMeter {
         }
     }
 
-    /// Updates the extremes by one physics step, and returns the speed with which that of the ego is compared (m/s), if there is one now. It must not be
-    /// called after the ego's first collision.
-    pub(crate) fn observe(&mut self, own: &VehicleState, now: &CurrentMargins) -> Option<f64> {
+    /// Updates the extremes by one physics step. Returns the speed with which the ego's speed is
+    /// compared (m/s), if there is one at this step. It must not be called after the ego's first
+    /// collision.
+    pub(crate) fn observe(&mut self, ego: &VehicleState, now: &CurrentMargins) -> Option<f64> {
         let extremes = &mut self.extremes;
         keep_least(&mut extremes.min_thw_front_s, now.thw_front_s);
         keep_least(&mut extremes.min_thw_rear_s, now.thw_rear_s);
@@ -111,18 +113,19 @@ impl MarginMeter {
         keep_least(&mut extremes.min_gap_rear_m, now.gap_rear_m);
         keep_least(&mut extremes.min_ttc_rear_s, now.ttc_rear_s);
         keep_least(&mut self.min_ttc_front_s, now.ttc_front_s);
-        extremes.max_deceleration_mps2 = extremes.max_deceleration_mps2.max(-own.acceleration_mps2);
-        // When the vehicle comes to a standstill, its deceleration ends at once. The controller did not cause that jerk.
-        if let Some(last_mps2) = self.last_acceleration_mps2.filter(|_| own.speed_mps > 0.0) {
-            let jerk_mps3 = (own.acceleration_mps2 - last_mps2).abs() / self.step_s;
+        extremes.max_deceleration_mps2 = extremes.max_deceleration_mps2.max(-ego.acceleration_mps2);
+        // When the vehicle comes to a standstill, its deceleration ends at once. The controller did
+        // not cause that jerk.
+        if let Some(last_mps2) = self.last_acceleration_mps2.filter(|_| ego.speed_mps > 0.0) {
+            let jerk_mps3 = (ego.acceleration_mps2 - last_mps2).abs() / self.step_s;
             extremes.max_jerk_mps3 = extremes.max_jerk_mps3.max(jerk_mps3);
         }
-        self.last_acceleration_mps2 = Some(own.acceleration_mps2);
-        self.observe_speed_deficit(own.speed_mps, now.lead)
+        self.last_acceleration_mps2 = Some(ego.acceleration_mps2);
+        self.observe_speed_deficit(ego.speed_mps, now.lead)
     }
 
-    /// Compares the ego's speed with a reference: the lead vehicle's speed once it has been ahead for [`SETTLED_LEAD_S`],
-    /// or the ego's own speed at the start if there is no lead vehicle.
+    /// Compares the ego's speed with a reference: the lead vehicle's speed once it has been ahead
+    /// for [`SETTLED_LEAD_S`], or the ego's own speed at the start if there is no lead vehicle.
     fn observe_speed_deficit(&mut self, own_mps: f64, lead: Result<Lead, Absent>) -> Option<f64> {
         let start_speed_mps = *self.start_speed_mps.get_or_insert(own_mps);
         let reference_mps = match lead {
@@ -142,8 +145,8 @@ impl MarginMeter {
         Some(reference_mps)
     }
 
-    /// Sets the smallest gap to zero after a collision of the ego: the front gap if the other vehicle `is_ahead`, otherwise
-    /// the rear gap.
+    /// Sets the smallest gap to zero after a collision of the ego: the front gap if the other
+    /// vehicle `is_ahead`, otherwise the rear gap.
     pub(crate) fn note_collision(&mut self, is_ahead: bool) {
         let gap = if is_ahead { &mut self.extremes.min_gap_front_m } else { &mut self.extremes.min_gap_rear_m };
         *gap = Ok(0.0);
@@ -160,7 +163,8 @@ impl MarginMeter {
     }
 }
 
-/// Replaces `least` by `now` if that is smaller. A value replaces an absence; an absence never replaces anything.
+/// Replaces `least` by `now` if that is smaller. A value replaces an absence; an absence never
+/// replaces anything.
 fn keep_least(least: &mut Measured, now: Measured) {
     let Ok(value) = now else { return };
     if !least.is_ok_and(|least| least <= value) {

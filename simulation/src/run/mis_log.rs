@@ -1,4 +1,4 @@
-//! Summarises what the margin increase system (MIS) did in a run, from its commands.
+//! Summarises the actions of the margin increase system (MIS) in a run, from its commands.
 
 use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_traffic::{Absent, CONTROL_STEP, Measured, Time};
@@ -11,9 +11,9 @@ pub(super) struct MisObservation<'a> {
     pub(super) command: &'a EgoCommand,
     pub(super) speed_mps: f64,
     pub(super) thw_front_s: Measured,
-    /// Where the vehicle behind is.
+    /// The position of the vehicle behind.
     pub(super) rear: RearObservation,
-    /// Why the system is not available; `None` if it is.
+    /// The reason for which the system is not available; `None` if it is.
     pub(super) failed: Option<Reason>,
 }
 
@@ -24,7 +24,7 @@ pub(super) struct RearObservation {
     pub(super) near: Option<usize>,
     /// Whether the lead vehicle brakes and the ego brakes hard in front of it.
     pub(super) is_hazard: bool,
-    /// Whether it has left the lane.
+    /// Whether the vehicle has left the lane.
     pub(super) has_crossed: bool,
     /// True only at the first control step at which it is at the critical distance.
     pub(super) is_critical: bool,
@@ -116,8 +116,9 @@ impl MisLog {
         self.reasons.push(ReasonSpan { reason, from_s: time_s, until_s: time_s });
     }
 
-    /// Notes the interval in which the system could have engaged for the vehicle behind that matters: the first one that is near
-    /// in a hazard, else the first one that leaves the lane after it was near.
+    /// Notes the interval in which the system could have engaged for the vehicle behind that
+    /// matters: the first one that is near in a hazard, else the first one that leaves the lane
+    /// after it was near.
     fn note_decision(&mut self, time_s: f64, rear: RearObservation) {
         if let Some(near) = rear.near {
             self.last_near = Some(near);
@@ -140,8 +141,8 @@ impl MisLog {
         }
     }
 
-    /// Returns the interval in which the system could have engaged (s): without a hazard and a crossing until the end. `None`
-    /// if no vehicle behind was near.
+    /// Returns the interval in which the system could have engaged (s): without a hazard and a
+    /// crossing until the end. `None` if no vehicle behind was near.
     fn decided_s(&self) -> Option<[f64; 2]> {
         let until_the_end = || Some([self.near_since_s.first()?.1, self.reasons.last()?.until_s]);
         self.decided.map(|(interval_s, _)| interval_s).or_else(until_the_end)

@@ -6,9 +6,10 @@
 //!  without the system  (b) R comes near ─▶ (d) F brakes ─▶ (a) E brakes hard in front of R
 //! ```
 //!
-//! E is the ego, F the lead vehicle, R the rear vehicle, and d_c the critical distance. The moments follow from the
-//! ground truth, not from the controller, so that runs with and without the system can be compared. Each is noted once.
-//! They may occur in another order: the lead vehicle may brake early.
+//! E is the ego, F the lead vehicle, R the rear vehicle, and d_c the critical distance. The moments
+//! follow from the ground truth, not from the controller, so that runs with and without the system
+//! can be compared. Each is noted once. They may occur in another order: the lead vehicle may brake
+//! early.
 
 use closecall_traffic::Time;
 
@@ -29,7 +30,7 @@ impl Default for Moments {
 impl Moments {
     /// Notes that `moment` is reached at `time`, unless it was reached before.
     pub(super) fn note(&mut self, moment: Moment, time: Time) {
-        if !self.noted.iter().any(|known| known.moment == moment) {
+        if !self.noted.iter().any(|noted| noted.moment == moment) {
             self.noted.push(ReachedMoment { moment, time });
         }
     }

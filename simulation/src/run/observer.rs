@@ -72,7 +72,7 @@ pub enum RunEvent {
     DriverNote {
         /// Index of the driver's vehicle in the list of actors.
         actor: usize,
-        /// What the driver does.
+        /// The driver's action.
         note: DriverNote,
     },
     /// The ego stack changed its state.
@@ -89,7 +89,7 @@ pub enum RunEvent {
         /// The phase now.
         to: Phase,
     },
-    /// Two vehicles touched for the first time. The changes of velocity are not known yet.
+    /// Two vehicles touched for the first time. The changes of velocity follow later.
     Collision(Collision),
     /// The bumpers of two vehicles met for the first time, too slowly for a collision.
     Touch(Collision),
@@ -97,15 +97,17 @@ pub enum RunEvent {
 
 /// Observes a run.
 pub trait Observer {
-    /// Returns whether [`Observer::step`] is to be called. The view of a step takes time to compute.
+    /// Returns whether [`Observer::step`] is to be called. The view of a step takes time to
+    /// compute.
     fn wants_steps(&self) -> bool {
         true
     }
     /// Called at each control step (25 Hz).
     fn step(&mut self, view: &StepView<'_>);
     /// Called when something happens, with its time.
-    fn event(&mut self, time: Time, what: &RunEvent);
-    /// Called at each physics step (100 Hz) with the states of all vehicles, in the order of the scenario's actors.
+    fn event(&mut self, time: Time, event: &RunEvent);
+    /// Called at each physics step (100 Hz) with the states of all vehicles, in the order of the
+    /// scenario's actors.
     fn moved(&mut self, _time: Time, _vehicles: &mut dyn Iterator<Item = VehicleState>) {}
 }
 

@@ -38,7 +38,8 @@ impl Encounter {
         self.phase
     }
 
-    /// Updates the phase by one step and returns it. `follower` is the vehicle behind the ego in the ego's lane.
+    /// Updates the phase by one step and returns it. `follower` is the vehicle behind the ego in
+    /// the ego's lane.
     pub(crate) fn update(&mut self, world: &World, ego: usize, follower: Option<Follower>) -> Phase {
         if let Some(Follower { actor, thw_s }) = follower {
             self.rear = Some(actor);
@@ -57,7 +58,8 @@ impl Encounter {
         self.phase
     }
 
-    /// Returns true once: the first time that the rear vehicle, in any lane, is `critical_gap_m` or less behind the ego.
+    /// Returns true once: the first time that the rear vehicle, in any lane, is `critical_gap_m` or
+    /// less behind the ego.
     pub(crate) fn reaches_critical_gap(&mut self, world: &World, ego: usize, critical_gap_m: f64) -> bool {
         if self.reached_critical_gap {
             return false;
@@ -67,13 +69,13 @@ impl Encounter {
         self.reached_critical_gap
     }
 
-    /// Returns the gap along the road from the front of the rear vehicle `actor` to the rear end of the ego (m). It is
-    /// negative once the front has passed that end.
+    /// Returns the gap along the road from the front of the rear vehicle `actor` to the rear end of
+    /// the ego (m). It is negative once the front has passed that end.
     fn gap_m(&self, world: &World, ego: usize, actor: usize) -> f64 {
         let [ego_m, actor_m] = [ego, actor].map(|index| world.vehicle(index).dimensions.length_m);
         bumper_gap_m(world.state(ego).s_m - world.state(actor).s_m, ego_m, actor_m)
     }
 }
 
-/// Duration of a run after its first collision, so that a second impact of a pile-up is still observed.
+/// Duration of a run after its first collision: a second impact of a pile-up is still observed.
 pub(crate) const AFTER_COLLISION: Time = Time::from_ms(2_000);

@@ -1,11 +1,13 @@
-//! Measures what becomes of the method's promise: the headway that is gained, and the braking around the crossing.
+//! Measures the fulfilment of the method's promise: the headway that is gained, and the braking
+//! around the crossing.
 //!
 //! ```text
 //!  start ──────▶ R is near ──────▶ R is at the critical distance ──▶ R crosses
 //!  │ least headway │ goal in reach? │ headway                    2 s │ 2 s: hardest braking
 //! ```
 //!
-//! R is the vehicle behind the ego in its lane. All values are true states, whatever a controller says of itself.
+//! R is the vehicle behind the ego in its lane. All values are true states; the reports of a
+//! controller do not count.
 
 use std::collections::VecDeque;
 
@@ -17,7 +19,8 @@ use closecall_traffic::{Absent, Measured, Time};
 
 use closecall_scenarios::outcome::Promise;
 
-/// Time before and after the crossing in which the ego is not to brake hard: the paper's critical time.
+/// Time before and after the crossing in which the ego is not to brake hard: the paper's critical
+/// time.
 const AROUND_CROSSING: Time = Time::from_ms(2_000);
 
 /// The ego at one physics step.
@@ -28,7 +31,7 @@ pub(super) struct EgoMotion {
     pub(super) thw_front_s: Measured,
 }
 
-/// Collects what becomes of the promise.
+/// Collects the fulfilment of the promise.
 #[derive(Debug)]
 pub(super) struct PromiseMeter {
     /// Smallest front time headway until a vehicle behind is near (s).
@@ -76,8 +79,8 @@ impl PromiseMeter {
         }
     }
 
-    /// Notes that a vehicle behind is near, for the first time. `encounter` is that of the ego with it and with the lead
-    /// vehicle; `None` without a lead vehicle.
+    /// Notes that a vehicle behind is near, for the first time. `encounter` is the encounter of the
+    /// ego with it and with the lead vehicle; `None` without a lead vehicle.
     pub(super) fn note_near(&mut self, encounter: Option<Encounter>, settings: &MisSettings) {
         if !self.is_near {
             self.is_near = true;

@@ -5,11 +5,12 @@ use closecall_traffic::CONTROL_STEP;
 
 use closecall_scenarios::Scenario;
 
-/// Number of scans before the start: one second, in which tracks are confirmed and settle. Without it, the ego would start
-/// without a lead vehicle and accelerate.
+/// Number of scans before the start: one second, in which tracks are confirmed and settle. Without
+/// it, the ego would start without a lead vehicle and accelerate.
 const SCANS_BEFORE_START: i64 = 25;
 
-/// Runs the sensors over the time before the start, in which all vehicles keep the speed at which they start.
+/// Runs the sensors over the time before the start, in which all vehicles keep the speed at which
+/// they start.
 pub(super) fn settle_sensors(
     perception: &mut dyn Perception,
     scenario: &Scenario,

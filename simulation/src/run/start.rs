@@ -1,18 +1,19 @@
-//! Where the ego starts.
+//! The start of the ego.
 //!
-//! A sample is the same in every arm: all other vehicles start at the same places with the same speeds, their drivers draw the
-//! same random numbers, and events on the clock happen at the same times. The ego starts at the speed of the scenario, in
-//! balance: where a vehicle would have been that has kept the gap of its own controller all along. If a controller keeps a
-//! longer gap than the scenario's cruise control, its ego is further back by the difference, and the rear vehicle closer to it by
-//! the same difference.
+//! A sample is the same in every arm: all other vehicles start at the same places with the same
+//! speeds, their drivers draw the same random numbers, and events on the clock happen at the same
+//! times. The ego starts at the speed of the scenario, in balance: at the position of a vehicle
+//! that has always kept the gap of its own controller. If a controller keeps a longer gap than the
+//! scenario's cruise control, its ego is further back by the difference, and the rear vehicle
+//! closer to it by the same difference.
 //!
 //! ```text
 //!  arm `acc`       R ─────────── gap ───────────▶ E ── 0.7 s ──▶ F
 //!  arm `gap-1.6`   R ───── shorter ─────▶ E ─────── 1.6 s ──────▶ F
 //! ```
 //!
-//! Starting at the place of the scenario instead, the ego would brake for seconds to fall back, and what is compared would be
-//! that manoeuvre.
+//! From the place of the scenario, the ego would brake for seconds to fall back, and the comparison
+//! would be one of this manoeuvre.
 
 use closecall_controllers::EgoSettings;
 use closecall_traffic::VehicleState;
@@ -21,10 +22,12 @@ use super::{Arm, SampleError};
 use crate::world::World;
 use closecall_scenarios::Scenario;
 
-/// Smallest gap to the vehicles ahead of and behind the ego at its start (m): numerical, so that no two vehicles overlap.
+/// Smallest gap to the vehicles ahead of and behind the ego at its start (m): numerical, no two
+/// vehicles may overlap.
 const MIN_GAP_M: f64 = 1.0;
 
-/// Returns the state in which the ego of an arm starts. `world` holds all vehicles as the scenario places them.
+/// Returns the state in which the ego of an arm starts. `world` holds all vehicles as the scenario
+/// places them.
 ///
 /// # Errors
 /// [`SampleError::Start`] if another vehicle is in the way.

@@ -28,11 +28,11 @@ use crate::world::{Action, InitialVehicle, World};
 use closecall_scenarios::Scenario;
 use closecall_scenarios::outcome::{Ahead, EndReason, Moment, Outcome, Phase};
 
-/// Deceleration of the ego above which it counts as braking hard (m/s²): an assumption, above the 1 m/s² of the paper's
-/// comfort limit with its overshoot; 1.2 to 3 are plausible.
+/// Deceleration of the ego above which it counts as braking hard (m/s²): an assumption, above the 1
+/// m/s² of the paper's comfort limit with its overshoot; 1.2 to 3 are plausible.
 const HAZARD_BRAKING_MPS2: f64 = 1.5;
 
-/// What a run waits for.
+/// The next event for which a run waits.
 pub(super) enum Next {
     /// A command of the ego controller.
     Control,
@@ -71,12 +71,13 @@ pub(super) struct Run<'a> {
     command: Option<EgoCommand>,
     /// Time of the first command of emergency braking.
     emergency_braking_at: Option<Time>,
-    /// How far the driver of each vehicle looks. The ego perceives with its sensors; its margins need the lane and the path.
+    /// How far the driver of each vehicle looks. The ego perceives with its sensors; its margins
+    /// need the lane and the path.
     looks: Vec<Looks>,
     // Buffers that are reused in each step.
     neighbours: Vec<Neighbours>,
     tracks: Vec<Track>,
-    /// The tracks of the other sensors: what a controller gets that does not look back.
+    /// The tracks of the other sensors, for a controller that does not look back.
     tracks_ahead: Vec<Track>,
     margins: CurrentMargins,
     actions: Vec<Action>,
@@ -103,7 +104,9 @@ impl<'a> Run<'a> {
         let mis_settings = *arm.controller.settings(&settings).mis().or(settings.mis()).unwrap_or(&MisSettings::PAPER);
         let own = key;
         // Noise and drivers draw from these random numbers; the outcome names the run itself.
-        let key = scenario.random_numbers.map_or(own, |of| RunKey { seed: of.seed, sample: of.sample });
+        let key = scenario
+            .random_numbers
+            .map_or(own, |random_numbers| RunKey { seed: random_numbers.seed, sample: random_numbers.sample });
         let world_with = |ego: VehicleState| {
             let vehicles = scenario.actors.iter().enumerate().map(|(index, actor)| InitialVehicle {
                 id: actor.id.clone(),
@@ -159,8 +162,8 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Goes on until the ego controller has to act, or the run ends. [`Self::input`] is then the controller's input, and
-    /// [`Self::command`] takes its answer.
+    /// Goes on until the ego controller has to act, or the run ends. [`Self::input`] is then the
+    /// controller's input, and [`Self::command`] takes its answer.
     pub(super) fn go_on(&mut self, observer: &mut dyn Observer) -> Result<Next, SampleError> {
         loop {
             self.report_motion(observer);
@@ -179,7 +182,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Takes the command of the ego controller for the current time. Returns why the run has ended, or `None` if it goes on.
+    /// Takes the command of the ego controller for the current time. Returns why the run has ended,
+    /// or `None` if it goes on.
     pub(super) fn command(
         &mut self,
         command: EgoCommand,
@@ -240,15 +244,15 @@ impl<'a> Run<'a> {
     fn update_surroundings(&mut self, observer: &mut dyn Observer) {
         self.world.find_neighbours(&self.looks, &mut self.neighbours);
         let ego = self.scenario.ego;
-        let own = self.world.state(ego);
-        self.margins = CurrentMargins::new(own, &self.neighbours[ego], self.widths(ego));
+        let ego_state = self.world.state(ego);
+        self.margins = CurrentMargins::new(ego_state, &self.neighbours[ego], self.widths(ego));
         if self.world.is_wrecked(ego) {
             return;
         }
-        let reference_mps = self.meter.observe(own, &self.margins);
+        let reference_mps = self.meter.observe(ego_state, &self.margins);
         self.promise.observe(&EgoMotion {
             time: self.world.time(),
-            braking_mps2: -own.acceleration_mps2,
+            braking_mps2: -ego_state.acceleration_mps2,
             thw_front_s: self.margins.thw_front_s,
         });
         let rear = self.margins.follower.zip(self.margins.gap_rear_m.ok()).map(|(actor, gap_m)| {
@@ -256,7 +260,7 @@ impl<'a> Run<'a> {
             Rear { gap_m, speed_mps: state.speed_mps, acceleration_mps2: state.acceleration_mps2 }
         });
         self.cost.observe(&Instant {
-            own_mps: own.speed_mps,
+            own_mps: ego_state.speed_mps,
             reference_mps,
             lead_brakes: self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light),
             rear,
@@ -289,7 +293,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Stores the command of the ego controller, and notes what follows from it.
+    /// Stores the command of the ego controller, and notes its consequences.
     fn accept_command(&mut self, command: EgoCommand, observer: &mut dyn Observer) {
         let time = self.world.time();
         let failed: Option<Reason> = sensor_availability(self.perception.as_ref()).reason();
@@ -319,13 +323,13 @@ impl<'a> Run<'a> {
     /// Observes where the vehicle behind is.
     fn observe_rear(&mut self) -> RearObservation {
         let ego = self.scenario.ego;
-        let own = self.world.state(ego);
+        let ego_state = self.world.state(ego);
         let near = self.margins.follower.filter(|rear| {
-            let closing_mps = self.world.state(*rear).speed_mps - own.speed_mps;
+            let closing_mps = self.world.state(*rear).speed_mps - ego_state.speed_mps;
             self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= ENGAGEMENT_GAP_M)
                 && closing_mps >= ENGAGEMENT_CLOSING_MPS
         });
-        let brakes_hard = own.acceleration_mps2 < -HAZARD_BRAKING_MPS2;
+        let brakes_hard = ego_state.acceleration_mps2 < -HAZARD_BRAKING_MPS2;
         RearObservation {
             near,
             is_hazard: near.is_some() && self.lead_brakes() && brakes_hard,
@@ -355,7 +359,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Notes what becomes of the method's promise now.
+    /// Updates the fulfilment of the method's promise.
     fn note_promise(&mut self, rear: RearObservation) {
         if let (Some(actor), Ok(rear_gap_m)) = (rear.near, self.margins.gap_rear_m) {
             let ego_mps = self.world.state(self.scenario.ego).speed_mps;
@@ -393,8 +397,8 @@ impl<'a> Run<'a> {
             };
             self.vehicles.push(vehicle);
         }
-        // The sensors process the vehicles in the order of their names, so that their random draws do not depend on the order
-        // of the list of actors.
+        // The sensors process the vehicles in the order of their names: their random draws do not
+        // depend on the order of the list of actors.
         let others = self.world.by_name().iter().filter(|actor| **actor != self.scenario.ego);
         self.others.extend(others.map(|&actor| self.vehicles[actor]));
     }

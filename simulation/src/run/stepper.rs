@@ -14,17 +14,19 @@ use closecall_scenarios::outcome::Outcome;
 /// The name of the controller in the outcome of a run that is stepped from outside.
 const NAME: &str = "external";
 
-/// A run that is stepped from outside: its caller decides the command of each control step, as a learning algorithm does.
+/// A run that is stepped from outside: its caller decides the command of each control step, as a
+/// learning algorithm does.
 ///
-/// It is the run that [`simulate`](super::simulate) makes of a controller that gives the same commands, down to the last bit.
+/// It is the run that [`simulate`](super::simulate) makes of a controller that gives the same
+/// commands, down to the last bit.
 pub struct Stepper {
     run: Option<Run<'static>>,
     outcome: Option<Outcome>,
 }
 
 impl Stepper {
-    /// Starts a run, and goes on to its first control step. `sensors` is the depth of the sensor simulation, or `None` for the
-    /// scenario's own.
+    /// Starts a run, and goes on to its first control step. `sensors` is the depth of the sensor
+    /// simulation, or `None` for the scenario's own.
     ///
     /// # Errors
     /// [`SampleError`] if the run cannot start.
@@ -51,7 +53,8 @@ impl Stepper {
         self.run.as_ref().map(Run::scenario)
     }
 
-    /// Returns the true margins of the ego; `None` if the run has ended. They are for judging: no controller knows them.
+    /// Returns the true margins of the ego; `None` if the run has ended. They are for judging: no
+    /// controller knows them.
     pub fn margins(&self) -> Option<&CurrentMargins> {
         self.run.as_ref().map(Run::margins)
     }
@@ -61,11 +64,12 @@ impl Stepper {
         self.outcome.as_ref()
     }
 
-    /// Commands the ego, and goes on to the next control step or to the end of the run. Does nothing if the run has ended.
+    /// Commands the ego, and goes on to the next control step or to the end of the run. Does
+    /// nothing if the run has ended.
     ///
     /// # Errors
-    /// [`SampleError`] if the command is not finite, or if a driver or a sensor fails. The run has then ended without an
-    /// outcome.
+    /// [`SampleError`] if the command is not finite, or if a driver or a sensor fails. The run has
+    /// then ended without an outcome.
     pub fn step(&mut self, command: EgoCommand, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let Some(mut run) = self.run.take() else { return Ok(()) };
         match run.command(command, observer)? {
@@ -88,7 +92,7 @@ impl Stepper {
     }
 }
 
-/// Stands for the controller outside. The ego starts where the scenario places it.
+/// Represents the controller outside. The ego starts at the place of the scenario.
 struct External;
 
 impl ControllerFactory for External {

@@ -5,8 +5,8 @@ use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput
 use closecall_scenarios::MisState;
 use closecall_traffic::Time;
 
-/// An ego stack whose margin increase system does not drive in some of its states: there, cruise control and emergency
-/// braking drive alone. The system itself goes through its states as before.
+/// An ego stack whose margin increase system does not drive in some of its states: in these, cruise
+/// control and emergency braking drive alone. The system itself goes through its states unchanged.
 pub(super) struct Suppressed {
     stack: Box<dyn EgoController>,
     without_mis: EgoStack,
@@ -14,7 +14,7 @@ pub(super) struct Suppressed {
 }
 
 impl Suppressed {
-    /// Creates the controller of one run. `settings` are those of `stack`.
+    /// Creates the controller of one run. `settings` are the settings of `stack`.
     pub(super) fn new(stack: Box<dyn EgoController>, settings: EgoSettings, off: Vec<MisState>) -> Self {
         Self { stack, without_mis: EgoStack::without_mis(settings), off }
     }

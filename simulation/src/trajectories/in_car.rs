@@ -1,7 +1,8 @@
 //! The log that one simulated vehicle would record of itself, and the ground truth of its lane changes.
 //!
-//! The log holds the vehicle's motion at 100 Hz and, on every fourth step, the signals of its bus. It contains no noise
-//! except the rounding of the written numbers. Robustness studies add noise of their own, from a seed.
+//! The log holds the vehicle's motion at 100 Hz and, on every fourth step, the signals of its bus.
+//! It contains no noise except the rounding of the written numbers. Robustness studies add noise
+//! from a seed.
 
 use closecall_recorded::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState, maths};
@@ -16,7 +17,8 @@ const PAUSE: Time = Time::from_ms(10_000);
 /// Lateral speed above which a vehicle counts as changing lanes, or attempting to (m/s).
 const MIN_LATERAL_SPEED_MPS: f64 = 0.01;
 
-/// Returns the id of the actor whose log is recorded: `requested`, or else the first one with an overtaking driver.
+/// Returns the id of the actor whose log is recorded: `requested`, or else the first one with an
+/// overtaking driver.
 ///
 /// # Errors
 /// The ids to choose from, if there is no such actor.
@@ -24,11 +26,11 @@ pub fn recorded_actor(scenario: &ScenarioConfig, requested: Option<&str>) -> Res
     let actors = &scenario.actors;
     let all = || actors.iter().map(|actor| actor.id.to_string()).collect::<Vec<_>>().join(", ");
     let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
-    let found = match requested {
+    let actor = match requested {
         None => actors.iter().find(overtakes),
         Some(name) => actors.iter().find(|actor| actor.id.to_string() == name),
     };
-    found.map(|actor| actor.id.to_string()).ok_or_else(|| match requested {
+    actor.map(|actor| actor.id.to_string()).ok_or_else(|| match requested {
         None => format!("no actor has an overtaking driver: name one of {}", all()),
         Some(name) => format!("there is no actor `{name}`: name one of {}", all()),
     })
@@ -53,7 +55,8 @@ struct Run {
     road: Road,
     /// Start of the run on the clock of the log.
     start: Time,
-    /// True while nothing is recorded: the scenario lacks the actor, or the vehicle has collided and no longer drives.
+    /// True while nothing is recorded: the scenario lacks the actor, or the vehicle has collided
+    /// and has stopped driving.
     has_ended: bool,
     manoeuvre: Option<Manoeuvre>,
     /// Lane and time of the previous step.
@@ -105,7 +108,8 @@ impl InCarRecorder {
         self.run.has_ended = true;
         let Some(actor) = scenario.actors.iter().position(|actor| actor.id.as_str() == self.actor) else { return };
         let start = self.frames.last().map_or(Time::ZERO, |frame| frame.time + PAUSE);
-        // Every run starts at a multiple of the bus period, so that the bus signals of the whole log share one clock.
+        // Every run starts at a multiple of the bus period, so that the bus signals of the whole
+        // log share one clock.
         let start = start + Time::from_ns((CONTROL_STEP.ns() - start.ns() % CONTROL_STEP.ns()) % CONTROL_STEP.ns());
         let vehicle = &scenario.actors[actor].vehicle;
         (self.class, self.dimensions) = (vehicle.class, vehicle.dimensions);
@@ -162,8 +166,8 @@ impl InCarRecorder {
         }
     }
 
-    /// Ends the current manoeuvre, if any, and appends its lane changes. `end_recorded` is true if the vehicle stopped
-    /// moving to that side, false if the run ended first.
+    /// Ends the current manoeuvre, if any, and appends its lane changes. `end_recorded` is true if
+    /// the vehicle stopped moving to that side, false if the run ended first.
     fn end_manoeuvre(&mut self, end_recorded: bool) {
         let Some(Manoeuvre { side, start, start_recorded, crossings }) = self.run.manoeuvre.take() else { return };
         let end = self.run.previous.map_or(start, |(_, time)| time);
@@ -185,8 +189,8 @@ impl InCarRecorder {
 impl Observer for InCarRecorder {
     fn step(&mut self, _: &StepView<'_>) {}
 
-    fn event(&mut self, _: Time, what: &RunEvent) {
-        if let RunEvent::Collision(collision) = what {
+    fn event(&mut self, _: Time, event: &RunEvent) {
+        if let RunEvent::Collision(collision) = event {
             self.run.has_ended |= collision.between.iter().any(|actor| actor.as_str() == self.actor);
         }
     }

@@ -1,4 +1,4 @@
-//! Simulated traffic as trajectory data: all vehicles seen from the road, or one as it would log itself.
+//! Simulated traffic as trajectory data: all vehicles seen from the road, or one vehicle's own log.
 
 mod in_car;
 mod recorder;

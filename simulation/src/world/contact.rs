@@ -41,11 +41,11 @@ struct Entry {
 
 /// Searches the pairs of vehicles that touch. The memory is reused from step to step.
 ///
-/// Only pairs whose bounds along the plane's x axis overlap are tested (sweep and prune: D. Baraff, *Dynamic simulation
-/// of non-penetrating rigid bodies*, Cornell University 1992).
+/// Only pairs whose bounds along the plane's x axis overlap are tested (sweep and prune: D. Baraff,
+/// *Dynamic simulation of non-penetrating rigid bodies*, Cornell University 1992).
 ///
-/// parry's tree of bounds (`Bvh`) finds the same pairs. Updated from step to step, it takes 44 µs per step with 200 vehicles, and
-/// 0.27 ms with 1,000; the sorted list takes 0.5 µs and 18 µs.
+/// parry's tree of bounds (`Bvh`) finds the same pairs. Updated from step to step, it takes 44 µs
+/// per step with 200 vehicles, and 0.27 ms with 1,000; the sorted list takes 0.5 µs and 18 µs.
 #[derive(Debug, Default)]
 pub(super) struct ContactSearch {
     order: Vec<Entry>,
@@ -57,27 +57,28 @@ pub(super) struct ContactSearch {
 }
 
 impl ContactSearch {
-    /// Replaces the content of `found` by the pairs of vehicles that touch within a step and are not among `known`.
+    /// Replaces the content of `touches` by the pairs of vehicles that touch within a step and are
+    /// not among `ongoing`.
     ///
-    /// `by_name` holds the indices of the actors in the order of their names. The pairs are sorted by time; pairs with
-    /// equal times are in the order of `by_name`.
+    /// `by_name` holds the indices of the actors in the order of their names. The pairs are sorted
+    /// by time; pairs with equal times are in the order of `by_name`.
     pub(super) fn find(
         &mut self,
         boxes: StepBoxes<'_>,
         by_name: &[usize],
-        known: &[[usize; 2]],
+        ongoing: &[[usize; 2]],
         touches: &mut Vec<Touch>,
     ) {
         self.sort(boxes, by_name);
         self.ranks.clear();
-        for (index, one) in self.order.iter().enumerate() {
+        for (index, first_reach) in self.order.iter().enumerate() {
             for other in &self.order[index + 1..] {
-                if other.reach_m[0] > one.reach_m[1] {
+                if other.reach_m[0] > first_reach.reach_m[1] {
                     break;
                 }
-                let ranks = [one.rank.min(other.rank), one.rank.max(other.rank)];
+                let ranks = [first_reach.rank.min(other.rank), first_reach.rank.max(other.rank)];
                 let pair @ [first, second] = ranks.map(|rank| by_name[rank]);
-                if known.contains(&pair) {
+                if ongoing.contains(&pair) {
                     continue;
                 }
                 #[cfg(test)]
@@ -91,8 +92,8 @@ impl ContactSearch {
                 }
             }
         }
-        self.ranks.sort_by(|(one_ranks, one), (other_ranks, other)| {
-            one.fraction.total_cmp(&other.fraction).then(one_ranks.cmp(other_ranks))
+        self.ranks.sort_by(|(one_ranks, a), (other_ranks, b)| {
+            a.fraction.total_cmp(&b.fraction).then(one_ranks.cmp(other_ranks))
         });
         touches.clear();
         touches.extend(self.ranks.iter().map(|(_, touch)| *touch));
@@ -105,7 +106,7 @@ impl ContactSearch {
             self.order.extend((0..by_name.len()).map(|rank| Entry { reach_m: [0.0; 2], rank }));
         }
         if by_name.len() <= FEW {
-            // Testing all pairs is faster, and the order stays that of the names.
+            // Testing all pairs is faster, and the order stays the order of the names.
             self.order.iter_mut().for_each(|entry| entry.reach_m = [f64::NEG_INFINITY, f64::INFINITY]);
             return;
         }
@@ -114,13 +115,12 @@ impl ContactSearch {
             let actor = by_name[entry.rank];
             entry.reach_m = reach_m(&boxes.before[actor], &boxes.after[actor]);
         }
-        self.order
-            .sort_unstable_by(|one, other| one.reach_m[0].total_cmp(&other.reach_m[0]).then(one.rank.cmp(&other.rank)));
+        self.order.sort_unstable_by(|a, b| a.reach_m[0].total_cmp(&b.reach_m[0]).then(a.rank.cmp(&b.rank)));
     }
 }
 
-/// Returns bounds of a box's position along the plane's x axis during a step (m). A position that is not a number
-/// reaches everywhere, since [`first_contact`] counts it as a contact.
+/// Returns bounds of a box's position along the plane's x axis during a step (m). A position that
+/// is not a number reaches everywhere, since [`first_contact`] counts it as a contact.
 fn reach_m(before: &OrientedBox, after: &OrientedBox) -> [f64; 2] {
     // At least the radius of the circle through the corners, which is half of the diagonal.
     let radius_m = (0.5 * (before.length_m * before.length_m + before.width_m * before.width_m)).sqrt();
@@ -152,9 +152,11 @@ pub(super) struct StruckVehicle<'a> {
     pub(super) velocity_mps: Vector2<f64>,
 }
 
-/// Returns which of two vehicles closed the gap: the one that moves towards the struck side of the other.
+/// Returns which of two vehicles closed the gap: the one that moves towards the struck side of the
+/// other.
 ///
-/// Motion is measured along the normal of one of the two struck sides: the one along which they approach faster.
+/// Motion is measured along the normal of one of the two struck sides: the one along which they
+/// approach faster.
 pub(super) fn closed_by(first: StruckVehicle<'_>, second: StruckVehicle<'_>) -> ClosedBy {
     let relative = first.velocity_mps - second.velocity_mps;
     let from_first = outward(first.shape, first.side);
@@ -165,7 +167,8 @@ pub(super) fn closed_by(first: StruckVehicle<'_>, second: StruckVehicle<'_>) -> 
     match (first_approaches, second_approaches) {
         (true, true) => ClosedBy::Both,
         (false, true) => ClosedBy::Second,
-        // If neither approaches, both stand within rounding. The gap is then attributed to the first vehicle.
+        // If neither approaches, both stand within rounding. The gap is then attributed to the
+        // first vehicle.
         _ => ClosedBy::First,
     }
 }
@@ -201,17 +204,17 @@ mod tests {
     }
 
     /// Compares every pair of vehicles, in the order of the names.
-    fn by_brute_force(boxes: StepBoxes<'_>, by_name: &[usize], known: &[[usize; 2]]) -> Vec<Touch> {
+    fn by_brute_force(boxes: StepBoxes<'_>, by_name: &[usize], ongoing: &[[usize; 2]]) -> Vec<Touch> {
         let StepBoxes { before, after } = boxes;
         let mut touches = Vec::new();
         for (rank, &first) in by_name.iter().enumerate() {
-            for &second in by_name[rank + 1..].iter().filter(|&&second| !known.contains(&[first, second])) {
+            for &second in by_name[rank + 1..].iter().filter(|&&second| !ongoing.contains(&[first, second])) {
                 if let Some(at) = first_contact(&before[first], &after[first], &before[second], &after[second]) {
                     touches.push(Touch { pair: [first, second], fraction: at.fraction, struck_side: at.sides });
                 }
             }
         }
-        touches.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
+        touches.sort_by(|a, b| a.fraction.total_cmp(&b.fraction));
         touches
     }
 
@@ -240,9 +243,9 @@ mod tests {
             for moving in [&earlier[..moving.len()], &moving] {
                 let [before, after] = boxes(moving);
                 let boxes = StepBoxes { before: &before, after: &after };
-                let known: &[[usize; 2]] = &[[3, 1]];
-                search.find(boxes, &by_name, known, &mut touches);
-                let expected = by_brute_force(boxes, &by_name, known);
+                let ongoing: &[[usize; 2]] = &[[3, 1]];
+                search.find(boxes, &by_name, ongoing, &mut touches);
+                let expected = by_brute_force(boxes, &by_name, ongoing);
                 prop_assert_eq!(&touches, &expected);
             }
         }

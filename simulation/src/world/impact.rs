@@ -1,35 +1,38 @@
 //! Moves vehicles that have collided: rigid bodies that hit each other, spin and slide.
 //!
-//! parry finds the moment of contact in `f64` (see [`super::contact`]). This module receives the vehicles at that
-//! moment and lets rapier2d's solver compute the impact. Rapier computes in `f32`, so positions are relative to that of
-//! the first vehicle that collided.
+//! parry finds the moment of contact in `f64` (see [`super::contact`]). This module receives the
+//! vehicles at that moment and lets rapier2d's solver compute the impact. Rapier computes in `f32`,
+//! so positions are relative to the first vehicle that collided.
 //!
-//! No other force acts during an impact, so that momentum is conserved; afterwards the tyres slide. The velocities after
-//! an impact are read at its end, as in accident reconstruction.
+//! No other force acts during an impact, so that momentum is conserved; afterwards the tyres slide.
+//! The velocities after an impact are read at its end, as in accident reconstruction.
 
 use closecall_traffic::{GRAVITY_MPS2, maths};
 use nalgebra::Vector2;
 use rapier2d::prelude::*;
 
-/// Coefficient of restitution of the contact points: that of car bodies at medium and high closing speeds, about 0.1
-/// (Brach and Brach, *Vehicle Accident Analysis*, 2011; SAE 1999-01-0097). At a change of velocity of 1 to 2 m/s, 0.2 to
-/// 0.4 are measured (SAE 931842); the model has no such rise, and underestimates the change of velocity there.
+/// Coefficient of restitution of the contact points: the value of car bodies at medium and high
+/// closing speeds, about 0.1 (Brach and Brach, *Vehicle Accident Analysis*, 2011; SAE
+/// 1999-01-0097). At a change of velocity of 1 to 2 m/s, 0.2 to 0.4 are measured (SAE 931842); the
+/// model has no such rise, and underestimates the change of velocity there.
 ///
-/// In a central impact of parallel vehicles, the centres separate at 0.11 of the closing speed (600 collisions with a rear
-/// vehicle that stays in its lane: 0.112 in each without weaving, 0.093 to 0.112 with it). With an offset of 0.8 m and a yaw
-/// of up to 0.1 rad at 10 m/s, it is 0.03 to 0.20. In `low-thw-overtake`, where the rear vehicle changes lanes, the centres
-/// separate at 0.02 of the closing speed (median of 474 collisions); each change of velocity is then about 7 % smaller than
-/// with a restitution of 0.1 between the centres.
+/// In a central impact of parallel vehicles, the centres separate at 0.11 of the closing speed (600
+/// collisions with a rear vehicle that stays in its lane: 0.112 in each without weaving, 0.093 to
+/// 0.112 with it). With an offset of 0.8 m and a yaw of up to 0.1 rad at 10 m/s, it is 0.03 to
+/// 0.20. In `low-thw-overtake`, where the rear vehicle changes lanes, the centres separate at 0.02
+/// of the closing speed (median of 474 collisions); each change of velocity is then about 7 %
+/// smaller than with a restitution of 0.1 between the centres.
 const RESTITUTION: f32 = 0.1;
 /// Friction between car bodies: an assumption; 0.3 to 0.7 are plausible.
 const BODY_FRICTION: f32 = 0.5;
-/// Fraction of the road's friction that locked tyres sliding partly sideways provide: an assumption; 0.6 to 1 are
-/// plausible.
+/// Fraction of the road's friction that locked tyres sliding partly sideways provide: an
+/// assumption; 0.6 to 1 are plausible.
 const SLIDING_SHARE: f64 = 0.8;
-/// Duration of an impact (s): an assumption, the order of published crash pulses. No tyre force acts during it, and the change of velocity is read at its end.
+/// Duration of an impact (s): an assumption, the order of published crash pulses. No tyre force
+/// acts during it, and the change of velocity is read at its end.
 pub(super) const IMPACT_DURATION_S: f64 = 0.1;
-/// Radius of gyration of a vehicle as a fraction of its diagonal, for the friction that slows its spin: 1/√12,
-/// that of a uniform plate.
+/// Radius of gyration of a vehicle as a fraction of its diagonal, for the friction that slows its
+/// spin: 1/√12, the value of a uniform plate.
 const GYRATION_SHARE: f64 = 0.29;
 
 /// A vehicle's motion in the plane.
@@ -86,7 +89,8 @@ fn vector(v: Vector2<f64>) -> Vector {
 }
 
 impl Wreckage {
-    /// Creates a wreckage without bodies. `origin_m` is the origin of rapier's coordinates, `friction` the road's.
+    /// Creates a wreckage without bodies. `origin_m` is the origin of rapier's coordinates,
+    /// `friction` the road's.
     pub(super) fn new(origin_m: Vector2<f64>, friction: f64) -> Self {
         let parameters = IntegrationParameters { max_ccd_substeps: 4, ..IntegrationParameters::default() };
         Self {
@@ -155,7 +159,8 @@ impl Wreckage {
         );
     }
 
-    /// Reduces the speed and the yaw rate of every body by what its sliding tyres dissipate in one step.
+    /// Reduces the speed and the yaw rate of every body by the dissipation of its sliding tyres in
+    /// one step.
     #[expect(clippy::cast_possible_truncation, reason = "rapier computes in f32")]
     fn slide(&mut self, step_s: f64) {
         let slowing_mps = (SLIDING_SHARE * self.friction * GRAVITY_MPS2 * step_s) as f32;
@@ -216,7 +221,8 @@ mod tests {
         Vehicle { spec: TRUCK, speed_mps }
     }
 
-    /// Total momentum before and after an impact (kg·m/s), and the speed at which the vehicles separate (m/s).
+    /// Total momentum before and after an impact (kg·m/s), and the speed at which the vehicles
+    /// separate (m/s).
     struct Impact {
         before: Vector2<f64>,
         after: Vector2<f64>,

@@ -6,7 +6,8 @@ use closecall_traffic::{Lane, Road, Side, maths};
 
 use super::World;
 
-/// Smallest overlap with a lane at which a vehicle counts as being in it (m). A wheel on the marking does not count.
+/// Smallest overlap with a lane at which a vehicle counts as being in it (m). A wheel on the
+/// marking does not count.
 const LANE_OVERLAP_M: f64 = 0.2;
 /// Lateral clearance below which two vehicles count as being in each other's path (m).
 pub(super) const PATH_MARGIN_M: f64 = 0.1;
@@ -39,7 +40,8 @@ impl Extent {
     }
 }
 
-/// A lane as neighbours see it: a vehicle is in it that reaches between these lateral positions (m).
+/// A lane as neighbours see it: a vehicle is in it that reaches between these lateral positions
+/// (m).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LaneBand {
     right_m: f64,
@@ -53,7 +55,8 @@ impl LaneBand {
         Self { right_m: centre_m - half_m, left_m: centre_m + half_m }
     }
 
-    /// Returns whether a vehicle between these lateral positions, of its right and of its left end, is in the lane.
+    /// Returns whether a vehicle between these lateral positions, of its right and of its left end,
+    /// is in the lane.
     pub(super) fn contains(&self, [right_m, left_m]: [f64; 2]) -> bool {
         right_m < self.left_m && left_m > self.right_m
     }
@@ -68,11 +71,12 @@ pub(super) struct LanesAround {
 }
 
 impl LanesAround {
-    /// Returns the lanes around a vehicle at the lateral position `d_m`, as far as its driver looks.
+    /// Returns the lanes around a vehicle at the lateral position `d_m`, within the sight of its
+    /// driver.
     pub(super) fn new(road: &Road, d_m: f64, looks: Looks) -> Self {
-        let own = road.lane_at(d_m);
-        let beside = |side| if looks.adjacent { road.beside(own, side) } else { None };
-        Self { own, left: beside(Side::Left), right: beside(Side::Right) }
+        let lane = road.lane_at(d_m);
+        let beside = |side| if looks.adjacent { road.beside(lane, side) } else { None };
+        Self { own: lane, left: beside(Side::Left), right: beside(Side::Right) }
     }
 
     /// Sets `around` to the neighbours before any is found.
@@ -166,17 +170,17 @@ impl Around {
     }
 }
 
-/// Sets `around` to the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if there
-/// are many vehicles.
+/// Sets `around` to the vehicles around `actor`, which is compared with every other one.
+/// [`super::search`] is faster if there are many vehicles.
 pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks, around: &mut Around) {
     let lanes = LanesAround::new(road, extents[actor].d_m, looks);
     lanes.clear(around);
     let band = |lane| LaneBand::new(road, lane);
-    let (own, left, right) = (band(lanes.own), lanes.left.map(band), lanes.right.map(band));
+    let (own_lane, left, right) = (band(lanes.own), lanes.left.map(band), lanes.right.map(band));
     for other in (0..extents.len()).filter(|other| *other != actor) {
         let candidate = Candidate::new(extents, [actor, other]);
         let sides_m = extents[other].sides_m();
-        if own.contains(sides_m) {
+        if own_lane.contains(sides_m) {
             candidate.insert_into(&mut around.own);
         }
         for (band, slot) in [(&left, &mut around.left), (&right, &mut around.right)] {
@@ -199,7 +203,8 @@ pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks, 
     }
 }
 
-/// Puts a vehicle into `slot` if it is in the path of `actor`, ahead of the vehicle ahead, and nearer than the one there.
+/// Puts a vehicle into `slot` if it is in the path of `actor`, ahead of the vehicle ahead, and
+/// nearer than the one there.
 pub(super) fn keep_beyond(slot: &mut Option<Nearest>, extents: &[Extent], [actor, ahead, other]: [usize; 3]) {
     if other == actor || other == ahead {
         return;
@@ -212,10 +217,10 @@ pub(super) fn keep_beyond(slot: &mut Option<Nearest>, extents: &[Extent], [actor
 }
 
 pub(super) fn keep_nearest(slot: &mut Option<Nearest>, candidate: Nearest) {
-    // Two vehicles at the same gap have different lateral positions, unless they overlap. The result therefore depends on the
-    // list of actors only if they do.
+    // Two vehicles at the same gap have different lateral positions, unless they overlap. The
+    // result therefore depends on the list of actors only if they do.
     let order = |nearest: &Nearest| (nearest.gap_m, nearest.lateral_offset_m, nearest.actor);
-    if slot.is_none_or(|known| order(&candidate) < order(&known)) {
+    if slot.is_none_or(|nearest| order(&candidate) < order(&nearest)) {
         *slot = Some(candidate);
     }
 }
@@ -232,12 +237,12 @@ pub(super) struct Candidate {
 impl Candidate {
     /// Creates the second vehicle relative to the first.
     pub(super) fn new(extents: &[Extent], [actor, other]: [usize; 2]) -> Self {
-        let (own, at) = (&extents[actor], &extents[other]);
-        let ahead_m = at.s_m - own.s_m;
-        let gap_m = bumper_gap_m(ahead_m.abs(), own.length_m, at.length_m);
-        let lateral_offset_m = at.d_m - own.d_m;
+        let (extent, at) = (&extents[actor], &extents[other]);
+        let ahead_m = at.s_m - extent.s_m;
+        let gap_m = bumper_gap_m(ahead_m.abs(), extent.length_m, at.length_m);
+        let lateral_offset_m = at.d_m - extent.d_m;
         let [right_m, left_m] = at.sides_m();
-        let is_in_path = lateral_offset_m.abs() < 0.5 * (left_m - right_m) + own.half_width_m + PATH_MARGIN_M;
+        let is_in_path = lateral_offset_m.abs() < 0.5 * (left_m - right_m) + extent.half_width_m + PATH_MARGIN_M;
         Self { nearest: Nearest { actor: other, gap_m, lateral_offset_m }, ahead_m, is_in_path }
     }
 

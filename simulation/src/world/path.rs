@@ -1,10 +1,11 @@
 //! The lateral path of a lane change: a quintic polynomial over the distance travelled.
 //!
-//! The path is a function of distance, not of time, so that a vehicle can follow it at any speed: a driver that brakes
-//! in the middle of a lane change stays on the path and takes longer.
+//! The path is a function of distance, not of time. A vehicle can follow it at any speed: a driver
+//! that brakes in the middle of a lane change stays on the path and takes longer.
 //!
-//! The quintic connects any lateral state (position, slope, second derivative) to the centre of the target lane, where
-//! slope and second derivative are zero. Between two lane centres it is the minimum-jerk path.
+//! The quintic connects any lateral state (position, slope, second derivative) to the centre of the
+//! target lane, where slope and second derivative are zero. Between two lane centres it is the
+//! minimum-jerk path.
 
 use closecall_traffic::Quintic;
 
@@ -24,8 +25,8 @@ pub(crate) struct LateralState {
 pub(crate) struct LanePath(Quintic);
 
 impl LanePath {
-    /// Returns the path from the state `from` to the lateral position `to_m` over a distance of `length_m`, which must be
-    /// positive.
+    /// Returns the path from the state `from` to the lateral position `to_m` over a distance of
+    /// `length_m`, which must be positive.
     pub(crate) fn new(from: LateralState, to_m: f64, length_m: f64) -> Self {
         Self(Quintic::between([from.d_m, from.slope, from.second_derivative_per_m], [to_m, 0.0, 0.0], length_m))
     }
@@ -35,13 +36,15 @@ impl LanePath {
         self.0.length()
     }
 
-    /// Returns the lateral state after a distance of `travelled_m`. Beyond the end, it is the state at the end.
+    /// Returns the lateral state after a distance of `travelled_m`. Beyond the end, it is the state
+    /// at the end.
     pub(crate) fn at(&self, travelled_m: f64) -> LateralState {
         let [d_m, slope, second_derivative_per_m] = self.0.at(travelled_m.clamp(0.0, self.length_m()));
         LateralState { d_m, slope, second_derivative_per_m }
     }
 
-    /// Returns the largest magnitude of the second derivative (1/m), from samples at every 5 % of the path.
+    /// Returns the largest magnitude of the second derivative (1/m), from samples at every 5 % of
+    /// the path.
     pub(crate) fn max_second_derivative_per_m(&self) -> f64 {
         (0..=20)
             .map(|k| self.at(self.length_m() * f64::from(k) / 20.0).second_derivative_per_m.abs())

@@ -6,13 +6,14 @@
 //!  weaving of the driver  ─▶ deviation over that distance ────┘
 //! ```
 //!
-//! Lags and jerk limits are assumptions of the order of published brake-system responses: a passenger car or a motorcycle
-//! builds up full braking in 0.1 to 0.3 s, a lorry in 0.2 to 0.4 s, and an articulated lorry in 0.4 to 1.0 s (accident
-//! analysts' tables: nilgens.com, wien.gerichts-sv.at, unfallanalyse.hamburg).
-//! The kinematic bicycle (Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 2) is inverted: the vehicle follows the
-//! path exactly, and course, slip angle and yaw rate are those that the bicycle needs for it. The lateral acceleration is
-//! limited when the path is planned: a lane change that would need more than the tyres provide is made longer, and the
-//! check of a scenario rejects weaving that would.
+//! Lags and jerk limits are assumptions of the order of published brake-system responses: a
+//! passenger car or a motorcycle builds up full braking in 0.1 to 0.3 s, a lorry in 0.2 to 0.4 s,
+//! and an articulated lorry in 0.4 to 1.0 s (accident analysts' tables: nilgens.com,
+//! wien.gerichts-sv.at, unfallanalyse.hamburg). The kinematic bicycle (Rajamani, *Vehicle Dynamics
+//! and Control*, 2012, ch. 2) is inverted: the vehicle follows the path exactly, and course, slip
+//! angle and yaw rate are those that the bicycle needs for it. The lateral acceleration is limited
+//! when the path is planned: a lane change that would need more than the tyres provide is made
+//! longer, and the check of a scenario rejects weaving that would.
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
 use closecall_scenarios::lateral_grip_mps2;
@@ -20,10 +21,12 @@ use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleCla
 
 use super::path::{LanePath, LateralState};
 
-/// Shortest distance of a lane change, even at walking pace (m): an assumption, the order of a car's turning circle.
+/// Shortest distance of a lane change, even at walking pace (m): an assumption, the order of a
+/// car's turning circle.
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
-/// Speed at which a vehicle stands that is slowing down and not driven (m/s): numerical. A control law that approaches its gap
-/// exponentially would never stand; wheel speed sensors do not resolve such a speed.
+/// Speed at which a vehicle stands that is slowing down and not driven (m/s): numerical. A control
+/// law that approaches its gap exponentially would never stand; wheel speed sensors do not resolve
+/// such a speed.
 const STANDING_MPS: f64 = 0.01;
 /// Quasi-static brake dive of the body (rad per m/s²): an assumption, about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
@@ -93,13 +96,15 @@ pub(crate) struct Plant {
     brake_light_from_mps2: f64,
     wheelbase_m: f64,
     friction: f64,
-    /// Fraction of the difference to the commanded acceleration that the actuators cover in one step.
+    /// Fraction of the difference to the commanded acceleration that the actuators cover in one
+    /// step.
     lag_share: f64,
     step_s: f64,
     state: VehicleState,
     /// The lane change in progress.
     lane_change: Option<LaneChangePath>,
-    /// The lateral state that the driver intends: on the lane's centre line, or on the path of the lane change.
+    /// The lateral state that the driver intends: on the lane's centre line, or on the path of the
+    /// lane change.
     intended: LateralState,
     weave: Option<Weave>,
     /// Distance travelled along the lane since the start (m): the argument of `weave`.
@@ -111,8 +116,9 @@ pub(crate) struct Plant {
 }
 
 impl Plant {
-    /// Creates a vehicle that stands on the centre line of its lane or moves along it. `weave` is the driver's deviation
-    /// from that line, `friction` the road's, and `step_s` the length of a step.
+    /// Creates a vehicle that stands on the centre line of its lane or moves along it. `weave` is
+    /// the driver's deviation from that line, `friction` the road's, and `step_s` the length of a
+    /// step.
     pub(crate) fn new(
         vehicle: &Vehicle,
         state: VehicleState,
@@ -154,7 +160,8 @@ impl Plant {
         self.lane_change.map(|change| change.target)
     }
 
-    /// Returns the lateral deviation from the path that the driver intends, positive to the left (m).
+    /// Returns the lateral deviation from the path that the driver intends, positive to the left
+    /// (m).
     pub(crate) fn lateral_deviation_m(&self) -> f64 {
         self.deviation.offset_m
     }
@@ -164,20 +171,22 @@ impl Plant {
         -self.state.acceleration_mps2 * DIVE_RAD_PER_MPS2
     }
 
-    /// Puts the vehicle where its bumper meets another one: it gets this speed (m/s), and is moved along the road by `shift_m`.
+    /// Puts the vehicle where its bumper meets another one: it gets this speed (m/s), and is moved
+    /// along the road by `shift_m`.
     pub(crate) fn meet(&mut self, speed_mps: f64, shift_m: f64) {
         self.state.speed_mps = speed_mps;
         self.state.s_m += shift_m;
     }
 
-    /// Starts a lane change, or replaces the one in progress. The path becomes longer than requested if the tyres could not
-    /// provide the lateral acceleration otherwise.
+    /// Starts a lane change, or replaces the one in progress. The path becomes longer than
+    /// requested if the tyres could not provide the lateral acceleration otherwise.
     pub(crate) fn change_lane(&mut self, change: LaneChange, road: &Road) {
         let target_m = road.lane_centre_m(change.target);
         let requested_m = change.duration_s * self.state.speed_mps;
         let mut path = LanePath::new(self.intended, target_m, requested_m.max(SHORTEST_LANE_CHANGE_M));
         let limit_per_m = lateral_grip_mps2(self.friction) / (self.state.speed_mps * self.state.speed_mps).max(1.0);
-        // The second derivative falls with the square of the length, so that a few steps of 10 % suffice.
+        // The second derivative falls with the square of the length, so that a few steps of 10 %
+        // suffice.
         while path.max_second_derivative_per_m() > limit_per_m && path.length_m() < 10.0 * requested_m.max(100.0) {
             path = LanePath::new(self.intended, target_m, 1.1 * path.length_m());
         }
@@ -238,7 +247,8 @@ impl Plant {
         self.state.d_m = d_m;
         self.state.heading_rad = course_rad - slip_rad;
         self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_per_m());
-        // In a curve, a distance along the lane differs from the distance along the road's reference line.
+        // In a curve, a distance along the lane differs from the distance along the road's
+        // reference line.
         self.state.s_m += along_m / (1.0 - road.curvature_per_m() * d_m);
     }
 
@@ -258,7 +268,8 @@ struct Advance {
     distance_m: f64,
 }
 
-/// Advances by one step of constant acceleration. If the speed reaches zero within the step, the vehicle stops there.
+/// Advances by one step of constant acceleration. If the speed reaches zero within the step, the
+/// vehicle stops there.
 fn advance(speed_mps: f64, acceleration_mps2: f64, step_s: f64) -> Advance {
     let after_mps = speed_mps + acceleration_mps2 * step_s;
     if after_mps > 0.0 {
@@ -389,7 +400,8 @@ mod tests {
             }
             straight.step(0.0, Indicator::Off, &road);
             weaving.step(0.0, Indicator::Off, &road);
-            // The slope of the weaving changes the distance along the lane, and so the lane change, by some millimetres.
+            // The slope of the weaving changes the distance along the lane, and so the lane change,
+            // by some millimetres.
             let deviation_m = weaving.state().d_m - straight.state().d_m;
             assert!((deviation_m - weaving.lateral_deviation_m()).abs() < 0.005, "step {step}: {deviation_m}");
             widest_m = widest_m.max(deviation_m.abs());

@@ -6,7 +6,7 @@
 //!   lane 3   ●────────●──────●───────▶        can be nearer, bumper to bumper, than the one found
 //! ```
 //!
-//! The result is that of [`super::neighbours::find`] to the bit.
+//! The result equals the result of [`super::neighbours::find`] to the bit.
 
 use std::ops::RangeInclusive;
 
@@ -39,13 +39,13 @@ pub(super) struct NeighbourSearch {
     order: Vec<Entry>,
     /// The vehicles in each lane. A vehicle may be in several.
     lanes: Vec<Vec<Entry>>,
-    /// The vehicles whose path touches each strip. The strips are the lanes at their full width, and what lies beyond
-    /// the road on both sides.
+    /// The vehicles whose path touches each strip. The strips are the lanes at their full width,
+    /// and the areas beyond the road on both sides.
     strips: Vec<Vec<Entry>>,
     /// The strips that the path of each vehicle touches.
     touched: Vec<RangeInclusive<usize>>,
-    /// For each vehicle, the number of vehicles of each lane, and then of each strip that it touches, that come before it in
-    /// `order`.
+    /// For each vehicle, the number of vehicles of each lane, and then of each strip that it
+    /// touches, that come before it in `order`.
     ranks: Vec<usize>,
     /// The lanes.
     bands: Vec<LaneBand>,
@@ -57,8 +57,8 @@ pub(super) struct NeighbourSearch {
 }
 
 impl NeighbourSearch {
-    /// Replaces `found` by the vehicles around each vehicle, as far as each driver looks.
-    pub(super) fn find_all(&mut self, world: &World, road: &Road, looks: &[Looks], found: &mut [Neighbours]) {
+    /// Replaces `neighbours` by the vehicles around each vehicle, within the sight of each driver.
+    pub(super) fn find_all(&mut self, world: &World, road: &Road, looks: &[Looks], neighbours: &mut [Neighbours]) {
         self.extents.clear();
         self.extents.extend((0..world.len()).map(|actor| Extent::of(world, actor)));
         let few = world.len() <= FEW;
@@ -66,13 +66,13 @@ impl NeighbourSearch {
             self.sort(road);
         }
         let mut around = Around::default();
-        for ((actor, found), looks) in found.iter_mut().enumerate().zip(looks) {
+        for ((actor, neighbours), looks) in neighbours.iter_mut().enumerate().zip(looks) {
             if few {
                 neighbours::find(&self.extents, actor, road, *looks, &mut around);
             } else {
                 self.find(actor, road, *looks, &mut around);
             }
-            around.describe(world, found);
+            around.describe(world, neighbours);
         }
     }
 
@@ -91,7 +91,7 @@ impl NeighbourSearch {
         for entry in &mut self.order {
             entry.s_m = self.extents[entry.actor].s_m;
         }
-        self.order.sort_unstable_by(|one, other| one.s_m.total_cmp(&other.s_m).then(one.actor.cmp(&other.actor)));
+        self.order.sort_unstable_by(|a, b| a.s_m.total_cmp(&b.s_m).then(a.actor.cmp(&b.actor)));
         self.touched.clear();
         self.touched.extend(self.extents.iter().map(|extent| strips(road, extent.sides_m())));
         self.bands.clear();
@@ -121,7 +121,8 @@ impl NeighbourSearch {
         self.ranks[(self.lanes.len() + self.strips.len()) * actor + lane]
     }
 
-    /// Returns the vehicles of a strip whose centre is ahead of that of a vehicle, which touches the strip.
+    /// Returns the vehicles of a strip whose centre is ahead of the centre of a vehicle, which
+    /// touches the strip.
     fn ahead_in_strip(&self, actor: usize, strip: usize) -> &[Entry] {
         let rank = self.rank_in_lane(actor, self.lanes.len() + strip);
         let list = &self.strips[strip][rank..];
@@ -151,7 +152,8 @@ impl NeighbourSearch {
         }
     }
 
-    /// Fills `slot` with the nearest vehicle in the path of `actor` that is ahead of the vehicle ahead.
+    /// Fills `slot` with the nearest vehicle in the path of `actor` that is ahead of the vehicle
+    /// ahead.
     fn fill_beyond(&self, [actor, ahead]: [usize; 2], slot: &mut Option<Nearest>) {
         for strip in self.touched[actor].clone() {
             for entry in self.ahead_in_strip(actor, strip) {
@@ -168,7 +170,8 @@ impl NeighbourSearch {
     /// Fills `slot` with the neighbours of `actor` in a lane.
     fn fill(&self, actor: usize, lane: Lane, slot: &mut LaneAround) {
         let lane = usize::from(lane.0) - 1;
-        // A vehicle at the same position along the road is alongside, whichever of the two comes first.
+        // A vehicle at the same position along the road is alongside, whichever of the two comes
+        // first.
         let (behind, ahead) = self.lanes[lane].split_at(self.rank_in_lane(actor, lane));
         for entry in ahead {
             if self.is_beyond(actor, entry, &slot.lead) {
@@ -184,7 +187,8 @@ impl NeighbourSearch {
         }
     }
 
-    /// Fills `slot` with the nearest vehicle in the path of `actor`, of those that are `ahead`.
+    /// Fills `slot` with the nearest vehicle in the path of `actor`, of the vehicles that are
+    /// `ahead`.
     fn fill_path(&self, actor: usize, ahead: &[Entry], slot: &mut Option<Nearest>) {
         for entry in ahead {
             if self.is_beyond(actor, entry, slot) {
@@ -198,11 +202,12 @@ impl NeighbourSearch {
         }
     }
 
-    /// Returns whether a vehicle and all farther ones have a greater gap than the neighbour that is known.
-    fn is_beyond(&self, actor: usize, entry: &Entry, known: &Option<Nearest>) -> bool {
-        let own = &self.extents[actor];
-        let least_gap_m = bumper_gap_m((entry.s_m - own.s_m).abs(), own.length_m, self.longest_m);
-        known.is_some_and(|known| known.gap_m < least_gap_m)
+    /// Returns whether a vehicle and all farther ones have a greater gap than the nearest neighbour
+    /// so far.
+    fn is_beyond(&self, actor: usize, entry: &Entry, nearest: &Option<Nearest>) -> bool {
+        let extent = &self.extents[actor];
+        let least_gap_m = bumper_gap_m((entry.s_m - extent.s_m).abs(), extent.length_m, self.longest_m);
+        nearest.is_some_and(|nearest| nearest.gap_m < least_gap_m)
     }
 
     /// Calls `each` with another vehicle, relative to `actor`.
@@ -215,8 +220,9 @@ impl NeighbourSearch {
     }
 }
 
-/// Returns the indices of the strips that the path of a vehicle between these lateral positions touches. Two paths with a
-/// common point have a common strip, whatever the rounding, because the index never falls to the right.
+/// Returns the indices of the strips that the path of a vehicle between these lateral positions
+/// touches. Two paths with a common point have a common strip, whatever the rounding, because the
+/// index never falls to the right.
 fn strips(road: &Road, [right_m, left_m]: [f64; 2]) -> RangeInclusive<usize> {
     let last = f64::from(road.lanes()) + 1.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before the cast")]
@@ -242,7 +248,7 @@ mod tests {
     }
 
     fn vehicle() -> impl Strategy<Value = (VehicleClass, f64, f64, f64)> {
-        // Positions on a grid, so that some vehicles overlap or are at the same position.
+        // Positions on a grid: some vehicles overlap or are at the same position.
         let s_m = prop_oneof![(0..40_i32).prop_map(|cell| 5.0 * f64::from(cell)), 0.0..400.0_f64];
         let d_m = prop_oneof![prop::sample::select(vec![-1.875, -5.625, -9.375]), -14.0..3.0_f64];
         (prop::sample::select(VehicleClass::ALL.to_vec()), s_m, d_m, -0.3..0.3_f64)
@@ -255,14 +261,14 @@ mod tests {
         ) {
             let road = Road::straight(3);
             let world = world(road, &vehicles);
-            let mut found = vec![Neighbours::default(); world.len()];
+            let mut neighbours = vec![Neighbours::default(); world.len()];
             let mut search = NeighbourSearch::default();
             for looks in [Looks::AROUND, Looks::AHEAD, Looks::AROUND] {
-                search.find_all(&world, &road, &vec![looks; world.len()], &mut found);
-                for (actor, found) in found.iter().enumerate() {
+                search.find_all(&world, &road, &vec![looks; world.len()], &mut neighbours);
+                for (actor, neighbours) in neighbours.iter().enumerate() {
                     let all = world.neighbours(actor);
                     let ahead = Neighbours { left: None, right: None, beyond: None, ..all };
-                    prop_assert_eq!(*found, if looks.adjacent { all } else { ahead });
+                    prop_assert_eq!(*neighbours, if looks.adjacent { all } else { ahead });
                 }
             }
         }
@@ -275,7 +281,8 @@ mod tests {
             let vehicles: Vec<_> = (0..number)
                 .map(|index| {
                     let class = if index % 7 == 0 { VehicleClass::Truck } else { VehicleClass::Car };
-                    // Every eleventh vehicle changes lanes, and the others deviate from the centre of their lanes.
+                    // Every eleventh vehicle changes lanes, and the others deviate from the centre
+                    // of their lanes.
                     let d_m = -1.875 - 3.75 * (index % 3) as f64 + 0.1 * (index % 5) as f64;
                     let d_m = if index % 11 == 0 { d_m + 1.5 } else { d_m };
                     (class, 12.0 * index as f64, d_m, 0.0)

@@ -13,7 +13,8 @@ use super::plant::Plant;
 use super::search::NeighbourSearch;
 use closecall_scenarios::outcome::{Collision, Phase, TOUCH_MPS};
 
-/// Gap at which two bumpers that touch are held apart (m): numerical. Neighbours with a gap below zero would count as side by side.
+/// Gap at which two bumpers that touch are held apart (m): numerical. Neighbours with a gap below
+/// zero would count as side by side.
 const HELD_APART_M: f64 = 1e-3;
 
 /// The commands to one vehicle for one step.
@@ -55,7 +56,7 @@ struct Actor {
     body: Body,
 }
 
-/// An impact that is still in progress, so that its change of velocity is not final.
+/// An impact in progress: its change of velocity is not final.
 struct OpenImpact {
     /// Index of its collision in the list of collisions.
     collision: usize,
@@ -74,8 +75,8 @@ pub(crate) struct World {
     step: Time,
     time: Time,
     actors: Vec<Actor>,
-    /// Indices of the actors in the order of their names. Pairs are processed in this order, so that the result does not
-    /// depend on the order of the list of actors.
+    /// Indices of the actors in the order of their names. Pairs are processed in this order: the
+    /// result does not depend on the order of the list of actors.
     by_name: Vec<usize>,
     shapes: Vec<OrientedBox>,
     shapes_before: Vec<OrientedBox>,
@@ -91,7 +92,8 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// Creates the world at time zero. The vehicles must not overlap; the check of the scenario ensures this.
+    /// Creates the world at time zero. The vehicles must not overlap; the check of the scenario
+    /// ensures this.
     pub(crate) fn new(road: Road, friction: f64, step: Time, vehicles: Vec<InitialVehicle>) -> Self {
         let actors: Vec<Actor> = vehicles
             .into_iter()
@@ -170,7 +172,8 @@ impl World {
         }
     }
 
-    /// Returns a vehicle's lateral deviation from the path that its driver intends, positive to the left (m).
+    /// Returns a vehicle's lateral deviation from the path that its driver intends, positive to the
+    /// left (m).
     pub(crate) fn lateral_deviation_m(&self, actor: usize) -> f64 {
         match &self.actors[actor].body {
             Body::Driven(plant) => plant.lateral_deviation_m(),
@@ -178,7 +181,7 @@ impl World {
         }
     }
 
-    /// Returns whether a vehicle has touched another one, so that its driver has lost control.
+    /// Returns whether a vehicle has touched another one. Its driver has then lost control.
     pub(crate) fn is_wrecked(&self, actor: usize) -> bool {
         matches!(self.actors[actor].body, Body::Wrecked { .. })
     }
@@ -186,18 +189,18 @@ impl World {
     /// Returns the vehicles around a vehicle.
     pub(crate) fn neighbours(&self, actor: usize) -> Neighbours {
         let extents: Vec<Extent> = (0..self.len()).map(|actor| Extent::of(self, actor)).collect();
-        let mut found = Neighbours::default();
+        let mut neighbours = Neighbours::default();
         let mut around = Around::default();
         neighbours::find(&extents, actor, &self.road, Looks::AROUND, &mut around);
-        around.describe(self, &mut found);
-        found
+        around.describe(self, &mut neighbours);
+        neighbours
     }
 
-    /// Replaces `found` by the vehicles around each vehicle, as far as each driver looks. Both lists are in the order of the
-    /// actors.
-    pub(crate) fn find_neighbours(&mut self, looks: &[Looks], found: &mut [Neighbours]) {
+    /// Replaces `neighbours` by the vehicles around each vehicle, within the sight of each driver.
+    /// Both lists are in the order of the actors.
+    pub(crate) fn find_neighbours(&mut self, looks: &[Looks], neighbours: &mut [Neighbours]) {
         let mut search = std::mem::take(&mut self.search);
-        search.find_all(self, &self.road, looks, found);
+        search.find_all(self, &self.road, looks, neighbours);
         self.search = search;
     }
 
@@ -211,7 +214,8 @@ impl World {
         &self.bumper_touches
     }
 
-    /// Moves all vehicles by one step. `actions` is in the order of the actors; `phase` is noted in collisions of this step.
+    /// Moves all vehicles by one step. `actions` is in the order of the actors; `phase` is noted in
+    /// collisions of this step.
     pub(crate) fn step(&mut self, actions: &[Action], phase: Phase) {
         std::mem::swap(&mut self.shapes, &mut self.shapes_before);
         let step_s = self.step.s();
@@ -258,7 +262,8 @@ impl World {
         }
     }
 
-    /// Finds the pairs that have touched for the first time within the last step, and starts their collisions.
+    /// Finds the pairs that have touched for the first time within the last step, and starts their
+    /// collisions.
     fn collide(&mut self, phase: Phase) {
         let mut touches = std::mem::take(&mut self.touches);
         let boxes = StepBoxes { before: &self.shapes_before, after: &self.shapes };
@@ -279,8 +284,9 @@ impl World {
         }
     }
 
-    /// Returns the two vehicles of a contact, the one behind first, if it is a touch: the front bumper of a car or truck meets the rear bumper of another one,
-    /// slowly, and both drive. A motorcycle has no bumper, and its rider may fall.
+    /// Returns the two vehicles of a contact, the one behind first, if it is a touch: the front
+    /// bumper of a car or truck meets the rear bumper of another one, slowly, and both drive. A
+    /// motorcycle has no bumper, and its rider may fall.
     fn bumpers(&self, touch: &Touch) -> Option<[usize; 2]> {
         let [behind, ahead] = match touch.struck_side {
             [BoxSide::Front, BoxSide::Rear] => touch.pair,
@@ -293,14 +299,15 @@ impl World {
         (is_slow && has_bumper(behind) && has_bumper(ahead)).then_some([behind, ahead])
     }
 
-    /// Notes a touch, unless it is a further one of its pair. The vehicle behind pushes the one ahead: from now on both have the speed that conserves their
-    /// momentum, until one of them brakes or accelerates away.
+    /// Notes a touch, unless its pair has touched before. The vehicle behind pushes the one ahead:
+    /// from then on both have the speed that conserves their momentum, until one of them brakes or
+    /// accelerates away.
     fn hold_apart(&mut self, touch: &Touch, [behind, ahead]: [usize; 2], phase: Phase) {
         let [follower_mps, lead_mps] = [behind, ahead].map(|actor| self.state(actor).speed_mps);
         let [follower_kg, lead_kg] = [behind, ahead].map(|actor| self.vehicle(actor).mass_kg);
         let common_mps = (follower_kg * follower_mps + lead_kg * lead_mps) / (follower_kg + lead_kg);
         let between = touch.pair.map(|actor| self.actors[actor].id.clone());
-        if !self.bumper_touches.iter().any(|known| known.between == between) {
+        if !self.bumper_touches.iter().any(|touch| touch.between == between) {
             let mut collision = self.contact(touch, phase);
             let changes_mps = |actor: usize| (common_mps - if actor == behind { follower_mps } else { lead_mps }).abs();
             collision.delta_v_mps = touch.pair.map(changes_mps);
@@ -364,7 +371,7 @@ impl World {
                 None => Vector2::zeros(),
             },
             Body::Driven(plant) => {
-                // The direction of motion is that of the box's centre in this step.
+                // The direction of motion is the direction of the box's centre in this step.
                 let (from, to) = (&self.shapes_before[actor], &self.shapes[actor]);
                 let moved_m = Vector2::new(to.x_m - from.x_m, to.y_m - from.y_m);
                 moved_m.try_normalize(1e-9).map_or_else(Vector2::zeros, |course| course * plant.state().speed_mps)
@@ -372,7 +379,8 @@ impl World {
         }
     }
 
-    /// Hands a driven vehicle to the solver, at the position that it had after `fraction` of the step.
+    /// Hands a driven vehicle to the solver, at the position that it had after `fraction` of the
+    /// step.
     fn wreck(&mut self, actor: usize, fraction: f64) {
         if self.is_wrecked(actor) {
             return;
@@ -394,7 +402,8 @@ impl World {
         self.actors[actor].body = Body::Wrecked { body, state };
     }
 
-    /// Updates the changes of velocity of all impacts in progress, and removes those that have ended.
+    /// Updates the changes of velocity of all impacts in progress, and removes those that have
+    /// ended.
     fn update_impacts(&mut self, step_s: f64) {
         let Some(wreckage) = &self.wreckage else { return };
         for impact in &mut self.open_impacts {
@@ -410,7 +419,8 @@ impl World {
     }
 }
 
-/// Returns the state of a wreck in the road frame. Its acceleration is the change of speed since the state `before`.
+/// Returns the state of a wreck in the road frame. Its acceleration is the change of speed since
+/// the state `before`.
 fn road_state(motion: &Motion, road: &Road, before: &VehicleState, step_s: f64) -> VehicleState {
     let (s_m, d_m) = road.road_position_m(motion.position_m.x, motion.position_m.y);
     let speed_mps = motion.velocity_mps.norm();
@@ -432,7 +442,8 @@ mod tests {
 
     use super::*;
 
-    /// Vehicles in one lane, each with its class, the position of its centre (m) and its speed (m/s).
+    /// Vehicles in one lane, each with its class, the position of its centre (m) and its speed
+    /// (m/s).
     fn world(vehicles: &[(VehicleClass, f64, f64)]) -> World {
         let initial = |(index, &(class, s_m, speed_mps)): (usize, &(VehicleClass, f64, f64))| InitialVehicle {
             id: ActorId::new(&format!("v{index}")).unwrap(),
@@ -444,7 +455,8 @@ mod tests {
         World::new(Road::straight(3), 0.9, PHYSICS_STEP, vehicles.iter().enumerate().map(initial).collect())
     }
 
-    /// Runs the world for some seconds with a constant acceleration of each vehicle (m/s²), and returns the smallest gap between the first two (m).
+    /// Runs the world for some seconds with a constant acceleration of each vehicle (m/s²), and
+    /// returns the smallest gap between the first two (m).
     fn drive(world: &mut World, duration_s: f64, accelerations_mps2: &[f64]) -> f64 {
         let command = |mps2: &f64| Action { acceleration_mps2: *mps2, ..Action::default() };
         let actions: Vec<Action> = accelerations_mps2.iter().map(command).collect();

@@ -3,7 +3,8 @@
 use closecall_controllers::{EgoController, EgoSettings, R157Driver};
 use closecall_simulation::ControllerFactory;
 
-/// The competent and careful driver in the place of the ego: it starts where the ego starts, and follows with its gap.
+/// The competent and careful driver in the place of the ego: it starts where the ego starts, and
+/// follows with its gap.
 pub(super) struct CarefulEgo;
 
 impl ControllerFactory for CarefulEgo {

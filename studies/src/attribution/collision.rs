@@ -25,17 +25,18 @@ pub struct Party {
     pub side: BoxSide,
 }
 
-/// By which driver, or by what, a collision was avoidable. `None`: it is not decided. The answers for the striking vehicle are
-/// decided if its front strikes the rear of the other one.
+/// How a collision was avoidable. `None`: undecided. The answers for the striking vehicle are
+/// decided if its front strikes the rear of the other vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Avoidable {
-    /// By the competent and careful driver of UN Regulation 157 in the place of the striking vehicle.
+    /// By the competent and careful driver of UN Regulation 157 in the place of the striking
+    /// vehicle.
     pub careful_in_striking: Option<bool>,
-    /// By that driver in the place of the ego; `None` if the run with it has no outcome.
+    /// By this driver in the place of the ego; `None` if the run with it has no outcome.
     pub careful_as_ego: Option<bool>,
-    /// By full braking of the striking vehicle from the moment on at which the hazard can be perceived.
+    /// By full braking of the striking vehicle as soon as the hazard can be perceived.
     pub full_braking_from_hazard: Option<bool>,
-    /// By full braking of the striking vehicle from the start on.
+    /// By full braking of the striking vehicle from the start.
     pub full_braking_from_start: Option<bool>,
 }
 
@@ -82,7 +83,8 @@ pub struct Attribution {
 }
 
 impl Attribution {
-    /// Returns the phase in words: of the encounter, of the braking of the lead vehicle, and of the system.
+    /// Returns the phase in words: of the encounter, of the braking of the lead vehicle, and of the
+    /// system.
     pub fn phase_words(&self) -> String {
         format!("{}, {}", braking_words(self.phase, self.is_after_lead_braking), state_word(self.ego_state))
     }
@@ -104,7 +106,7 @@ pub fn phase_word(phase: Phase) -> &'static str {
     }
 }
 
-/// Returns what the ego stack does in a state.
+/// Returns the action of the ego stack in a state.
 pub fn state_word(state: EgoState) -> &'static str {
     match state {
         EgoState::Following => "ego following",
@@ -115,8 +117,8 @@ pub fn state_word(state: EgoState) -> &'static str {
     }
 }
 
-/// Runs a case with further settings, and attributes its first collision. Returns the outcome, and `None` if no vehicle
-/// collides.
+/// Runs a case with further settings, and attributes its first collision. Returns the outcome, and
+/// `None` if no vehicle collides.
 ///
 /// # Errors
 /// [`CausesError`] if the sample has no outcome.

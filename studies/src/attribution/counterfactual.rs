@@ -1,4 +1,4 @@
-//! What would have happened with another way of braking of the striking vehicle.
+//! Whether the striking vehicle avoids the collision if it brakes in another way.
 
 use closecall_controllers::reference::{BrakingReaction, CRITICAL_TTC_S};
 use closecall_traffic::geometry::BoxSide;
@@ -6,20 +6,22 @@ use closecall_traffic::{Vehicle, VehicleState};
 
 use super::Trace;
 
-/// Time for which the motion is continued beyond the collision (s). Full braking from any speed on a motorway ends earlier.
+/// Time for which the motion is continued beyond the collision (s). Full braking from any speed on
+/// a motorway ends earlier.
 const BEYOND_S: f64 = 15.0;
 
-/// Largest braking of a cruise control above 20 m/s (m/s²) (ISO 15622). The careful driver in the loop sees a risk beyond it.
+/// Largest braking of a cruise control above 20 m/s (m/s²) (ISO 15622). If more is needed, the
+/// careful driver in the loop sees a risk.
 const CRUISE_CONTROL_MPS2: f64 = 3.5;
 
 /// How the striking vehicle brakes instead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Braking {
-    /// As the competent and careful driver of UN Regulation 157, from the perception of a risk on.
+    /// As the competent and careful driver of UN Regulation 157, once it perceives a risk.
     Careful,
-    /// With all that the road allows (m/s²), from the moment on at which the hazard can be perceived.
+    /// With the full friction of the road (m/s²), once the hazard can be perceived.
     FullFromHazard(f64),
-    /// With all that the road allows (m/s²), from the start of the run on.
+    /// With the full friction of the road (m/s²), from the start of the run.
     FullFromStart(f64),
 }
 
@@ -38,8 +40,8 @@ pub(super) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Returns whether the vehicles stay apart if the striking vehicle brakes in another way; `None` if that is not decided.
-    /// Braking along the lane says something about a front that strikes a rear, and about no other contact.
+    /// Returns whether the vehicles stay apart if the striking vehicle brakes in another way;
+    /// `None` if undecided. Braking along the lane decides only about a front that strikes a rear.
     pub(super) fn is_avoided(&self, braking: Braking) -> Option<bool> {
         if self.sides != [BoxSide::Front, BoxSide::Rear] {
             return None;
@@ -49,84 +51,88 @@ impl Pair<'_> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "15 s in steps of 10 ms")]
         let steps = self.trace.states.len() + (BEYOND_S / self.step_s) as usize;
         let hazard = self.hazard_step();
-        let mut own = first[striking];
+        let mut striking_state = first[striking];
         let mut last_of_other = first[struck];
         let (mut reaction, mut differs) = (None::<BrakingReaction>, false);
         for step in 0..steps {
             let recorded = self.trace.states.get(step);
             if recorded.is_none() && !differs {
-                // The vehicle drives as it did up to the contact, and the contact follows.
+                // The vehicle drives unchanged up to the contact, and the contact follows.
                 return Some(false);
             }
             let other = recorded.map_or_else(|| continued(&last_of_other, self.step_s), |states| states[struck]);
             last_of_other = other;
             if let (false, Some(states)) = (differs, recorded) {
-                own = states[striking];
+                striking_state = states[striking];
             }
-            if step > 0 && self.touch(&own, &other) {
+            if step > 0 && self.touch(&striking_state, &other) {
                 return Some(false);
             }
             let wanted_mps2 = match braking {
-                Braking::Careful => self.careful_mps2(&own, &other, &mut reaction),
+                Braking::Careful => self.careful_mps2(&striking_state, &other, &mut reaction),
                 Braking::FullFromHazard(mps2) => hazard.is_some_and(|hazard| step >= hazard).then_some(mps2),
                 Braking::FullFromStart(mps2) => Some(mps2),
             };
             if let Some(mps2) = wanted_mps2 {
                 differs = true;
-                own = self.braked(&own, mps2);
+                striking_state = self.braked(&striking_state, mps2);
             }
-            if differs && own.speed_mps == 0.0 {
+            if differs && striking_state.speed_mps == 0.0 {
                 return Some(true);
             }
         }
         Some(differs)
     }
 
-    /// Returns the braking of the careful driver (m/s²); `None` before its first risk. While it is no faster than the vehicle
-    /// ahead, it keeps its speed.
+    /// Returns the braking of the careful driver (m/s²); `None` before its first risk. While it is
+    /// no faster than the vehicle ahead, it keeps its speed.
     fn careful_mps2(
         &self,
-        own: &VehicleState,
+        striking: &VehicleState,
         other: &VehicleState,
         reaction: &mut Option<BrakingReaction>,
     ) -> Option<f64> {
-        let closing_mps = own.speed_mps - other.speed_mps;
-        if reaction.is_none() && self.is_in_path(own, other) && self.is_risk(own, other) {
+        let closing_mps = striking.speed_mps - other.speed_mps;
+        if reaction.is_none() && self.is_in_path(striking, other) && self.is_risk(striking, other) {
             *reaction = Some(BrakingReaction::default());
         }
         reaction.as_mut().map(|reaction| if closing_mps > 0.0 { reaction.advance(self.step_s) } else { 0.0 })
     }
 
-    /// Returns whether the careful driver sees a risk: as the same driver in the loop, at a time to collision of 2 s, or if more
-    /// braking is needed than a cruise control may use.
-    fn is_risk(&self, own: &VehicleState, other: &VehicleState) -> bool {
-        let (gap_m, closing_mps) = (self.gap_m(own, other), own.speed_mps - other.speed_mps);
-        // Both brake to a standstill, or the own speed falls to that of a vehicle that does not brake.
+    /// Returns whether the careful driver sees a risk. As in the loop, this driver sees one at a
+    /// time to collision of 2 s, or if more braking is needed than a cruise control may use.
+    fn is_risk(&self, striking: &VehicleState, other: &VehicleState) -> bool {
+        let (gap_m, closing_mps) = (self.gap_m(striking, other), striking.speed_mps - other.speed_mps);
+        // Both vehicles brake to a standstill, or the speed falls to the speed of a vehicle that
+        // does not brake.
         let braking_mps2 = -other.acceleration_mps2;
         let needed_mps2 = if braking_mps2 > 0.0 {
-            own.speed_mps.powi(2) / (2.0 * (gap_m + other.speed_mps.powi(2) / (2.0 * braking_mps2)))
+            striking.speed_mps.powi(2) / (2.0 * (gap_m + other.speed_mps.powi(2) / (2.0 * braking_mps2)))
         } else {
             closing_mps.max(0.0).powi(2) / (2.0 * gap_m)
         };
         gap_m <= CRITICAL_TTC_S * closing_mps || !(needed_mps2 <= CRUISE_CONTROL_MPS2)
     }
 
-    /// Returns the first step at which the struck vehicle can be seen to brake, or at which the time to collision falls to
-    /// the 2 s of the careful driver, whichever comes first.
+    /// Returns the first step at which the struck vehicle can be seen to brake, or at which the
+    /// time to collision falls to the 2 s of the careful driver, whichever comes first.
     fn hazard_step(&self) -> Option<usize> {
         let [striking, struck] = self.indices;
         self.trace.states.iter().position(|states| {
-            let (own, other) = (&states[striking], &states[struck]);
-            let closing_mps = own.speed_mps - other.speed_mps;
-            other.brake_light || (self.is_in_path(own, other) && self.gap_m(own, other) <= CRITICAL_TTC_S * closing_mps)
+            let (striking_state, other) = (&states[striking], &states[struck]);
+            let closing_mps = striking_state.speed_mps - other.speed_mps;
+            other.brake_light
+                || (self.is_in_path(striking_state, other)
+                    && self.gap_m(striking_state, other) <= CRITICAL_TTC_S * closing_mps)
         })
     }
 
-    /// Returns the vehicle one step later, if it brakes with `braking_mps2` along the path that it had.
-    fn braked(&self, own: &VehicleState, braking_mps2: f64) -> VehicleState {
-        let speed_mps = (own.speed_mps - braking_mps2 * self.step_s).max(0.0);
-        let s_m = own.s_m + 0.5 * (own.speed_mps + speed_mps) * self.step_s;
-        VehicleState { s_m, d_m: self.lateral_m(s_m), speed_mps, acceleration_mps2: -braking_mps2, ..*own }
+    /// Returns the vehicle one step later, if it brakes with `braking_mps2` along its recorded
+    /// path.
+    fn braked(&self, striking: &VehicleState, braking_mps2: f64) -> VehicleState {
+        let speed_mps = (striking.speed_mps - braking_mps2 * self.step_s).max(0.0);
+        let s_m = striking.s_m + 0.5 * (striking.speed_mps + speed_mps) * self.step_s;
+        VehicleState { s_m, d_m: self.lateral_m(s_m), speed_mps, acceleration_mps2: -braking_mps2, ..*striking }
     }
 
     /// Returns the lateral position of the striking vehicle at `s_m` of its path.
@@ -137,28 +143,30 @@ impl Pair<'_> {
         states.get(next).or(states.last()).map_or(0.0, |states| states[striking].d_m)
     }
 
-    /// Returns the gap along the road (m); negative while the vehicles overlap lengthwise or the other one is behind.
-    fn gap_m(&self, own: &VehicleState, other: &VehicleState) -> f64 {
-        other.s_m - own.s_m - 0.5 * self.vehicles.map(|vehicle| vehicle.dimensions.length_m).iter().sum::<f64>()
+    /// Returns the gap along the road (m); negative while the vehicles overlap lengthwise or the
+    /// other one is behind.
+    fn gap_m(&self, striking: &VehicleState, other: &VehicleState) -> f64 {
+        other.s_m - striking.s_m - 0.5 * self.vehicles.map(|vehicle| vehicle.dimensions.length_m).iter().sum::<f64>()
     }
 
-    fn overlaps_sideways(&self, own: &VehicleState, other: &VehicleState) -> bool {
+    fn overlaps_sideways(&self, striking: &VehicleState, other: &VehicleState) -> bool {
         let half_m = 0.5 * self.vehicles.map(|vehicle| vehicle.dimensions.width_m).iter().sum::<f64>();
-        (own.d_m - other.d_m).abs() < half_m
+        (striking.d_m - other.d_m).abs() < half_m
     }
 
     /// Returns whether the other vehicle is ahead in the path of the striking one.
-    fn is_in_path(&self, own: &VehicleState, other: &VehicleState) -> bool {
-        other.s_m > own.s_m && self.overlaps_sideways(own, other)
+    fn is_in_path(&self, striking: &VehicleState, other: &VehicleState) -> bool {
+        other.s_m > striking.s_m && self.overlaps_sideways(striking, other)
     }
 
-    fn touch(&self, own: &VehicleState, other: &VehicleState) -> bool {
+    fn touch(&self, striking: &VehicleState, other: &VehicleState) -> bool {
         let lengths_m: f64 = self.vehicles.map(|vehicle| vehicle.dimensions.length_m).iter().sum();
-        self.overlaps_sideways(own, other) && (own.s_m - other.s_m).abs() < 0.5 * lengths_m
+        self.overlaps_sideways(striking, other) && (striking.s_m - other.s_m).abs() < 0.5 * lengths_m
     }
 }
 
-/// Returns a vehicle one step later that goes on with its acceleration, if that is braking, to a standstill.
+/// Returns a vehicle one step later. If its acceleration is braking, the vehicle continues it to a
+/// standstill.
 fn continued(state: &VehicleState, step_s: f64) -> VehicleState {
     let speed_mps = (state.speed_mps + state.acceleration_mps2.min(0.0) * step_s).max(0.0);
     let s_m = state.s_m + 0.5 * (state.speed_mps + speed_mps) * step_s;
@@ -173,8 +181,8 @@ mod tests {
 
     const STEP_S: f64 = 0.01;
 
-    /// A vehicle at 30 m/s follows another at 30 m/s with `gap_m`. That one brakes with 6 m/s² from 1 s on, and the follower does
-    /// not. The trace ends at the contact.
+    /// A vehicle at 30 m/s follows another at 30 m/s with `gap_m`. The vehicle ahead brakes with 6
+    /// m/s² from 1 s on, and the follower does not. The trace ends at the contact.
     fn trace(gap_m: f64) -> Trace {
         let mut trace = Trace::default();
         let at = |s_m: f64, speed_mps: f64, acceleration_mps2: f64| VehicleState {
@@ -185,15 +193,15 @@ mod tests {
             ..VehicleState::default()
         };
         let length_m = Vehicle::typical(VehicleClass::Car).dimensions.length_m;
-        let (mut own, mut other) = (at(0.0, 30.0, 0.0), at(gap_m + length_m, 30.0, 0.0));
+        let (mut striking, mut other) = (at(0.0, 30.0, 0.0), at(gap_m + length_m, 30.0, 0.0));
         let mut step = 0;
-        while other.s_m - own.s_m >= length_m && step < 2_000 {
+        while other.s_m - striking.s_m >= length_m && step < 2_000 {
             trace.times.push(Time::from_ms(10 * step));
-            trace.states.push(vec![own, other]);
+            trace.states.push(vec![striking, other]);
             let braking = if step >= 100 { 6.0 } else { 0.0 };
             let speed_mps = (other.speed_mps - braking * STEP_S).max(0.0);
             other = at(other.s_m + 0.5 * (speed_mps + other.speed_mps) * STEP_S, speed_mps, -braking);
-            own = at(own.s_m + 30.0 * STEP_S, 30.0, 0.0);
+            striking = at(striking.s_m + 30.0 * STEP_S, 30.0, 0.0);
             step += 1;
         }
         trace
@@ -210,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_driver_who_does_nothing_else_avoids_nothing() {
-        // Of two vehicles side by side, the second drifts into the path of the first in the last step. No brake light, no risk.
+        // Of two vehicles side by side, the second drifts into the path of the first in the last
+        // step. No brake light, no risk.
         let at = |s_m: f64, d_m: f64| VehicleState { s_m, d_m, speed_mps: 30.0, ..VehicleState::default() };
         let mut trace = Trace::default();
         for step in 0..100_u32 {
@@ -245,8 +254,8 @@ mod tests {
 
     #[test]
     fn a_careful_driver_needs_a_gap_that_its_delay_uses_up() {
-        // At once a risk. 0.75 s of delay, and 7.59 m/s² reached in 0.6 s: 31 m before the driver brakes fully, and 56 m from
-        // then on, of the gap and the 75 m of the vehicle ahead.
+        // A risk at once. 0.75 s of delay, and 7.59 m/s² reached in 0.6 s: 31 m before the driver
+        // brakes fully, and 56 m afterwards, of the gap and the 75 m of the vehicle ahead.
         assert!(!avoided(5.0, Braking::Careful));
         assert!(avoided(60.0, Braking::Careful));
         let least = (1..100).map(f64::from).find(|gap_m| avoided(*gap_m, Braking::Careful)).unwrap();

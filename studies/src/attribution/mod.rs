@@ -1,4 +1,5 @@
-//! Attribution of a collision: which vehicle closed the gap, in which phase, and how it was avoidable.
+//! Attribution of a collision: which vehicle closed the gap, in which phase, and how it was
+//! avoidable.
 //!
 //! ```text
 //!  run of the sample ─▶ trace of all vehicles ─┬▶ striking vehicle, struck vehicle, phase, state of the system
@@ -7,10 +8,11 @@
 //!  run with the careful driver as the ego ─────┴▶ careful driver in the place of the ego
 //! ```
 //!
-//! The counterfactuals of the striking vehicle keep the motion of the struck vehicle as it was. What follows the collision is
-//! not known of it: it goes on with its last acceleration, at most to a standstill, in the lane position that it had. The
-//! counterfactual of the ego is a run of the loop, in which the other drivers react to the other ego. Braking decides about a
-//! front that strikes a rear; of other contacts, the counterfactuals of the striking vehicle say nothing.
+//! The counterfactuals of the striking vehicle keep the motion of the struck vehicle. The trace
+//! ends at the collision: after it, the struck vehicle keeps its last acceleration, at most to a
+//! standstill, and its lane position. The counterfactual of the ego is a run of the loop, in which
+//! the other drivers react to the other ego. In a rear-end collision, the braking of the striking
+//! vehicle decides. About other contacts, the counterfactuals of the striking vehicle say nothing.
 
 mod careful_ego;
 mod collision;

@@ -24,8 +24,8 @@ impl Observer for Trace {
         }
     }
 
-    fn event(&mut self, _: Time, what: &RunEvent) {
-        if let RunEvent::Collision(collision) = what {
+    fn event(&mut self, _: Time, event: &RunEvent) {
+        if let RunEvent::Collision(collision) = event {
             self.collision.get_or_insert_with(|| collision.clone());
         }
     }

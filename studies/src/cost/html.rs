@@ -9,8 +9,8 @@ pub fn section(cost: &Cost) -> Markup {
     html! {
         h2 { "Cost where nothing happens" }
         p.note {
-            "The samples in which no vehicle collides, and the lead vehicle does not brake, in any arm. Margins are the smallest of each sample: their 1st, "
-            "5th and 50th percentile. Speed lost: how much slower than the lead vehicle the ego becomes, in the mean and at the 95th "
+            "The samples in which no vehicle collides, and the lead vehicle does not brake, in any arm. Each sample has its smallest margin: the "
+            "table has their 1st, 5th and 50th percentile. Speed lost: how much slower than the lead vehicle the ego becomes, in the mean and at the 95th "
             "percentile. Time lost: to the baseline, in the mean of some of the samples, which are run again. Rates are per hour of simulated "
             "encounters, not of driving."
         }

@@ -8,11 +8,14 @@ use serde::Serialize;
 use super::time_lost::mean_time_lost_s;
 use crate::case::{CausesError, fails};
 
-/// Number of samples of a campaign that are run again for the time lost, in equal numbers for each scenario, and at least one each.
+/// Number of samples of a campaign that are run again for the time lost, in equal numbers for each
+/// scenario, and at least one each.
 pub const TIMED_SAMPLES: usize = 50;
-/// Thresholds of the rear time headway (s): 1 s, and the headway below which the paper calls a following critical.
+/// Thresholds of the rear time headway (s): 1 s, and the headway below which the paper calls a
+/// following critical.
 pub(super) const THW_BELOW_S: [f64; 2] = [1.0, 0.5];
-/// Threshold of the rear time to collision (s): the time to closest encounter below which the paper calls an encounter critical.
+/// Threshold of the rear time to collision (s): the time to closest encounter below which the paper
+/// calls an encounter critical.
 pub(super) const TTC_BELOW_S: f64 = 2.6;
 const SECONDS_PER_HOUR: f64 = 3_600.0;
 /// Number of samples that are kept. The samples to be timed are taken from them.
@@ -23,9 +26,11 @@ const MAX_KEPT: usize = 4_096;
 pub struct ArmCost {
     /// The controller.
     pub controller: String,
-    /// The 1st, the 5th and the 50th percentile of the smallest rear time headway (s), to a part in 16,384; `None` if no vehicle is behind.
+    /// The 1st, the 5th and the 50th percentile of the smallest rear time headway (s), to a part in
+    /// 16,384; `None` if no vehicle is behind.
     pub min_thw_rear_s: Option<[f64; 3]>,
-    /// The same of the smallest rear time to collision (s); `None` if no vehicle approaches.
+    /// The same percentiles of the smallest rear time to collision (s); `None` if no vehicle
+    /// approaches.
     pub min_ttc_rear_s: Option<[f64; 3]>,
     /// Share of the samples whose rear time headway falls below 1 s, and below 0.5 s.
     pub share_thw_below: [f64; 2],
@@ -35,7 +40,8 @@ pub struct ArmCost {
     pub speed_lost_mps: [f64; 2],
     /// Engagements of the system per hour of simulated encounters.
     pub engagements_per_hour: f64,
-    /// Mean time that the ego loses to the baseline (s); `None` for the baseline itself, and if no sample was run again.
+    /// Mean time that the ego loses to the baseline (s); `None` for the baseline itself, and if no
+    /// sample was run again.
     pub time_lost_s: Option<f64>,
 }
 
@@ -53,9 +59,10 @@ pub struct ScenarioCost {
     pub scenario: String,
     /// Samples in which no vehicle collides in any arm.
     pub samples_without_collision: u64,
-    /// Of these, samples in which the lead vehicle does not brake in any arm: those where nothing happens.
+    /// Of these, samples in which the lead vehicle does not brake in any arm: the uneventful
+    /// samples.
     pub samples: u64,
-    /// Number of them that were run again for the time lost.
+    /// Number of uneventful samples that were run again for the time lost.
     pub timed_samples: usize,
     /// The arms, the baseline first; empty without such a sample.
     pub arms: Vec<ArmCost>,
@@ -92,21 +99,21 @@ struct Values {
 /// [`CausesError`] if the folder cannot be read.
 pub fn cost(saved: &SavedCampaign) -> Result<Cost, CausesError> {
     let names: Vec<&String> = saved.manifest().scenarios.iter().map(|scenario| &scenario.name).collect();
-    let mut found: Vec<Uneventful> = names.iter().map(|_| Uneventful::default()).collect();
+    let mut uneventful: Vec<Uneventful> = names.iter().map(|_| Uneventful::default()).collect();
     for record in saved.folder().complete_records()? {
         let record = record?;
         let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
         let index = names.iter().position(|name| **name == record.scenario);
         if let (Some(outcomes), Some(index)) = (outcomes, index) {
-            found[index].push(record.sample, &outcomes);
+            uneventful[index].push(record.sample, &outcomes);
         }
     }
     let timed = TIMED_SAMPLES.div_ceil(names.len().max(1));
-    let of_scenario = |(found, name): (Uneventful, &&String)| found.finish(saved, name, timed);
-    Ok(Cost { scenarios: found.into_iter().zip(&names).map(of_scenario).collect() })
+    let of_scenario = |(uneventful, name): (Uneventful, &&String)| uneventful.finish(saved, name, timed);
+    Ok(Cost { scenarios: uneventful.into_iter().zip(&names).map(of_scenario).collect() })
 }
 
-/// The samples of a scenario in which nothing happens.
+/// The uneventful samples of a scenario.
 struct Uneventful {
     without_collision: u64,
     samples: u64,
@@ -138,7 +145,7 @@ impl Uneventful {
         }
     }
 
-    /// Counts a sample, and keeps its number if it is one of those to be kept.
+    /// Counts a sample, and keeps its number if its turn has come.
     fn keep(&mut self, sample: u64) {
         if self.samples.is_multiple_of(self.spacing) {
             if self.kept.len() == MAX_KEPT {
@@ -229,23 +236,23 @@ mod tests {
 
     #[test]
     fn the_samples_kept_of_many_lie_evenly_over_all() {
-        let mut found = Uneventful::default();
+        let mut uneventful = Uneventful::default();
         for sample in 0..100_000 {
-            found.keep(sample);
+            uneventful.keep(sample);
         }
-        assert_eq!((found.samples, found.spacing), (100_000, 32));
-        assert!(found.kept.iter().zip(0..).all(|(sample, index)| *sample == 32 * index));
-        assert_eq!(found.kept.len(), 3_125);
+        assert_eq!((uneventful.samples, uneventful.spacing), (100_000, 32));
+        assert!(uneventful.kept.iter().zip(0..).all(|(sample, index)| *sample == 32 * index));
+        assert_eq!(uneventful.kept.len(), 3_125);
     }
 
     #[test]
     fn a_scenario_without_an_uneventful_sample_says_why() {
-        let of = |samples_without_collision, samples| {
+        let reason = |samples_without_collision, samples| {
             let scenario = "a".to_owned();
             ScenarioCost { scenario, samples_without_collision, samples, timed_samples: 0, arms: Vec::new() }.why_none()
         };
-        assert_eq!(of(0, 0), Some("no sample without a collision"));
-        assert_eq!(of(4, 0), Some("no sample without braking of the lead vehicle"));
-        assert_eq!(of(4, 1), None);
+        assert_eq!(reason(0, 0), Some("no sample without a collision"));
+        assert_eq!(reason(4, 0), Some("no sample without braking of the lead vehicle"));
+        assert_eq!(reason(4, 1), None);
     }
 }

@@ -1,9 +1,9 @@
-//! What a system costs where nothing happens: in the samples in which no vehicle collides, and the lead vehicle does
-//! not brake, in any arm. Each scenario is measured for itself.
+//! The cost of a system in uneventful samples: no vehicle collides, and the lead vehicle does not
+//! brake, in any arm. Each scenario is measured separately.
 //!
-//! Margins behind the ego shrink if the ego slows down, speed and time are lost, and each engagement is felt by the occupants.
-//! The figures follow from the journal; the time lost needs runs of both arms, which are made for some samples unless the rear
-//! sensors are simulated in full.
+//! If the ego slows down, the margins behind it shrink, and it loses speed and time. The occupants
+//! feel each engagement. The figures follow from the journal. The time lost needs runs of both
+//! arms, which are made for some samples unless the rear sensors are simulated in full.
 
 mod html;
 mod measure;

@@ -22,11 +22,12 @@ impl Observer for Positions {
     }
 }
 
-/// Returns the mean time that the ego of each arm loses to that of the first arm (s), over samples of a scenario that are run again. Returns
-/// `None` without samples, if the sensors are simulated in full, or if a controller is a process of its own.
+/// Returns the mean time that the ego of each arm loses to the ego of the first arm (s), over
+/// samples of a scenario that are run again. Returns `None` without samples, if the sensors are
+/// simulated in full, or if a controller is a separate process.
 ///
-/// At the time at which the shorter of the two runs ends, the ego of the arm is behind that of the baseline by some distance. The
-/// time lost is how long before the baseline was there.
+/// At the end of the shorter run, the ego of the arm is some distance behind the ego of the
+/// baseline. The time lost is the time since the ego of the baseline passed this position.
 pub(super) fn mean_time_lost_s(saved: &SavedCampaign, scenario: &str, samples: &[u64]) -> Option<Vec<f64>> {
     let manifest = saved.manifest();
     if samples.is_empty() || manifest.arms.iter().any(|arm| arm.built_in().is_none()) {

@@ -14,11 +14,11 @@ use crate::case::fails;
 pub struct StageRun {
     /// The stages that are replaced.
     pub stages: Vec<Stage>,
-    /// Whether the stage is made as usual, and not perfect.
+    /// Whether the stage is made as usual, instead of perfect.
     pub is_usual: bool,
     /// The settings that replace them, each as `key=value`.
     pub settings: Vec<String>,
-    /// How the stage is worse than, or differs from, what is usual; `None` if it does not.
+    /// How the stage is worse than usual, or differs from it; `None` if it does not.
     pub unusual: Option<String>,
     /// Whether no vehicle collides.
     pub prevents: bool,
@@ -28,7 +28,7 @@ pub struct StageRun {
     pub min_gap_rear_m: Option<f64>,
     /// Smallest gap to the vehicle ahead (m).
     pub min_gap_front_m: Option<f64>,
-    /// Why the run has no outcome.
+    /// The reason for which the run has no outcome.
     pub error: Option<String>,
 }
 
@@ -50,11 +50,12 @@ impl StageRun {
     }
 }
 
-/// What the failure is due to.
+/// The cause of the failure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Cause {
-    /// The stage whose perfection prevents the failure: the first in the chain that is unusual, or else the first.
+    /// The stage whose perfection prevents the failure: the first in the chain that is unusual, or
+    /// else the first.
     Stage {
         /// The stage.
         stage: Stage,
@@ -79,7 +80,7 @@ pub struct MisRun {
     pub prevents: bool,
 }
 
-/// What the margin increase system has to do with the failure.
+/// The role of the margin increase system in the failure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisEffect {
     /// Whether no vehicle collides without the system: the system induces the failure.
@@ -109,7 +110,8 @@ pub struct Explanation {
     pub controller: String,
     /// Depth of the sensor simulation: `full`, `object` or `ground-truth`.
     pub sensors: String,
-    /// What happened: who struck whom, after what, what the system did and why, and which faults held.
+    /// The event in one sentence: who struck whom, after what, the actions of the system and their
+    /// reasons, and the faults that held.
     pub happened: String,
     /// The collision.
     pub collision: Attribution,
@@ -119,9 +121,9 @@ pub struct Explanation {
     pub missing: Vec<(Stage, String)>,
     /// The runs with two stages replaced. Empty if a stage alone prevents the failure.
     pub pairs: Vec<StageRun>,
-    /// What the failure is due to.
+    /// The cause of the failure.
     pub cause: Cause,
-    /// What the margin increase system has to do with it; `None` if the controller has none.
+    /// The role of the margin increase system; `None` if the controller has none.
     pub mis: Option<MisEffect>,
 }
 

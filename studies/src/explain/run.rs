@@ -16,8 +16,8 @@ use crate::case::{Case, CausesError, fails};
 /// Explains a case. Returns `None` if no vehicle collides in it.
 ///
 /// # Errors
-/// [`CausesError`] if the sample itself has no outcome. A run with a stage replaced that has no outcome does not prevent the
-/// failure; its message is kept.
+/// [`CausesError`] if the sample itself has no outcome. A run with a replaced stage that has no
+/// outcome does not prevent the failure; its message is kept.
 pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
     let (outcome, collision) = attribute(case, &[])?;
     let Some(collision) = collision else { return Ok(None) };
@@ -33,7 +33,8 @@ pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
     let run = |stages: &Vec<Stage>| {
         let unusual = unusual(stages[0], case, &scenario);
         let perfect = StageRun { unusual: unusual.clone(), ..replaced(case, stages) };
-        // A stage that is out of order may be the cause although its perfection brings about another failure.
+        // A stage that is out of order may be the cause although its perfection brings about
+        // another failure.
         let usual = usual_settings(stages[0], case);
         if unusual.is_none() || perfect.prevents || usual.is_empty() {
             return vec![perfect];
@@ -51,7 +52,7 @@ pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
         None => {
             pairs = tried_pairs(case, &present);
             match pairs.iter().find(|run| run.prevents).map(|run| &run.stages[..]) {
-                Some(&[one, other]) => Cause::Pair { stages: [one, other] },
+                Some(&[first, second]) => Cause::Pair { stages: [first, second] },
                 _ => Cause::None,
             }
         }
@@ -78,7 +79,7 @@ fn tried_pairs(case: &Case, present: &[Vec<Stage>]) -> Vec<StageRun> {
     let pairs: Vec<[Stage; 2]> = stages
         .iter()
         .enumerate()
-        .flat_map(|(index, &one)| stages[index + 1..].iter().map(move |&other| [one, other]))
+        .flat_map(|(index, &first)| stages[index + 1..].iter().map(move |&second| [first, second]))
         .collect();
     pairs.par_iter().map(|pair| replaced(case, pair)).collect()
 }
@@ -98,7 +99,8 @@ fn with_settings(case: &Case, stages: &[Stage], texts: Vec<String>) -> StageRun 
     StageRun::new(stages, texts, result)
 }
 
-/// Returns what the margin increase system has to do with the failure; `None` if the controller has none.
+/// Returns the role of the margin increase system in the failure; `None` if the controller has
+/// none.
 fn mis_effect(case: &Case, outcome: &Outcome) -> Result<Option<MisEffect>, CausesError> {
     let scenario = case.concrete(&[])?;
     let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else { return Ok(None) };

@@ -53,7 +53,7 @@ impl Stage {
         }
     }
 
-    /// Returns what the stage is replaced by, after "with".
+    /// Returns the replacement of the stage, as words after "with".
     pub const fn replacement(self) -> &'static str {
         match self {
             Self::Points => "exact points of the rear LiDAR",

@@ -31,10 +31,10 @@ impl Explanation {
                 let with = if is_usual { "it as usual, though not with it perfect" } else { stage.replacement() };
                 format!("It is due to {}{unusual}: with {with}, no vehicle collides{narrowly}.", stage.name())
             }
-            Cause::Pair { stages: [one, other] } => format!(
+            Cause::Pair { stages: [first, second] } => format!(
                 "No stage alone is to blame. With {} and {} together, no vehicle collides.",
-                one.replacement(),
-                other.replacement()
+                first.replacement(),
+                second.replacement()
             ),
             Cause::None => "No stage of the chain, and no pair of stages, prevents it if perfect.".to_owned(),
         };
@@ -45,18 +45,19 @@ impl Explanation {
     }
 }
 
-/// Gap below which a run counts as having passed narrowly (m): an assumption, a quarter of a car's width.
+/// Gap below which a run counts as having passed narrowly (m): an assumption, a quarter of a car's
+/// width.
 const NARROW_GAP_M: f64 = 0.5;
 
-/// Returns by how little a run has passed, if it has passed narrowly.
+/// Returns the margin by which a run has passed, if it has passed narrowly.
 fn narrowly(run: &StageRun) -> Option<String> {
     let least_m = [run.min_gap_rear_m, run.min_gap_front_m].into_iter().flatten().reduce(f64::min)?;
     (least_m < NARROW_GAP_M).then(|| format!(", but narrowly: the least gap is {least_m:.1} m"))
 }
 
-/// Returns what the margin increase system did that induced a failure.
+/// Returns the action of the margin increase system that induced a failure.
 fn induced_words(mis: &MisEffect) -> String {
-    let what = match mis.state {
+    let cause = match mis.state {
         Some(MisState::Increasing) => {
             let by =
                 mis.mean_deceleration_mps2.map_or_else(String::new, |mps2| format!(" by {mps2:.2} m/s² in the mean"));
@@ -70,7 +71,7 @@ fn induced_words(mis: &MisEffect) -> String {
         }
         None => "no state of the system alone is to blame, but all of them together".to_owned(),
     };
-    format!("The system induces it (without the system, no vehicle collides): {what}.")
+    format!("The system induces it (without the system, no vehicle collides): {cause}.")
 }
 
 impl fmt::Display for ExplanationText<'_> {
@@ -78,8 +79,9 @@ impl fmt::Display for ExplanationText<'_> {
         let Self { explanation, folder, command_for } = self;
         let folder = folder.display().to_string();
         let replay = |settings: &[String]| {
-            let of = SavedSample { folder: &folder, sample: explanation.sample, scenario: Some(&explanation.scenario) };
-            command_for(&Action::Replay(Replay { settings, ..Replay::new(of) }))
+            let saved_sample =
+                SavedSample { folder: &folder, sample: explanation.sample, scenario: Some(&explanation.scenario) };
+            command_for(&Action::Replay(Replay { settings, ..Replay::new(saved_sample) }))
         };
         let collision = &explanation.collision;
         writeln!(
@@ -116,7 +118,7 @@ impl fmt::Display for ExplanationText<'_> {
     }
 }
 
-/// Returns the outcome of a run with a stage replaced in words.
+/// Returns the outcome of a run with a replaced stage in words.
 fn outcome_words(run: &StageRun) -> String {
     let gap =
         |name: &str, gap_m: Option<f64>| gap_m.map_or_else(String::new, |m| format!(", least {name} gap {m:.1} m"));

@@ -1,4 +1,4 @@
-//! Which stages of a run are out of the ordinary.
+//! The stages of a run that are out of the ordinary.
 //!
 //! | stage | usual |
 //! |---|---|
@@ -8,7 +8,8 @@
 //! | timing | the latencies of the shipped sensors |
 //! | rear-reaction | no injected fault, and up to the 97.5 % quantile of the parameter that gives it; up to 2.5 s without one |
 //!
-//! Clusters, actuation and the braking of the lead vehicle have no usual values: they never count as unusual.
+//! Clusters, actuation and the braking of the lead vehicle have no usual values: they never count
+//! as unusual.
 
 use closecall_controllers::CheckedDriver;
 use closecall_scenarios::parameters::Distribution;
@@ -19,13 +20,14 @@ use closecall_traffic::{CONTROL_STEP, Check, Environment, ParameterName, Paramet
 use super::Stage;
 use crate::case::Case;
 
-/// Longest usual reaction time of a driver without a sampled one (s): an assumption, the upper end of the distribution of the
-/// library's scenarios.
+/// Longest usual reaction time of a driver without a sampled one (s): an assumption, the upper end
+/// of the distribution of the library's scenarios.
 const USUAL_REACTION_S: f64 = 2.5;
 /// Quantile of a sampled reaction time up to which it is usual: the upper end of the middle 95 %.
 const USUAL_QUANTILE: f64 = 0.975;
 
-/// Returns the settings that make a stage usual again, each as `key=value`. Empty if there are none.
+/// Returns the settings that make a stage usual again, each as `key=value`. Empty if there are
+/// none.
 pub(super) fn usual_settings(stage: Stage, case: &Case) -> Vec<String> {
     match stage {
         Stage::Class if case.file.config().fault.class_background => vec!["fault.class-background=false".to_owned()],
@@ -63,7 +65,8 @@ fn reaction_s(actor: &Actor) -> Option<f64> {
     }
 }
 
-/// Returns the longest usual reaction time of an actor (s): the quantile of the parameter that gives it, or else 2.5 s.
+/// Returns the longest usual reaction time of an actor (s): the quantile of the parameter that
+/// gives it, or else 2.5 s.
 fn usual_reaction_s(case: &Case, index: usize, now_s: f64) -> f64 {
     let (space, parameters) = (case.file.space(), parameters(case));
     let with_quantile = |name: &ParameterName, distribution: &Distribution| {

@@ -19,7 +19,8 @@ impl Counted {
     }
 }
 
-/// Largest number of encounters per km that is believed: a lead vehicle that brakes without an end every 100 m. An assumption.
+/// Largest number of encounters per km that is believed: a lead vehicle that brakes without an end
+/// every 100 m. An assumption.
 const MOST_PER_KM: f64 = 10.0;
 
 impl FromStr for Counted {

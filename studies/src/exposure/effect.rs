@@ -12,8 +12,9 @@ use super::interval::{extremes, product, rate_interval, share_difference};
 use super::{EventRule, Observed};
 use crate::case::CausesError;
 
-/// Share of the samples in which the lead vehicle must brake for a scenario to be the counted encounter: an assumption; runs that
-/// end by a collision before it brakes are part of the encounter.
+/// Share of the samples in which the lead vehicle must brake if the scenario is the counted
+/// encounter: an assumption. Runs that end by a collision before the lead vehicle brakes are part
+/// of the encounter.
 const LEAD_BRAKES_SHARE: f64 = 0.95;
 /// The distance that the effect refers to (km).
 const PER_KM: f64 = 1e6;
@@ -39,8 +40,8 @@ pub enum Rate {
 }
 
 impl Rate {
-    /// Returns the rate with its interval at 95 %, or with its stated range (events per 10⁶ km). The value of a range is its
-    /// geometric mean.
+    /// Returns the rate with its interval at 95 %, or with its stated range (events per 10⁶ km).
+    /// The value of a range is its geometric mean.
     pub fn per_million_km(&self) -> (f64, [f64; 2]) {
         match *self {
             Self::Counted { events, distance_km } => {
@@ -52,7 +53,7 @@ impl Rate {
     }
 }
 
-/// What a paired campaign says about the system, given an encounter.
+/// The shares of a paired campaign, given an encounter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CampaignShares {
     /// The scenario.
@@ -67,7 +68,7 @@ pub struct CampaignShares {
     pub induced: u64,
 }
 
-/// What is missing for the net effect.
+/// A missing input of the net effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Missing {
@@ -88,7 +89,7 @@ impl fmt::Display for Missing {
     }
 }
 
-/// The net effect of the system: collisions that it prevents less those that it induces, per 10⁶ km.
+/// The net effect of the system: prevented collisions less induced collisions, per 10⁶ km.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NetEffect {
     /// Encounters per 10⁶ km.
@@ -101,19 +102,20 @@ pub struct NetEffect {
     pub difference_95: [f64; 2],
     /// The net effect.
     pub net: f64,
-    /// Interval of the net effect at 95 %; with a stated range of the rate its extremes over the range, each with the interval of
-    /// the difference.
+    /// Interval of the net effect at 95 %; with a stated range of the rate its extremes over the
+    /// range, each with the interval of the difference.
     pub net_95: [f64; 2],
 }
 
-/// The exposure, and the net effect as far as it can be said.
+/// The exposure, and the net effect if the inputs suffice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exposure {
-    /// What counts as an event.
+    /// The rule for events.
     pub rule: EventRule,
-    /// What trajectory files show; `None` without files.
+    /// The observation in trajectory files; `None` without files.
     pub observed: Option<Observed>,
-    /// The largest rate at 95 % if no event was seen (events per 10⁶ km); `None` if one was, or no distance is known.
+    /// The largest rate at 95 % if no event was seen (events per 10⁶ km); `None` if one was, or no
+    /// distance is known.
     pub at_most_per_million_km: Option<f64>,
     /// The rate; `None` if it is not known.
     pub rate: Option<Rate>,
@@ -121,7 +123,7 @@ pub struct Exposure {
     pub campaign: Option<CampaignShares>,
     /// The net effect; `None` if it cannot be said.
     pub effect: Option<NetEffect>,
-    /// What would have to be known.
+    /// The missing inputs.
     pub missing: Vec<Missing>,
 }
 
@@ -134,10 +136,10 @@ pub fn exposure(
 ) -> Exposure {
     let counted = observed
         .as_ref()
-        .filter(|seen| seen.distance_km > 0.0 && seen.events > 0)
-        .map(|seen| Rate::Counted { events: seen.events, distance_km: seen.distance_km });
-    let without_event = observed.as_ref().filter(|seen| seen.distance_km > 0.0 && seen.events == 0);
-    let at_most_per_million_km = without_event.map(|seen| rate_interval(0, seen.distance_km)[1] * PER_KM);
+        .filter(|observed| observed.distance_km > 0.0 && observed.events > 0)
+        .map(|observed| Rate::Counted { events: observed.events, distance_km: observed.distance_km });
+    let without_event = observed.as_ref().filter(|observed| observed.distance_km > 0.0 && observed.events == 0);
+    let at_most_per_million_km = without_event.map(|observed| rate_interval(0, observed.distance_km)[1] * PER_KM);
     let rate = counted.or(prior.map(|[low, high]| Rate::Prior { low, high }));
     let usable = campaign.as_ref().filter(|campaign| campaign.samples > 0);
     let effect = rate.as_ref().zip(usable).map(|(source, campaign)| {
@@ -155,11 +157,12 @@ pub fn exposure(
     Exposure { rule, observed, at_most_per_million_km, rate, campaign, effect, missing }
 }
 
-/// Returns what a scenario of a saved campaign says, given an encounter. `scenario` may be left out if the campaign has only one.
-/// An unpaired campaign has no samples.
+/// Returns the shares of a scenario of a saved campaign, given an encounter. `scenario` may be left
+/// out if the campaign has only one. An unpaired campaign has no samples.
 ///
 /// # Errors
-/// [`CausesError`] if the folder cannot be read, there is no such scenario, or the lead vehicle does not brake in it.
+/// [`CausesError`] if the folder cannot be read, there is no such scenario, or the lead vehicle
+/// does not brake in it.
 pub fn shares_of(saved: &SavedCampaign, scenario: Option<&str>) -> Result<CampaignShares, CausesError> {
     let name = saved.file(scenario)?.config().name.clone();
     let mut summary = Summary::of(&saved.works()?);
@@ -178,7 +181,7 @@ pub fn shares_of(saved: &SavedCampaign, scenario: Option<&str>) -> Result<Campai
     if runs > 0 && lead_braked_share < LEAD_BRAKES_SHARE {
         return Err(CausesError::OtherEncounter { scenario: name, braked, runs });
     }
-    let pairs = summary.scenarios.iter().find(|(found, _)| *found == name).map(|(_, counts)| counts.pairs);
+    let pairs = summary.scenarios.iter().find(|(scenario, _)| *scenario == name).map(|(_, counts)| counts.pairs);
     let Pairs { prevented, induced, both, neither, .. } = pairs.unwrap_or_default();
     let samples = prevented + induced + both + neither;
     Ok(CampaignShares { scenario: name, lead_braked_share, samples, prevented, induced })
@@ -197,23 +200,23 @@ mod tests {
     #[test]
     fn the_net_effect_follows_from_the_printed_inputs() {
         let observed = Observed { events: 20, distance_km: 5_000.0, ..Observed::default() };
-        let found = exposure(RULE, Some(observed), None, campaign(150, 10)).effect.unwrap();
+        let effect = exposure(RULE, Some(observed), None, campaign(150, 10)).effect.unwrap();
         // 20 / 5000 km · 10⁶ km · (150 − 10) / 1000
-        assert!((found.net - 560.0).abs() < 1e-9 && (found.rate - 4_000.0).abs() < 1e-9, "{found:?}");
-        assert!(found.net_95[0] > 0.0 && found.net_95[0] < 400.0 && found.net_95[1] > 750.0, "{found:?}");
+        assert!((effect.net - 560.0).abs() < 1e-9 && (effect.rate - 4_000.0).abs() < 1e-9, "{effect:?}");
+        assert!(effect.net_95[0] > 0.0 && effect.net_95[0] < 400.0 && effect.net_95[1] > 750.0, "{effect:?}");
     }
 
     #[test]
     fn what_is_missing_is_named() {
         let none = exposure(RULE, None, None, None);
         assert_eq!((none.missing, none.effect), (vec![Missing::Rate, Missing::Campaign], None));
-        let seen = Observed { events: 0, distance_km: 12.0, ..Observed::default() };
+        let observed = Observed { events: 0, distance_km: 12.0, ..Observed::default() };
         assert_eq!(
-            exposure(RULE, Some(seen.clone()), None, campaign(5, 1)).missing,
+            exposure(RULE, Some(observed.clone()), None, campaign(5, 1)).missing,
             [Missing::Rate],
             "no event was seen"
         );
-        let with_prior = exposure(RULE, Some(seen), Some([100.0, 10_000.0]), campaign(50, 10)).effect.unwrap();
+        let with_prior = exposure(RULE, Some(observed), Some([100.0, 10_000.0]), campaign(50, 10)).effect.unwrap();
         assert!((with_prior.net - 40.0).abs() < 1e-9, "geometric mean 1000 · 0.04");
         let [low, high] = with_prior.difference_95;
         assert_eq!(with_prior.net_95, [100.0 * low, 10_000.0 * high], "{with_prior:?}");
@@ -221,11 +224,12 @@ mod tests {
 
     #[test]
     fn no_event_in_a_distance_bounds_the_rate() {
-        let seen = Observed { events: 0, distance_km: 5_000.0, ..Observed::default() };
-        let found = exposure(RULE, Some(seen), None, None);
-        // The 97.5 % quantile of chi-squared with one degree of freedom is 5.0239: half of it in 5,000 km.
-        assert!((found.at_most_per_million_km.unwrap() - 502.39).abs() < 0.01, "{found:?}");
-        let text = super::super::ExposureText(&found).to_string();
+        let observed = Observed { events: 0, distance_km: 5_000.0, ..Observed::default() };
+        let exposure = exposure(RULE, Some(observed), None, None);
+        // The 97.5 % quantile of chi-squared with one degree of freedom is 5.0239: half of it in
+        // 5,000 km.
+        assert!((exposure.at_most_per_million_km.unwrap() - 502.39).abs() < 0.01, "{exposure:?}");
+        let text = super::super::ExposureText(&exposure).to_string();
         assert!(text.contains("0 events in 5000 km: at most 502 per 10^6 km (95 %)"), "{text}");
     }
 }

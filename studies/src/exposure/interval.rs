@@ -8,7 +8,8 @@ const Z: f64 = 1.959_963_984_540_054;
 /// Probabilities of the bounds.
 const TAILS: [f64; 2] = [0.025, 0.975];
 
-/// Returns the Jeffreys interval of a rate at 95 %, from `events` in `distance`: in events per unit of the distance.
+/// Returns the Jeffreys interval of a rate at 95 %, from `events` in `distance`: in events per unit
+/// of the distance.
 pub fn rate_interval(events: u64, distance: f64) -> [f64; 2] {
     let Ok(gamma) = Gamma::new(events as f64 + 0.5, 1.0) else { return [0.0, f64::INFINITY] };
     let [low, high] = TAILS.map(|tail| gamma.inverse_cdf(tail) / distance);
@@ -30,11 +31,14 @@ pub fn share_difference(first: u64, second: u64, samples: u64) -> (f64, [f64; 2]
     let ([p_low, p_high], [q_low, q_high]) = (wilson(first, samples), wilson(second, samples));
     let scale = ((1.0 - p) * (1.0 - q)).sqrt();
     let correlation = if scale > 0.0 { -(p * q).sqrt() / scale } else { 0.0 };
-    let combined = |one: f64, other: f64| (one * one + other * other - 2.0 * correlation * one * other).max(0.0).sqrt();
+    let combined = |first: f64, second: f64| {
+        (first * first + second * second - 2.0 * correlation * first * second).max(0.0).sqrt()
+    };
     (p - q, [p - q - combined(p - p_low, q_high - q), p - q + combined(p_high - p, q - q_low)])
 }
 
-/// Returns the product of a positive and any independent quantity, and its interval, from their values with intervals.
+/// Returns the product of a positive and any independent quantity, and its interval, from their
+/// values with intervals.
 pub fn product((rate, rate_95): (f64, [f64; 2]), (effect, effect_95): (f64, [f64; 2])) -> (f64, [f64; 2]) {
     let bound =
         |rate_bound: f64, effect_bound: f64| maths::hypot(effect * (rate - rate_bound), rate * (effect - effect_bound));
@@ -44,7 +48,8 @@ pub fn product((rate, rate_95): (f64, [f64; 2]), (effect, effect_95): (f64, [f64
     (value, [value - bound(toward_low, effect_95[0]), value + bound(toward_high, effect_95[1])])
 }
 
-/// Returns the smallest and the largest product of a positive quantity in a stated range and any quantity in an interval.
+/// Returns the smallest and the largest product of a positive quantity in a stated range and any
+/// quantity in an interval.
 pub fn extremes([low, high]: [f64; 2], [effect_low, effect_high]: [f64; 2]) -> [f64; 2] {
     [if effect_low >= 0.0 { low } else { high } * effect_low, if effect_high >= 0.0 { high } else { low } * effect_high]
 }
@@ -68,8 +73,9 @@ mod tests {
         }
     }
 
-    /// Returns in how many of `worlds` synthetic worlds the interval of the net effect covers the truth. In each, `mean` events
-    /// are expected in the recorded distance, and a campaign of `samples` prevents with probability `p` and induces with `q`.
+    /// Returns in how many of `worlds` synthetic worlds the interval of the net effect covers the
+    /// truth. In each, `mean` events are expected in the recorded distance, and a campaign of
+    /// `samples` prevents with probability `p` and induces with `q`.
     fn covered(worlds: u64, mean: f64, [p, q]: [f64; 2], samples: u64) -> usize {
         let truth = mean * (p - q);
         (0..worlds)
@@ -119,11 +125,13 @@ mod tests {
 
     #[test]
     fn intervals_agree_with_published_ones() {
-        // Half the quantiles of chi-squared with 21 degrees of freedom, which tables give as 10.283 and 35.479.
+        // Half the quantiles of chi-squared with 21 degrees of freedom, which tables give as 10.283
+        // and 35.479.
         let [low, high] = rate_interval(10, 1.0);
         assert!((low - 10.283 / 2.0).abs() < 1e-3 && (high - 35.479 / 2.0).abs() < 1e-3, "{low} {high}");
         assert_eq!(rate_interval(0, 1.0)[0], 0.0);
-        // Wilson interval of 81 of 263 (Newcombe, Statistics in Medicine 17 (1998) 857–872): 0.2553 to 0.3662.
+        // Wilson interval of 81 of 263 (Newcombe, Statistics in Medicine 17 (1998) 857–872): 0.2553
+        // to 0.3662.
         let [low, high] = wilson(81, 263);
         assert!((low - 0.2553).abs() < 1e-4 && (high - 0.3662).abs() < 1e-4, "{low} {high}");
     }

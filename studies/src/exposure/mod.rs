@@ -1,4 +1,5 @@
-//! Exposure: how often the encounter happens on a road, and the net effect of the system per 10⁶ km.
+//! Exposure: how often the encounter happens on a road, and the net effect of the system per 10⁶
+//! km.
 //!
 //! ```text
 //!  trajectory files ─▶ the lead vehicle brakes while a rear vehicle is near: events, distance ─┐
@@ -6,22 +7,24 @@
 //!  paired campaign ─▶ prevented and induced collisions, given such an encounter ───────────────┘
 //! ```
 //!
-//! The net effect is λ·(p − q)·10⁶ km, with the rate λ of encounters per kilometre, and the shares p prevented and q induced of the
-//! samples. It follows from the printed inputs by the printed equations. Where an input is missing, the result says which.
+//! The net effect is λ·(p − q)·10⁶ km, with the rate λ of encounters per kilometre, and the shares
+//! p prevented and q induced of the samples. It follows from the printed inputs by the printed
+//! equations. If an input is missing, the result names it.
 //!
 //! # Intervals
-//! * λ from N events in D kilometres: quantiles of a gamma distribution with shape N + ½, divided by D (Jeffreys interval of a
-//!   Poisson rate).
+//! * λ from N events in D kilometres: quantiles of a gamma distribution with shape N + ½, divided
+//!   by D (Jeffreys interval of a Poisson rate).
 //! * p and q of n samples: Wilson score intervals (Wilson 1927).
-//! * p − q and λ·(p − q): the method of variance estimates recovery (Zou and Donner, *Construction of confidence intervals about
-//!   effect measures*, Statistics in Medicine 27 (2008) 1693–1702), which combines the distances of the bounds to the estimates
-//!   like standard deviations; p and q of the same samples are correlated by −√(p·q/((1 − p)·(1 − q))).
+//! * p − q and λ·(p − q): the method of variance estimates recovery (Zou and Donner, *Construction
+//!   of confidence intervals about effect measures*, Statistics in Medicine 27 (2008) 1693–1702),
+//!   which combines the distances of the bounds to the estimates like standard deviations; p and q
+//!   of the same samples are correlated by −√(p·q/((1 − p)·(1 − q))).
 //!
-//! A stated range of λ has no confidence. The net effect then has the extremes of the products: the ends of the range with the ends
-//! of the interval of p − q.
+//! A stated range of λ has no confidence. The net effect then has the extremes of the products: the
+//! ends of the range with the ends of the interval of p − q.
 //!
-//! The events count as independent of each other, and the sampled encounters as those of the road: neither can be shown by the
-//! data, and the result says so.
+//! The events count as independent of each other, and the sampled encounters count as encounters of
+//! the road. The data can show neither, and the result says so.
 
 mod arguments;
 mod effect;

@@ -1,25 +1,28 @@
-//! Encounters in trajectory data: the lead vehicle of a vehicle brakes while another comes near from behind.
+//! Encounters in trajectory data: the lead vehicle of a vehicle brakes while another comes near
+//! from behind.
 
 use closecall_recorded::filters::{Presence, SmoothedTrajectoryData};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Trajectory, TrajectoryPoint};
 use serde::Serialize;
 
-/// Time for which the lead vehicle must not have braked before an event, so that one braking counts once (s): an assumption.
+/// Time for which the lead vehicle must not have braked before an event (s): an assumption. One
+/// braking thus counts once.
 const APART_S: f64 = 2.0;
-/// Largest front time headway of the ego at which the lead vehicle matters (s): that below which the system engages.
+/// Largest front time headway of the ego at which the lead vehicle matters (s): the headway below
+/// which the system engages.
 const SHORT_THW_S: f64 = 1.5;
 /// Speed below which a time headway is meaningless (m/s).
 const MIN_SPEED_MPS: f64 = 1.0;
 
-/// What counts as an event.
+/// The rule for events.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EventRule {
     /// Deceleration of the lead vehicle from which it counts as braking (m/s²).
     pub braking_mps2: f64,
 }
 
-/// What was observed in trajectory data.
+/// The observation in trajectory data.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Observed {
     /// Names of the data.
@@ -28,7 +31,8 @@ pub struct Observed {
     pub distance_km: f64,
     /// Time that all vehicles were seen (h).
     pub hours: f64,
-    /// Times at which a vehicle comes near another from behind, which follows a third at a short headway.
+    /// Times at which a vehicle comes near another from behind, which follows a third at a short
+    /// headway.
     pub approaches: u64,
     /// Events: the lead vehicle begins to brake while the rear vehicle is near.
     pub events: u64,
@@ -53,18 +57,19 @@ pub fn observe(data: &SmoothedTrajectoryData, rule: EventRule, into: &mut Observ
 
 /// Observes one vehicle as the ego.
 fn observe_ego(data: &SmoothedTrajectoryData, ego: usize, rule: EventRule, into: &mut Observed) {
-    let own = &data.tracks[ego].trajectory;
+    let trajectory = &data.tracks[ego].trajectory;
     // The rear vehicle that is near, by the index of its track.
     let mut near = None;
-    for point in &own.points {
-        let Some((lead, rear)) = neighbours(data, ego, (own, point)) else {
+    for point in &trajectory.points {
+        let Some((lead, rear)) = neighbours(data, ego, (trajectory, point)) else {
             near = None;
             continue;
         };
         let closing_mps = rear.point.speed_mps - point.speed_mps;
         let thw_s = lead.gap_m / point.speed_mps.max(MIN_SPEED_MPS);
         let was_near = near == Some(rear.presence.track_index);
-        // Once near, the rear vehicle stays near until it is out of reach: its approach ends when it has come close.
+        // Once near, the rear vehicle stays near until it is out of reach: its approach ends when
+        // it has come close.
         let is_near = thw_s < SHORT_THW_S
             && rear.gap_m <= ENGAGEMENT_GAP_M
             && (was_near || closing_mps >= ENGAGEMENT_CLOSING_MPS);
@@ -80,7 +85,8 @@ fn observe_ego(data: &SmoothedTrajectoryData, ego: usize, rule: EventRule, into:
     }
 }
 
-/// Returns whether a vehicle brakes, and was seen not to brake in the time before. It need not have been the lead vehicle then.
+/// Returns whether a vehicle brakes, and did not brake in the time before. It need not have been
+/// the lead vehicle then.
 fn begins_to_brake(data: &SmoothedTrajectoryData, presence: Presence, rule: EventRule) -> bool {
     let (track, now) = data.look_up(presence);
     let brakes = |point: &TrajectoryPoint| point.acceleration_mps2 <= -rule.braking_mps2;
@@ -101,7 +107,7 @@ struct Neighbour<'a> {
 fn neighbours<'a>(
     data: &'a SmoothedTrajectoryData,
     ego: usize,
-    (own, point): (&Trajectory, &TrajectoryPoint),
+    (trajectory, point): (&Trajectory, &TrajectoryPoint),
 ) -> Option<(Neighbour<'a>, Neighbour<'a>)> {
     let (mut ahead, mut behind) = (None::<Neighbour<'a>>, None::<Neighbour<'a>>);
     for &presence in data.present_at(point.time).iter().filter(|presence| presence.track_index != ego) {
@@ -110,9 +116,9 @@ fn neighbours<'a>(
             continue;
         }
         let distance_m = at.s_m - point.s_m;
-        let gap_m = bumper_gap_m(distance_m.abs(), own.dimensions.length_m, other.dimensions.length_m);
+        let gap_m = bumper_gap_m(distance_m.abs(), trajectory.dimensions.length_m, other.dimensions.length_m);
         let nearest = if distance_m > 0.0 { &mut ahead } else { &mut behind };
-        if nearest.as_ref().is_none_or(|known| gap_m < known.gap_m) {
+        if nearest.as_ref().is_none_or(|neighbour| gap_m < neighbour.gap_m) {
             *nearest = Some(Neighbour { presence, point: at, gap_m });
         }
     }
@@ -152,8 +158,8 @@ mod tests {
         Trajectory { track_id, vehicle_id: track_id, class: VehicleClass::Car, dimensions, points: points.collect() }
     }
 
-    /// Three vehicles in a lane: the lead vehicle brakes by 6 m/s² from 12 s to 13 s, and the rear vehicle, which starts `rear_m`
-    /// behind the ego, is 8 m/s faster.
+    /// Three vehicles in a lane: the lead vehicle brakes by 6 m/s² from 12 s to 13 s, and the rear
+    /// vehicle, which starts `rear_m` behind the ego, is 8 m/s faster.
     fn observed(rear_m: f64, braking_mps2: f64) -> Observed {
         let rear = |t: f64| (-rear_m + 38.0 * t, 38.0, 0.0);
         observed_in(
@@ -172,18 +178,21 @@ mod tests {
 
     fn observed_in(tracks: Vec<Trajectory>, braking_mps2: f64) -> Observed {
         let data = TrajectoryData::new("made", Time::from_s(STEP_S), tracks);
-        let mut found = Observed::default();
-        observe(&smooth(&data), EventRule { braking_mps2 }, &mut found);
-        found
+        let mut observed = Observed::default();
+        observe(&smooth(&data), EventRule { braking_mps2 }, &mut observed);
+        observed
     }
 
     #[test]
     fn a_braking_lead_vehicle_counts_if_a_rear_vehicle_is_near() {
         // At 12 s the rear vehicle is 130 − 96 = 34 m behind.
-        let found = observed(130.0, 4.0);
-        assert_eq!((found.events, found.approaches), (1, 1), "{found:?}");
-        assert!((found.closing_mps[0] - 8.0).abs() < 0.2 && (0.6..1.0).contains(&found.rear_thw_s[0]), "{found:?}");
-        assert!((found.distance_km - 1.35).abs() < 0.05, "{found:?}");
+        let encounters = observed(130.0, 4.0);
+        assert_eq!((encounters.events, encounters.approaches), (1, 1), "{encounters:?}");
+        assert!(
+            (encounters.closing_mps[0] - 8.0).abs() < 0.2 && (0.6..1.0).contains(&encounters.rear_thw_s[0]),
+            "{encounters:?}"
+        );
+        assert!((encounters.distance_km - 1.35).abs() < 0.05, "{encounters:?}");
         assert_eq!(observed(320.0, 4.0).events, 0, "too far away");
         assert_eq!(observed(130.0, 7.0).events, 0, "braking less than that");
     }
@@ -196,7 +205,8 @@ mod tests {
             let lead = track(1, |t| braking_from(12.0, t));
             observed_in(vec![lead, track(2, |t| (30.0 * t, 30.0, 0.0)), rear, follower], 4.0)
         };
-        // The faster vehicle passes the follower at 60 / 8 = 7.5 s, and is the rear vehicle from then on.
+        // The faster vehicle passes the follower at 60 / 8 = 7.5 s, and is the rear vehicle from
+        // then on.
         assert_eq!(scene(20.0).events, 1);
         assert_eq!(scene(11.0).events, 0, "the follower behind it never approached");
     }

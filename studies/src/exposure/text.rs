@@ -13,11 +13,11 @@ pub struct ExposureText<'a>(pub &'a Exposure);
 impl fmt::Display for ExposureText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Exposure { rule, observed, at_most_per_million_km, rate, campaign, effect, missing } = self.0;
-        if let Some(seen) = observed.as_ref().filter(|seen| seen.hours > 0.0) {
-            write_observed(f, seen, rule.braking_mps2)?;
+        if let Some(observed) = observed.as_ref().filter(|observed| observed.hours > 0.0) {
+            write_observed(f, observed, rule.braking_mps2)?;
         }
-        if let (Some(seen), Some(at_most)) = (observed, at_most_per_million_km) {
-            let km = (1_000.0 * seen.distance_km).round() / 1_000.0;
+        if let (Some(observed), Some(at_most)) = (observed, at_most_per_million_km) {
+            let km = (1_000.0 * observed.distance_km).round() / 1_000.0;
             writeln!(f, "0 events in {km} km: at most {at_most:.0} per 10^6 km (95 %)")?;
         }
         match rate {
@@ -85,28 +85,34 @@ impl fmt::Display for ExposureText<'_> {
                 }
                 writeln!(
                     f,
-                    "assumed: the events are independent of each other, and the sampled encounters are those of the road"
+                    "assumed: the events are independent of each other, and the sampled encounters are encounters of the road"
                 )
             }
             None => {
-                writeln!(f, "NET EFFECT: cannot be said. It would have to be known:")?;
+                writeln!(f, "NET EFFECT: cannot be said. These inputs are missing:")?;
                 missing.iter().try_for_each(|missing| writeln!(f, "  {missing}"))
             }
         }
     }
 }
 
-fn write_observed(f: &mut fmt::Formatter<'_>, seen: &Observed, braking_mps2: f64) -> fmt::Result {
-    writeln!(f, "{}: {:.3} km, {:.3} h of all vehicles", seen.sources.join(", "), seen.distance_km, seen.hours)?;
+fn write_observed(f: &mut fmt::Formatter<'_>, observed: &Observed, braking_mps2: f64) -> fmt::Result {
+    writeln!(
+        f,
+        "{}: {:.3} km, {:.3} h of all vehicles",
+        observed.sources.join(", "),
+        observed.distance_km,
+        observed.hours
+    )?;
     writeln!(
         f,
         "  {} approaches: a vehicle comes within 100 m of one that follows at less than 1.5 s, 10 km/h or more faster",
-        seen.approaches
+        observed.approaches
     )?;
-    writeln!(f, "  {} events: the lead vehicle brakes by {braking_mps2} m/s² or more meanwhile", seen.events)?;
-    for (what, values, unit) in [
-        ("speed difference at an approach", &seen.closing_mps, "m/s"),
-        ("rear time headway at an event", &seen.rear_thw_s, "s"),
+    writeln!(f, "  {} events: the lead vehicle brakes by {braking_mps2} m/s² or more meanwhile", observed.events)?;
+    for (quantity, values, unit) in [
+        ("speed difference at an approach", &observed.closing_mps, "m/s"),
+        ("rear time headway at an event", &observed.rear_thw_s, "s"),
     ] {
         let mut sorted = values.clone();
         sorted.sort_by(f64::total_cmp);
@@ -114,7 +120,7 @@ fn write_observed(f: &mut fmt::Formatter<'_>, seen: &Observed, braking_mps2: f64
             let at = |share: f64| quantile(&sorted, share);
             writeln!(
                 f,
-                "  {what}: median {:.2} {unit}, 5 to 95 %: {:.2} to {:.2} {unit}",
+                "  {quantity}: median {:.2} {unit}, 5 to 95 %: {:.2} to {:.2} {unit}",
                 at(0.5),
                 at(0.05),
                 at(0.95)

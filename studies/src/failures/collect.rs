@@ -9,7 +9,8 @@ use crate::attribution::attribute;
 use crate::case::{Case, CausesError, fails};
 use crate::explain::{Explanation, explain};
 
-/// Largest number of failures that a report attributes, so that a report of a large campaign takes seconds.
+/// Largest number of failures that a report attributes. The report of a large campaign then takes
+/// seconds.
 const MOST_ATTRIBUTED: usize = 200;
 
 /// The failures of a campaign.
@@ -17,11 +18,13 @@ const MOST_ATTRIBUTED: usize = 200;
 pub struct Failures {
     /// The failures in the order of the table.
     pub rows: Vec<FailureRow>,
-    /// Number of failures without an attribution, because of the sensors or because there are too many.
+    /// Number of failures without an attribution, because of the sensors or because there are too
+    /// many.
     pub without_attribution: usize,
 }
 
-/// Returns the failures of the arm under test of a campaign, with attributions and what is kept of earlier explanations.
+/// Returns the failures of the arm under test of a campaign, with attributions and stored
+/// explanations.
 ///
 /// # Errors
 /// [`CausesError`] if the folder cannot be read.
@@ -46,11 +49,12 @@ pub fn campaign_failures(saved: &SavedCampaign) -> Result<Failures, CausesError>
     Ok(Failures { rows, without_attribution })
 }
 
-/// Explains failures of the arm under test: `sample` alone, or up to `most` in the order of the table. Returns the explanations
-/// in that order, and all failures of the campaign with them.
+/// Explains failures of the arm under test: `sample` alone, or up to `most` in the order of the
+/// table. Returns the explanations in that order, and all failures of the campaign with them.
 ///
 /// # Errors
-/// [`CausesError`] if the folder cannot be read, the campaign has no such scenario, or a sample has no outcome or no failure.
+/// [`CausesError`] if the folder cannot be read, the campaign has no such scenario, or a sample has
+/// no outcome or no failure.
 pub fn explain_failures(
     saved: &SavedCampaign,
     scenario: Option<&str>,
@@ -82,15 +86,16 @@ pub fn explain_failures(
     Ok((explanations, failures))
 }
 
-/// Returns the error for a sample that does not fail, with some that do; or, if it fails in the journal, for one that does not
-/// repeat.
+/// Returns the error for a sample that does not fail, with some that do. If the sample fails in the
+/// journal, returns the error for a sample that does not repeat.
 pub(crate) fn passes(saved: &SavedCampaign, case: &Case) -> CausesError {
     let rows = match (has_failed(saved, case), rows(saved)) {
         (Ok(true), _) => {
             return CausesError::NotRepeated { sample: case.sample, controller: case.arm.controller.name().to_owned() };
         }
         (Ok(false), Ok(rows)) => rows,
-        // A journal that cannot be read says neither that the sample passes nor that none fails.
+        // A journal that cannot be read shows neither that the sample passes nor that no sample
+        // fails.
         (Err(error), _) | (_, Err(error)) => return error,
     };
     let failing: Vec<String> = rows.iter().take(5).map(|row| row.sample.to_string()).collect();
@@ -111,14 +116,14 @@ fn has_failed(saved: &SavedCampaign, case: &Case) -> Result<bool, CausesError> {
     Ok(false)
 }
 
-/// Returns the failures of the arm under test with what is kept of earlier explanations.
+/// Returns the failures of the arm under test with stored explanations.
 fn rows(saved: &SavedCampaign) -> Result<Vec<FailureRow>, CausesError> {
     let kept = read_rows(saved.folder());
     let mut rows = Vec::new();
     for record in saved.folder().records()? {
         let Some(row) = FailureRow::of(&record?) else { continue };
-        let known = kept.iter().find(|known| known.is_same(&row) && known.time_s == row.time_s);
-        rows.push(known.cloned().unwrap_or(row));
+        let explained = kept.iter().find(|explained| explained.is_same(&row) && explained.time_s == row.time_s);
+        rows.push(explained.cloned().unwrap_or(row));
     }
     if rows.is_empty() {
         // Only all samples together show that none fails.
@@ -128,7 +133,8 @@ fn rows(saved: &SavedCampaign) -> Result<Vec<FailureRow>, CausesError> {
     Ok(rows)
 }
 
-/// Returns whether the controller is part of this program: a process of another author is not started for a report.
+/// Returns whether the controller is part of this program: a report does not start another author's
+/// process.
 fn is_built_in(saved: &SavedCampaign, controller: &str) -> bool {
     let manifest = saved.manifest();
     let mut arms = manifest.arms.iter().zip(manifest.arm_names());

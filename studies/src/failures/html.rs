@@ -9,19 +9,21 @@ use super::{FailureRow, Failures};
 use crate::attribution::{braking_words, phase_word, state_word};
 use crate::explain::Cause;
 
-/// The comments around the section, by which it is found and replaced.
+/// The comments around the section, which mark it for replacement.
 const BEGIN: &str = "<!-- causes -->";
 const END: &str = "<!-- end of causes -->";
 /// Largest number of failures that the page lists.
 const MOST_LISTED: usize = 100;
 
-/// Returns the section of the report. `is_named` says whether a command must name the scenario. Without failures there is none.
+/// Returns the section of the report. `is_named` says whether a command must name the scenario.
+/// Without failures there is none.
 pub fn section(failures: &Failures, is_named: bool, command_for: CommandFor) -> Markup {
     let body = if failures.rows.is_empty() { Markup::default() } else { body(failures, is_named, command_for) };
     html! { (PreEscaped(BEGIN)) (body) (PreEscaped(END)) }
 }
 
-/// Returns the part of a page before the section, the section, and the part after it; `None` if the page has none.
+/// Returns the part of a page before the section, the section, and the part after it; `None` if the
+/// page has none.
 pub fn without_section(page: &str) -> Option<[&str; 3]> {
     let (before, rest) = page.split_once(BEGIN)?;
     let (section, after) = rest.split_once(END)?;
@@ -33,17 +35,17 @@ fn body(failures: &Failures, is_named: bool, command_for: CommandFor) -> Markup 
     html! {
         h2 { "Causes" }
         p.note {
-            "All failures of the arm under test: induced ones first, then those that no perfect stage prevents, then those with the most "
-            "harm. Avoidable: whether the competent and careful driver of UN Regulation 157 in the place of the striking vehicle or of the "
-            "ego, or full braking of the striking vehicle, would have avoided the first collision; braking decides about a "
-            "front that strikes a rear only. Due to: the stage of the chain whose "
+            "All failures of the arm under test: induced failures first, then failures that no perfect stage prevents, then the most "
+            "harmful. Avoidable: whether the competent and careful driver of UN Regulation 157 in the place of the striking vehicle or of the "
+            "ego, or full braking of the striking vehicle, would have avoided the first collision. The braking of "
+            "the striking vehicle decides only in a rear-end collision. Due to: the stage of the chain whose "
             "perfection prevents the failure, once " code { "closecall explain" } " has found it."
         }
         (counts(rows))
         @if failures.without_attribution > 0 {
             p.note {
                 (failures.without_attribution) " of " (rows.len()) " failures are not attributed yet: they are many, or their sensors are "
-                "slow. " code { (command_for(&Action::ExplainAll("."))) } " does it."
+                "slow. " code { (command_for(&Action::ExplainAll("."))) } " attributes them."
             }
         }
         div.wide tabindex="0" {
@@ -63,7 +65,7 @@ fn body(failures: &Failures, is_named: bool, command_for: CommandFor) -> Markup 
 fn counts(rows: &[FailureRow]) -> Markup {
     let mut counted: BTreeMap<(String, &str, &str), usize> = BTreeMap::new();
     for row in rows {
-        let avoidable = row.attribution.as_ref().map_or("not known", |found| found.avoidable.words());
+        let avoidable = row.attribution.as_ref().map_or("not known", |attribution| attribution.avoidable.words());
         let who = format!("{} strikes {}", row.vehicles[0], row.vehicles[1]);
         *counted.entry((who, phase_word(row.phase), avoidable)).or_default() += 1;
     }
@@ -78,13 +80,14 @@ fn counts(rows: &[FailureRow]) -> Markup {
 }
 
 fn line(row: &FailureRow, is_named: bool, command_for: CommandFor) -> Markup {
-    let of = SavedSample { folder: ".", sample: row.sample, scenario: is_named.then_some(&row.scenario) };
-    let commands = [Action::Replay(Replay::new(of)), Action::Explain(of), Action::Minimize(of)];
+    let saved_sample = SavedSample { folder: ".", sample: row.sample, scenario: is_named.then_some(&row.scenario) };
+    let commands =
+        [Action::Replay(Replay::new(saved_sample)), Action::Explain(saved_sample), Action::Minimize(saved_sample)];
     let phase = match (&row.attribution, row.is_after_lead_braking) {
-        (Some(found), _) => found.phase_words(),
+        (Some(attribution), _) => attribution.phase_words(),
         (None, is_after) => braking_words(row.phase, is_after),
     };
-    let state = row.attribution.as_ref().map_or("", |found| state_word(found.ego_state));
+    let state = row.attribution.as_ref().map_or("", |attribution| state_word(attribution.ego_state));
     html! {
         tr.collided {
             td.number { (row.sample) }
@@ -92,19 +95,19 @@ fn line(row: &FailureRow, is_named: bool, command_for: CommandFor) -> Markup {
             td title=(state) { (phase) }
             td { (match row.is_induced { Some(true) => "induced", Some(false) => "no", None => "" }) }
             td.number { (format!("{:.3}", row.harm)) }
-            td { (row.attribution.as_ref().map_or("", |found| found.avoidable.words())) }
+            td { (row.attribution.as_ref().map_or("", |attribution| attribution.avoidable.words())) }
             td title=(row.sentence.clone().unwrap_or_default()) { (due_to(row)) }
             td { @for action in &commands { code { (command_for(action)) } br; } }
         }
     }
 }
 
-/// Returns what the failure is due to.
+/// Returns the cause of the failure.
 fn due_to(row: &FailureRow) -> String {
     match &row.cause {
         None => String::new(),
         Some(Cause::Stage { stage }) => stage.name().to_owned(),
-        Some(Cause::Pair { stages: [one, other] }) => format!("{} and {}", one.name(), other.name()),
+        Some(Cause::Pair { stages: [first, second] }) => format!("{} and {}", first.name(), second.name()),
         Some(Cause::None) => "no stage".to_owned(),
     }
 }

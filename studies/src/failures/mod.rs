@@ -1,11 +1,13 @@
-//! The failures of a campaign with their causes: the table of the report, and the file `causes.json` of a campaign's folder.
+//! The failures of a campaign with their causes: the table of the report, and the file
+//! `causes.json` of a campaign's folder.
 //!
 //! ```text
 //!  journal ─▶ rows: which vehicle struck which, in which phase ─▶ + attribution ─▶ + explanation ─▶ table, causes.json
 //! ```
 //!
-//! The rows follow from the journal. An attribution needs two runs of the sample, which is done for every failure unless the
-//! rear sensors are simulated in full. An explanation needs about ten runs; `closecall explain` makes it.
+//! The rows follow from the journal. An attribution needs two runs of the sample, which is done for
+//! every failure unless the rear sensors are simulated in full. An explanation needs about ten
+//! runs; `closecall explain` makes it.
 
 mod collect;
 mod html;

@@ -33,9 +33,9 @@ pub struct FailureRow {
     pub phase: Phase,
     /// Whether the lead vehicle had begun to brake.
     pub is_after_lead_braking: bool,
-    /// How it was avoidable; `None` if the sample was not run again.
+    /// How the collision was avoidable; `None` if the sample was not run again.
     pub attribution: Option<Attribution>,
-    /// What the failure is due to; `None` if it was not explained.
+    /// The cause of the failure; `None` if it was not explained.
     pub cause: Option<Cause>,
     /// The explanation in a sentence; `None` if it was not explained.
     pub sentence: Option<String>,
@@ -86,11 +86,9 @@ impl FailureRow {
     }
 }
 
-/// The order of the table: induced failures first, then unexplained ones, then those with the most harm.
-pub fn order(one: &FailureRow, other: &FailureRow) -> Ordering {
+/// The order of the table: induced failures first, then unexplained ones, then failures with the
+/// most harm.
+pub fn order(a: &FailureRow, b: &FailureRow) -> Ordering {
     let rank = |row: &FailureRow| (row.is_induced == Some(true), row.is_unexplained());
-    rank(other)
-        .cmp(&rank(one))
-        .then(other.harm.total_cmp(&one.harm))
-        .then((&one.scenario, one.sample).cmp(&(&other.scenario, other.sample)))
+    rank(b).cmp(&rank(a)).then(b.harm.total_cmp(&a.harm)).then((&a.scenario, a.sample).cmp(&(&b.scenario, b.sample)))
 }

@@ -8,8 +8,8 @@ use super::FailureRow;
 /// The name of the file.
 pub const CAUSES: &str = "causes.json";
 
-/// Reads the rows that earlier explanations of the campaign have kept. A file that cannot be read counts as none: the rows can
-/// be made again.
+/// Reads the rows that previous explanations of the campaign have kept. A file that cannot be read
+/// counts as none: the rows can be made again.
 pub fn read_rows(folder: &Folder) -> Vec<FailureRow> {
     let text = std::fs::read_to_string(folder.file(CAUSES)).unwrap_or_default();
     serde_json::from_str(&text).unwrap_or_default()

@@ -8,8 +8,8 @@ use maud::{DOCTYPE, PreEscaped, html};
 use super::table::csv;
 use super::{Map, MapPoint, svg};
 
-/// Writes `map.html`, a picture for each front time headway, `map.csv` and `map.json` into a folder, which is created if it does
-/// not exist. Returns the paths.
+/// Writes `map.html`, a picture for each front time headway, `map.csv` and `map.json` into a
+/// folder, which is created if it does not exist. Returns the paths.
 ///
 /// # Errors
 /// [`WriteError`] if a file cannot be written.
@@ -41,7 +41,7 @@ fn page(map: &Map) -> String {
                 style { "body{font-family:sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem}td,th{padding:.2rem .6rem;text-align:left}svg{max-width:100%;height:auto}" }
             }
             body {
-                h1 { "Which margin is reached" }
+                h1 { "Margin that the system reaches" }
                 p {
                     "The margin is the gain of the front time headway from the engagement until the rear vehicle is "
                     (map.critical_gap_m) " m behind. The ego and the lead vehicle drive at " (format!("{:.1}", map.grid.speed_mps))

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-/// The region in which the paper's system is in time: upper end of each band of the speed difference (km/h), and the share of the
-/// cases in it. Above the last band the share is 0; between 25 and 30 km/h the paper states none.
+/// The region in which the paper's system is in time: upper end of each band of the speed
+/// difference (km/h), and the share of the cases in it. Above the last band the share is 0; between
+/// 25 and 30 km/h the paper states none.
 pub const PAPER_IN_TIME: [(f64, &str); 3] = [(20.0, "always"), (25.0, "59 %"), (30.0, "not stated")];
 
 /// Largest difference of margin between theory and loop that needs no reason (s).
@@ -30,7 +31,8 @@ pub struct MapPoint {
     pub is_in_time_in_theory: bool,
     /// Whether the goal is reached in the loop.
     pub is_in_time_in_loop: bool,
-    /// Why theory and loop differ by more than 0.2 s, or only one of them has a margin; `None` if they agree.
+    /// Why theory and loop differ by more than 0.2 s, or only one of them has a margin; `None` if
+    /// they agree.
     pub reason: Option<String>,
 }
 

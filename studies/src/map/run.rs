@@ -22,9 +22,11 @@ use super::MapPoint;
 const SCENARIO: &str = include_str!("scenario.toml");
 /// Kilometres per hour in one metre per second.
 const KMH_PER_MPS: f64 = 3.6;
-/// Time for which the rear vehicle approaches before it can be detected (s), so that the run starts in balance.
+/// Time for which the rear vehicle approaches before it can be detected (s): the run starts in
+/// balance.
 const BEFORE_DETECTION_S: f64 = 1.0;
-/// The parameters that the grid sets. The gap at the start follows from the detection distance and the speed difference.
+/// The parameters that the grid sets. The gap at the start follows from the detection distance and
+/// the speed difference.
 const GRID_PARAMETERS: [&str; 5] = ["speed-mps", "closing-mps", "detection-m", "start-gap-m", "front-thw-s"];
 
 /// A map that cannot be computed.
@@ -64,7 +66,7 @@ pub enum MapError {
         detection_m: f64,
         /// The front time headway (s).
         front_thw_s: f64,
-        /// Why there is no outcome.
+        /// The reason for which there is no outcome.
         source: SampleError,
     },
 }
@@ -83,7 +85,7 @@ pub struct MapGrid {
 }
 
 impl MapGrid {
-    /// Returns the grid with each list in rising order, without values that it has twice.
+    /// Returns the grid with each list in rising order, without repeated values.
     fn sorted(&self) -> Self {
         let mut grid = self.clone();
         for list in [&mut grid.closing_kmh, &mut grid.detection_m, &mut grid.front_thw_s] {
@@ -113,11 +115,12 @@ pub struct Map {
     pub points: Vec<MapPoint>,
 }
 
-/// Computes the map of a margin increase system. `settings` change the scenario of the points, but not the values of the grid, nor
-/// the true tracks.
+/// Computes the map of a margin increase system. `settings` change the scenario of the points, but
+/// not the values of the grid, nor the true tracks.
 ///
 /// # Errors
-/// [`MapError`] if a value is out of range, a setting changes what the map sets, or a point has no outcome.
+/// [`MapError`] if a value is out of range, a setting changes a value of the map, or a point has no
+/// outcome.
 pub fn map(grid: &MapGrid, controller: &ControllerChoice, settings: &[Setting]) -> Result<Map, MapError> {
     let Some(BuiltIn::Mis | BuiltIn::MisExtended) = controller.built_in() else {
         return Err(MapError::NoMis { controller: controller.to_string() });
@@ -167,7 +170,7 @@ struct Cell {
     front_thw_s: f64,
 }
 
-/// What the theory says about a point.
+/// The theory's statement about a point.
 struct Theory {
     planned_mps2: f64,
     margin_s: f64,
@@ -221,7 +224,8 @@ impl Cell {
         Ok((point, mis))
     }
 
-    /// Returns the margin of the braking plan at the moment of the engagement; `None` if the conditions for engaging do not hold.
+    /// Returns the margin of the braking plan at the moment of the engagement; `None` if the
+    /// conditions for engaging do not hold.
     fn theory(self, speed_mps: f64, mis: &MisSettings) -> Option<Theory> {
         let closing_mps = self.closing_kmh / KMH_PER_MPS;
         if closing_mps < mis.engage_closing_mps || self.front_thw_s >= mis.short_thw_s {
@@ -253,7 +257,7 @@ impl Cell {
         })
     }
 
-    /// Returns why theory and loop differ, from what the run did.
+    /// Returns why theory and loop differ, from the events of the run.
     fn reason(self, point: &MapPoint, outcome: &Outcome, mis: &MisSettings) -> String {
         let Ok(summary) = &outcome.mis else { return "the controller has no margin increase system".to_owned() };
         let Ok(engaged_at_s) = summary.engaged_at_s else {
@@ -334,9 +338,9 @@ mod tests {
 
     #[test]
     fn a_known_cause_of_a_difference_is_named() {
-        let one = MapGrid { closing_kmh: vec![24.0], detection_m: vec![100.0], ..grid() };
+        let single = MapGrid { closing_kmh: vec![24.0], detection_m: vec![100.0], ..grid() };
         let settings = ["actor.rear.driver.prescribed.acceleration-profile=[[0.0, 0.0], [3.0, -3.0]]".parse().unwrap()];
-        let map = map(&one, &ControllerChoice::MIS, &settings).unwrap();
+        let map = map(&single, &ControllerChoice::MIS, &settings).unwrap();
         let reason = map.points[0].reason.as_deref().unwrap();
         assert!(
             reason.contains("the rear vehicle never is at the critical gap in the loop: it releases at"),

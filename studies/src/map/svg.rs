@@ -79,7 +79,7 @@ fn bands(svg: &mut String, map: &Map) {
 
 fn cell(svg: &mut String, map: &Map, point: &MapPoint, [x, y]: [f64; 2]) {
     let share = point.loop_s.map_or(0.0, |s| (s / map.goal_s).clamp(0.0, 1.0));
-    // From white to green; what is in time has a dark frame.
+    // From white to green. A point in time has a dark frame.
     let channel = |from: f64, to: f64| (from + share * (to - from)).round();
     let (red, green, blue) = (channel(250.0, 120.0), channel(246.0, 200.0), channel(240.0, 140.0));
     let frame = if point.is_in_time_in_loop { "#14532d" } else { "#d0d0d0" };

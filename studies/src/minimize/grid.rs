@@ -5,7 +5,8 @@ use closecall_traffic::maths;
 /// Number of steps of the grid in the middle 95 % of a distribution, at least.
 const STEPS: f64 = 100.0;
 
-/// Returns the step of the grid: the largest of 1, 2 and 5 times a power of ten that divides `span` into 100 steps or more.
+/// Returns the step of the grid: the largest of 1, 2 and 5 times a power of ten that divides `span`
+/// into 100 steps or more.
 pub(super) fn step(span: f64) -> f64 {
     let finest = span / STEPS;
     let power = maths::powf(10.0, maths::log10(finest).floor());

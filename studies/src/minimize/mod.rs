@@ -5,11 +5,12 @@
 //!                                                                              └─▶ nearest value that passes ─▶ its twin
 //! ```
 //!
-//! First every set of one, two and three parameters is tried, all others at their nominal values. If none fails, delta debugging
-//! (Zeller and Hildebrandt, *Simplifying and isolating failure-inducing input*, IEEE Transactions on Software Engineering 28
-//! (2002) 183–200) removes parameters from the sample until no single one can be removed. Then each remaining number moves
-//! towards its nominal value by bisection, on a grid of readable values. The random numbers stay those of the sample: the
-//! files name them, so that a plain `closecall run FILE` repeats the case.
+//! First every set of one, two and three parameters is tried, all others at their nominal values.
+//! If none fails, delta debugging (Zeller and Hildebrandt, *Simplifying and isolating
+//! failure-inducing input*, IEEE Transactions on Software Engineering 28 (2002) 183–200) removes
+//! parameters from the sample until no single one can be removed. Then each remaining number moves
+//! towards its nominal value by bisection, on a grid of readable values. The random numbers of the
+//! sample stay: the files name them, and a plain `closecall run FILE` repeats the case.
 
 mod grid;
 mod run;

@@ -14,7 +14,7 @@ use crate::attribution::{Attribution, attribute};
 use crate::case::{Case, CausesError, fails};
 use crate::failures::passes;
 
-/// Number of steps of the grid beyond a failing value in which a passing one is looked for.
+/// Number of steps of the grid beyond a failing value within which a passing one is sought.
 const MOST_STEPS_TO_TWIN: i64 = 20;
 
 /// A parameter of the smallest case that is off its nominal value.
@@ -84,16 +84,16 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
         return Ok(None);
     }
     let trial = Trial::new(case);
-    let found = fewest(&trial);
-    let (values, candidates) = shrunk(&trial, &found.names);
+    let subset = fewest(&trial);
+    let (values, candidates) = shrunk(&trial, &subset.names);
     let settings = Trial::settings(&values)?;
     let (_, collision) = attribute(case, &settings)?;
     let controller = case.arm.controller.name();
     let not_reduced = || CausesError::NotReduced { sample: case.sample, controller: controller.to_owned() };
     let collision = collision.ok_or_else(not_reduced)?;
-    let off_nominal: Vec<Offset> = found.names.iter().filter_map(|name| offset(&trial, &values, name)).collect();
+    let off_nominal: Vec<Offset> = subset.names.iter().filter_map(|name| offset(&trial, &values, name)).collect();
     let why_more_than_three = (off_nominal.len() > 3).then(|| {
-        let more = if found.is_smallest { "four are needed" } else { "of these, none can be left out" };
+        let more = if subset.is_smallest { "four are needed" } else { "of these, none can be left out" };
         format!("no set of three parameters fails with the others at their nominal values, and {more}")
     });
     let sentence = words::sentence(&collision, &off_nominal);
@@ -119,12 +119,12 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
 /// # Errors
 /// [`CausesError`] if the sample does not fail, or has no outcome.
 pub fn minimize_sample(saved: &SavedCampaign, case: &Case) -> Result<Minimized, CausesError> {
-    let found = minimize(case)?.ok_or_else(|| passes(saved, case))?;
+    let minimized = minimize(case)?.ok_or_else(|| passes(saved, case))?;
     // A process has a name in reports, and a command on the command line.
     let manifest = saved.manifest();
     let mut arms = manifest.arms.iter().zip(manifest.arm_names());
-    let choice = arms.find(|(_, name)| *name == found.controller).map(|(arm, _)| arm.to_string());
-    Ok(Minimized { choice: choice.unwrap_or_else(|| found.controller.clone()), ..found })
+    let choice = arms.find(|(_, name)| *name == minimized.controller).map(|(arm, _)| arm.to_string());
+    Ok(Minimized { choice: choice.unwrap_or_else(|| minimized.controller.clone()), ..minimized })
 }
 
 fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Option<Offset> {
@@ -138,8 +138,8 @@ fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Optio
     })
 }
 
-/// Moves each named parameter towards its nominal value as far as the case still fails. Returns the values, and for each
-/// parameter the next value that passes.
+/// Moves each named parameter towards its nominal value, until the case would pass. Returns the
+/// values, and for each parameter the next value that passes.
 fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candidate>) {
     let mut values = trial.with(names);
     for name in names {
@@ -147,7 +147,7 @@ fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candid
             values.insert(name.clone(), failing);
         }
     }
-    // The other parameters have moved since: the boundary of each is looked for again.
+    // The other parameters have moved since then: the boundary of each is sought again.
     let candidates = names.iter().filter_map(|name| {
         let (failing, next) = boundary(trial, &values, name)?;
         let passing = first_passing(trial, &values, name, (&failing, next))?;
@@ -161,8 +161,9 @@ fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candid
     (values, candidates)
 }
 
-/// Returns the first value of a parameter from `next` on, away from the failing one, with which the case passes: what does not
-/// fail may also fail at half the time step only, or be no valid scenario.
+/// Returns the first value of a parameter from `next` on, away from the failing one, with which the
+/// case passes. A value that does not fail may fail at half the time step only, or make no valid
+/// scenario.
 fn first_passing(
     trial: &Trial<'_>,
     values: &Parameters,
@@ -185,8 +186,8 @@ fn first_passing(
     })
 }
 
-/// Returns the value of a parameter that is nearest to nominal and still fails, and the next one, which passes. `None` if even
-/// the nominal value fails.
+/// Returns the value of a parameter that is nearest to nominal and still fails, and the next one,
+/// which passes. `None` if even the nominal value fails.
 fn boundary(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Option<(Value, Value)> {
     let at = |value: Value| {
         let mut changed = values.clone();

@@ -18,8 +18,8 @@ pub(super) struct Found {
     pub(super) is_smallest: bool,
 }
 
-/// Returns the fewest parameters with which the case fails, the others being at their nominal values. Of several sets of the
-/// same size, the one that is nearest to nominal is returned.
+/// Returns the fewest parameters with which the case fails, the others being at their nominal
+/// values. Of several sets of the same size, the one that is nearest to nominal is returned.
 pub(super) fn fewest(trial: &Trial<'_>) -> Found {
     for size in 0..=TRIED.min(trial.differing.len()) {
         if let Some(names) = of_size(trial, size) {
@@ -31,15 +31,17 @@ pub(super) fn fewest(trial: &Trial<'_>) -> Found {
     Found { names, is_smallest }
 }
 
-/// Returns the failing set of `size` parameters that is nearest to nominal; `None` if no such set fails.
+/// Returns the failing set of `size` parameters that is nearest to nominal; `None` if no such set
+/// fails.
 fn of_size(trial: &Trial<'_>, size: usize) -> Option<Vec<ParameterName>> {
     let mut sets = sets(&trial.differing, size);
-    sets.sort_by(|one, other| distance(trial, one).total_cmp(&distance(trial, other)));
+    sets.sort_by(|a, b| distance(trial, a).total_cmp(&distance(trial, b)));
     let fails = |set: &&Vec<ParameterName>| trial.fails(&trial.with(set));
     if trial.case.sensors() != SensorMode::Full {
         return sets.par_iter().find_first(fails).cloned();
     }
-    // Full sensors are slow. What fails with object-level sensors is likely to fail with them, and is tried first.
+    // Full sensors are slow. A set that fails with object-level sensors is likely to fail with full
+    // sensors, and is tried first.
     let quick = Case { arm: Arm { sensors: Some(SensorMode::Object), ..trial.case.arm.clone() }, ..trial.case.clone() };
     let quick = Trial::new(&quick);
     let likely: Vec<bool> = sets.par_iter().map(|set| quick.fails(&quick.with(set))).collect();
@@ -53,16 +55,17 @@ fn sets(names: &[ParameterName], size: usize) -> Vec<Vec<ParameterName>> {
     if size == 0 {
         return vec![Vec::new()];
     }
-    let mut found = Vec::new();
+    let mut subsets = Vec::new();
     for (index, name) in names.iter().enumerate() {
         for rest in sets(&names[index + 1..], size - 1) {
-            found.push([vec![name.clone()], rest].concat());
+            subsets.push([vec![name.clone()], rest].concat());
         }
     }
-    found
+    subsets
 }
 
-/// Returns how far the parameters of the sample are from nominal, in widths of their distributions. A label is one width away.
+/// Returns how far the parameters of the sample are from nominal, in widths of their distributions.
+/// A label is one width away.
 fn distance(trial: &Trial<'_>, names: &[ParameterName]) -> f64 {
     names.iter().map(|name| offset_in_spans(trial, name)).sum()
 }
@@ -76,7 +79,8 @@ fn offset_in_spans(trial: &Trial<'_>, name: &ParameterName) -> f64 {
     }
 }
 
-/// Removes parameters from the sample until no single one can be removed: delta debugging for a minimal failing set.
+/// Removes parameters from the sample until no single one can be removed: delta debugging for a
+/// minimal failing set.
 fn delta_debugged(trial: &Trial<'_>) -> Vec<ParameterName> {
     let mut names = trial.differing.clone();
     let mut parts = 2;

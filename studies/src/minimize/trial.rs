@@ -21,10 +21,11 @@ pub(super) struct Trial<'a> {
     pub(super) nominal: Parameters,
     /// The parameters whose two values differ, in the order of their names.
     pub(super) differing: Vec<ParameterName>,
-    /// Whether a case must have the same result at half the time step, too. Not if the sample itself has not.
+    /// Whether a case must have the same result at half the time step, too. False if the sample
+    /// itself has not.
     is_robust: bool,
-    /// Results that are known already, by the values of the parameters.
-    known: Mutex<BTreeMap<String, bool>>,
+    /// Results so far, by the values of the parameters.
+    results: Mutex<BTreeMap<String, bool>>,
 }
 
 impl<'a> Trial<'a> {
@@ -36,9 +37,9 @@ impl<'a> Trial<'a> {
         let nominal = space.nominal();
         let differing = sampled.iter().filter(|(name, value)| nominal.get(name) != Some(value));
         let differing = differing.map(|(name, _)| name.clone()).collect();
-        let trial = Self { case, sampled, nominal, differing, is_robust: true, known: Mutex::default() };
+        let trial = Self { case, sampled, nominal, differing, is_robust: true, results: Mutex::default() };
         let is_robust = trial.fails(&trial.sampled);
-        Self { is_robust, known: Mutex::default(), ..trial }
+        Self { is_robust, results: Mutex::default(), ..trial }
     }
 
     /// Returns the nominal values with the named parameters at the values of the sample.
@@ -55,14 +56,14 @@ impl<'a> Trial<'a> {
     /// Returns whether a case fails. A case that is no valid scenario, or has no outcome, does not.
     pub(super) fn fails(&self, parameters: &Parameters) -> bool {
         let key = parameters.iter().map(|(name, value)| format!("{name}={value:?};")).collect::<String>();
-        if let Some(known) = self.known.lock().ok().and_then(|known| known.get(&key).copied()) {
-            return known;
+        if let Some(result) = self.results.lock().ok().and_then(|results| results.get(&key).copied()) {
+            return result;
         }
-        let found = self.case.file.concrete(parameters).is_ok_and(|scenario| self.holds_in(&scenario, fails));
-        if let Ok(mut known) = self.known.lock() {
-            known.insert(key, found);
+        let does_fail = self.case.file.concrete(parameters).is_ok_and(|scenario| self.holds_in(&scenario, fails));
+        if let Ok(mut results) = self.results.lock() {
+            results.insert(key, does_fail);
         }
-        found
+        does_fail
     }
 
     /// Returns whether a case is a valid scenario in which no vehicle collides.
@@ -75,7 +76,8 @@ impl<'a> Trial<'a> {
         self.holds_in(scenario, |outcome| !fails(outcome))
     }
 
-    /// Returns whether a condition holds for the outcome of a scenario, at the time step and at half of it.
+    /// Returns whether a condition holds for the outcome of a scenario, at the time step and at
+    /// half of it.
     fn holds_in(&self, scenario: &Scenario, holds: impl Fn(&Outcome) -> bool) -> bool {
         let run = |scenario: &Scenario| run_guarded(scenario, self.case.key(), &self.case.arm, &mut NoObserver);
         let has = |scenario: &Scenario| run(scenario).is_ok_and(|outcome| holds(&outcome));

@@ -30,7 +30,8 @@ pub(super) struct Candidate {
     pub(super) distance: f64,
 }
 
-/// Returns the nearest case that passes: with one parameter changed, or with the rear vehicle starting earlier or later.
+/// Returns the nearest case that passes: with one parameter changed, or with the rear vehicle
+/// starting earlier or later.
 ///
 /// # Errors
 /// [`SettingError`] if a value cannot be written as a setting.
@@ -39,10 +40,11 @@ pub(super) fn twin(
     values: &Parameters,
     candidates: &[Candidate],
 ) -> Result<Option<Twin>, SettingError> {
-    // A case that fails at nominal values has no way back to them: every parameter is moved in both directions.
+    // A case that fails at nominal values cannot move back to them: every parameter is moved in
+    // both directions.
     let moved = if candidates.is_empty() { moved_parameters(trial, values) } else { Vec::new() };
     let all = candidates.iter().chain(&moved);
-    let nearest = all.min_by(|one, other| one.distance.total_cmp(&other.distance));
+    let nearest = all.min_by(|a, b| a.distance.total_cmp(&b.distance));
     let by_parameter = nearest.map(|candidate| -> Result<_, SettingError> {
         let mut changed = values.clone();
         changed.insert(candidate.name.clone(), candidate.value.clone());
@@ -54,14 +56,15 @@ pub(super) fn twin(
         Ok((candidate.distance, twin))
     });
     let by_start = shifted_start(trial, values, &Trial::settings(values)?);
-    // A shift by the largest one counts like a parameter that moves by the width of its distribution.
+    // The largest shift counts like a parameter that moves by the width of its distribution.
     Ok(match (by_parameter.transpose()?, by_start) {
         (Some((distance, twin)), Some((shift, other))) => Some(if distance <= shift { twin } else { other }),
-        (one, other) => one.or(other).map(|(_, twin)| twin),
+        (by_parameter, by_start) => by_parameter.or(by_start).map(|(_, twin)| twin),
     })
 }
 
-/// Returns the smallest shift of the start of a rear vehicle with which the case passes, as a share of the largest one.
+/// Returns the smallest shift of the start of a rear vehicle with which the case passes, as a share
+/// of the largest one.
 fn shifted_start(trial: &Trial<'_>, values: &Parameters, settings: &[Setting]) -> Option<(f64, Twin)> {
     let scenario = trial.case.file.concrete(values).ok()?;
     let ego = &scenario.actors[scenario.ego];
@@ -91,7 +94,8 @@ fn shifted_start(trial: &Trial<'_>, values: &Parameters, settings: &[Setting]) -
     })
 }
 
-/// Returns for each varying parameter the nearest value on either side with which the case passes, if there is one.
+/// Returns for each varying parameter the nearest value on either side with which the case passes,
+/// if there is one.
 fn moved_parameters(trial: &Trial<'_>, values: &Parameters) -> Vec<Candidate> {
     let space = trial.case.file.space();
     let varying: Vec<(ParameterName, f64)> = space
@@ -102,7 +106,8 @@ fn moved_parameters(trial: &Trial<'_>, values: &Parameters) -> Vec<Candidate> {
     varying.par_iter().filter_map(|(name, span)| moved(trial, values, name, *span)).collect()
 }
 
-/// Returns the value nearest to that of a parameter, in the direction of `span`, with which the case passes.
+/// Returns the value nearest to the parameter's value, in the direction of `span`, with which the
+/// case passes.
 fn moved(trial: &Trial<'_>, values: &Parameters, name: &ParameterName, span: f64) -> Option<Candidate> {
     let Some(Value::Number(from)) = values.get(name) else { return None };
     let step = grid::step(span.abs());

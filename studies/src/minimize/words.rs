@@ -8,7 +8,8 @@ use crate::attribution::{Attribution, phase_word};
 /// Kilometres per hour in one metre per second.
 const KMH_PER_MPS: f64 = 3.6;
 
-/// A unit by the ending of a parameter's name: the unit of a reader, the factor to it, and its decimals.
+/// A unit by the ending of a parameter's name: the unit of a reader, the factor to it, and its
+/// decimals.
 const UNITS: [(&str, &str, f64, usize); 7] = [
     ("-mps2", "m/s²", 1.0, 1),
     ("-mps3", "m/s³", 1.0, 1),
@@ -29,35 +30,36 @@ struct Named<'a> {
 
 impl Named<'_> {
     fn of(name: &str) -> Self {
-        let found = UNITS.into_iter().find_map(|(ending, unit, factor, decimals)| {
+        let named = UNITS.into_iter().find_map(|(ending, unit, factor, decimals)| {
             Some(Named { name: name.strip_suffix(ending)?.replace('-', " "), unit, factor, decimals })
         });
-        found.unwrap_or_else(|| Named { name: name.replace('-', " "), unit: "", factor: 1.0, decimals: 2 })
+        named.unwrap_or_else(|| Named { name: name.replace('-', " "), unit: "", factor: 1.0, decimals: 2 })
     }
 
-    /// Returns two numbers and their difference in the unit of a reader, all with the same decimals: as many as a step of the grid
-    /// needs, or more if the two numbers would look the same. The difference is that of the numbers as they are written.
+    /// Returns two numbers and their difference in the unit of a reader, all with the same
+    /// decimals. The decimals are those that a step of the grid needs, or more if the two numbers
+    /// would look the same. The difference is the difference of the written numbers.
     fn numbers(&self, values: [f64; 2], step: Option<f64>) -> [String; 3] {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "steps are above 1e-12")]
         let needed = |step: f64| (-maths::log10(step * self.factor)).ceil().max(0.0) as usize;
         let least = step.map_or(self.decimals, needed);
         let written = |decimals: i32| values.map(|value| (value * self.factor * 10_f64.powi(decimals)).round());
         let differ = |decimals: &usize| {
-            let [one, other] = written(*decimals as i32);
-            one != other
+            let [first, second] = written(*decimals as i32);
+            first != second
         };
         let decimals = (least..least + 4).find(differ).unwrap_or(least);
-        let [one, other] = written(decimals as i32);
+        let [first, second] = written(decimals as i32);
         let text = |number: f64| {
             let number = number / 10_f64.powi(decimals as i32);
             format!("{number:.decimals$} {}", self.unit).trim_end().to_owned()
         };
-        [text(one), text(other), text((one - other).abs())]
+        [text(first), text(second), text((first - second).abs())]
     }
 }
 
 /// Returns a value and the nominal one in words, such as `closing 39.2 km/h (nominal 30.1 km/h)`.
-/// `step` is that of the parameter's grid.
+/// `step` is the step of the parameter's grid.
 pub(super) fn value(name: &str, value: &Value, nominal: &Value, step: Option<f64>) -> String {
     let named = Named::of(name);
     match (value, nominal) {
@@ -69,7 +71,7 @@ pub(super) fn value(name: &str, value: &Value, nominal: &Value, step: Option<f64
     }
 }
 
-/// Returns a change in words, after "passes when". `step` is that of the parameter's grid.
+/// Returns a change in words, after "passes when". `step` is the step of the parameter's grid.
 pub(super) fn change(name: &str, failing: &Value, passing: &Value, step: Option<f64>) -> String {
     let named = Named::of(name);
     match (failing, passing) {
@@ -84,7 +86,7 @@ pub(super) fn change(name: &str, failing: &Value, passing: &Value, step: Option<
 
 /// Returns the smallest failing case in a sentence.
 pub(super) fn sentence(collision: &Attribution, off: &[Offset]) -> String {
-    let what = format!(
+    let strike = format!(
         "{} strikes {} with {:.1} km/h, {:.1} s after the start (phase {})",
         collision.striking.actor,
         collision.struck.actor,
@@ -94,8 +96,8 @@ pub(super) fn sentence(collision: &Attribution, off: &[Offset]) -> String {
     );
     let off: Vec<&str> = off.iter().map(|offset| &offset.words[..]).collect();
     match &off[..] {
-        [] => format!("{what}, with all parameters at their nominal values."),
-        off => format!("{what}, with {}, and all other parameters at their nominal values.", off.join(", ")),
+        [] => format!("{strike}, with all parameters at their nominal values."),
+        off => format!("{strike}, with {}, and all other parameters at their nominal values.", off.join(", ")),
     }
 }
 
@@ -114,7 +116,7 @@ mod tests {
         assert_eq!(change("brake-phase", 0.245, 0.26, 0.005), "brake phase is 0.015 more (0.260 instead of 0.245)");
         assert_eq!(change("brake-at-s", 16.2, 16.0, 0.1), "brake at is 0.2 s less (16.0 s instead of 16.2 s)");
         assert_eq!(change("gap-m", 120.0, 100.0, 20.0), "gap is 20 m less (100 m instead of 120 m)");
-        // 30.06 and 29.916 km/h: the difference is that of the numbers that stand there.
+        // 30.06 and 29.916 km/h: the difference is the difference of the written numbers.
         assert_eq!(
             change("closing-mps", 8.35, 8.31, 0.05),
             "closing is 0.2 km/h less (29.9 km/h instead of 30.1 km/h)"

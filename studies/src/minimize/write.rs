@@ -26,11 +26,12 @@ pub struct MinimizedFiles {
     pub twin: Option<PathBuf>,
 }
 
-/// Returns the files of a smallest case and of its twin: `output`, or else a name made of the scenario and the sample, and
-/// beside it a file with `-passes` at the end of its name.
+/// Returns the files of a smallest case and of its twin: `output`, or else a name made of the
+/// scenario and the sample, and beside it a file with `-passes` at the end of its name.
 ///
 /// # Errors
-/// [`CausesError::Foreign`] if there is such a file already, and `closecall minimize` has not written it.
+/// [`CausesError::Foreign`] if such a file exists already, and `closecall minimize` has not written
+/// it.
 pub fn output_files(case: &Case, output: Option<&Path>) -> Result<[PathBuf; 2], CausesError> {
     let usual = || format!("{}-{}.toml", case.file.config().name, case.sample).into();
     let failing = output.map_or_else(usual, Path::to_owned);
@@ -71,7 +72,7 @@ pub fn write_files(
     Ok(MinimizedFiles { failing: path.clone(), twin: passing.map(|_| twin.clone()) })
 }
 
-/// What a file says about its case.
+/// The text of a file about its case.
 struct Text<'a> {
     name: &'a str,
     minimized: &'a Minimized,
@@ -111,12 +112,13 @@ fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String,
     if let Some(sensors) = document.entry("sensors").or_insert(Item::Table(Table::new())).as_table_like_mut() {
         sensors.insert("mode", Item::Value(minimized.sensors.as_str().into()));
     }
-    // A campaign that names no controller judges by the gate. It drives with another controller than this case needs, if not so.
+    // A campaign that names no controller judges by the gate. Without the gate, it would drive with
+    // another controller than this case needs.
     if minimized.is_default() {
         document.insert("gate", Item::Table(gate(case, text)));
     }
     let written = format!("{}{document}", heading(text));
-    // The file must be a scenario: a mistake shows here, and not when it is run.
+    // The file must be a scenario. A mistake shows here, and not when the file is run.
     ScenarioFile::parse(Path::new(text.name), &written, &[])?.check()?;
     Ok(written)
 }
@@ -137,8 +139,8 @@ fn gate(case: &Case, text: &Text<'_>) -> Table {
     gate
 }
 
-/// Returns a seed or the number of a sample. TOML has no number above the largest signed one: such a seed is written as text,
-/// which the check below refuses with a message.
+/// Returns a seed or the number of a sample. TOML has no number above the largest signed one. Such
+/// a seed is written as text, which the check below refuses with a message.
 fn number(value: u64) -> Value {
     i64::try_from(value).map_or_else(|_| Value::from(value.to_string()), Value::from)
 }

@@ -1,8 +1,10 @@
-//! How well the object-level sensors agree with the full chain on whether the ego collides, sample by sample.
+//! Whether the object-level sensors agree with the full chain on the ego's collision, sample by
+//! sample.
 //!
-//! Every sample is run in both modes with the margin increase system, and with the same random numbers. Agreement beyond chance is
-//! Cohen's κ (J. Cohen, *A coefficient of agreement for nominal scales*, 1960). Each sample on which the modes differ has a reason:
-//! the first difference of the two runs that is large enough to matter.
+//! Every sample is run in both modes with the margin increase system, and with the same random
+//! numbers. Agreement beyond chance is Cohen's κ (J. Cohen, *A coefficient of agreement for nominal
+//! scales*, 1960). Each sample on which the modes differ has a reason: the first difference of the
+//! two runs that is large enough to matter.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::ScenarioFile;
@@ -16,12 +18,13 @@ use rayon::prelude::*;
 
 use crate::perception::study::StudyError;
 
-/// Difference of times from which they count as different (s): more than the resolution of the tracks, which is 0.04 s.
+/// Time difference above which two times differ (s): more than the resolution of the tracks, which
+/// is 0.04 s.
 const DIFFERENT_S: f64 = 0.1;
 /// Name of the vehicle that approaches, as in the scenarios of the library.
 const REAR: &str = "rear";
 
-/// What one run of a sample showed.
+/// The verdict of one run of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
     /// Whether the ego collided.
@@ -55,7 +58,7 @@ pub struct Agreement {
 }
 
 impl Verdict {
-    /// Returns what a run showed.
+    /// Returns the verdict of a run.
     pub fn of(outcome: &Outcome) -> Self {
         let mis = outcome.mis.as_ref().ok();
         Self {
@@ -79,23 +82,24 @@ impl Pair {
     }
 }
 
-/// Returns the first difference of two runs of a sample that is large enough to matter. `names` says what each run had.
-pub fn reason([one, other]: [&Verdict; 2], names: [&str; 2]) -> String {
-    let differ = |what: &str, first: Option<f64>, second: Option<f64>| match (first, second) {
+/// Returns the first difference of two runs of a sample that is large enough to matter. `names` are
+/// the names of the runs' sensors.
+pub fn reason([first_verdict, second_verdict]: [&Verdict; 2], names: [&str; 2]) -> String {
+    let differ = |change: &str, first: Option<f64>, second: Option<f64>| match (first, second) {
         (Some(first), Some(second)) if (first - second).abs() > DIFFERENT_S => Some(format!(
-            "the system {what} {:.2} s {} with {}",
+            "the system {change} {:.2} s {} with {}",
             (first - second).abs(),
             if first < second { "earlier" } else { "later" },
             names[0]
         )),
-        (Some(_), None) => Some(format!("the system {what} only with {}", names[0])),
-        (None, Some(_)) => Some(format!("the system {what} only with {}", names[1])),
+        (Some(_), None) => Some(format!("the system {change} only with {}", names[0])),
+        (None, Some(_)) => Some(format!("the system {change} only with {}", names[1])),
         _ => None,
     };
-    differ("engages", one.engaged_at_s, other.engaged_at_s)
-        .or_else(|| differ("releases", one.released_at_s, other.released_at_s))
+    differ("engages", first_verdict.engaged_at_s, second_verdict.engaged_at_s)
+        .or_else(|| differ("releases", first_verdict.released_at_s, second_verdict.released_at_s))
         .unwrap_or_else(|| {
-            let missed = if one.has_collided { other } else { one };
+            let missed = if first_verdict.has_collided { second_verdict } else { first_verdict };
             let gap = missed
                 .min_gap_rear_m
                 .map_or_else(String::new, |gap_m| format!(": the other run passes by {gap_m:.2} m"));
@@ -104,7 +108,8 @@ pub fn reason([one, other]: [&Verdict; 2], names: [&str; 2]) -> String {
 }
 
 impl Agreement {
-    /// Runs all samples of a scenario in both modes. The result does not depend on the number of threads.
+    /// Runs all samples of a scenario in both modes. The result does not depend on the number of
+    /// threads.
     ///
     /// # Errors
     /// [`StudyError`] if a run fails.
@@ -130,12 +135,14 @@ impl Agreement {
 
     /// Returns the collision rates with object-level sensors and with the full chain.
     pub fn rates(&self) -> [f64; 2] {
-        let rate =
-            |of: fn(&Pair) -> bool| self.pairs.iter().filter(|pair| of(pair)).count() as f64 / self.pairs.len() as f64;
+        let rate = |condition: fn(&Pair) -> bool| {
+            self.pairs.iter().filter(|pair| condition(pair)).count() as f64 / self.pairs.len() as f64
+        };
         [rate(|pair| pair.object.has_collided), rate(|pair| pair.full.has_collided)]
     }
 
-    /// Returns Cohen's κ; `None` if no run or every run collides, so that chance alone explains the agreement.
+    /// Returns Cohen's κ; `None` if no run or every run collides, so that chance alone explains the
+    /// agreement.
     pub fn kappa(&self) -> Option<f64> {
         let [object, full] = self.rates();
         let agree = self.pairs.iter().filter(|pair| !pair.differs()).count() as f64 / self.pairs.len() as f64;

@@ -14,29 +14,32 @@ pub(crate) mod watching;
 const EGO_MPS: f64 = 30.0;
 /// Position of the ego along the road at the start (m).
 const EGO_S_M: f64 = 1_000.0;
-/// Gap from the front of the approaching vehicle to the rear of the ego, at the start and at the end (m).
+/// Gap from the front of the approaching vehicle to the rear of the ego, at the start and at the
+/// end (m).
 pub const GAPS_M: [f64; 2] = [150.0, 5.0];
 /// Closing speeds (m/s): 10 to 50 km/h, as in the scenarios of the library.
 const CLOSING_MPS: [f64; 2] = [2.8, 13.9];
 /// Gap of the car in between (m).
 const SCREEN_GAP_M: f64 = 25.0;
-/// Gap at which a vehicle appears for the time to confirm (m), and the longest time that is waited (steps).
+/// Gap at which a vehicle appears for the time to confirm (m), and the longest time that is waited
+/// (steps).
 pub const APPEARS_AT_M: f64 = 40.0;
 const WAIT_STEPS: i64 = 100;
 /// Time at which it appears (steps): 6 s.
 const APPEARS_AFTER_STEPS: i64 = 150;
-/// Distance beyond which a track and a vehicle do not belong together (m): the cut-off of GOSPA, a usual value for vehicles.
+/// Distance beyond which a track and a vehicle do not belong together (m): the cut-off of GOSPA, a
+/// usual value for vehicles.
 pub const CUTOFF_M: f64 = 5.0;
 
-/// What one control step showed.
+/// The observation of one control step.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// True gap from the front of the vehicle to the ego's rear (m).
     pub gap_m: f64,
     /// The confirmed track of the vehicle, if there is one.
     pub tracked: Option<Tracked>,
-    /// Generalised optimal sub-pattern assignment metric of all confirmed rear tracks (m): Rahmathullah, García-Fernández and
-    /// Svensson (2017), with p = 2 and α = 2.
+    /// Generalised optimal sub-pattern assignment metric of all confirmed rear tracks (m):
+    /// Rahmathullah, García-Fernández and Svensson (2017), with p = 2 and α = 2.
     pub gospa_m: f64,
 }
 
@@ -53,12 +56,13 @@ pub struct Tracked {
     pub confidence: f64,
 }
 
-/// What one approach showed.
+/// The observations of one approach.
 #[derive(Clone, Debug, Default)]
 pub struct Approach {
     /// Every control step from the first gap on.
     pub observations: Vec<Observation>,
-    /// Normalised squared errors of the tracks that belong to a vehicle; 4 on average if their covariance is right.
+    /// Normalised squared errors of the tracks that belong to a vehicle; 4 on average if their
+    /// covariance is right.
     pub nees: Vec<f64>,
     /// Number of steps in which the ego knew that its rear sensors had failed.
     pub failed_steps: u64,
@@ -66,7 +70,8 @@ pub struct Approach {
     pub id_switches: u64,
     /// Number of confirmed tracks that belonged to no vehicle, and were classified as one.
     pub false_tracks: u64,
-    /// Time from the appearance of a vehicle until its track is confirmed (s); `None` if it was not within 4 s.
+    /// Time from the appearance of a vehicle until its track is confirmed (s); `None` if it was not
+    /// within 4 s.
     pub confirmed_after_s: Option<f64>,
 }
 
@@ -86,9 +91,9 @@ pub struct Address {
 pub fn approach(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Approach, SensorError> {
     let ego_id = ego_name();
     let mut rng = stream(at.seed, at.run, &ego_id, "approach");
-    let mut found = drive(case, sensors, road, at, &mut rng)?;
-    found.confirmed_after_s = time_to_confirm(case, sensors, road, at)?;
-    Ok(found)
+    let mut approach = drive(case, sensors, road, at, &mut rng)?;
+    approach.confirmed_after_s = time_to_confirm(case, sensors, road, at)?;
+    Ok(approach)
 }
 
 #[expect(clippy::unwrap_used, reason = "a legal name")]
@@ -96,7 +101,7 @@ fn ego_name() -> ActorId {
     ActorId::new("ego").unwrap()
 }
 
-/// The ego, the vehicle that approaches, and the one in between.
+/// The ego, the vehicle that approaches, and the vehicle in between.
 struct Traffic {
     ego: SceneVehicle,
     others: Vec<SceneVehicle>,
@@ -143,7 +148,8 @@ impl Traffic {
         -self.front_x_m(&self.others[0]) - 0.5 * self.ego.vehicle.dimensions.length_m
     }
 
-    /// Returns position of the front, and lateral position, relative to the ego, of each other vehicle (m).
+    /// Returns position of the front, and lateral position, relative to the ego, of each other
+    /// vehicle (m).
     fn truths_m(&self) -> Vec<[f64; 2]> {
         self.others.iter().map(|other| [self.front_x_m(other), other.state.d_m - self.ego.state.d_m]).collect()
     }
@@ -156,7 +162,8 @@ fn build(sensors: &Sensors, at: Address) -> Result<Box<dyn Perception>, SensorEr
 fn drive(case: &Case, sensors: &Sensors, road: &Road, at: Address, rng: &mut Stream) -> Result<Approach, SensorError> {
     let [from, to] = CLOSING_MPS;
     let closing_mps = from + (to - from) * rng.random::<f64>();
-    // The offset varies the distances at which each side of the alternating mirror scans the vehicle.
+    // The offset varies the distances at which each side of the alternating mirror scans the
+    // vehicle.
     let start_m = GAPS_M[0] + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
     let traffic = Traffic::new(case, road, start_m, closing_mps);
     observe((case, road), traffic, &mut *build(sensors, at)?)
@@ -169,7 +176,7 @@ fn observe(
     perception: &mut dyn Perception,
 ) -> Result<Approach, SensorError> {
     let mut audit = TrackAudit::default();
-    let mut found = Approach::default();
+    let mut approach = Approach::default();
     // A vehicle in the way is not driven through.
     let last_m = if case.is_screened { SCREEN_GAP_M + 10.0 } else { GAPS_M[1] };
     for step in 0.. {
@@ -188,21 +195,22 @@ fn observe(
         audit.observe(tracks, &scene)?;
         let confirmed: Vec<&Track> = confirmed(tracks).collect();
         let truths_m = traffic.truths_m();
-        found.observations.push(Observation {
+        approach.observations.push(Observation {
             gap_m,
             tracked: nearest(&confirmed, truths_m[0]).map(|track| errors(track, truths_m[0], &traffic.others[0])),
             gospa_m: gospa_m(&truths_m, &confirmed),
         });
-        found.failed_steps += u64::from(perception.health().rear == Health::Failed);
+        approach.failed_steps += u64::from(perception.health().rear == Health::Failed);
         traffic.advance();
     }
-    found.id_switches = audit.id_switches;
-    found.false_tracks = audit.false_tracks() as u64;
-    found.nees = audit.nees;
-    Ok(found)
+    approach.id_switches = audit.id_switches;
+    approach.false_tracks = audit.false_tracks() as u64;
+    approach.nees = audit.nees;
+    Ok(approach)
 }
 
-/// Drives an approach, and calls `see` with the gap (m), the confirmed track, and the traffic in each step, until it is false.
+/// Drives an approach, and calls `see` with the gap (m), the confirmed track, and the traffic in
+/// each step, until `see` returns false.
 fn follow(
     (case, sensors, road, at): (&Case, &Sensors, &Road, Address),
     from_m: f64,
@@ -228,12 +236,14 @@ fn follow(
     Ok(())
 }
 
-/// The gaps at which the track of a vehicle reaches a state for the first time (m); those of the end of the approach if never.
+/// The gaps at which the track of a vehicle reaches a state for the first time (m). If it never
+/// does, the gap at the end of the approach.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Firsts {
     /// The track is confirmed.
     pub(crate) confirmed_m: f64,
-    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle: what a function waits for.
+    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle:
+    /// the state that a function waits for.
     pub(crate) classified_m: f64,
 }
 
@@ -311,7 +321,7 @@ fn distance_m([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
 /// Returns the nearest track within the cut-off.
 fn nearest<'a>(tracks: &[&'a Track], truth_m: [f64; 2]) -> Option<&'a Track> {
     let apart_m = |track: &Track| distance_m(position_m(track), truth_m);
-    let nearest = tracks.iter().min_by(|one, other| apart_m(one).total_cmp(&apart_m(other)))?;
+    let nearest = tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
     (apart_m(nearest) <= CUTOFF_M).then_some(*nearest)
 }
 
@@ -328,7 +338,8 @@ fn errors(track: &Track, truth_m: [f64; 2], vehicle: &SceneVehicle) -> Tracked {
     }
 }
 
-/// Returns the GOSPA metric: the least over all assignments of √(Σ d² + c²/2 · (missed + false)) (m).
+/// Returns the GOSPA metric: the least over all assignments of √(Σ d² + c²/2 · (missed + false))
+/// (m).
 fn gospa_m(truths_m: &[[f64; 2]], tracks: &[&Track]) -> f64 {
     let mut free: Vec<[f64; 2]> = tracks.iter().map(|track| position_m(track)).collect();
     least_m2(truths_m, &mut free).sqrt()

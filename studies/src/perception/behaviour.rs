@@ -1,4 +1,4 @@
-//! How the tracks of a vehicle behave: how they err, how late they are, and when they are missing.
+//! The behaviour of a vehicle's tracks: their errors, their delays, and their gaps.
 //!
 //! ```text
 //!  full chain ───────────┬▶ approaches, appearances, manoeuvres ─▶ Behaviour ─▶ validation of the object-level sensor
@@ -16,14 +16,15 @@ use crate::perception::approach::watching::{Delays, Seen, Step, delays, lags_s, 
 use crate::perception::cases::Case;
 use crate::perception::study::StudyError;
 
-/// Gaps between which errors are taken, and the one that divides near from far (m).
+/// Gaps between which errors are measured, and the gap that divides near from far (m).
 pub(crate) const GAPS_M: [f64; 3] = [20.0, 50.0, 80.0];
 /// Lag at which the correlation of errors is taken (control steps): 1 s.
 pub(crate) const LAG_STEPS: usize = 25;
 /// Bounds of a correlation (-), which leave its time finite.
 const CORRELATION_BOUNDS: [f64; 2] = [1e-3, 0.999];
 
-/// How the tracks of a vehicle behave. Arrays have the values along the road (m), across it (m), and of the speed (m/s).
+/// The behaviour of a vehicle's tracks. Arrays have the values along the road (m), across it (m),
+/// and of the speed (m/s).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Behaviour {
     /// Root mean square errors at gaps from 20 to 80 m.
@@ -32,7 +33,8 @@ pub struct Behaviour {
     pub near_far_sd: [[f64; 3]; 2],
     /// Correlation times of the errors (s).
     pub time_s: [f64; 3],
-    /// Mean times until a vehicle that appears is confirmed, and classified (s); infinite if most are not within 4 s.
+    /// Mean times until a vehicle that appears is confirmed, and classified (s); infinite if most
+    /// are not within 4 s.
     pub after_s: [f64; 2],
     /// Share of the steps after the first confirmation in which no track is reported (-).
     pub missed: f64,
@@ -40,11 +42,12 @@ pub struct Behaviour {
     pub longest_gap_s: f64,
     /// Share of the steps with a track in which the latest scan has not detected the vehicle (-).
     pub coasting: f64,
-    /// Mean times by which tracks slow down, and move across the road, later than the vehicle (s); infinite if most are lost.
+    /// Mean times by which tracks slow down, and move across the road, later than the vehicle (s);
+    /// infinite if most are lost.
     pub lag_s: [f64; 2],
 }
 
-/// What one approach and its manoeuvres show.
+/// The sensors' view of one approach and its manoeuvres.
 #[derive(Clone, Debug)]
 pub(crate) struct Shown {
     pub(crate) steps: Vec<Step>,
@@ -53,7 +56,8 @@ pub(crate) struct Shown {
 }
 
 impl Behaviour {
-    /// Measures the behaviour of the tracks of a case in `approaches` approaches. It does not depend on the number of threads.
+    /// Measures the behaviour of the tracks of a case in `approaches` approaches. It does not
+    /// depend on the number of threads.
     ///
     /// # Errors
     /// [`StudyError`] if a sensor model fails.
@@ -63,7 +67,7 @@ impl Behaviour {
         road: &Road,
         [seed, approaches]: [u64; 2],
     ) -> Result<Self, StudyError> {
-        let one = |run| {
+        let watched = |run| {
             let at = Address { seed, run };
             let shown = || {
                 Ok(Shown {
@@ -74,12 +78,12 @@ impl Behaviour {
             };
             shown().map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
-        Ok(Self::of(&(0..approaches).into_par_iter().map(one).collect::<Result<Vec<Shown>, StudyError>>()?))
+        Ok(Self::of(&(0..approaches).into_par_iter().map(watched).collect::<Result<Vec<Shown>, StudyError>>()?))
     }
 
-    /// Returns what follows from all approaches of a case.
+    /// Returns the behaviour over all approaches of a case.
     pub(crate) fn of(shown: &[Shown]) -> Self {
-        let series: Vec<Vec<Step>> = shown.iter().map(|one| one.steps.clone()).collect();
+        let series: Vec<Vec<Step>> = shown.iter().map(|vehicle| vehicle.steps.clone()).collect();
         let [near_m, middle_m, far_m] = GAPS_M;
         let rms = |from_m: f64, to_m: f64| root_mean_squares(&errors_between(&series, [from_m, to_m]));
         let [missed, longest_gap_s, coasting] = misses(&series);
@@ -89,13 +93,14 @@ impl Behaviour {
             near_far_sd: [rms(near_m, middle_m), rms(middle_m, far_m)],
             time_s: correlation_times_s(&series),
             after_s: [
-                most(shown.iter().map(|one| one.delays.confirmed_s).collect()),
-                most(shown.iter().map(|one| one.delays.classified_s).collect()),
+                most(shown.iter().map(|vehicle| vehicle.delays.confirmed_s).collect()),
+                most(shown.iter().map(|vehicle| vehicle.delays.classified_s).collect()),
             ],
             missed,
             longest_gap_s,
             coasting,
-            lag_s: [0, 1].map(|axis| most(shown.iter().map(|one| one.lags_s.map(|lags_s| lags_s[axis])).collect())),
+            lag_s: [0, 1]
+                .map(|axis| most(shown.iter().map(|vehicle| vehicle.lags_s.map(|lags_s| lags_s[axis])).collect())),
         }
     }
 }
@@ -108,12 +113,13 @@ fn errors_between(series: &[Vec<Step>], [near_m, far_m]: [f64; 2]) -> Vec<[f64; 
 
 fn root_mean_squares(errors: &[[f64; 4]]) -> [f64; 3] {
     [0, 1, 2].map(|axis| {
-        let sum: f64 = errors.iter().map(|it| it[axis] * it[axis]).sum();
+        let sum: f64 = errors.iter().map(|error| error[axis] * error[axis]).sum();
         (sum / errors.len().max(1) as f64).sqrt()
     })
 }
 
-/// Returns the correlation times of the errors at the gaps where they are taken (s), from their correlation with those a second later.
+/// Returns the correlation times of the errors at the gaps where errors are measured (s), from
+/// their correlation with the errors a second later.
 fn correlation_times_s(series: &[Vec<Step>]) -> [f64; 3] {
     let is_within = |step: &Step| step.gap_m >= GAPS_M[0] && step.gap_m <= GAPS_M[2];
     [0, 1, 2].map(|axis| {
@@ -131,8 +137,8 @@ fn correlation_times_s(series: &[Vec<Step>]) -> [f64; 3] {
     })
 }
 
-/// Returns the share of the steps after the first confirmation without a track (-), the longest time without one (s), and the share of
-/// the steps with one that coast (-).
+/// Returns the share of the steps after the first confirmation without a track (-), the longest
+/// time without one (s), and the share of the coasting steps among the steps with one (-).
 fn misses(series: &[Vec<Step>]) -> [f64; 3] {
     let [mut steps, mut missed, mut coasting, mut longest] = [0_u64; 4];
     for approach in series {
@@ -149,13 +155,13 @@ fn misses(series: &[Vec<Step>]) -> [f64; 3] {
     [missed as f64 / steps.max(1) as f64, longest as f64 * CONTROL_STEP.s(), coasting as f64 / tracked.max(1) as f64]
 }
 
-/// Returns the mean of the values that exist; infinity if less than half of them do.
+/// Returns the mean of the values that exist; infinity if less than half of them exist.
 fn mean_of_most(values: &[Option<f64>]) -> f64 {
-    let found: Vec<f64> = values.iter().copied().flatten().collect();
-    if found.is_empty() || 2 * found.len() < values.len() {
+    let existing: Vec<f64> = values.iter().copied().flatten().collect();
+    if existing.is_empty() || 2 * existing.len() < values.len() {
         return f64::INFINITY;
     }
-    found.iter().sum::<f64>() / found.len() as f64
+    existing.iter().sum::<f64>() / existing.len() as f64
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
-//! The conditions under which perception is studied: each differs from the usual one in one respect.
+//! The conditions under which perception is studied: each differs from the usual one in one
+//! respect.
 //!
-//! The usual condition has the light, the weather and the road of the scenario whose sensors are studied.
+//! The usual condition has the light, the weather and the road of the scenario whose sensors are
+//! studied.
 
 use closecall_scenarios::{ScenarioError, ScenarioFile, library};
 use closecall_sensors::camera::Sun;
@@ -12,11 +14,13 @@ use closecall_traffic::{BodyShape, Environment, Lane, Light, Plate, Road, Side, 
 pub const USUAL_PAINT: f64 = 0.5;
 /// Reflectivities of paint, from black to white (-).
 const PAINTS: [f64; 4] = [0.1, 0.2, 0.35, 0.8];
-/// Rates of moderate and heavy rain (mm/h): the lower ends of the classes "strong" and "very strong" of the German Weather Service.
+/// Rates of moderate and heavy rain (mm/h): the lower ends of the classes "strong" and "very
+/// strong" of the German Weather Service.
 const RAIN_MM_PER_H: [f64; 2] = [10.0, 30.0];
 /// Visibilities in fog (m).
 const FOG_M: [f64; 2] = [200.0, 100.0];
-/// Lateral offset of the neighbouring lane, and of a vehicle that straddles the marking (lane widths).
+/// Lateral offset of the neighbouring lane, and of a vehicle that straddles the marking (lane
+/// widths).
 const OFFSETS: [f64; 2] = [1.0, 0.5];
 /// Offset of the car in between in the second case of traffic (m): half of a lane of 3.75 m.
 const ASIDE_M: f64 = 1.9;
@@ -24,7 +28,8 @@ const ASIDE_M: f64 = 1.9;
 /// A condition.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// What is varied: `class`, `paint`, `plate`, `offset`, `weather`, `light`, `traffic` or `fault`.
+    /// The varied condition: `class`, `paint`, `plate`, `offset`, `weather`, `light`, `traffic` or
+    /// `fault`.
     pub factor: &'static str,
     /// The condition, in words.
     pub name: String,
@@ -42,9 +47,10 @@ pub struct Case {
     pub environment: Environment,
     /// Whether another car drives 25 m behind the ego, in its lane.
     pub is_screened: bool,
-    /// The faults of the sensors, which hold for the whole approach; `None` for those of the study.
+    /// The faults of the sensors, which hold for the whole approach; `None` for the faults of the
+    /// study.
     pub faults: Option<Faults>,
-    /// The position of the sun, if the fault needs it; `None` for that of the study.
+    /// The position of the sun, if the fault needs it; `None` for the position of the study.
     pub sun: Option<Sun>,
     /// Whether guard rails stand along the road, if the road of the study has none.
     pub has_guard_rails: bool,
@@ -103,8 +109,9 @@ fn named(light: Light) -> &'static str {
     }
 }
 
-/// Returns the cases, the usual one first: that of the scenario's light, weather and road, from which each of the others differs in one
-/// respect. `mode` says which faults of the library apply.
+/// Returns the cases. The usual case comes first: it has the scenario's light, weather and road,
+/// and each other case differs from it in one respect. `mode` determines the faults of the library
+/// that apply.
 ///
 /// # Errors
 /// [`ScenarioError`] if a scenario of the library is broken.
@@ -139,7 +146,7 @@ pub fn cases(mode: SensorMode, environment: &Environment, road: &Road) -> Result
     Ok(cases)
 }
 
-/// Returns a case for each lane beside that of the ego, and for each of its markings.
+/// Returns a case for each lane beside the ego's lane, and for each of its markings.
 fn offsets(usual: &Case, road: &Road) -> impl Iterator<Item = Case> {
     let ego_lane = ego_lane(road);
     let sides = [(1.0, Side::Left, "left"), (-1.0, Side::Right, "right")];
@@ -153,7 +160,7 @@ fn offsets(usual: &Case, road: &Road) -> impl Iterator<Item = Case> {
     })
 }
 
-/// Returns the cases of other weather. A weather that the usual condition has is not repeated.
+/// Returns the cases of other weather. The weather of the usual condition is not repeated.
 fn weathers(usual: &Case) -> impl Iterator<Item = Case> {
     let here = usual.environment;
     let clear = Environment { light: here.light, friction: here.friction, ..Environment::CLEAR_DAY };
@@ -171,9 +178,10 @@ pub(crate) fn ego_lane(road: &Road) -> Lane {
     road.lane_at(-1.5 * road.lane_width_m())
 }
 
-/// Returns a case for each scenario of the library in which a rear sensor of this mode, the odometry or the map has a fault. Of the
-/// scenario come the fault and what it needs: the guard rails, and for glare the position of the sun, the light and the air. The sensors
-/// are those of the study.
+/// Returns a case for each scenario of the library in which a rear sensor of this mode, the
+/// odometry or the map has a fault. The case takes from that scenario the fault and its
+/// requirements: the guard rails, and for glare the position of the sun, the light and the air. The
+/// sensors are the sensors of the study.
 ///
 /// # Errors
 /// [`ScenarioError`] if a scenario of the library is broken: its fault would silently be missing.
@@ -231,11 +239,11 @@ mod tests {
             let file = ScenarioFile::parse(&library::path("low-thw-overtake"), text, &settings).unwrap();
             file.concrete(&file.space().nominal()).unwrap().sensors
         };
-        let (stock, own) = (sensors(&[]), sensors(&["sensors.rear-lidar.nominal-range-m=60.0"]));
+        let (stock, studied) = (sensors(&[]), sensors(&["sensors.rear-lidar.nominal-range-m=60.0"]));
         let road = Road::straight(3);
         let cases = cases(SensorMode::Full, &Environment::CLEAR_DAY, &road).unwrap();
         let faulty: Vec<&Case> = cases.iter().filter(|case| case.factor == "fault").collect();
-        // Those of the rear LiDAR and camera, of odometry and map, and no others.
+        // Only faults of the rear LiDAR and camera, of odometry and map.
         let names: Vec<&str> = faulty
             .iter()
             .filter_map(|case| case.name.strip_prefix("fault: "))
@@ -247,10 +255,10 @@ mod tests {
             .collect();
         assert!(names == expected && names.len() >= 30, "{names:?} {expected:?}");
         for case in faulty {
-            let sensors = case.sensors(&own);
-            let faultless = sensors.with_faults(Faults::default()).with_sun(own.camera().sun);
-            assert_eq!(faultless, own, "{}", case.name);
-            assert_ne!(sensors, own, "{}", case.name);
+            let sensors = case.sensors(&studied);
+            let faultless = sensors.with_faults(Faults::default()).with_sun(studied.camera().sun);
+            assert_eq!(faultless, studied, "{}", case.name);
+            assert_ne!(sensors, studied, "{}", case.name);
             assert_ne!(sensors, case.sensors(&stock), "{}", case.name);
             let faults = *sensors.faults();
             assert_eq!(faults, faults.throughout(), "{}", case.name);

@@ -1,7 +1,9 @@
-//! What follows from the approaches of a case: curves over the distance, and figures with 95 % intervals.
+//! The figures of the approaches of a case: curves over the distance, and figures with 95 %
+//! intervals.
 //!
-//! Steps of one approach are correlated, and approaches are not. An interval therefore rests on the scatter of the approaches:
-//! that of Clopper and Pearson for a share of approaches, Student's for a mean of their means, and Garwood's for a rate.
+//! Steps of one approach are correlated, and approaches are not. An interval therefore rests on the
+//! scatter of the approaches: Clopper and Pearson's interval for a share of approaches, Student's
+//! for a mean of their means, and Garwood's for a rate.
 
 use closecall_traffic::CONTROL_STEP;
 use closecall_traffic::statistics::interval::clopper_pearson;
@@ -42,8 +44,8 @@ pub struct CurvePoint {
     pub gap_m: f64,
     /// Probability that the vehicle has a confirmed track there.
     pub confirmed: Estimate,
-    /// Errors of the position along the road (m), of the position across it (m), and of the speed (m/s), over the approaches with a
-    /// track there; `None` if there are fewer than two.
+    /// Errors of the position along the road (m), of the position across it (m), and of the speed
+    /// (m/s), over the approaches with a track there; `None` if there are fewer than two.
     pub errors: Option<[PointErrors; 3]>,
 }
 
@@ -89,9 +91,11 @@ pub struct Figures {
     pub curve: Vec<CurvePoint>,
     /// Distance of the first confirmed track (m); 0 in an approach without one.
     pub range_m: Estimate,
-    /// Errors of the position along the road (m), of the position across it (m), and of the speed (m/s).
+    /// Errors of the position along the road (m), of the position across it (m), and of the speed
+    /// (m/s).
     pub errors: Option<[ErrorFigures; 3]>,
-    /// Time from the appearance of a vehicle at 40 m until its track is confirmed (s); `None` if it never was.
+    /// Time from the appearance of a vehicle at 40 m until its track is confirmed (s); `None` if it
+    /// never is.
     pub confirmed_after_s: Option<Estimate>,
     /// Share of the approaches in which it was confirmed within 4 s.
     pub confirms: Estimate,
@@ -99,13 +103,15 @@ pub struct Figures {
     pub false_tracks_per_h: Estimate,
     /// Changes of the id of a vehicle's track, per approach.
     pub id_switches: Estimate,
-    /// Share of the steps in which the ego knew that its rear sensors had failed, so that no function was available.
+    /// Share of the steps in which the ego knows that its rear sensors have failed. No function is
+    /// available then.
     pub unavailable: Estimate,
     /// Mean GOSPA metric (m).
     pub gospa_m: Estimate,
     /// Share of the steps with a track in which the most probable class is the true one.
     pub class_accuracy: Option<Estimate>,
-    /// Expected calibration error of the class scores: the mean difference of score and accuracy over the bins.
+    /// Expected calibration error of the class scores: the mean difference of score and accuracy
+    /// over the bins.
     pub calibration_error: Option<f64>,
     /// The bins of the calibration.
     pub calibration: Vec<CalibrationBin>,
@@ -123,13 +129,17 @@ impl Figures {
         let of_error = |error: fn(&Tracked) -> f64| {
             error_figures(&runs.iter().map(|run| run.iter().map(error).collect()).collect::<Vec<Vec<f64>>>())
         };
-        let errors = (of_error(|it| it.position_m[0]), of_error(|it| it.position_m[1]), of_error(|it| it.speed_mps));
+        let errors = (
+            of_error(|track| track.position_m[0]),
+            of_error(|track| track.position_m[1]),
+            of_error(|track| track.speed_mps),
+        );
         let steps: usize = approaches.iter().map(|approach| approach.observations.len()).sum();
         let false_tracks = approaches.iter().map(|approach| approach.false_tracks).sum();
         let confirmed: Vec<f64> = approaches.iter().filter_map(|approach| approach.confirmed_after_s).collect();
         let (calibration, calibration_error) = calibration(&runs);
         let right = |run: &Vec<Tracked>| {
-            (!run.is_empty()).then(|| mean(run.iter().map(|it| f64::from(u8::from(it.is_class_right)))))
+            (!run.is_empty()).then(|| mean(run.iter().map(|track| f64::from(u8::from(track.is_class_right)))))
         };
         Self {
             curve: curve(approaches),
@@ -171,14 +181,18 @@ fn failed_share(approach: &Approach) -> f64 {
 }
 
 fn first_confirmed_m(approach: &Approach) -> f64 {
-    approach.observations.iter().find(|it| it.tracked.is_some()).map_or(0.0, |it| it.gap_m)
+    approach
+        .observations
+        .iter()
+        .find(|observation| observation.tracked.is_some())
+        .map_or(0.0, |observation| observation.gap_m)
 }
 
 /// Returns the mean of independent values with Student's interval.
 fn student(values: &[f64]) -> Estimate {
     let count = values.len() as f64;
     let value = mean(values.iter().copied());
-    let variance = values.iter().map(|it| (it - value).powi(2)).sum::<f64>() / (count - 1.0);
+    let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (count - 1.0);
     let half = match StudentsT::new(0.0, 1.0, count - 1.0) {
         Ok(student) if count > 1.0 => student.inverse_cdf(0.975) * (variance / count).sqrt(),
         _ => f64::INFINITY,
@@ -187,9 +201,9 @@ fn student(values: &[f64]) -> Estimate {
 }
 
 /// Returns a share of independent approaches.
-fn share(hits: usize, of: usize) -> Estimate {
-    let interval_95 = clopper_pearson(hits as u64, of as u64, 0.95);
-    Estimate { value: hits as f64 / of as f64, interval_95 }
+fn share(hits: usize, trials: usize) -> Estimate {
+    let interval_95 = clopper_pearson(hits as u64, trials as u64, 0.95);
+    Estimate { value: hits as f64 / trials as f64, interval_95 }
 }
 
 /// Returns the rate of events that happen independently: Garwood's interval (1936).
@@ -210,46 +224,54 @@ fn error_figures(runs: &[Vec<f64>]) -> Option<ErrorFigures> {
         return None;
     }
     magnitudes.sort_by(f64::total_cmp);
-    let of_runs =
-        |of: fn(f64) -> f64| student(&runs.iter().map(|run| mean(run.iter().map(|it| of(*it)))).collect::<Vec<_>>());
+    let of_runs = |transform: fn(f64) -> f64| {
+        student(&runs.iter().map(|run| mean(run.iter().map(|error| transform(*error)))).collect::<Vec<_>>())
+    };
     let squares = of_runs(|error| error * error);
     let rmse =
         Estimate { value: squares.value.sqrt(), interval_95: squares.interval_95.map(|bound| bound.max(0.0).sqrt()) };
     Some(ErrorFigures { bias: of_runs(|error| error), rmse, q95: quantile(&magnitudes, 0.95) })
 }
 
-/// Returns the curves: at each distance, the first step of each approach at which the vehicle is that near.
+/// Returns the curves. At each distance, the first step of each approach at this distance or nearer
+/// counts.
 fn curve(approaches: &[Approach]) -> Vec<CurvePoint> {
     let points = (GAPS_M[0] / SPACING_M).floor() as usize;
     let at = |index: usize| {
         let gap_m = SPACING_M * index as f64;
-        let seen: Vec<Option<Tracked>> = approaches
+        let tracks: Vec<Option<Tracked>> = approaches
             .iter()
-            .filter_map(|approach| approach.observations.iter().find(|it| it.gap_m <= gap_m))
-            .filter(|it| it.gap_m > gap_m - SPACING_M)
-            .map(|it| it.tracked)
+            .filter_map(|approach| approach.observations.iter().find(|observation| observation.gap_m <= gap_m))
+            .filter(|observation| observation.gap_m > gap_m - SPACING_M)
+            .map(|observation| observation.tracked)
             .collect();
-        if seen.is_empty() {
+        if tracks.is_empty() {
             return None;
         }
-        let tracked: Vec<Tracked> = seen.iter().flatten().copied().collect();
-        let of = |error: fn(&Tracked) -> f64| PointErrors::of(&tracked.iter().map(error).collect::<Vec<f64>>());
-        let errors =
-            (tracked.len() > 1).then(|| [of(|it| it.position_m[0]), of(|it| it.position_m[1]), of(|it| it.speed_mps)]);
-        Some(CurvePoint { gap_m, confirmed: share(tracked.len(), seen.len()), errors })
+        let tracked: Vec<Tracked> = tracks.iter().flatten().copied().collect();
+        let errors_of = |error: fn(&Tracked) -> f64| PointErrors::of(&tracked.iter().map(error).collect::<Vec<f64>>());
+        let errors = (tracked.len() > 1).then(|| {
+            [
+                errors_of(|track| track.position_m[0]),
+                errors_of(|track| track.position_m[1]),
+                errors_of(|track| track.speed_mps),
+            ]
+        });
+        Some(CurvePoint { gap_m, confirmed: share(tracked.len(), tracks.len()), errors })
     };
     (1..=points).filter_map(at).collect()
 }
 
-/// Returns the bins of the calibration, and the expected calibration error (Naeini, Cooper and Hauskrecht 2015).
+/// Returns the bins of the calibration, and the expected calibration error (Naeini, Cooper and
+/// Hauskrecht 2015).
 fn calibration(runs: &[Vec<Tracked>]) -> (Vec<CalibrationBin>, Option<f64>) {
     let mut bins = [(0.0, 0.0, 0_u64); BINS];
-    for it in runs.iter().flatten() {
+    for track in runs.iter().flatten() {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the bins")]
-        let bin = ((it.confidence * BINS as f64) as usize).min(BINS - 1);
+        let bin = ((track.confidence * BINS as f64) as usize).min(BINS - 1);
         let (confidence, right, steps) = &mut bins[bin];
         (*confidence, *right, *steps) =
-            (*confidence + it.confidence, *right + f64::from(u8::from(it.is_class_right)), *steps + 1);
+            (*confidence + track.confidence, *right + f64::from(u8::from(track.is_class_right)), *steps + 1);
     }
     let total: u64 = bins.iter().map(|(_, _, steps)| steps).sum();
     let filled = bins.into_iter().filter(|(_, _, steps)| *steps > 0);
@@ -298,7 +320,8 @@ mod tests {
             is_class_right: true,
             confidence: 1.0,
         };
-        // The second observation of an approach is nearer than the distance of the point, and does not count.
+        // The second observation of an approach is nearer than the distance of the point, and does
+        // not count.
         let approach = |along_m| Approach {
             observations: [(29.0, along_m), (28.0, 100.0)]
                 .map(|(gap_m, along_m)| Observation { gap_m, tracked: Some(tracked(along_m)), gospa_m: 0.0 })
@@ -309,7 +332,8 @@ mod tests {
         let point = points.iter().find(|point| point.gap_m == 30.0).unwrap();
         let [along, across, speed] = point.errors.unwrap();
         assert!((along.bias - 4.0 / 3.0).abs() < 1e-12 && (along.rmse - (14.0_f64 / 3.0).sqrt()).abs() < 1e-12);
-        // The quantile lies between the two largest magnitudes, a tenth of their difference below the largest.
+        // The quantile lies between the two largest magnitudes, a tenth of their difference below
+        // the largest.
         assert!((along.q95 - 2.9).abs() < 1e-12 && (speed.bias + along.bias).abs() < 1e-12, "{along:?}");
         assert_eq!(across, PointErrors { bias: 0.5, rmse: 0.5, q95: 0.5 });
     }

@@ -7,11 +7,13 @@
 //!                          └▶ scores of the true class ─▶ confidence
 //! ```
 //!
-//! Only what is perceived is fitted: no controller runs, and no collision counts. A range is the mean distance of the first
-//! confirmed track, plus the distance that the object-level sensor itself needs to confirm a vehicle. A class range is the mean
-//! distance at which a confirmed track is first classified as a vehicle, plus the distance that the latency costs. It is a distance
-//! and no time, because the full chain recognises a vehicle in fog at nearly the same distance at all closing speeds. The errors of the
-//! measurements are those with which its tracks err as the full chain's do.
+//! Only perception is fitted: no controller runs, and no collision counts. A range is the mean
+//! distance of the first confirmed track, plus the distance that the object-level sensor itself
+//! needs to confirm a vehicle. A class range is the mean distance at which a confirmed track is
+//! first classified as a vehicle, plus the distance that the latency costs. It is a distance and no
+//! time, because the full chain recognises a vehicle in fog at nearly the same distance at all
+//! closing speeds. The errors of the measurements are fitted until the tracks have the errors of
+//! the full chain.
 
 use std::collections::BTreeMap;
 
@@ -32,20 +34,21 @@ pub use errors::at_bounds;
 
 /// Reflectivities of the paint of the grid (-).
 const PAINTS: [f64; 6] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.8];
-/// Visibilities of the grid (m), the first that of a clear day.
+/// Visibilities of the grid (m), first the visibility of a clear day.
 const VISIBILITIES_M: [f64; 9] = [10_000.0, 1_000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0];
-/// Extinction times visibility: Koschmieder's contrast threshold of 2 %.
+/// Extinction multiplied by visibility: Koschmieder's contrast threshold of 2 %.
 const KOSCHMIEDER: f64 = 3.912;
 /// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid.
 const SHAPE_PAINTS: [f64; 2] = [0.1, 0.4];
 const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
 /// Gaps between which the class scores of tracks are taken (m).
 const GAPS_M: [f64; 2] = [20.0, 80.0];
-/// Ranges at which the object-level sensor's own time to confirm, and to report a class, are measured (m).
+/// Ranges at which the object-level sensor's own time to confirm a vehicle, and to report a class,
+/// is measured (m).
 const TEST_RANGE_M: f64 = 100.0;
 const TEST_CLASS_RANGE_M: f64 = 60.0;
 
-/// What a fit is made of.
+/// The inputs of a fit.
 #[derive(Clone, Debug)]
 pub struct FitPlan<'a> {
     /// The scenario whose sensors are fitted.
@@ -70,7 +73,8 @@ struct Fitter<'a> {
     lidar: Sensors,
 }
 
-/// Fits the rear object-level sensor to the full chain. The result does not depend on the number of threads.
+/// Fits the rear object-level sensor to the full chain. The result does not depend on the number of
+/// threads.
 ///
 /// # Errors
 /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
@@ -92,16 +96,17 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
     Ok(RearFit { errors: fitter.error_grids(&ranges)?, ..ranges })
 }
 
-/// Fits the errors alone to the full chain, with the ranges of another fit, whose validation no longer holds.
+/// Fits the errors alone to the full chain, with the ranges of another fit. The validation of that
+/// fit does not hold for the new one.
 ///
 /// # Errors
-/// As [`fit`].
+/// Works like [`fit`].
 pub fn fit_errors(plan: &FitPlan<'_>, ranges: &RearFit) -> Result<RearFit, StudyError> {
     Ok(RearFit { errors: Fitter::new(plan)?.error_grids(ranges)?, validation: None, ..ranges.clone() })
 }
 
 impl FitPlan<'_> {
-    /// Returns what a file says about where its figures come from.
+    /// Returns the statement of a file about the origin of its figures.
     pub(crate) fn origin(&self) -> Origin {
         let FitPlan { seed, approaches, command, version, file } = self.clone();
         Origin { command, version, scenario: file.config().name.clone(), seed, approaches }
@@ -127,8 +132,8 @@ fn mean(values: &[f64]) -> f64 {
 
 /// Returns the mean distances at which tracks are confirmed and classified (m).
 fn means_m(firsts: &[Firsts]) -> [f64; 2] {
-    let of = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
-    [of(|firsts| firsts.confirmed_m), of(|firsts| firsts.classified_m)]
+    let mean_m = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
+    [mean_m(|firsts| firsts.confirmed_m), mean_m(|firsts| firsts.classified_m)]
 }
 
 impl<'a> Fitter<'a> {
@@ -149,14 +154,15 @@ impl Fitter<'_> {
 
     /// Returns when the tracks are confirmed and classified in all approaches of a case.
     fn firsts(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Firsts>, StudyError> {
-        let one = |run| {
+        let firsts = |run| {
             firsts(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
-        (0..self.plan.approaches).into_par_iter().map(one).collect()
+        (0..self.plan.approaches).into_par_iter().map(firsts).collect()
     }
 
-    /// Returns the distances that the object-level sensor with these errors needs to confirm a vehicle, and to report its class (m).
+    /// Returns the distances that the object-level sensor with these errors needs to confirm a
+    /// vehicle, and to report its class (m).
     fn own_delays_m(&self, errors: &FittedErrors) -> Result<[f64; 2], StudyError> {
         let file = with_settings(self.plan.file, &[format!("sensors.rear-object.range-m={TEST_RANGE_M:?}")])?;
         let sensors = file.concrete(&file.space().nominal())?.sensors.with_mode(SensorMode::Object);
@@ -165,7 +171,8 @@ impl Fitter<'_> {
         Ok([TEST_RANGE_M - confirmed_m, TEST_CLASS_RANGE_M - classified_m])
     }
 
-    /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's range.
+    /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's
+    /// range.
     fn ranges(&self, errors: &FittedErrors) -> Result<(Vec<RangeGrid>, f64), StudyError> {
         let [delay_m, class_delay_m] = self.own_delays_m(errors)?;
         let (mut grids, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
@@ -180,15 +187,19 @@ impl Fitter<'_> {
             for paint in PAINTS {
                 let (mut row_m, mut class_row_m) = (Vec::new(), Vec::new());
                 for visibility_m in VISIBILITIES_M {
-                    let found = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
-                    let [centre_m, classified_m] = means_m(&found);
+                    let firsts = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
+                    let [centre_m, classified_m] = means_m(&firsts);
                     if class == VehicleClass::Car {
-                        squares += found.iter().map(|it| maths::ln(it.confirmed_m / centre_m).powi(2)).sum::<f64>();
-                        count += found.len() as f64 - 1.0;
+                        squares += firsts
+                            .iter()
+                            .map(|approach| maths::ln(approach.confirmed_m / centre_m).powi(2))
+                            .sum::<f64>();
+                        count += firsts.len() as f64 - 1.0;
                     }
                     let range_m = rounded(centre_m + delay_m, 10.0);
-                    // A class that the full chain knows when it confirms the track limits nothing.
-                    let is_known_at_once = found.iter().all(|it| it.classified_m == it.confirmed_m);
+                    // A class that the full chain knows at the confirmation of the track limits
+                    // nothing.
+                    let is_known_at_once = firsts.iter().all(|approach| approach.classified_m == approach.confirmed_m);
                     let class_range_m = rounded(classified_m + class_delay_m, 10.0).min(range_m);
                     row_m.push(range_m);
                     class_row_m.push(if is_known_at_once { range_m } else { class_range_m });
@@ -201,25 +212,31 @@ impl Fitter<'_> {
         Ok((grids, rounded((squares / count.max(1.0)).sqrt(), 1e4)))
     }
 
-    /// Returns the ranges of each body shape relative to those of the first of its class.
+    /// Returns the ranges of each body shape relative to the ranges of the first shape of its
+    /// class.
     fn shapes(&self) -> Result<ShapeRatios, StudyError> {
         let (mut range, mut class_range) = (BTreeMap::new(), BTreeMap::new());
         for class in VehicleClass::ALL {
             let means_m = |shape: BodyShape| {
-                let of = |paint: f64, visibility_m: f64| {
+                let means_at = |paint: f64, visibility_m: f64| {
                     let case = Case { shape: Some(shape), ..Self::case(class, paint, Plate::Clean, visibility_m) };
-                    self.firsts(&case, &self.full).map(|found| means_m(&found))
+                    self.firsts(&case, &self.full).map(|firsts| means_m(&firsts))
                 };
-                let row = |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| of(paint, *visibility_m)).collect();
+                let row =
+                    |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| means_at(paint, *visibility_m)).collect();
                 SHAPE_PAINTS.into_iter().map(row).collect::<Result<Vec<Vec<[f64; 2]>>, StudyError>>()
             };
             let shapes = BodyShape::of_class(class);
             let first_m = means_m(shapes[0])?;
             for shape in &shapes[1..] {
                 let own_m = means_m(*shape)?;
-                let ratios = |of: usize| -> Vec<Vec<f64>> {
-                    let row = |(own, first): (&Vec<[f64; 2]>, &Vec<[f64; 2]>)| {
-                        own.iter().zip(first).map(|(own, first)| rounded(own[of] / first[of], 1e3)).collect()
+                let ratios = |figure: usize| -> Vec<Vec<f64>> {
+                    let row = |(shape, first): (&Vec<[f64; 2]>, &Vec<[f64; 2]>)| {
+                        shape
+                            .iter()
+                            .zip(first)
+                            .map(|(shape, first)| rounded(shape[figure] / first[figure], 1e3))
+                            .collect()
                     };
                     own_m.iter().zip(&first_m).map(row).collect()
                 };
@@ -233,20 +250,20 @@ impl Fitter<'_> {
 
     /// Returns the mean score of the true class, of each class.
     fn class_confidence(&self) -> Result<ByClass, StudyError> {
-        let of = |class| {
+        let confidence = |class| {
             let case = Case { class, ..Case::usual() };
-            let one = |run| {
+            let scores = |run| {
                 scores(&case, &self.full, &self.scenario.road, Address { seed: self.plan.seed, run }, GAPS_M)
                     .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
             };
             let scores: Result<Vec<Vec<f64>>, StudyError> =
-                (0..self.plan.approaches).into_par_iter().map(one).collect();
+                (0..self.plan.approaches).into_par_iter().map(scores).collect();
             Ok::<f64, StudyError>(rounded(mean(&scores?.concat()).clamp(0.25, 1.0), 1e4))
         };
         Ok(ByClass {
-            car: of(VehicleClass::Car)?,
-            truck: of(VehicleClass::Truck)?,
-            motorcycle: of(VehicleClass::Motorcycle)?,
+            car: confidence(VehicleClass::Car)?,
+            truck: confidence(VehicleClass::Truck)?,
+            motorcycle: confidence(VehicleClass::Motorcycle)?,
         })
     }
 }

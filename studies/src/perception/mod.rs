@@ -1,4 +1,4 @@
-//! A study of perception without a controller: where it ends, how it errs, and what spoils it.
+//! A study of perception without a controller: its range, its errors, and the effect of faults.
 //!
 //! ```text
 //!  scenario ─▶ sensors ─┐
@@ -10,13 +10,13 @@
 //! approaches, a vehicle comes from 150 m behind to 5 m at a closing speed of its own. The ego keeps its speed and its lane.
 //!
 //! * [`cases`]: the conditions
-//! * [`agreement`]: verdicts with object-level sensors against those with the full chain
+//! * [`agreement`]: verdicts with object-level sensors against verdicts with the full chain
 //! * [`approach`]: one approach
 //! * [`study`]: all approaches of all cases
 //! * [`fit`]: the fit of the object-level sensor to the full chain
 //! * [`behaviour`]: errors, delays and misses of the tracks of a vehicle
-//! * [`validation`]: the object-level sensor against the full chain, in these respects
-//! * [`figures`]: what follows from the approaches of a case, with intervals
+//! * [`validation`]: the object-level sensor against the full chain, by this behaviour
+//! * [`figures`]: the figures of the approaches of a case, with intervals
 
 pub mod agreement;
 pub mod approach;

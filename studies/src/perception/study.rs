@@ -15,7 +15,7 @@ use crate::perception::figures::Figures;
 pub enum Extent {
     /// Few: within a minute on two cores.
     Quick,
-    /// Many: within a quarter of an hour on two cores.
+    /// Many approaches: within a quarter of an hour on two cores.
     Full,
     /// This many.
     Runs(u64),
@@ -32,14 +32,14 @@ impl Extent {
     }
 }
 
-/// Why a study cannot be made.
+/// The reason for which a study cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The scenario with the sensors cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// The sensors have no error, so that there is nothing to study.
-    #[error("failed to study the sensors: those of mode `ground-truth` have no errors; choose `full` or `object`")]
+    /// The sensors have no error: there is nothing to study.
+    #[error("failed to study the sensors: sensors of mode `ground-truth` have no errors; choose `full` or `object`")]
     GroundTruth,
     /// A run of a sample fails.
     #[error("failed to compare the sensors: sample {sample}: {message}")]
@@ -88,8 +88,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// Studies the sensors of a scenario at the nominal values of its parameters, in its light and weather and on its road. `mode`
-    /// replaces the scenario's.
+    /// Studies the sensors of a scenario at the nominal values of its parameters, in its light and
+    /// weather and on its road. `mode` replaces the mode of the scenario.
     ///
     /// The result does not depend on the number of threads.
     ///
@@ -102,9 +102,9 @@ impl Study {
             return Err(StudyError::GroundTruth);
         }
         let cases = cases(sensors.mode(), &scenario.environment, &scenario.road)?;
-        let found = study(&cases, &sensors, &scenario.road, [seed, extent.runs()])?;
+        let cases = study(&cases, &sensors, &scenario.road, [seed, extent.runs()])?;
         let name = file.config().name.clone();
-        Ok(Self { name, mode: sensors.mode(), seed, runs: extent.runs(), cases: found })
+        Ok(Self { name, mode: sensors.mode(), seed, runs: extent.runs(), cases })
     }
 }
 

@@ -1,7 +1,8 @@
-//! The object-level sensor against the full chain, over class, paint and weather: what their tracks show, and where they differ.
+//! The object-level sensor against the full chain, over class, paint and weather: the behaviour of
+//! their tracks, and the differences.
 //!
-//! The criteria of [`Difference`] were stated before the first comparison. They ask what matters to a function that acts on the
-//! tracks, and not whether a difference can be told from chance.
+//! The criteria of [`Difference`] precede the first comparison. They ask what matters to a function
+//! that acts on the tracks, and not whether a difference can be told from chance.
 
 use closecall_sensors::{Chain, RearFit, SensorMode, Validation, ValidationFigures};
 use closecall_traffic::{Environment, VehicleClass};
@@ -11,24 +12,26 @@ use crate::perception::cases::Case;
 use crate::perception::fit::FitPlan;
 use crate::perception::study::StudyError;
 
-/// Reflectivities of the paint (-): black, dark, and that of a usual car.
+/// Reflectivities of the paint (-): black, dark, and the paint of a usual car.
 const PAINTS: [f64; 3] = [0.1, 0.2, 0.5];
-/// Weathers: visibility (m) and rain (mm/h). Clear air, strong rain (German Weather Service), and two densities of fog.
+/// Weathers: visibility (m) and rain (mm/h). Clear air, strong rain (German Weather Service), and
+/// two densities of fog.
 const WEATHERS: [[f64; 2]; 4] = [[10_000.0, 0.0], [10_000.0, 10.0], [300.0, 0.0], [100.0, 0.0]];
 
-/// Factor between two deviations, and between two correlation times, up to which they count as equal (assumptions): a correlation time
-/// of some seconds is hardly better known from approaches of some ten seconds.
+/// Factor between two deviations, and between two correlation times, up to which they count as
+/// equal (assumptions): a correlation time of some seconds is hardly better known from approaches
+/// of some ten seconds.
 const SD_FACTOR: f64 = 1.5;
 const TIME_FACTOR: f64 = 3.0;
-/// Differences of deviations up to which they count as equal: of positions (m), a hundredth of a vehicle's width; of speeds (m/s), 2 % of
-/// the smallest closing speed (assumptions).
+/// Differences of deviations up to which they count as equal: of positions (m), a hundredth of a
+/// vehicle's width; of speeds (m/s), 2 % of the smallest closing speed (assumptions).
 const SD_FLOORS: [f64; 3] = [0.02, 0.02, 0.05];
 /// Difference of times up to which they count as equal (s): a control step.
 const TIME_FLOOR_S: f64 = 0.04;
 /// Difference of shares up to which they count as equal (-): one percentage point.
 const SHARE_FLOOR: f64 = 0.01;
 
-/// A figure in which the object-level sensor differs from the full chain by more than is immaterial.
+/// A figure in which the object-level sensor differs materially from the full chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// Class of the vehicle.
@@ -39,25 +42,25 @@ pub struct Difference {
     pub weather: [f64; 2],
     /// Name of the figure.
     pub figure: &'static str,
-    /// That of the full chain.
+    /// The figure of the full chain.
     pub full: f64,
-    /// That of the object-level sensor.
+    /// The figure of the object-level sensor.
     pub object: f64,
 }
 
-/// A vehicle in a weather with what its tracks show.
+/// A vehicle in a weather with the behaviour of its tracks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// The class, the paint (-), and visibility (m) and rain (mm/h).
     pub at: (VehicleClass, f64, [f64; 2]),
     /// In the full chain.
     pub full: Behaviour,
-    /// With the object-level sensor.
+    /// The behaviour with the object-level sensor.
     pub object: Behaviour,
 }
 
-/// Measures both sensors of the scenario over the grid, or over the part of it that `is_asked` names. The object-level sensor has the
-/// fit that ships, or another one.
+/// Measures both sensors of the scenario over the grid, or over the part of it that `is_asked`
+/// names. The object-level sensor has the fit that ships, or another one.
 ///
 /// # Errors
 /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
@@ -67,19 +70,19 @@ pub fn measure(
     is_asked: impl Fn(VehicleClass, f64, [f64; 2]) -> bool,
 ) -> Result<Vec<Measured>, StudyError> {
     let scenario = plan.file.concrete(&plan.file.space().nominal())?;
-    // A sensor refers to its fit for as long as the program runs, and a program validates few fits.
+    // A sensor refers to its fit until the program ends, and a program validates few fits.
     let fit: Option<&'static RearFit> = fit.map(|fit| &*Box::leak(Box::new(fit.clone())));
     let mut measured = Vec::new();
     for class in VehicleClass::ALL {
         for paint in PAINTS {
             for weather in WEATHERS.into_iter().filter(|weather| is_asked(class, paint, *weather)) {
                 let case = case(class, paint, weather);
-                let of = |mode| {
+                let behaviour = |mode| {
                     let sensors = scenario.sensors.with_mode(mode);
                     let sensors = fit.map_or(sensors, |fit| sensors.with_rear_fit(fit));
                     Behaviour::measure(&case, &sensors, &scenario.road, [plan.seed, plan.approaches])
                 };
-                let (full, object) = (of(SensorMode::Full)?, of(SensorMode::Object)?);
+                let (full, object) = (behaviour(SensorMode::Full)?, behaviour(SensorMode::Object)?);
                 measured.push(Measured { at: (class, paint, weather), full, object });
             }
         }
@@ -95,29 +98,30 @@ fn case(class: VehicleClass, paint: f64, [visibility_m, rain_mm_per_h]: [f64; 2]
 /// Returns the table of the whole grid, for the file of the fit.
 pub fn table(plan: &FitPlan<'_>, measured: &[Measured]) -> Validation {
     let of_class = |class, chain| {
-        let rows = |of: &dyn Fn(&Behaviour) -> f64| -> Vec<Vec<f64>> {
+        let rows = |value: &dyn Fn(&Behaviour) -> f64| -> Vec<Vec<f64>> {
             let of_paint = |paint: f64| {
-                let cells = measured.iter().filter(|it| (it.at.0, it.at.1) == (class, paint));
-                cells.map(|it| rounded(of(it.of(chain)))).collect()
+                let cells =
+                    measured.iter().filter(|measurement| (measurement.at.0, measurement.at.1) == (class, paint));
+                cells.map(|measurement| rounded(value(measurement.of(chain)))).collect()
             };
             PAINTS.into_iter().map(of_paint).collect()
         };
         ValidationFigures {
             class,
             chain,
-            along_sd_m: rows(&|it| it.sd[0]),
-            across_sd_m: rows(&|it| it.sd[1]),
-            speed_sd_mps: rows(&|it| it.sd[2]),
-            along_time_s: rows(&|it| it.time_s[0]),
-            across_time_s: rows(&|it| it.time_s[1]),
-            speed_time_s: rows(&|it| it.time_s[2]),
-            confirmed_after_s: rows(&|it| it.after_s[0]),
-            classified_after_s: rows(&|it| it.after_s[1]),
-            missed: rows(&|it| it.missed),
-            longest_gap_s: rows(&|it| it.longest_gap_s),
-            coasting: rows(&|it| it.coasting),
-            braking_lag_s: rows(&|it| it.lag_s[0]),
-            lateral_lag_s: rows(&|it| it.lag_s[1]),
+            along_sd_m: rows(&|behaviour| behaviour.sd[0]),
+            across_sd_m: rows(&|behaviour| behaviour.sd[1]),
+            speed_sd_mps: rows(&|behaviour| behaviour.sd[2]),
+            along_time_s: rows(&|behaviour| behaviour.time_s[0]),
+            across_time_s: rows(&|behaviour| behaviour.time_s[1]),
+            speed_time_s: rows(&|behaviour| behaviour.time_s[2]),
+            confirmed_after_s: rows(&|behaviour| behaviour.after_s[0]),
+            classified_after_s: rows(&|behaviour| behaviour.after_s[1]),
+            missed: rows(&|behaviour| behaviour.missed),
+            longest_gap_s: rows(&|behaviour| behaviour.longest_gap_s),
+            coasting: rows(&|behaviour| behaviour.coasting),
+            braking_lag_s: rows(&|behaviour| behaviour.lag_s[0]),
+            lateral_lag_s: rows(&|behaviour| behaviour.lag_s[1]),
         }
     };
     let of_both = |class| [Chain::Full, Chain::Object].map(|chain| of_class(class, chain));
@@ -136,7 +140,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl Measured {
-    /// Returns what one of the sensors shows.
+    /// Returns the figures of one of the sensors.
     pub fn of(&self, chain: Chain) -> &Behaviour {
         match chain {
             Chain::Full => &self.full,
@@ -145,35 +149,36 @@ impl Measured {
     }
 }
 
-/// Returns the figures of a table in which the sensors differ by more than is immaterial.
+/// Returns the figures of a table in which the sensors differ materially.
 pub fn differences(table: &Validation) -> Vec<Difference> {
-    let mut found = Vec::new();
+    let mut differences = Vec::new();
     for class in VehicleClass::ALL {
-        let of = |chain| table.figures.iter().find(|it| (it.class, it.chain) == (class, chain));
-        let (Some(full), Some(object)) = (of(Chain::Full), of(Chain::Object)) else { continue };
+        let figures = |chain| table.figures.iter().find(|row| (row.class, row.chain) == (class, chain));
+        let (Some(full), Some(object)) = (figures(Chain::Full), figures(Chain::Object)) else { continue };
         for (row, paint) in table.paints.iter().enumerate() {
             for (column, weather) in table.visibilities_m.iter().zip(&table.rain_mm_per_h).enumerate() {
                 for ((figure, full), (_, object)) in full.named().into_iter().zip(object.named()) {
                     let (full, object) = (full[row][column], object[row][column]);
                     if is_material(figure, full, object) {
                         let weather = [*weather.0, *weather.1];
-                        found.push(Difference { class, paint: *paint, weather, figure, full, object });
+                        differences.push(Difference { class, paint: *paint, weather, figure, full, object });
                     }
                 }
             }
         }
     }
-    found
+    differences
 }
 
-/// Returns whether two values of a figure differ by more than is immaterial. The longest time without a track follows from the share of
-/// the steps without one, and has no criterion of its own.
+/// Returns whether two values of a figure differ materially. The longest time without a track
+/// follows from the share of the steps without one, and has no separate criterion.
 fn is_material(figure: &str, full: f64, object: f64) -> bool {
     if full == object {
         return false;
     }
     let ratio = full.max(object) / full.min(object);
-    // Rounded values are compared, so that a difference of exactly one control step is not material by its rounding.
+    // Rounded values are compared: a difference of exactly one control step is not material by its
+    // rounding.
     let apart = (full - object).abs() - 1e-9;
     match figure {
         "along-sd-m" => ratio > SD_FACTOR && apart > SD_FLOORS[0],
@@ -219,19 +224,22 @@ mod tests {
         let file = source::load(Path::new("low-thw-overtake"), &[]).unwrap();
         let Origin { command, version, seed, approaches, .. } = shipped.origin.clone();
         let plan = FitPlan { file: &file, seed, approaches, command, version };
-        // The nearest of the ranges, so that the measurement is short.
+        // The nearest of the ranges keeps the measurement short.
         let at = (VehicleClass::Motorcycle, PAINTS[0], WEATHERS[3]);
         let measured = measure(&plan, None, |class, paint, weather| (class, paint, weather) == at).unwrap();
         let table = table(&plan, &measured);
         for chain in [Chain::Full, Chain::Object] {
-            let of = |table: &Validation| {
-                table.figures.iter().find(|it| (it.class, it.chain) == (at.0, chain)).unwrap().clone()
+            let figures = |table: &Validation| {
+                table.figures.iter().find(|row| (row.class, row.chain) == (at.0, chain)).unwrap().clone()
             };
-            let (shipped, found) = (of(shipped), of(&table));
-            for ((name, shipped), (_, found)) in shipped.named().into_iter().zip(found.named()) {
-                assert!(!is_material(name, shipped[0][3], found[0][0]), "{chain:?}, {name}: {shipped:?} {found:?}");
+            let (shipped, measured) = (figures(shipped), figures(&table));
+            for ((name, shipped), (_, measured)) in shipped.named().into_iter().zip(measured.named()) {
                 assert!(
-                    (shipped[0][3] - found[0][0]).abs() < 0.011 || shipped[0][3] == found[0][0],
+                    !is_material(name, shipped[0][3], measured[0][0]),
+                    "{chain:?}, {name}: {shipped:?} {measured:?}"
+                );
+                assert!(
+                    (shipped[0][3] - measured[0][0]).abs() < 0.011 || shipped[0][3] == measured[0][0],
                     "{chain:?}, {name}"
                 );
             }

@@ -1,4 +1,4 @@
-//! The effects that faults have on perception, and how each is recognised.
+//! The effects of faults on perception, and how each is recognised.
 
 use closecall_sensors::Health;
 use closecall_sensors::faults::NOTICED_AFTER_SCANS;
@@ -6,13 +6,14 @@ use closecall_traffic::{Source, Track, TrackStatus, VehicleClass, maths};
 
 use crate::watch::{Car, Of, Pair, Step, pair};
 
-/// Closing speed of an approaching vehicle (m/s), that of one beside the ego, and the error of the clock of the library (s).
+/// Closing speed of an approaching vehicle (m/s), closing speed of a vehicle beside the ego, and
+/// the error of the clock of the library (s).
 const CLOSING_MPS: f64 = 10.0;
 const CLOSING_BESIDE_MPS: f64 = 1.0;
 /// Distance from the ego's middle to its bumper (m).
 const HALF_EGO_M: f64 = 2.3;
 
-/// What a fault does.
+/// The effect of a fault.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Effect {
     /// The sensor loses its tracks in this step, and has failed for the ego a second later.
@@ -27,13 +28,13 @@ pub(crate) enum Effect {
     Hidden { left_m: f64 },
     /// So many points per scan are where nothing is.
     FalsePoints { at_least: f64 },
-    /// The same, and boxes and tracks are those of a sensor without the fault.
+    /// The same, and boxes and tracks equal the ones of a sensor without the fault.
     GhostPointsOnly { at_least: f64 },
     /// The images of vehicles behind a guard rail have tracks, in no lane.
     BesideTheRoad,
     /// So much of the points on vehicles is left.
     Points { share: [f64; 2] },
-    /// The points on vehicles are others, and higher by this (m).
+    /// The points on vehicles differ, and are higher by this (m).
     OtherPoints { higher_m: [f64; 2] },
     /// The first track is so much nearer.
     Range { share: [f64; 2] },
@@ -41,7 +42,7 @@ pub(crate) enum Effect {
     Late { steps: [usize; 2] },
     /// In so many steps, the track is not measured.
     Coasts { share: [f64; 2] },
-    /// The position along the road scatters so many times as much.
+    /// The position along the road scatters this many times as much.
     ScattersAlong { times: f64 },
     /// An approaching vehicle appears nearer to the ego.
     Nearer { by_m: f64 },
@@ -49,18 +50,19 @@ pub(crate) enum Effect {
     ToLeft { by_deg: f64 },
     /// A vehicle appears faster.
     Faster { by_mps: f64 },
-    /// A vehicle this far to the left counts as in another lane: 0 left, 2 right of the ego's. It is seen where it is.
+    /// A vehicle this far to the left counts as in another lane: 0 left, 2 right of the ego's. Its
+    /// position is right.
     OtherLane { left_m: f64, lane: usize },
     /// There is a track without a vehicle.
     Ghost,
 }
 
-fn is_about(found: f64, expected: f64, tolerance: f64) -> Result<(), String> {
-    if (found - expected).abs() <= tolerance { Ok(()) } else { Err(format!("{found:.3}, not {expected:.3}")) }
+fn is_about(value: f64, expected: f64, tolerance: f64) -> Result<(), String> {
+    if (value - expected).abs() <= tolerance { Ok(()) } else { Err(format!("{value:.3}, not {expected:.3}")) }
 }
 
-fn is_in<T: PartialOrd + std::fmt::Debug>(found: T, [least, most]: [T; 2]) -> Result<(), String> {
-    if found >= least && found <= most { Ok(()) } else { Err(format!("{found:?}")) }
+fn is_in<T: PartialOrd + std::fmt::Debug>(value: T, [least, most]: [T; 2]) -> Result<(), String> {
+    if value >= least && value <= most { Ok(()) } else { Err(format!("{value:?}")) }
 }
 
 fn holds(is_so: bool, says: impl Into<String>) -> Result<(), String> {
@@ -87,8 +89,8 @@ fn per_scan(steps: &[Step], count: impl Fn(&Step) -> usize) -> f64 {
 
 impl Effect {
     /// Returns the vehicle of the drive, and the number of steps.
-    fn scene(&self, of: Of) -> (Option<Car>, i64) {
-        let beside = of == Of::Surround;
+    fn scene(&self, sensor: Of) -> (Option<Car>, i64) {
+        let beside = sensor == Of::Surround;
         let near_m: f64 = if beside { 6.0 } else { 60.0 };
         let closing_mps = if beside { CLOSING_BESIDE_MPS } else { CLOSING_MPS };
         let steady = |gap_m, left_m| Some(Car { gap_m, left_m, closing_mps: 0.0 });
@@ -117,10 +119,10 @@ impl Effect {
     /// Checks that a scenario of the library has this effect.
     ///
     /// # Errors
-    /// What was found instead.
-    pub(crate) fn check(&self, name: &str, of: Of) -> Result<(), String> {
+    /// The value that differs from the effect.
+    pub(crate) fn check(&self, name: &str, sensor: Of) -> Result<(), String> {
         let is_timed = matches!(self, Self::Dead { .. } | Self::Frozen { .. } | Self::FrozenImage { .. } | Self::Ghost);
-        let Pair { usual, faulty } = pair(name, of, self.scene(of), is_timed);
+        let Pair { usual, faulty } = pair(name, sensor, self.scene(sensor), is_timed);
         holds(usual.iter().all(|step| step.health == Health::Ok), "the usual sensor is not well")?;
         let z_m = |steps: &[Step]| mean(steps.iter().flat_map(|step| &step.points_z_m).map(|z_m| f64::from(*z_m)));
         match *self {
@@ -129,7 +131,7 @@ impl Effect {
                 let is_gone = |step: &Step| step.tracks.is_empty();
                 // The camera is no condition of a track.
                 holds(
-                    of == Of::RearCamera || !is_gone(&faulty[from_step - 1]) && is_gone(&faulty[159]),
+                    sensor == Of::RearCamera || !is_gone(&faulty[from_step - 1]) && is_gone(&faulty[159]),
                     "tracks remain",
                 )
             }
@@ -139,7 +141,7 @@ impl Effect {
                 // The tracker of a LiDAR goes on with the same boxes.
                 let state = |steps: &[Step], step: usize| steps[step].track().map(|track| track.state);
                 let repeats = state(&faulty, from_step + 1) == state(&faulty, from_step + 20);
-                let is_lidar = matches!(of, Of::RearLidar | Of::FrontLidar);
+                let is_lidar = matches!(sensor, Of::RearLidar | Of::FrontLidar);
                 let height = |step: usize| faulty[step].points_z_m.clone();
                 let is_repeated = if is_lidar { height(from_step + 1) == height(from_step + 20) } else { repeats };
                 holds(is_repeated && state(&usual, from_step + 1) != state(&usual, from_step + 20), "nothing repeats")
@@ -164,9 +166,10 @@ impl Effect {
                     all.filter(|track| track.y_m() > 7.4).collect::<Vec<_>>()
                 };
                 holds(ghosts(&usual).is_empty(), "they are there with the right map")?;
-                let found = ghosts(&faulty);
-                let in_no_lane = found.iter().all(|track| track.lane.iter().all(|probability| *probability < 0.1));
-                holds(found.len() > 30 && in_no_lane, format!("{} tracks", found.len()))
+                let ghost_tracks = ghosts(&faulty);
+                let in_no_lane =
+                    ghost_tracks.iter().all(|track| track.lane.iter().all(|probability| *probability < 0.1));
+                holds(ghost_tracks.len() > 30 && in_no_lane, format!("{} tracks", ghost_tracks.len()))
             }
             Self::Points { share } => {
                 let [before, after] = [&usual, &faulty].map(|steps| per_scan(steps, |step| step.points_z_m.len()));
@@ -187,7 +190,7 @@ impl Effect {
             }
             Self::Late { steps } => match (first(&usual), first(&faulty)) {
                 (Some(usual), Some(faulty)) => is_in(faulty.saturating_sub(usual), steps),
-                found => Err(format!("{found:?}")),
+                value => Err(format!("{value:?}")),
             },
             Self::Coasts { share } => {
                 let coasting = |steps: &[Step]| {
@@ -202,8 +205,8 @@ impl Effect {
                     let centre_m = settled(steps, Track::x_m);
                     settled(steps, |track| (track.x_m() - centre_m).powi(2)).sqrt()
                 };
-                let found = scatter(&faulty) / scatter(&usual);
-                holds(found > times, format!("{found} times"))
+                let ratio = scatter(&faulty) / scatter(&usual);
+                holds(ratio > times, format!("{ratio} times"))
             }
             Self::Nearer { by_m } => {
                 let apart_m = |steps: &[Step]| settled(steps, |track| track.x_m().abs());
@@ -211,7 +214,7 @@ impl Effect {
             }
             Self::ToLeft { by_deg } => {
                 let moved_m = settled(&faulty, Track::y_m) - settled(&usual, Track::y_m);
-                let mount_m = if of.source() == Source::Surround { 0.0 } else { HALF_EGO_M };
+                let mount_m = if sensor.source() == Source::Surround { 0.0 } else { HALF_EGO_M };
                 let apart_m = settled(&usual, |track| track.x_m().abs()) - mount_m;
                 let expected_m = apart_m * maths::sin(by_deg.to_radians());
                 is_about(moved_m, expected_m, 0.25 * expected_m.abs())
@@ -223,8 +226,9 @@ impl Effect {
             }
             Self::OtherLane { lane, .. } => {
                 is_about(settled(&faulty, Track::y_m) - settled(&usual, Track::y_m), 0.0, 0.1)?;
-                let [own, other] = [settled(&usual, |track| track.lane[1]), settled(&faulty, |track| track.lane[lane])];
-                holds(own > 0.5 && other > 0.5, format!("own lane {own}, then {other}"))
+                let [settled_usual, other] =
+                    [settled(&usual, |track| track.lane[1]), settled(&faulty, |track| track.lane[lane])];
+                holds(settled_usual > 0.5 && other > 0.5, format!("own lane {settled_usual}, then {other}"))
             }
             Self::Ghost => {
                 let [before, after] = [&usual, &faulty].map(|steps| per_scan(steps, |step| step.tracks.len()));

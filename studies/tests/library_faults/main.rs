@@ -1,4 +1,5 @@
-//! Every scenario of `scenarios/library/faults`, at its shipped magnitude: what its fault does to perception.
+//! Every scenario of `scenarios/library/faults`, at its shipped magnitude: the effect of its fault
+//! on perception.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -11,12 +12,12 @@ use std::path::Path;
 use effects::Effect::{self, *};
 use watch::Of;
 
-/// What each fault does. The drives are those of [`Effect::check`].
+/// The effect of each fault. [`Effect::check`] defines the drives.
 const TABLE: [(&str, Of, Effect); 82] = [
     ("camera-dead", Of::RearCamera, Dead { from_step: 125 }),
     ("camera-dirty", Of::RearCamera, Unclassified { loss: 0.2 }),
     ("camera-frozen", Of::RearCamera, FrozenImage { from_step: 125 }),
-    // What glare costs at this magnitude is small: see docs/evidence/faults.md.
+    // The effect of glare at this magnitude is small: see docs/evidence/faults.md.
     ("camera-low-sun", Of::RearCamera, Unclassified { loss: 0.0 }),
     ("camera-main-beam", Of::RearCamera, Unclassified { loss: 0.0 }),
     ("camera-out-of-focus", Of::RearCamera, Unclassified { loss: 0.2 }),
@@ -111,9 +112,9 @@ fn the_table_has_every_scenario_of_the_folder_once() {
 #[test]
 fn each_fault_has_its_effect_on_perception() {
     let mut wrong = Vec::new();
-    for (name, of, effect) in &TABLE {
-        if let Err(found) = effect.check(name, *of) {
-            wrong.push(format!("{name}: {effect:?}: {found}"));
+    for (name, sensor, effect) in &TABLE {
+        if let Err(difference) = effect.check(name, *sensor) {
+            wrong.push(format!("{name}: {effect:?}: {difference}"));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -1,4 +1,4 @@
-//! One drive with the sensors of a scenario: what they show of one vehicle.
+//! One drive with the sensors of a scenario: their view of one vehicle.
 
 use closecall_scenarios::{Scenario, ScenarioFile, library};
 use closecall_sensors::faults::Faults;
@@ -41,14 +41,15 @@ impl Of {
 /// The vehicle that the sensor watches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Car {
-    /// Gap between the bumpers: ahead of the ego for the sensors that look ahead, and behind it for the others (m).
+    /// Gap between the bumpers: ahead of the ego for the sensors that look ahead, and behind it for
+    /// the others (m).
     pub(crate) gap_m: f64,
     /// Lateral offset from the ego, positive to the left (m).
     pub(crate) left_m: f64,
     pub(crate) closing_mps: f64,
 }
 
-/// What one step showed.
+/// The observation of one step.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     /// The tracks of the sensor that a function may act on.
@@ -63,7 +64,7 @@ pub(crate) struct Step {
 impl Step {
     /// Returns the track of the vehicle that the sensor watches.
     pub(crate) fn track(&self) -> Option<&Track> {
-        self.tracks.iter().min_by(|one, other| one.y_m().abs().total_cmp(&other.y_m().abs()))
+        self.tracks.iter().min_by(|a, b| a.y_m().abs().total_cmp(&b.y_m().abs()))
     }
 }
 
@@ -81,14 +82,14 @@ fn vehicle(actor: usize, s_m: f64, d_m: f64, speed_mps: f64) -> SceneVehicle {
 }
 
 /// Drives with the sensors, on the road and in the light of the scenario.
-pub(crate) fn drive(of: Of, sensors: &Sensors, scenario: &Scenario, (car, steps): (Option<Car>, i64)) -> Vec<Step> {
+pub(crate) fn drive(sensor: Of, sensors: &Sensors, scenario: &Scenario, (car, steps): (Option<Car>, i64)) -> Vec<Step> {
     let ego_id = ActorId::new("ego").unwrap();
     let mut perception = sensors.build(&NoiseKey { seed: 3, sample: 1, ego: ego_id, actors: [].into() }).unwrap();
     let environment = Environment { light: scenario.environment.light, ..Environment::CLEAR_DAY };
     let road: &Road = &scenario.road;
     let mut ego = vehicle(0, EGO_S_M, EGO_D_M, EGO_MPS);
     let length_m = ego.vehicle.dimensions.length_m;
-    let sign = if of.looks_ahead() { 1.0 } else { -1.0 };
+    let sign = if sensor.looks_ahead() { 1.0 } else { -1.0 };
     let of_car = |car: Car| {
         let s_m = EGO_S_M + sign * (car.gap_m + length_m);
         vehicle(1, s_m, EGO_D_M + car.left_m, EGO_MPS - sign * car.closing_mps)
@@ -97,16 +98,16 @@ pub(crate) fn drive(of: Of, sensors: &Sensors, scenario: &Scenario, (car, steps)
     let mut shown = Vec::new();
     for step in 0..steps {
         let scene = Scene { time: CONTROL_STEP * step, road, environment: &environment, ego, others: &others };
-        let is_own = |track: &&Track| track.source == of.source() && track.status != TrackStatus::Tentative;
+        let is_own = |track: &&Track| track.source == sensor.source() && track.status != TrackStatus::Tentative;
         let tracks = perception.step(&scene).unwrap().iter().filter(is_own).cloned().collect();
         let health = perception.health();
-        let health = match of.source() {
+        let health = match sensor.source() {
             Source::Front => health.front,
             Source::Surround => health.surround,
             Source::Rear => health.rear,
         };
         let (mut points_z_m, mut false_points) = (Vec::new(), 0);
-        for mounted in perception.lidars().iter().filter(|mounted| mounted.looks_ahead == of.looks_ahead()) {
+        for mounted in perception.lidars().iter().filter(|mounted| mounted.looks_ahead == sensor.looks_ahead()) {
             let (scan, truth) = (mounted.lidar.latest(), mounted.lidar.truth());
             for (index, point) in truth.points.iter().enumerate() {
                 match point.source {
@@ -130,12 +131,12 @@ pub(crate) struct Pair {
     pub(crate) faulty: Vec<Step>,
 }
 
-/// Drives with the sensors of a scenario without its faults, and with them: from their start to their end if `is_timed`, and else for
-/// the whole drive.
-pub(crate) fn pair(name: &str, of: Of, (car, steps): (Option<Car>, i64), is_timed: bool) -> Pair {
+/// Drives with the sensors of a scenario without its faults, and with them: from their start to
+/// their end if `is_timed`, and else for the whole drive.
+pub(crate) fn pair(name: &str, sensor: Of, (car, steps): (Option<Car>, i64), is_timed: bool) -> Pair {
     let without_camera = "sensors.rear-camera.pipeline=\"off\"";
-    // False points are then those of the fault.
-    let settings: &[&str] = match of {
+    // False points then come from the fault.
+    let settings: &[&str] = match sensor {
         Of::RearCamera => &[],
         Of::RearLidar => &[without_camera, "sensors.rear-lidar.false-alarm-rate=0.0"],
         Of::FrontLidar => &[without_camera, "sensors.front-lidar.false-alarm-rate=0.0"],
@@ -147,7 +148,7 @@ pub(crate) fn pair(name: &str, of: Of, (car, steps): (Option<Car>, i64), is_time
     assert_ne!(faults, Faults::default(), "{name} has no fault");
     let faulty = sensors.with_faults(if is_timed { faults } else { faults.throughout() });
     Pair {
-        usual: drive(of, &sensors.with_faults(Faults::default()), &scenario, (car, steps)),
-        faulty: drive(of, &faulty, &scenario, (car, steps)),
+        usual: drive(sensor, &sensors.with_faults(Faults::default()), &scenario, (car, steps)),
+        faulty: drive(sensor, &faulty, &scenario, (car, steps)),
     }
 }

@@ -1,4 +1,4 @@
-//! The tables of `docs/reference/output.md`, and what was written against them.
+//! The tables of `docs/reference/output.md`, compared with the written files.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -19,14 +19,15 @@ pub(super) fn rows(marker: &str) -> Vec<Vec<String>> {
     table.skip(2).map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
 }
 
-/// A documented key: its pattern, whether a reason may stand beside it, and whether a test can expect it.
+/// A documented key: its pattern, whether a reason may accompany it, and whether a test can expect
+/// it.
 struct Documented {
     pattern: String,
     may_be_absent: bool,
     is_rare: bool,
 }
 
-/// The keys of a table, with those of the tables that its marker includes.
+/// The keys of a table, with the keys of the tables that its marker includes.
 fn documented(name: &str) -> Vec<Documented> {
     let text = document();
     let start = format!("<!-- keys: {name}");
@@ -46,13 +47,14 @@ fn documented(name: &str) -> Vec<Documented> {
         })
         .collect();
     for include in includes.split(" + ").filter(|include| !include.is_empty()) {
-        // A question mark says that the test holds these keys elsewhere, and need not see each of them here.
+        // A question mark says that the test holds these keys elsewhere, and need not see each of
+        // them here.
         let (path, is_rare) = include.strip_suffix('?').map_or((include, false), |path| (path, true));
         let (prefix, section) = path.rsplit_once('.').unwrap_or(("", path));
-        all.extend(documented(section).into_iter().map(|one| Documented {
-            pattern: if prefix.is_empty() { one.pattern } else { format!("{prefix}.{}", one.pattern) },
-            is_rare: one.is_rare || is_rare,
-            ..one
+        all.extend(documented(section).into_iter().map(|entry| Documented {
+            pattern: if prefix.is_empty() { entry.pattern } else { format!("{prefix}.{}", entry.pattern) },
+            is_rare: entry.is_rare || is_rare,
+            ..entry
         }));
     }
     all
@@ -69,7 +71,7 @@ fn expanded(pattern: &str) -> Vec<String> {
     words.flat_map(|word| expanded(&format!("{}{word}{}", &pattern[..open], &pattern[close + 1..]))).collect()
 }
 
-/// True if a path is one of those that a pattern stands for.
+/// True if a pattern matches a path.
 fn matches(pattern: &str, path: &str) -> bool {
     let (pattern, path): (Vec<&str>, Vec<&str>) = (pattern.split('.').collect(), path.split('.').collect());
     let same =
@@ -110,19 +112,19 @@ impl Paths {
     }
 }
 
-/// Compares what was written with a table of keys, in both directions.
+/// Compares written keys with a table of keys, in both directions.
 pub(super) fn hold<'a>(section: &str, values: impl IntoIterator<Item = &'a Value>) {
     let paths = Paths::of(values);
     let documented = documented(section);
     let is_documented = |path: &str| {
-        let of = |path: &str, absent: bool| {
-            documented.iter().any(|one| (!absent || one.may_be_absent) && matches(&one.pattern, path))
+        let covers = |path: &str, absent: bool| {
+            documented.iter().any(|entry| (!absent || entry.may_be_absent) && matches(&entry.pattern, path))
         };
-        of(path, false) || path.strip_suffix("_absent").is_some_and(|path| of(path, true))
+        covers(path, false) || path.strip_suffix("_absent").is_some_and(|path| covers(path, true))
     };
     let unknown: Vec<_> = paths.leaves.iter().filter(|path| !is_documented(path)).collect();
     assert!(unknown.is_empty(), "docs/reference/output.md, {section}: written but not documented: {unknown:?}");
-    let is_written = |one: &&Documented| one.is_rare || paths.all.iter().any(|path| matches(&one.pattern, path));
-    let missing: Vec<_> = documented.iter().filter(|one| !is_written(one)).map(|one| &one.pattern).collect();
+    let is_written = |entry: &&Documented| entry.is_rare || paths.all.iter().any(|path| matches(&entry.pattern, path));
+    let missing: Vec<_> = documented.iter().filter(|entry| !is_written(entry)).map(|entry| &entry.pattern).collect();
     assert!(missing.is_empty(), "docs/reference/output.md, {section}: documented but not written: {missing:?}");
 }

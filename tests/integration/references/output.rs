@@ -1,4 +1,5 @@
-//! `docs/reference/output.md` against the files, columns and keys that small campaigns and runs write.
+//! `docs/reference/output.md` against the files, columns and keys that small campaigns and runs
+//! write.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -29,8 +30,8 @@ fn columns(path: &Path) -> Vec<[String; 3]> {
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
     let metadata = reader.metadata().file_metadata();
     let unit = |name: &str| {
-        let known = metadata.key_value_metadata()?.iter().find(|entry| entry.key == format!("unit:{name}"))?;
-        known.value.clone()
+        let unit = metadata.key_value_metadata()?.iter().find(|entry| entry.key == format!("unit:{name}"))?;
+        unit.value.clone()
     };
     let columns = metadata.schema_descr().columns().iter().map(|column| {
         let kind = match (column.physical_type(), column.logical_type_ref()) {
@@ -45,8 +46,8 @@ fn columns(path: &Path) -> Vec<[String; 3]> {
     columns.collect()
 }
 
-/// The documented columns of a table, each with its type and its unit. A value that may be absent has its reason in a
-/// column of its own behind it.
+/// The documented columns of a table, each with its type and its unit. A value that may be absent
+/// has its reason in a column of its own behind it.
 fn documented_columns(table: &str) -> Vec<[String; 3]> {
     let rows = rows(&format!("columns: {table} -->"));
     let columns = rows.iter().flat_map(|cells| {
@@ -82,8 +83,10 @@ fn the_columns_of_a_campaign_s_tables_are_those_documented() {
     for kind in patterns.iter().map(|[_, kind, _]| kind) {
         assert!(parameters.iter().any(|[_, written, _]| written == kind), "no parameter is a {kind}");
     }
-    assert!(parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, known, _]| known == kind)));
-    // The unit of this table stands in Arrow's metadata alone.
+    assert!(
+        parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, documented_kind, _]| documented_kind == kind))
+    );
+    // Only Arrow's metadata state the unit of this table.
     let names = |columns: Vec<[String; 3]>| columns.into_iter().map(|[name, kind, _]| [name, kind]).collect::<Vec<_>>();
     for table in ["timings.parquet", "arm_pairs.parquet"] {
         assert_eq!(names(columns(&out.join(table))), names(documented_columns(table)));
@@ -147,8 +150,8 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let (headline, harmless) = (headline.to_str().unwrap(), harmless.to_str().unwrap());
     let both = ["campaign", headline, harmless, "-n", "10", "--seed", "1", "--set", "duration-s=60"];
     let with = |more: &[&str], code| program(&[&both[..], more].concat(), code);
-    // Few samples leave a strict bound open; a loose one is certain after some of them, which the clock may not decide.
-    // They leave the requirements open in both.
+    // Few samples leave a strict bound open. A loose bound is certain after some of them, which the
+    // clock may not decide. They leave the requirements open in both.
     let open = with(&["--paired", "--max-probability", "0.2", "--out", &at("open"), "--record", "worst:1"], 4);
     let certain = with(&["--paired", "--max-probability", "0.6", "--until-certain"], 4);
     // A flag has an interval and a percentile has none; the last gate needs more samples.
@@ -233,8 +236,8 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     hold("lane-changes", each(&changes));
     let list = at("list.csv");
     let first = &changes[0];
-    let known = format!("overtake-without-brake,{},{},left,1\n", first["track_id"], first["crossing_s"]);
-    std::fs::write(&list, format!("recording_id,track_id,time_s,direction,clear\n{known}")).unwrap();
+    let known_change = format!("overtake-without-brake,{},{},left,1\n", first["track_id"], first["crossing_s"]);
+    std::fs::write(&list, format!("recording_id,track_id,time_s,direction,clear\n{known_change}")).unwrap();
     hold("lane-changes-scored", [&program(&["traffic", "lane-changes", &csv, "--reference", &list], 0)]);
     // Of few vehicles some metrics have no value, and some quantities too few.
     let few = at("few.csv");
@@ -243,8 +246,9 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     stdout(&closecall(record), 0);
     let alone = at("alone.csv");
     alone_in(&few, first["track_id"].as_u64().unwrap(), &alone);
-    let (many, one) = (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
-    hold("criticality", each(&many).into_iter().chain(each(&one)));
+    let (many, single) =
+        (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
+    hold("criticality", each(&many).into_iter().chain(each(&single)));
     hold("reenact", [&program(&["traffic", "reenact", &csv], 0)]);
     let sampled =
         program(&["traffic", "sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);

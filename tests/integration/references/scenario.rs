@@ -1,4 +1,4 @@
-//! `docs/reference/scenario.md` against its generator, and what it states against the program.
+//! `docs/reference/scenario.md` against its generator, and its statements against the program.
 
 use closecall_traffic::{KeyPath, Segment};
 
@@ -64,7 +64,7 @@ fn the_defaults_that_the_scenario_reference_states_are_those_of_the_program() {
     let mut checked = 0;
     for table in tables(schema.as_value(), &|key| probe.position(key)) {
         for key in table.keys.iter().filter(|key| matches!(key.kind, Kind::Number { .. } | Kind::Whole)) {
-            let stated = default_in(&key.description).map(|found| found.value);
+            let stated = default_in(&key.description).map(|default| default.value);
             let Some(stated) = stated.and_then(|text| number(&text, &key.kind)) else { continue };
             for way in &table.ways {
                 let inner: Vec<_> = way.iter().cloned().chain([Step::Key(key.name.clone())]).collect();
@@ -90,7 +90,8 @@ fn the_defaults_that_the_scenario_reference_states_are_those_of_the_program() {
     }
 }
 
-/// True if the scenario with `value` at `at` is the scenario without any value there, or is refused for the same reason.
+/// True if the scenario with `value` at `at` is the scenario without any value there, or is refused
+/// for the same reason.
 fn is_default(probe: &Probe, at: &KeyPath, value: &toml::Value) -> bool {
     let concrete = |value: Option<toml::Value>| {
         let file = probe.check(&probe.with(at, value).unwrap()).map_err(|error| error.to_string())?;
@@ -99,7 +100,8 @@ fn is_default(probe: &Probe, at: &KeyPath, value: &toml::Value) -> bool {
     concrete(Some(value.clone())) == concrete(None)
 }
 
-/// A stated default as a value of the file. The minus sign of prose is another character than that of a file.
+/// A stated default as a value of the file. The minus sign of prose differs from the minus sign of
+/// a file.
 fn number(text: &str, kind: &Kind) -> Option<toml::Value> {
     let plain = text.replace('−', "-");
     match kind {

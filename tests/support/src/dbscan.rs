@@ -2,10 +2,10 @@
 
 /// Returns the cluster of each point, `None` for noise.
 ///
-/// A core point has at least `core_points` points at most `radius` away, itself included. A cluster is a connected component of
-/// core points, with the other points within the radius of one of them. Clusters are numbered in the order of their first
-/// core points. A point at the border of several clusters belongs to the first of these. Takes time with the square of the number of
-/// points.
+/// A core point has at least `core_points` points at most `radius` away, itself included. A cluster
+/// is a connected component of core points, with the other points within the radius of one of them.
+/// Clusters are numbered in the order of their first core points. A point at the border of several
+/// clusters belongs to the first of these. Takes time with the square of the number of points.
 pub fn dbscan_by_definition(points: &[[f64; 2]], radius: f64, core_points: usize) -> Vec<Option<usize>> {
     let is_near = |one: [f64; 2], other: [f64; 2]| {
         let (x, y) = (one[0] - other[0], one[1] - other[1]);

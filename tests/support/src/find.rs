@@ -1,4 +1,5 @@
-//! The search for what a test needs. Each function says that the test is skipped if it finds nothing.
+//! The search for the requirements of a test. Each function says that the test is skipped if it
+//! finds nothing.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -50,8 +51,8 @@ pub fn has_python() -> bool {
     found(runs("python3", "--version"), Need::Python, "python3 is not installed").is_some()
 }
 
-/// Returns a Python interpreter that has the packages `onnxruntime` and `numpy`: that of the environment in which the shared library of
-/// ONNX Runtime lies.
+/// Returns a Python interpreter with the packages `onnxruntime` and `numpy`, from the environment
+/// of the shared library of ONNX Runtime.
 ///
 /// # Panics
 /// As [`skip`].
@@ -60,8 +61,8 @@ pub fn python_with_onnxruntime() -> Option<PathBuf> {
     found(python_around(&onnxruntime()?, "numpy, onnxruntime"), Need::Python, reason)
 }
 
-/// Returns a Python interpreter that has the packages `rerun`, `datafusion`, `pandas` and `matplotlib`: that of the environment in which
-/// the Rerun viewer lies.
+/// Returns a Python interpreter with the packages `rerun`, `datafusion`, `pandas` and `matplotlib`,
+/// from the environment of the Rerun viewer.
 ///
 /// # Panics
 /// As [`skip`].

@@ -1,11 +1,13 @@
-//! For tests only: finds what a test needs of the machine, and skips or fails the test if the machine lacks it. Also has the
-//! reference implementation that the clustering is compared with, [`dbscan_by_definition`].
+//! For tests only: finds the requirements of a test on the machine, and skips or fails the test if
+//! the machine lacks one. Also has [`dbscan_by_definition`], the reference implementation for the
+//! clustering.
 //!
-//! A few tests compare Closecall with other programs, or read trajectory data that is not part of the repository. On a
-//! machine that lacks one of these, such a test says `skipped (NEED): REASON` and passes. The environment variable
-//! `CLOSECALL_REQUIRE` lists needs, separated by commas, that must not be lacking: `CLOSECALL_REQUIRE=viewer,data`. A
-//! test that lacks one of them fails. A word that is not a need fails every test that asks for one, so that a misspelt
-//! variable cannot go unnoticed.
+//! A few tests compare Closecall with other programs, or read trajectory data that is not part of
+//! the repository. On a machine that lacks one of these, such a test says `skipped (NEED): REASON`
+//! and passes. The environment variable `CLOSECALL_REQUIRE` lists needs, separated by commas, that
+//! must not be lacking: `CLOSECALL_REQUIRE=viewer,data`. A test that lacks one of them fails. A
+//! word that is not a need fails every test that asks for one, so that a misspelt variable cannot
+//! go unnoticed.
 //!
 //! | need | found by |
 //! |---|---|

@@ -7,15 +7,17 @@ use crate::Need;
 /// The environment variable that lists the needs that must not be lacking.
 const VARIABLE: &str = "CLOSECALL_REQUIRE";
 
-/// Says that the calling test is skipped because `need` is lacking. The test has to return after this call.
+/// Says that the calling test is skipped because `need` is lacking. The test has to return after
+/// this call.
 ///
-/// The message goes to standard error past the test runner's capture, so that it shows although the test passes.
+/// The message goes to standard error past the test runner's capture, and shows although the test
+/// passes.
 ///
 /// # Panics
 /// If `CLOSECALL_REQUIRE` lists `need`, or holds a word that is not a need.
 pub fn skip(need: Need, reason: &str) {
     match decide(&required(), need, reason) {
-        // One write, so that lines of tests that run at the same time do not mix.
+        // One write: lines of tests that run at the same time do not mix.
         Ok(message) => std::io::stderr().write_all(message.as_bytes()).expect("standard error is open"),
         Err(message) => panic!("{message}"),
     }
@@ -30,7 +32,8 @@ pub(crate) fn required() -> Vec<Need> {
     parse(&list.to_string_lossy()).unwrap_or_else(|message| panic!("{message}"))
 }
 
-/// Reads a list of needs. Empty entries count for nothing, so that a script may build the list by appending.
+/// Reads a list of needs. Empty entries count for nothing, so that a script may build the list by
+/// appending.
 fn parse(list: &str) -> Result<Vec<Need>, String> {
     list.split(',').map(str::trim).filter(|word| !word.is_empty()).map(str::parse).collect()
 }
@@ -63,8 +66,8 @@ mod tests {
     #[test]
     fn an_unknown_word_is_an_error_that_lists_the_known_ones() {
         let message = parse("viewer,veiwer").unwrap_err();
-        let known = "viewer, onnxruntime, display, data, python, browser, exchange";
-        assert_eq!(message, format!("CLOSECALL_REQUIRE holds the unknown word `veiwer`; known are {known}"));
+        let words = "viewer, onnxruntime, display, data, python, browser, exchange";
+        assert_eq!(message, format!("CLOSECALL_REQUIRE holds the unknown word `veiwer`; known are {words}"));
         assert!(parse("Viewer").is_err() && parse("viewer data").is_err());
     }
 

@@ -1,4 +1,5 @@
-//! The machine of a schedule: it runs the samples of a campaign with the program's client and simulated processes.
+//! The machine of a schedule: it runs the samples of a campaign with the program's client and
+//! simulated processes.
 
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -19,7 +20,8 @@ use crate::workers::{Finished, OnFinished, SampleRunner, Samples};
 /// The time limit of a sample.
 const LIMIT: Duration = Duration::from_secs(1);
 
-/// How answers are read and retries recorded: as the program does it, or with one of its checks removed.
+/// How answers are read and retries recorded: as the program does it, or with one of its checks
+/// removed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reader {
     OfTheProgram,

@@ -1,20 +1,23 @@
-//! Campaigns in a simulated world: worker processes, their pipes and the clock follow a schedule that a seed determines.
+//! Campaigns in a simulated world: worker processes, their pipes and the clock follow a schedule
+//! that a seed determines.
 //!
 //! ```text
 //!  seed ─▶ faults ─▶ simulated processes ─▶ Client ─▶ Campaign::run ─▶ journal ─▶ resume ─▶ verdict
 //!                 └▶ kills, damaged journals ─────────────────────────────┘
 //! ```
 //!
-//! A schedule tests the real client, campaign, journal, repair and verdict. Only processes and clock are simulated. It runs a small
-//! campaign in a folder, interrupts and resumes it, and ends with a run without faults. Whatever happens,
+//! A schedule tests the real client, campaign, journal, repair and verdict. Only processes and
+//! clock are simulated. It runs a small campaign in a folder, interrupts and resumes it, and ends
+//! with a run without faults. Whatever happens,
 //!
 //! 1. an outcome in the journal is the one of its sample,
 //! 2. no verdict and no baseline comes from a part of the samples,
 //! 3. no PASS hides a sample without an outcome,
 //! 4. the last run completes the campaign to the records of an undisturbed one.
 //!
-//! The idea is that of FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled Transactional Key Value Store",
-//! SIGMOD 2021). `CLOSECALL_SCHEDULES=1000000` sets the number of schedules, `CLOSECALL_SCHEDULE=SEED` runs one of them.
+//! The idea comes from FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled
+//! Transactional Key Value Store", SIGMOD 2021). `CLOSECALL_SCHEDULES=1000000` sets the number of
+//! schedules, `CLOSECALL_SCHEDULE=SEED` runs one of them.
 
 mod machine;
 mod process;
@@ -34,7 +37,8 @@ fn number_from_env(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is no number: `{text}`")))
 }
 
-/// Runs schedules, and returns the first violation by seed, with the number of schedules that met a fault.
+/// Runs schedules, and returns the first violation by seed, with the number of schedules that met a
+/// fault.
 fn run(setup: &Setup, reader: Reader, seeds: std::ops::Range<u64>) -> (Option<(u64, Violation)>, usize) {
     let results: Vec<_> = seeds.into_par_iter().map(|seed| (seed, setup.run(seed, reader))).collect();
     let disturbed = results.iter().filter(|(_, result)| !matches!(result, Ok(0))).count();
@@ -57,7 +61,8 @@ fn no_schedule_files_a_wrong_outcome_or_hides_a_lost_one() {
     assert!(count == 1 || disturbed as u64 > count / 2, "{disturbed} of {count} schedules have a fault");
 }
 
-/// Without the check of the identity, an answer to another question is filed under the sample that was asked for.
+/// Without the check of the identity, an answer to another question is filed under the sample that
+/// was asked for.
 #[test]
 fn a_client_that_believes_every_answer_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Believing, 0..2_000);
@@ -65,7 +70,7 @@ fn a_client_that_believes_every_answer_is_found_out() {
     assert!(matches!(violation, Violation::OtherOutcome { .. } | Violation::OwnJournalRefused { .. }), "{violation}");
 }
 
-/// Without the count of what is retried, a crash leaves no trace.
+/// Without the count of retries, a crash leaves no trace.
 #[test]
 fn a_client_that_repeats_in_silence_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Silent, 0..2_000);

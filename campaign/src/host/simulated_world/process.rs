@@ -1,4 +1,5 @@
-//! A simulated worker process: it answers from a table of true records, unless the schedule has a fault for it.
+//! A simulated worker process: it answers from a table of true records, unless the schedule has a
+//! fault for it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::os::unix::process::ExitStatusExt;
@@ -22,7 +23,7 @@ const SIGSEGV: i32 = 11;
 /// The true records: by arm, then by sample.
 pub(super) type Truth = Vec<Vec<ArmRecord>>;
 
-/// What all processes of a schedule share.
+/// The common state of all processes of a schedule.
 pub(super) struct State {
     /// The clock.
     pub(super) now: Duration,
@@ -48,7 +49,7 @@ pub(super) fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What arrives in the pipe.
+/// An arrival in the pipe.
 enum Arrival {
     Line(Vec<u8>),
     /// A line that says that a call hangs and that the process ends.
@@ -74,36 +75,36 @@ pub(super) struct Process {
     earlier: VecDeque<Question>,
 }
 
-/// What a process does instead of answering once.
+/// A fault of a process, instead of answering once.
 #[derive(Clone, Copy)]
 enum Fault {
-    /// It answers twice.
+    /// The process answers twice.
     Twice,
     /// An earlier answer comes once more, before the right one.
     EarlierAgain,
     /// A copy of the process (`fork`) has run ahead, and answers the next sample.
     AnotherSample,
-    /// It repeats the question, and gives the record of another sample.
+    /// The process repeats the question, and gives the record of another sample.
     AnotherRecord,
-    /// It gives the record of the other arm.
+    /// The process gives the record of the other arm.
     AnotherArm,
-    /// It answers for another campaign.
+    /// The process answers for another campaign.
     AnotherTask,
     /// Its copy answers, and says so.
     Copy,
     /// Both it and its copy answer, in either order.
     ProcessAndCopy,
-    /// It ends in the middle of its answer.
+    /// The process ends in the middle of its answer.
     Cut,
-    /// It prints what is no answer.
+    /// The process prints a line that is no answer.
     Print,
     TooLong,
     CrashBefore,
     CrashAfter,
     Hang,
-    /// It answers after the time limit.
+    /// The process answers after the time limit.
     Late,
-    /// It reports that a call hangs, and ends.
+    /// The process reports that a call hangs, and ends.
     HangingCall,
 }
 
@@ -145,7 +146,7 @@ impl Process {
         Answer { question: question.clone(), copied_from: None, record, wall_s: 0.01, check_s: 0.0, is_last: false }
     }
 
-    /// Runs a sample: writes what the process writes, and when.
+    /// Runs a sample: writes the lines of the process, and their times.
     fn serve(&mut self, state: &mut State, question: &Question, limit: Duration) {
         let right = self.answer(question, self.arm, question.sample);
         let at = state.now + ANSWER_TIME;
@@ -220,7 +221,7 @@ impl Process {
         }
     }
 
-    /// Takes what has arrived until `until`, the earliest first.
+    /// Takes the lines that have arrived until `until`, the earliest first.
     fn take(&mut self, until: Duration) -> Option<(Duration, Arrival)> {
         let first = self.pipe.first_entry().filter(|first| first.key().0 <= until.as_nanos())?;
         let at = Duration::from_nanos(u64::try_from(first.key().0).unwrap());
@@ -234,7 +235,8 @@ impl Process {
 }
 
 impl Peer for Process {
-    /// As the process of the operating system: what has arrived before the question is a line that nobody has asked for.
+    /// Like the process of the operating system: a line that has arrived before the question is a
+    /// line without a question.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         let shared = Arc::clone(&self.state);
         let mut state = lock(&shared);

@@ -1,4 +1,5 @@
-//! One schedule: a campaign that is disturbed, interrupted, damaged and resumed, and what must hold of it.
+//! One schedule: a campaign that is disturbed, interrupted, damaged and resumed, and the properties
+//! that must hold.
 
 use std::fmt;
 use std::fs;
@@ -38,7 +39,7 @@ const MOST_RUNS: u32 = 3;
 /// Probabilities of a fault at a question (-).
 const RATES: [f64; 3] = [0.02, 0.1, 0.3];
 
-/// What a schedule has shown and must never show.
+/// A violation: what no schedule may show.
 #[derive(Debug)]
 pub(super) enum Violation {
     /// The journal files the outcome of another sample.
@@ -54,7 +55,7 @@ pub(super) enum Violation {
     /// The program refuses the journal that it has written.
     OwnJournalRefused { message: String },
     /// The last run, which has no fault, does not give the records of an undisturbed campaign.
-    Unlike { what: String },
+    Unlike { difference: String },
 }
 
 impl fmt::Display for Violation {
@@ -70,7 +71,9 @@ impl fmt::Display for Violation {
             Self::HiddenError { errors, verdict } => write!(f, "{errors} errors, and the verdict is {verdict:?}"),
             Self::OwnJournalRefused { message } => write!(f, "the program refuses its own journal: {message}"),
             Self::ForeignLine => f.write_str("a journal with a line of another campaign is resumed"),
-            Self::Unlike { what } => write!(f, "the last run, without faults, is unlike an undisturbed one: {what}"),
+            Self::Unlike { difference } => {
+                write!(f, "the last run, without faults, is unlike an undisturbed one: {difference}")
+            }
         }
     }
 }
@@ -165,13 +168,13 @@ impl Setup {
         campaign.retry_errors = run.retry_errors;
         let work = campaign.works[0].as_ref().clone();
         campaign.works = vec![Arc::new(crate::runner::Work { retry_crashed: run.retry_crashed, ..work })];
-        let (mut summary, mut seen, mut run_now) = (campaign.summary(), 0, 0);
+        let (mut summary, mut records, mut run_now) = (campaign.summary(), 0, 0);
         let mut judge = Judge::new(&campaign.works, &self.gates, campaign.inference);
         let locked = Folder::lock(path, &self.manifest, true).unwrap();
         let ended = campaign.run(Some(&locked), |next| {
             summary.push(next.record);
             judge.push(next.record);
-            seen += 1;
+            records += 1;
             run_now += u64::from(next.is_new);
             match run.kill_after {
                 Some(last) if next.is_new && last == run_now => ControlFlow::Break(End::Campaign),
@@ -188,10 +191,10 @@ impl Setup {
         self.check_outcomes(path)?;
         let complete: Result<Vec<Record>, FolderError> = locked.folder.complete_records().unwrap().collect();
         if complete.is_ok() != (journal_lines(path).len() as u64 == SAMPLES) {
-            return Err(Violation::PartialData { has: seen });
+            return Err(Violation::PartialData { has: records });
         }
         let errors = summary.total().errors();
-        let verdict = (seen == SAMPLES).then(|| verdict::judge(&summary, &judge, (&self.gates).into()).verdict());
+        let verdict = (records == SAMPLES).then(|| verdict::judge(&summary, &judge, (&self.gates).into()).verdict());
         let verdict = verdict.flatten();
         if errors > 0 && verdict.is_some_and(|verdict| verdict != Verdict::Error) {
             return Err(Violation::HiddenError { errors, verdict });
@@ -215,8 +218,8 @@ impl Setup {
         Ok(())
     }
 
-    /// Damages the journal as a power failure, a disk or a person does. A damage that resuming refuses is undone. Returns
-    /// whether there was one.
+    /// Damages the journal as a power failure, a disk or a person does. A damage that resuming
+    /// refuses is undone. Returns whether there was one.
     fn damage(&self, path: &Path, random: &mut Stream, reader: Reader) -> Result<bool, Violation> {
         let journal = path.join(JOURNAL);
         let before = fs::read(&journal).unwrap();
@@ -281,11 +284,11 @@ impl Setup {
         there.iter_mut().flat_map(|record| &mut record.arms).for_each(|arm| arm.flaky = None);
         let undisturbed = records(&self.truth, self.campaign.works[0].scenario());
         if there != undisturbed {
-            return Err(Violation::Unlike { what: format!("{} records", there.len()) });
+            return Err(Violation::Unlike { difference: format!("{} records", there.len()) });
         }
         match end {
             Some(Verdict::Pass) => Ok(()),
-            other => Err(Violation::Unlike { what: format!("the verdict is {other:?}") }),
+            other => Err(Violation::Unlike { difference: format!("the verdict is {other:?}") }),
         }
     }
 }

@@ -66,7 +66,7 @@ fn unchanged(block: u64, bytes: Vec<u8>) -> Vec<(u64, Vec<u8>)> {
     vec![(block, bytes)]
 }
 
-/// Returns the campaign of the first seed on machines that run that of the second one.
+/// Returns the campaign of the first seed on machines that run the campaign of the second seed.
 fn campaign(seeds: [u64; 2], change: Change) -> (Campaign, Manifest) {
     let [here, there] = seeds.map(|seed| plan(seed).manifest(Vec::new()).unwrap());
     let runner = BlockRunner::prepare(&Shipment::of(&there).unwrap()).unwrap();
@@ -126,10 +126,10 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// Takes an answer for that of the seed 3, which it is not.
+/// Disguises an answer as an answer of the seed 3.
 fn disguised(block: u64, bytes: Vec<u8>) -> Vec<(u64, Vec<u8>)> {
-    let [own, other] = [3, 4].map(|seed| plan(seed).manifest(Vec::new()).unwrap().configuration());
-    let disguised = text(&bytes).replace(&other, &own);
+    let [claimed, other] = [3, 4].map(|seed| plan(seed).manifest(Vec::new()).unwrap().configuration());
+    let disguised = text(&bytes).replace(&other, &claimed);
     assert_ne!(disguised.as_bytes(), bytes);
     vec![(block, disguised.into_bytes())]
 }
@@ -178,7 +178,7 @@ fn a_machine_with_another_campaign_is_refused() {
     let other = Shipment { version: "0.0.1+00".to_owned(), ..shipment.clone() };
     let message = error(&other).to_string();
     assert!(message.contains("0.0.1+00") && message.contains(&manifest.closecall_version), "{message}");
-    // What the manifest says about the scenario must be what the machine makes of its text.
+    // The manifest's statements about the scenario must agree with the text that the machine reads.
     let mut changed = manifest.clone();
     changed.scenarios[0].blake3 = blake3::hash(b"").to_string();
     let other = Shipment::of(&changed).unwrap();

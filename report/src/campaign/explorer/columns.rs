@@ -1,6 +1,7 @@
 //! The samples of one scenario in columns, as the page holds them.
 //!
-//! The parameters of a sample are the same in all arms, so that they stand once. A column without a second value is left out.
+//! The parameters of a sample are the same in all arms, so the page holds them once. A column
+//! without a second value is left out.
 
 use std::collections::BTreeMap;
 
@@ -36,7 +37,7 @@ pub(super) struct Samples {
     parameters: Vec<Values>,
     /// The columns of each arm.
     outcomes: Vec<Vec<Values>>,
-    /// Names of the two parameters that tell the most about the outcome.
+    /// Names of the two parameters that determine the outcome most.
     map: Vec<String>,
     #[serde(skip)]
     sources: Vec<Column>,
@@ -82,7 +83,8 @@ impl Values {
         Some(index)
     }
 
-    /// Returns true if the column can be looked at: it has several values, and not as many words as free text.
+    /// Returns true if the column can be looked at: it has several values, and not as many words as
+    /// free text.
     fn is_shown(&self) -> bool {
         let first = self.values.first();
         self.values.iter().any(|value| Some(value) != first)
@@ -96,18 +98,18 @@ impl Samples {
             .into_iter()
             .filter(|column| !LEFT_OUT.contains(&column.name.as_str()) && !column.name.ends_with("_absent"))
             .collect();
-        let of = |is_parameter: bool| {
+        let values_of = |is_parameter: bool| {
             let chosen = sources.iter().filter(move |column| column.name.starts_with(PARAMETER) == is_parameter);
             chosen.map(|column| Values::new(&column.name, column.is_number()))
         };
-        let outcomes = || of(false).chain([Values::new(CAUSE, false)]).collect();
+        let outcomes = || values_of(false).chain([Values::new(CAUSE, false)]).collect();
         Self {
             scenario: file.config().name.clone(),
             arms: arms.to_vec(),
             is_paired: arms.len() > 1,
             numbers: Vec::new(),
             fates: Vec::new(),
-            parameters: of(true).collect(),
+            parameters: values_of(true).collect(),
             outcomes: arms.iter().map(|_| outcomes()).collect(),
             map: Vec::new(),
             sources,
@@ -141,7 +143,8 @@ impl Samples {
         }
     }
 
-    /// Leaves out what cannot be looked at, and adds which parameters tell the most. `overview` is of the same samples.
+    /// Leaves out the columns that cannot be looked at, and adds the parameters that determine the
+    /// outcome most. `overview` is of the same samples.
     pub(super) fn finish(&mut self, overview: &ScenarioOverview) {
         self.parameters.retain(Values::is_shown);
         let shown: Vec<bool> = match self.outcomes.first() {
@@ -150,7 +153,7 @@ impl Samples {
                     let first = columns[index].values.first().copied().flatten();
                     let differs = |arm: &Vec<Values>| arm[index].values.first().copied().flatten() != first;
                     let is_filter = [REASON, CAUSE].contains(&columns[index].name.as_str());
-                    // In one arm a column may be constant that differs from arm to arm.
+                    // A column may be constant in one arm and differ from arm to arm.
                     is_filter || self.outcomes.iter().any(|arm| arm[index].is_shown() || differs(arm))
                 })
                 .collect(),

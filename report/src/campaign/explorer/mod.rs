@@ -1,4 +1,5 @@
-//! The explorer: a page on which the samples of a campaign are filtered, brushed and looked at one by one.
+//! The explorer: a page on which the samples of a campaign are filtered, brushed and looked at one
+//! by one.
 //!
 //! ```text
 //!  journal ─▶ columns of numbers and words ─┐
@@ -7,11 +8,12 @@
 //!                                                 └ served: a sample runs again when it is chosen
 //! ```
 //!
-//! The columns are those of `outcomes.parquet`. Plotly draws the charts; the page's own script filters, counts and links them. What is
-//! drawn does not grow with the campaign: histograms have bins, planes have cells and an even choice of points.
+//! The columns are the columns of `outcomes.parquet`. Plotly draws the charts; the page's own
+//! script filters, counts and links them. The drawn data do not grow with the campaign: histograms
+//! have bins, planes have cells and an even choice of points.
 //!
-//! `plotly` is the only crate found that carries the script of an interactive chart library: `charming` links ECharts from a server
-//! unless a JavaScript engine is built in.
+//! `plotly` is the only crate with the script of an interactive chart library: `charming` links
+//! ECharts from a server unless a JavaScript engine is built in.
 
 mod columns;
 mod page;

@@ -28,10 +28,10 @@ const OWN_STYLE: &str = include_str!("explorer.css");
 const SCRIPT: &str = include_str!("explorer.js");
 /// Number of histograms.
 const HISTOGRAMS: usize = 4;
-/// The number in the command of a sample that the page replaces by that of the chosen sample.
+/// The sample number in a command. The page replaces it by the number of the chosen sample.
 const PLACE: u64 = 9_876_543_210;
 
-/// What the script reads.
+/// The data of the script.
 #[derive(Serialize)]
 struct Data<'a> {
     is_served: bool,
@@ -107,8 +107,8 @@ pub fn explorer_page(saved: &SavedCampaign, place: &PagePlace, command_for: Comm
     }
     let command = |file: &ScenarioFile| {
         let scenario = (files.len() > 1).then_some(file.config().name.as_str());
-        let of = SavedSample { folder: ".", sample: PLACE, scenario };
-        command_for(&Action::Replay(Replay { is_paired: arms.len() > 1, ..Replay::new(of) }))
+        let saved_sample = SavedSample { folder: ".", sample: PLACE, scenario };
+        command_for(&Action::Replay(Replay { is_paired: arms.len() > 1, ..Replay::new(saved_sample) }))
     };
     let style =
         |fate: Fate| FateStyle { pair: fate.word(true), single: fate.word(false), colour: css(fate_colour(fate)) };
@@ -134,7 +134,7 @@ fn written(saved: &SavedCampaign, source: std::io::Error) -> ReportError {
     closecall_traffic::atomic::WriteError::new(saved.folder().path(), source).into()
 }
 
-/// What the page holds in compressed form.
+/// The compressed content of the page.
 struct Packed {
     data: String,
     plotly: String,

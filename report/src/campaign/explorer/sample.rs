@@ -16,7 +16,8 @@ pub fn sample_part(films: &[Film]) -> String {
     })
 }
 
-/// Returns the smallest case of a sample that fails, and beside it its twin that passes, as a part of a page. `films` are those of both.
+/// Returns the smallest failing case of a sample beside its twin that passes, as a part of a page.
+/// `films` are the films of both.
 pub fn twin_part(minimized: &Minimized, films: &[Film]) -> String {
     finished(&html! {
         h3 { "The smallest case that fails" }

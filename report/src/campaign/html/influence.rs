@@ -1,4 +1,4 @@
-//! What moves the result of a scenario, from the campaign's own samples.
+//! The influence of parameters on the result of a scenario, from the campaign's own samples.
 
 use std::io;
 

@@ -1,4 +1,5 @@
-//! The counts: how often the ego collides in each arm, how sure that is, and what the system under test changes.
+//! The counts: how often the ego collides in each arm, the confidence of this rate, and the changes
+//! by the system under test.
 
 use super::super::text::{goals, imposed, not_prevented};
 use std::io;
@@ -159,7 +160,7 @@ fn arm_pairs(summary: &Summary) -> Markup {
     }
 }
 
-/// Returns what the validity checks found in each scenario; empty if no run was checked.
+/// Returns the findings of the validity checks in each scenario; empty if no run was checked.
 pub(super) fn validity(findings: &Findings<'_>) -> Markup {
     let summary = findings.summary;
     if summary.scenarios.iter().all(|(_, counts)| counts.checks.runs == 0) {

@@ -12,9 +12,10 @@
 //!    each recorded sample              a picture, its numbers, how to open it
 //! ```
 //!
-//! The templates are maud's, which escapes every text. A page stands alone: it holds its style sheet and its charts, and loads
-//! nothing. Only the page of the recordings runs a script. A campaign's page shows wall times and its date, so that it is
-//! not among the files that are byte-identical in a repetition.
+//! The templates are maud's, which escapes every text. A page stands alone: it holds its style
+//! sheet and its charts, and loads nothing. Only the page of the recordings runs a script. A
+//! campaign's page shows wall times and its date, so that it is not among the files that are
+//! byte-identical in a repetition.
 
 mod coverage;
 mod influence;

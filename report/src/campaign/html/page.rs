@@ -23,8 +23,9 @@ pub fn document(title: &str, body: &Markup) -> Markup {
     }
 }
 
-/// Returns a table; `head` holds cells, `rows` holds rows. On a narrow page each row becomes a list in which every cell has the name
-/// of its column, and on a page that is wider but not wide enough the table scrolls sideways.
+/// Returns a table; `head` holds cells, `rows` holds rows. On a narrow page each row becomes a list
+/// in which every cell has the name of its column, and on a page that is wider but not wide enough
+/// the table scrolls sideways.
 pub fn table(head: &Markup, rows: &Markup) -> Markup {
     html! {
         div.wide tabindex="0" {

@@ -1,4 +1,4 @@
-//! What a repetition of the campaign needs, and the sources of the sampled values.
+//! Everything that a repetition of the campaign needs, and the sources of the sampled values.
 
 use closecall_scenarios::parameters::Provenance;
 use maud::{Markup, html};
@@ -8,10 +8,11 @@ use crate::campaign::findings::Findings;
 use crate::date::today;
 use crate::units::labelled;
 
-/// Returns the versions, the command, the files and the sampling, then the sources of each scenario's parameters.
+/// Returns the versions, the command, the files and the sampling, then the sources of each
+/// scenario's parameters.
 pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
     let rows = html! {
-        @for (what, value) in entries(findings) { tr { td { (what) } td { code { (value) } } } }
+        @for (name, value) in entries(findings) { tr { td { (name) } td { code { (value) } } } }
     };
     html! {
         h2 { "How it was made" }
@@ -35,7 +36,7 @@ pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
 fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     let manifest = findings.manifest;
     let mut entries = vec![("closecall", manifest.closecall_version.clone()), ("command", manifest.command.join(" "))];
-    // All that determines the outcomes: two pages with the same hash are about the same campaign.
+    // Everything that determines the outcomes: two pages with the same hash show the same campaign.
     if let Some(json) = manifest.determining_json() {
         entries.push(("configuration", format!("BLAKE3 {}", blake3::hash(json.as_bytes()).to_hex())));
     }

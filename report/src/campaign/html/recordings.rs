@@ -1,5 +1,5 @@
-//! The page of a campaign's recordings: a picture of each critical moment beside its numbers, and the commands that open
-//! the recording and run the sample again.
+//! The page of a campaign's recordings: a picture of each critical moment beside its numbers, and
+//! the commands that open the recording and run the sample again.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -21,13 +21,13 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) scenario: String,
     /// The sample's number.
     pub(in crate::campaign) sample: u64,
-    /// Why it was recorded, in words.
+    /// The reasons for its recording, in words.
     pub(in crate::campaign) reasons: Vec<&'static str>,
     /// The recording's file, relative to the page.
     pub(in crate::campaign) file: String,
     /// The command that runs the sample again.
     pub(in crate::campaign) replay: String,
-    /// For each arm: how the run ended in one sentence, and what the system under test did.
+    /// For each arm: the end of the run in one sentence, and the actions of the system under test.
     pub(in crate::campaign) story: Vec<String>,
     /// The critical moment, as SVG.
     pub(in crate::campaign) still: String,
@@ -35,7 +35,7 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) scrubber: Markup,
     /// The verdict on the pair, or on the only run.
     pub(in crate::campaign) verdict: &'static str,
-    /// What happened in the arm under test and why, in one sentence.
+    /// The event in the arm under test and its cause, in one sentence.
     pub(in crate::campaign) sentence: String,
     /// The outcome of each arm, the baseline first.
     pub(in crate::campaign) outcomes: Vec<Outcome>,
@@ -78,7 +78,8 @@ fn page(entries: &[IndexEntry], command_for: CommandFor) -> Markup {
 /// Filters the entries, and moves the vehicles.
 const SCRIPT: &str = include_str!("recordings.js");
 
-/// Returns the choices by which the entries can be filtered: verdict, scenario, and the arm whose ego collides.
+/// Returns the choices by which the entries can be filtered: verdict, scenario, and the arm whose
+/// ego collides.
 fn filters(entries: &[IndexEntry]) -> Markup {
     let arms = entries.iter().flat_map(|entry| &entry.outcomes).map(|outcome| outcome.controller.clone());
     let choices: [(&str, &str, BTreeSet<String>); 3] = [

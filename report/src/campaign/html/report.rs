@@ -17,7 +17,8 @@ use closecall_traffic::shown::shown;
 /// Writes the page of a campaign.
 ///
 /// # Errors
-/// [`WriteError`] if a chart cannot be drawn or the file cannot be written. An existing file then stays as it is.
+/// [`WriteError`] if a chart cannot be drawn or the file cannot be written. An existing file then
+/// stays as it is.
 pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> Result<(), WriteError> {
     write_file(path, |file| file.write_all(shown(&campaign(findings)?.into_string()).as_bytes()))
 }

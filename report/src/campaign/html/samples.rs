@@ -1,4 +1,4 @@
-//! Single samples: the worst, those that ended in an error, and the slowest.
+//! Single samples: the worst samples, the samples that ended in an error, and the slowest samples.
 
 use closecall_traffic::{Measured, Value};
 use maud::{Markup, html};
@@ -90,8 +90,8 @@ fn measured(value: Measured) -> Markup {
 /// Returns why samples of a scenario have no outcome; empty if all have one.
 /// Returns the command that runs a failed sample again, from within the campaign's folder.
 fn replay_failure(findings: &Findings<'_>, scenario: &str, failure: &FailureKindCount) -> String {
-    let of = SavedSample { folder: ".", sample: failure.first_sample, scenario: Some(scenario) };
-    let replay = Replay { controller: Some(&failure.controller), ..Replay::new(of) };
+    let saved_sample = SavedSample { folder: ".", sample: failure.first_sample, scenario: Some(scenario) };
+    let replay = Replay { controller: Some(&failure.controller), ..Replay::new(saved_sample) };
     (findings.command_for)(&Action::Replay(replay))
 }
 

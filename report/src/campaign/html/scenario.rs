@@ -1,4 +1,5 @@
-//! One scenario: its worst samples, how the outcome depends on the sampled values, the margins, and the coverage.
+//! One scenario: its worst samples, how the outcome depends on the sampled values, the margins, and
+//! the coverage.
 
 use std::io;
 
@@ -55,7 +56,8 @@ fn worst_scenario<'a>(findings: &Findings<'a>) -> Option<&'a ScenarioOverview> {
     worst_first(findings.judged).first().and_then(|gate| named(&gate.scenario)).or(scenarios.first())
 }
 
-/// Returns the evidence that is looked at first: the outcome map of the worst scenario, and pictures of the worst samples.
+/// Returns the evidence that is looked at first: the outcome map of the worst scenario, and
+/// pictures of the worst samples.
 pub(super) fn evidence(findings: &Findings<'_>) -> io::Result<Markup> {
     let stills = findings.worst_stills();
     let worst = worst_scenario(findings);
@@ -134,7 +136,7 @@ fn margins(scenario: &ScenarioOverview) -> io::Result<Markup> {
     })
 }
 
-/// Returns how many samples of each arm have no such margin.
+/// Returns how many samples of each arm lack the margin.
 fn absent(arms: &[String], bins: &[MarginBins]) -> String {
     let absent = arms.iter().zip(bins).filter(|(_, bins)| bins.absent > 0);
     absent.map(|(arm, bins)| format!("{arm}: {} samples without", bins.absent)).collect::<Vec<_>>().join("; ")
@@ -154,8 +156,8 @@ fn sampled_values(scenario: &ScenarioOverview) -> io::Result<Markup> {
         @if all > 0 {
             p.note {
                 (percent(hit as f64 / all as f64)) " of the cells of all pairs of parameters have a sample "
-                "(" (hit) " of " (all) "). Cells are of equal width, not of equal probability: those that a distribution "
-                "hardly reaches stay empty."
+                "(" (hit) " of " (all) "). Cells are of equal width, not of equal probability: cells that a "
+                "distribution hardly reaches stay empty."
             }
         }
         (fate_legend(scenario))

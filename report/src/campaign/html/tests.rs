@@ -24,7 +24,7 @@ fn page() -> String {
     reported(|findings| campaign(findings).unwrap().into_string())
 }
 
-/// Returns what a report makes of 30 samples with and without the margin increase system.
+/// Returns the data of a report of 30 samples with and without the margin increase system.
 fn reported(report: impl FnOnce(&Findings<'_>) -> String) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
     let file = ScenarioFile::load(&path, &[]).unwrap();

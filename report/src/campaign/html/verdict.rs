@@ -18,7 +18,8 @@ const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     }
 }
 
-/// Returns the head of the page: the verdict in one sentence, what was run, what else is to be said, and the fields for a signature.
+/// Returns the head of the page: the verdict in one sentence, the extent of the campaign, further
+/// remarks, and the fields for a signature.
 pub(super) fn header(findings: &Findings<'_>) -> Markup {
     let (judged, sampling) = (findings.judged, findings.manifest.sampling);
     let samples = findings.summary.total().samples;
@@ -42,7 +43,8 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     }
 }
 
-/// Returns what the system under test changed, in one sentence. `None` if the campaign has no baseline.
+/// Returns the changes by the system under test, in one sentence. `None` if the campaign has no
+/// baseline.
 fn headline(findings: &Findings<'_>) -> Option<String> {
     if !findings.summary.is_paired() {
         return None;
@@ -68,7 +70,8 @@ fn badge(standing: Standing) -> Markup {
     html! { span.badge.(standing_class(standing)) { (standing.word()) } }
 }
 
-/// Returns the gates and requirement checks in plain words, the worst first; those that are met are folded. Empty if there is none.
+/// Returns the gates and requirement checks in plain words, the worst first. Met ones are folded.
+/// Empty if there is none.
 pub(super) fn gates(findings: &Findings<'_>) -> Markup {
     if findings.judged.gates.is_empty() {
         return Markup::default();

@@ -175,7 +175,7 @@ fn no_column_needs_quotes_in_sql_and_those_with_a_value_in_each_row_are_not_null
     }
 }
 
-/// Returns what a sample counts for in an arm with this outcome.
+/// Returns the tally of a sample with this outcome in one arm.
 fn tally(outcome: Outcome) -> closecall_campaign::ledger::Tally {
     closecall_campaign::record::ArmRecord::new(outcome.controller.clone(), Ok(outcome)).tally()
 }

@@ -53,9 +53,10 @@ impl Axis {
         }
     }
 
-    /// Returns the index of the cell that a value lies in, if the axis is divided into `cells` cells. Values beyond the
-    /// ends of the axis belong to the outermost cells. Each label has a cell; labels beyond the number of cells share the
-    /// last cell. Returns `None` if the value is not on the axis.
+    /// Returns the index of the cell that a value lies in, if the axis is divided into `cells`
+    /// cells. Values beyond the ends of the axis belong to the outermost cells. Each label has a
+    /// cell; labels beyond the number of cells share the last cell. Returns `None` if the value is
+    /// not on the axis.
     pub fn cell(&self, value: &Value, cells: usize) -> Option<usize> {
         let last = cells.checked_sub(1)?;
         match (self, value) {
@@ -66,13 +67,14 @@ impl Axis {
                 share.is_finite().then(|| cell.min(last))
             }
             (Self::Labels { labels, .. }, Value::Label(label)) => {
-                labels.iter().position(|known| known == label).map(|index| index.min(last))
+                labels.iter().position(|candidate| candidate == label).map(|index| index.min(last))
             }
             _ => None,
         }
     }
 
-    /// Returns the number of cells in use, at most `cells`: labels need no more cells than there are labels.
+    /// Returns the number of cells in use, at most `cells`: labels need no more cells than there
+    /// are labels.
     pub fn cells(&self, cells: usize) -> usize {
         match self {
             Self::Numbers { .. } => cells,
@@ -80,18 +82,20 @@ impl Axis {
         }
     }
 
-    /// Returns the position of a value along the axis: the number itself, or the index of the label.
+    /// Returns the position of a value along the axis: the number itself, or the index of the
+    /// label.
     pub fn position(&self, value: &Value) -> Option<f64> {
         match (self, value) {
             (Self::Numbers { .. }, Value::Number(number)) => Some(*number),
             (Self::Labels { labels, .. }, Value::Label(label)) => {
-                labels.iter().position(|known| known == label).map(|index| index as f64)
+                labels.iter().position(|candidate| candidate == label).map(|index| index as f64)
             }
             _ => None,
         }
     }
 
-    /// Returns the positions of both ends. Labels stand at whole numbers, the outermost half a step from the ends.
+    /// Returns the positions of both ends. Labels lie at whole numbers, and the outermost labels
+    /// lie half a step from the ends.
     pub fn ends(&self) -> [f64; 2] {
         match self {
             Self::Numbers { low, high, .. } => [*low, *high],

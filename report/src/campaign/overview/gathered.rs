@@ -5,7 +5,7 @@ use closecall_scenarios::ScenarioFile;
 
 use super::ScenarioOverview;
 
-/// What a report shows of a campaign beside the counts.
+/// The data of a report beside the counts.
 #[derive(Clone, Debug)]
 pub struct Overview {
     /// The scenarios, in their order.
@@ -13,8 +13,8 @@ pub struct Overview {
 }
 
 impl Overview {
-    /// Returns an overview without samples. `files` are the scenarios; `arms` are the names of the controllers, the one
-    /// under test last.
+    /// Returns an overview without samples. `files` are the scenarios; `arms` are the names of the
+    /// controllers, the one under test last.
     pub fn new<'a>(files: impl IntoIterator<Item = &'a ScenarioFile>, arms: &[String]) -> Self {
         let scenario = |file: &ScenarioFile| ScenarioOverview::new(&file.config().name, file.space(), arms);
         Self { scenarios: files.into_iter().map(scenario).collect() }

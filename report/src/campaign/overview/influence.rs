@@ -1,4 +1,4 @@
-//! Which parameter moves the result, from the campaign's own samples.
+//! The influence of each parameter on the result, from the campaign's own samples.
 
 use closecall_campaign::ledger::PairFate;
 use closecall_campaign::partition::split_mix;
@@ -9,7 +9,7 @@ use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::sensitivity::given_data::{CLASSES, ClassCounts, Influence};
 use closecall_traffic::{Parameters, Value};
 
-/// What a report says if there are too few events.
+/// The text of a report with too few events.
 pub const FEW_EVENTS: &str = "too few samples with or without it to say";
 
 /// An event of a sample.
@@ -74,7 +74,7 @@ pub struct InfluenceCounts {
     counts: Vec<Vec<ClassCounts>>,
 }
 
-/// What the parameters say about one event.
+/// The influence of the parameters on one event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EventInfluence {
     /// The event.
@@ -108,14 +108,15 @@ impl InfluenceCounts {
             let Some(happened) = event.of(record) else { continue };
             for (counts, class) in counts.iter_mut().zip(&of_parameters) {
                 if let Some(class) = class {
-                    // The points of a low-discrepancy sequence have a pattern in their numbers: a hash has none.
+                    // The points of a low-discrepancy sequence have a pattern in their numbers: a
+                    // hash has none.
                     counts.push(*class, split_mix(record.sample), happened);
                 }
             }
         }
     }
 
-    /// Returns what the parameters say about each event.
+    /// Returns the influence of the parameters on each event.
     ///
     /// # Errors
     /// The reason for which nothing can be said.
@@ -134,14 +135,14 @@ impl InfluenceCounts {
 
     fn of_event(&self, event: Event, counts: &[ClassCounts]) -> EventInfluence {
         let [samples, events] = counts.first().map_or([0; 2], ClassCounts::total);
-        let found = self
+        let parameters = self
             .parameters
             .iter()
             .zip(counts)
             .filter_map(|((name, _), counts)| Some((name.clone(), counts.influence()?)));
-        let mut found: Vec<(String, Influence)> = found.collect();
-        found.sort_by(|(_, a), (_, b)| b.index.value.total_cmp(&a.index.value));
-        EventInfluence { event, samples, events, parameters: (!found.is_empty()).then_some(found) }
+        let mut parameters: Vec<(String, Influence)> = parameters.collect();
+        parameters.sort_by(|(_, a), (_, b)| b.index.value.total_cmp(&a.index.value));
+        EventInfluence { event, samples, events, parameters: (!parameters.is_empty()).then_some(parameters) }
     }
 }
 
@@ -155,10 +156,11 @@ impl EventInfluence {
     }
 }
 
-/// Returns the class of a parameter's value: one of equally probable parts of its distribution, or its label.
+/// Returns the class of a parameter's value: one of equally probable parts of its distribution, or
+/// its label.
 fn class(name: &str, distribution: &Distribution, parameters: &Parameters) -> Option<usize> {
-    match parameters.iter().find(|(known, _)| known.as_str() == name)?.1 {
-        Value::Label(label) => distribution.labels().iter().position(|known| known == label),
+    match parameters.iter().find(|(parameter, _)| parameter.as_str() == name)?.1 {
+        Value::Label(label) => distribution.labels().iter().position(|candidate| candidate == label),
         Value::Number(value) => {
             let share = distribution.cdf(*value)? * CLASSES as f64;
             #[expect(

@@ -16,7 +16,8 @@ pub struct MarginKind {
     pub title: &'static str,
     /// The upper end of the range, in the margin's unit. Larger values belong to the last bin.
     pub high: f64,
-    /// The value that separates small margins from sufficient ones, or the goal, if there is one, with its name.
+    /// The value that separates small margins from sufficient ones, or the goal, if there is one,
+    /// with its name.
     pub limit: Option<(f64, &'static str)>,
     value: fn(&Outcome) -> Measured,
 }
@@ -24,7 +25,8 @@ pub struct MarginKind {
 /// The headway that the method asks the system to gain (s).
 const GOAL_GAIN_S: f64 = 2.0;
 
-/// Returns the front headway gained from the engagement of the MIS until the vehicle behind is at the critical distance (s).
+/// Returns the front headway gained from the engagement of the MIS until the vehicle behind is at
+/// the critical distance (s).
 fn gained_s(outcome: &Outcome) -> Measured {
     let mis = outcome.mis.as_ref().map_err(|absent| *absent)?;
     Ok((mis.thw_front_at_critical_s? - mis.thw_front_at_engagement_s?).max(0.0))
@@ -100,8 +102,8 @@ pub const MARGINS: [MarginKind; 9] = [
 /// The distribution of one margin in one arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarginBins {
-    /// The number of samples in each of [`BINS`] bins of equal width from 0 to the upper end of the margin's range. The
-    /// last bin also counts larger values.
+    /// The number of samples in each of [`BINS`] bins of equal width from 0 to the upper end of the
+    /// margin's range. The last bin also counts larger values.
     pub counts: [u64; BINS],
     /// The number of samples that have no such margin.
     pub absent: u64,
@@ -113,7 +115,8 @@ impl MarginBins {
     pub(super) fn push(&mut self, kind: &MarginKind, outcome: &Outcome) {
         match (kind.value)(outcome) {
             Ok(value) => {
-                // A value that is not a number counts as the smallest margin, so that it never looks safe.
+                // A value that is not a number counts as the smallest margin, so that it never
+                // looks safe.
                 let share = if value.is_nan() { 0.0 } else { (value / kind.high).clamp(0.0, 1.0) };
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the bins")]
                 let bin = (share * BINS as f64) as usize;

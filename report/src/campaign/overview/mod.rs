@@ -1,5 +1,5 @@
-//! What a report shows of a campaign beside the counts. It is gathered from the journal, record by record, in an amount of
-//! memory that does not depend on the number of records.
+//! The data of a report beside the counts. It is gathered from the journal, record by record, in an
+//! amount of memory that does not depend on the number of records.
 //!
 //! ```text
 //!  records ─▶ counts of each arm         (totals of JUnit)

@@ -7,13 +7,14 @@ use super::Axis;
 /// Number of cells along each axis.
 pub const CELLS: usize = 8;
 
-/// The number of samples in each cell of the plane of two parameters, and of those with a collision.
+/// The numbers of samples, and of samples with a collision, in each cell of the plane of two
+/// parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairBins {
     /// The indices of both parameters among the axes.
     pub axes: [usize; 2],
-    /// The number of samples, of samples with a collision in any arm, and of samples with one in the arm under test, by the
-    /// cell of the first and of the second parameter.
+    /// The number of samples, of samples with a collision in any arm, and of samples with one in
+    /// the arm under test, by the cell of the first and of the second parameter.
     pub cells: [[[u64; 3]; CELLS]; CELLS],
 }
 
@@ -23,8 +24,8 @@ impl PairBins {
     }
 
     pub(super) fn push(&mut self, axes: &[Axis], parameters: &[Option<usize>], [any, tested]: [bool; 2]) {
-        let [one, other] = self.axes;
-        if let (Some(x), Some(y)) = (parameters[one], parameters[other]) {
+        let [first, second] = self.axes;
+        if let (Some(x), Some(y)) = (parameters[first], parameters[second]) {
             debug_assert!(axes.len() == parameters.len());
             let [samples, in_any, in_tested] = &mut self.cells[x][y];
             *samples += 1;
@@ -33,9 +34,9 @@ impl PairBins {
         }
     }
 
-    /// Returns how much the two parameters tell about the outcome (nat): the mutual information between the cell and
-    /// whether there was a collision, less the amount that chance alone is expected to show (G. A. Miller, *Note on the
-    /// bias of information estimates*, 1955).
+    /// Returns how much the two parameters tell about the outcome (nat). This is the mutual
+    /// information between the cell and the event of a collision, less the amount that chance alone
+    /// is expected to show (G. A. Miller, *Note on the bias of information estimates*, 1955).
     pub fn information_nat(&self) -> f64 {
         let cells = || self.cells.iter().flatten().filter(|[samples, ..]| *samples > 0);
         let samples: u64 = cells().map(|[samples, ..]| samples).sum();
@@ -51,9 +52,9 @@ impl PairBins {
 
     /// Returns the number of cells with a sample, and the number of all cells.
     pub fn coverage(&self, axes: &[Axis]) -> [usize; 2] {
-        let [one, other] = self.axes;
+        let [first, second] = self.axes;
         let hit = self.cells.iter().flatten().filter(|[samples, ..]| *samples > 0).count();
-        [hit, axes[one].cells(CELLS) * axes[other].cells(CELLS)]
+        [hit, axes[first].cells(CELLS) * axes[second].cells(CELLS)]
     }
 }
 

@@ -15,8 +15,8 @@ pub enum Fate {
     Passed,
     /// The ego collides in the baseline, and no vehicle collides in the arm under test.
     Prevented,
-    /// The ego collides in the arm under test, and in the baseline if there is one. In a pair, a collision of other vehicles in
-    /// the arm under test counts as well.
+    /// The ego collides in the arm under test, and in the baseline if there is one. In a pair, a
+    /// collision of other vehicles in the arm under test counts as well.
     Failed,
     /// The system under test adds a collision of the ego, or of other vehicles.
     Induced,
@@ -71,9 +71,9 @@ pub struct Point {
     pub parameters: Parameters,
 }
 
-/// One of the worst samples of the arm under test. Induced collisions come first, then the other collisions, each in
-/// falling order of the ego's change of velocity; then samples without a collision, in rising order of the smallest time to
-/// collision with the vehicle behind.
+/// One of the worst samples of the arm under test. Induced collisions come first, then the other
+/// collisions, each in falling order of the ego's change of velocity; then samples without a
+/// collision, in rising order of the smallest time to collision with the vehicle behind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorstSample {
     /// The sample's number.
@@ -104,8 +104,8 @@ impl WorstSample {
         })
     }
 
-    /// Compares two samples: the worse one is less. Of equal samples, the one with the smaller number is less. A value that
-    /// is not a number is the worst.
+    /// Compares two samples: the worse one is less. Of equal samples, the one with the smaller
+    /// number is less. A value that is not a number is the worst.
     pub(super) fn order(&self, other: &Self) -> Ordering {
         let ttc_s = |sample: &Self| sample.outcome.margins.min_ttc_rear_s.unwrap_or(f64::INFINITY);
         let by_collision = match (self.delta_v_mps, other.delta_v_mps) {

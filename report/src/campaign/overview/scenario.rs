@@ -1,4 +1,4 @@
-//! What a report shows of one scenario.
+//! The data of one scenario in a report.
 
 use std::collections::BTreeMap;
 
@@ -38,7 +38,7 @@ pub struct ErrorGroup {
     pub message: String,
 }
 
-/// What a report shows of one scenario beside the counts.
+/// The data of one scenario in a report, beside the counts.
 #[derive(Clone, Debug)]
 pub struct ScenarioOverview {
     /// The scenario's name.
@@ -55,13 +55,14 @@ pub struct ScenarioOverview {
     pub pairs: Vec<PairBins>,
     /// The distribution of each margin of [`MARGINS`] in each arm.
     pub margins: Vec<Vec<MarginBins>>,
-    /// What each parameter says about each event.
+    /// The influence of each parameter on each event.
     pub influence: InfluenceCounts,
     /// The worst samples of the arm under test, beginning with the worst.
     pub worst: Vec<WorstSample>,
     /// Samples with an outcome only because they were run again after a crash or a hang, by arm.
     pub flaky: BTreeMap<String, ErrorGroup>,
-    /// The samples with the smallest hashes of their number, for each fate: an even choice of all samples.
+    /// The samples with the smallest hashes of their number, for each fate: an even choice of all
+    /// samples.
     points: BTreeMap<(Fate, u64), Point>,
     /// The number of points of each fate.
     point_counts: [usize; Fate::ALL.len()],
@@ -71,7 +72,8 @@ impl ScenarioOverview {
     pub(super) fn new(name: &str, space: &ParameterSpace, arms: &[String]) -> Self {
         let axes: Vec<Axis> =
             space.iter().filter_map(|(name, entry)| Axis::of(name.as_str(), &entry.distribution)).collect();
-        let pairs = (0..axes.len()).flat_map(|one| (one + 1..axes.len()).map(move |other| PairBins::new([one, other])));
+        let pairs =
+            (0..axes.len()).flat_map(|first| (first + 1..axes.len()).map(move |second| PairBins::new([first, second])));
         Self {
             name: name.to_owned(),
             arms: arms.to_vec(),
@@ -98,9 +100,10 @@ impl ScenarioOverview {
         self.points.values()
     }
 
-    /// Returns the pair of parameters that tells the most about the outcome, or `None` if fewer than two parameters vary.
+    /// Returns the pair of parameters that tells the most about the outcome, or `None` if fewer
+    /// than two parameters vary.
     pub fn map(&self) -> Option<&PairBins> {
-        let better = |one: &&PairBins, other: &&PairBins| one.information_nat().total_cmp(&other.information_nat());
+        let better = |a: &&PairBins, b: &&PairBins| a.information_nat().total_cmp(&b.information_nat());
         // `max_by` returns the last of equal elements: the order is reversed to get the first.
         self.pairs.iter().rev().max_by(better)
     }
@@ -156,8 +159,8 @@ impl ScenarioOverview {
         self.push_point(Point { sample: record.sample, fate, parameters: outcome.parameters.clone() });
     }
 
-    /// Adds a point, and removes the one with the largest hash if there are too many: a random choice that does not depend
-    /// on the order of the samples.
+    /// Adds a point, and removes the one with the largest hash if there are too many: a random
+    /// choice that does not depend on the order of the samples.
     fn push_point(&mut self, point: Point) {
         let fate = point.fate;
         let hash = closecall_campaign::partition::split_mix(point.sample);

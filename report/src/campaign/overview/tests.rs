@@ -17,8 +17,8 @@ fn arms() -> Vec<String> {
     vec!["acc".to_owned(), "mis".to_owned()]
 }
 
-/// Returns a journal record whose arms collide as given. Beside `closing-mps` and `rear-class`, the parameters do not depend
-/// on the outcome.
+/// Returns a journal record whose arms collide as given. Beside `closing-mps` and `rear-class`, the
+/// parameters do not depend on the outcome.
 fn record(sample: u64, closing_mps: f64, class: &str, collided: [bool; 2]) -> Record {
     let rows = rows();
     let [hit, miss] = [0, 1].map(|row| rows[row].result.clone().unwrap());

@@ -20,7 +20,8 @@ const FIRST_VEHICLE: u64 = 1;
 const FIRST_LANE: u64 = 10_001;
 /// Number of the left edge of the road; the lines between and beyond the lanes follow.
 const FIRST_BOUNDARY: u64 = 20_001;
-/// Distance between the points of a line (m). In the tightest curve, with a radius of 400 m, the line deviates by 3 cm.
+/// Distance between the points of a line (m). In the tightest curve, with a radius of 400 m, the
+/// line deviates by 3 cm.
 const POINT_SPACING_M: f64 = 10.0;
 /// Wheel radius (m): an assumption; 0.3 to 0.5 are plausible. No run depends on it.
 pub(super) const WHEEL_RADIUS_M: f64 = 0.325;
@@ -217,7 +218,8 @@ fn environment(environment: &Environment) -> EnvironmentalConditions {
         Light::Dusk => (4, 77_400),
         Light::Night => (3, 0),
     };
-    // Upper ends of the levels from "none" on, in mm/h, and lower ends of the levels from "excellent" on, in m.
+    // Upper ends of the levels from "none" on, in mm/h, and lower ends of the levels from
+    // "excellent" on, in m.
     let rain = [0.1, 0.5, 1.9, 8.1, 34.0, 149.0].partition_point(|end| *end <= environment.rain_mm_per_h);
     let visible = [40_000.0, 10_000.0, 4_000.0, 2_000.0, 1_000.0, 200.0, 50.0]
         .partition_point(|end| *end > environment.visibility_m);
@@ -236,13 +238,13 @@ mod tests {
 
     #[test]
     fn the_weather_has_the_levels_of_the_standard() {
-        let of = |visibility_m, rain_mm_per_h| {
+        let levels = |visibility_m, rain_mm_per_h| {
             let levels = environment(&Environment { visibility_m, rain_mm_per_h, ..Environment::CLEAR_DAY });
             (levels.fog.unwrap(), levels.precipitation.unwrap())
         };
-        assert_eq!(of(10_000.0, 0.0), (3, 2));
-        assert_eq!(of(150.0, 5.0), (8, 5));
-        assert_eq!(of(20.0, 200.0), (9, 8));
+        assert_eq!(levels(10_000.0, 0.0), (3, 2));
+        assert_eq!(levels(150.0, 5.0), (8, 5));
+        assert_eq!(levels(20.0, 200.0), (9, 8));
     }
 
     #[test]

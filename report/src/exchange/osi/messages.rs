@@ -1,4 +1,5 @@
-//! The messages of `osi3.proto` as structs. A number is that of the field in the published message.
+//! The messages of `osi3.proto` as structs. Each number is the number of the field in the published
+//! message.
 
 use prost::Message;
 

@@ -1,4 +1,4 @@
-//! Collects what the messages of a run need.
+//! Collects the data for the messages of a run.
 
 use closecall_scenarios::Scenario;
 use closecall_simulation::{Observer, RunEvent, StepView};

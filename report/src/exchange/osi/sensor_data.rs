@@ -13,7 +13,8 @@ use super::recorder::Step;
 /// Number of the virtual sensor whose frame the tracks have: the ego's vehicle frame.
 const VIRTUAL_SENSOR: u64 = 30_000;
 
-/// Returns the message of a step. The virtual sensor sits on the ground below the centre of the ego's box.
+/// Returns the message of a step. The virtual sensor sits on the ground below the centre of the
+/// ego's box.
 pub(super) fn sensor_data(scenario: &Scenario, step: &Step) -> SensorData {
     let ego = &scenario.actors[scenario.ego].vehicle;
     let state = step.states.get(scenario.ego).copied().unwrap_or_default();
@@ -33,7 +34,8 @@ pub(super) fn sensor_data(scenario: &Scenario, step: &Step) -> SensorData {
     }
 }
 
-/// Returns a track. OSI asks for velocities relative to the ego; the covariances of two values have no place.
+/// Returns a track. OSI asks for velocities relative to the ego, and has no place for the
+/// covariances of two values.
 fn detected(track: &Track, ego_mps: f64) -> DetectedMovingObject {
     let [x, y, vx, vy] = [0, 1, 2, 3].map(|index| track.state[index]);
     let deviation = |index: usize| Some(track.covariance[(index, index)].max(0.0).sqrt());

@@ -1,4 +1,5 @@
-//! Writes the messages of a run: an MCAP file with all channels, or a trace file for each message type.
+//! Writes the messages of a run: an MCAP file with all channels, or a trace file for each message
+//! type.
 
 use std::collections::BTreeMap;
 use std::io::{self, Cursor};
@@ -16,7 +17,7 @@ use super::sensor_data::sensor_data;
 use crate::date::today;
 use crate::exchange::road::UsedRoad;
 
-/// The compiled `osi3.proto`: what a reader needs that has no definition of its own.
+/// The compiled `osi3.proto`, for a reader without a definition of its own.
 const DESCRIPTORS: &[u8] = include_bytes!("osi3.desc");
 
 /// A channel: its message type, its topic, and the short form of the type in names of files.
@@ -31,9 +32,10 @@ const SENSOR_DATA: Channel = Channel { message: "SensorData", topic: "sensor_dat
 const MAP: Channel = Channel { message: "MapAsamOpenDrive", topic: "ground_truth_map", short: "" };
 
 impl OsiRecorder {
-    /// Writes the messages, and returns the files. A path that ends in `.mcap` is one file with all channels and the map. Any
-    /// other becomes two trace files in its folder, whose names are those of the standard: date, message type, version of OSI,
-    /// version of protobuf, number of messages, and the stem of the path.
+    /// Writes the messages, and returns the files. A path that ends in `.mcap` is one file with all
+    /// channels and the map. Any other path becomes two trace files in its folder. The standard
+    /// gives their names: date, message type, version of OSI, version of protobuf, number of
+    /// messages, and the stem of the path.
     ///
     /// # Errors
     /// [`WriteError`] if a file cannot be written.

@@ -1,5 +1,6 @@
-//! The incident card of a sample: one page for a ticket, which loads nothing. It has what happened and why in one sentence for each arm,
-//! both arms from above in real time, the headways, and the command that runs the sample again.
+//! The incident card of a sample: one page for a ticket, which loads nothing. It has the event and
+//! its cause in one sentence for each arm, both arms from above in real time, the headways, and the
+//! command that runs the sample again.
 //!
 //! The animation is SMIL, part of SVG, and needs no script.
 
@@ -150,10 +151,10 @@ fn headways(film: &Film, window: Window) -> Markup {
     let span_s = (window.to - window.from).s().max(STEP.s());
     let x = |time: Time| MARGIN_PX + (time - window.from).s() / span_s * (width - 2.0 * MARGIN_PX);
     let y = |thw_s: f64| height - MARGIN_PX - (thw_s.min(MOST_THW_S) / MOST_THW_S) * (height - 1.5 * MARGIN_PX);
-    let curve = |of: fn(&Frame) -> Measured| {
+    let curve = |headway: fn(&Frame) -> Measured| {
         let mut points = String::new();
         for time in window.times() {
-            if let Some(Ok(thw_s)) = film.frames.get(frame_index(film, time)).map(of) {
+            if let Some(Ok(thw_s)) = film.frames.get(frame_index(film, time)).map(headway) {
                 let _ = write!(points, "{:.0},{:.1} ", x(time), y(thw_s));
             }
         }

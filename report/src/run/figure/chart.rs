@@ -1,4 +1,5 @@
-//! A line chart: axes with round ticks, curves with gaps, reference levels, and the marked moments of the encounter.
+//! A line chart: axes with round ticks, curves with gaps, reference levels, and the marked moments
+//! of the encounter.
 
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use closecall_traffic::maths;
@@ -13,7 +14,7 @@ pub(super) const MOMENT: &str = "#8a8a8a";
 const LIMIT: &str = "#d62728";
 const TICK_FONT_SIZE_PX: f64 = 10.0;
 const NAME_FONT_SIZE_PX: f64 = 11.0;
-/// Distance of two moments below which their style are at different heights (px).
+/// Distance of two moments below which their letters are at different heights (px).
 const CLOSE_PX: f64 = 12.0;
 /// Approximate number of ticks of an axis.
 const TICK_COUNT: f64 = 5.0;
@@ -68,7 +69,7 @@ impl Chart<'_> {
         for &(at, letter) in self.moments.iter().filter(|(at, _)| *at >= self.x[0] && *at <= self.x[1]) {
             let style = TextStyle { size: NAME_FONT_SIZE_PX, colour: INK, anchor: Anchor::Start };
             let x = self.x_of(at, area);
-            // Letters that are close together alternate in height.
+            // Letters close to each other alternate in height.
             is_low = x - last_x < CLOSE_PX && !is_low;
             last_x = x;
             svg.text([x + 2.0, area.top + if is_low { 24.0 } else { 12.0 }], &letter.to_string(), style);
@@ -133,7 +134,7 @@ fn pieces(points: &[(f64, Option<f64>)]) -> Vec<Vec<(f64, f64)>> {
     pieces
 }
 
-/// Returns the round values within a range. Their distance is 1, 2 or 5 times a power of ten.
+/// Returns the round values within a range. They are 1, 2 or 5 times a power of ten apart.
 pub(super) fn ticks([low, high]: Range) -> Vec<f64> {
     let rough = (high - low) / TICK_COUNT;
     if !(rough > 0.0 && rough.is_finite()) {

@@ -23,7 +23,8 @@ pub(super) fn colour(film: &Film, actor: usize) -> &'static str {
     }
 }
 
-/// Returns the name of an actor in a legend, in which all vehicles but ego, lead vehicle and rear vehicle share one entry.
+/// Returns the name of an actor in a legend, in which all vehicles but ego, lead vehicle and rear
+/// vehicle share one entry.
 pub(super) fn legend_name(film: &Film, actor: usize) -> String {
     let is_other = |actor: usize| matches!(film.actors[actor].part, Part::Other(_) | Part::Background);
     match is_other(actor) {

@@ -1,8 +1,9 @@
-//! The figure of a whole encounter, laid out like the paper's: the road at the moments (a) to (e), the trajectories in
-//! the road frame, and plots over time with the moments marked.
+//! The figure of a whole encounter, laid out like the paper's: the road at the moments (a) to (e),
+//! the trajectories in the road frame, and plots over time with the moments marked.
 //!
-//! If there are two films, the first is the baseline. Its curves are dashed, its vehicles are outlines, and its moments
-//! are not marked, but the road at its hazard, moment (a), and at its collision is shown first.
+//! If there are two films, the first is the baseline. Its curves are dashed, its vehicles are
+//! outlines, and its moments are not marked. Before the other strips, the figure shows the road at
+//! the baseline's hazard, moment (a), and at its collision.
 
 use closecall_recorded::criticality::CRITICAL_TTCE_S;
 use closecall_traffic::Time;
@@ -29,21 +30,23 @@ const LETTER_PX: f64 = 6.0;
 const INK: &str = "#222222";
 /// Rear and front end of the road that the strips show, relative to the ego (m).
 const REACH_M: [f64; 2] = [-125.0, 95.0];
-/// Number of equal intervals up to the critical moment whose ends are shown if a film has no moments.
+/// Number of equal intervals up to the critical moment whose ends are shown if a film has no
+/// moments.
 const FALLBACK_INTERVALS: u8 = 4;
 /// Time that the plots show after the last marked moment (s).
 const AFTER_S: f64 = 8.0;
 const BASELINE_DASH: &str = "5 3";
 
-/// Returns the figure of one film, or of a baseline and the film compared with it, as the text of an SVG file.
+/// Returns the figure of one film, or of a baseline and the film compared with it, as the text of
+/// an SVG file.
 pub fn encounter(films: &[Film]) -> String {
     let Some(film) = films.last() else { return Svg::new([WIDTH, 1.0]).finish() };
     let instants = instants(film);
     let baseline = films.first().filter(|_| films.len() > 1);
     let charts = charts(films);
     let of_baseline: Vec<Instant> = baseline.map(worst_instants).unwrap_or_default();
-    let own = instants.iter().map(|instant| ((film, baseline), instant));
-    let strips = of_baseline.iter().filter_map(|instant| Some(((baseline?, None), instant))).chain(own);
+    let tested = instants.iter().map(|instant| ((film, baseline), instant));
+    let strips = of_baseline.iter().filter_map(|instant| Some(((baseline?, None), instant))).chain(tested);
     let strips: Vec<((&Film, Option<&Film>), &Instant)> = strips.collect();
     let top_of_charts = 64.0 + STRIP_PERIOD * strips.len() as f64 + 34.0;
     let height = top_of_charts + CHART_PERIOD * charts.len() as f64 + 3.0 * BAND_HEIGHT + 30.0;
@@ -53,7 +56,7 @@ pub fn encounter(films: &[Film]) -> String {
     for (index, ((film, other), (time, letter, text))) in strips.into_iter().enumerate() {
         let top = 76.0 + STRIP_PERIOD * index as f64;
         let area = Area { left: LEFT, top, width: INNER, height: STRIP_HEIGHT };
-        // Of a collision the first frame in which the vehicles touch is shown.
+        // For a collision, the figure shows the first frame in which the vehicles touch.
         let is_collision = film.worst_collision().is_some_and(|collision| collision.time == *time);
         let frames_before =
             film.frames.partition_point(|frame| frame.time < *time || !is_collision && frame.time == *time);
@@ -103,7 +106,7 @@ fn title(svg: &mut Svg, films: &[Film]) {
 /// A time to show, with its letter and text.
 type Instant = (Time, char, String);
 
-/// Returns moment (a) and the collision of the baseline, as far as it reached these.
+/// Returns moment (a) and the collision of the baseline, if it reached them.
 fn worst_instants(baseline: &Film) -> Vec<Instant> {
     let arm = baseline.arm_label();
     let hazard = baseline.moments().iter().find(|noted| noted.moment == Moment::Hazard);
@@ -113,8 +116,9 @@ fn worst_instants(baseline: &Film) -> Vec<Instant> {
     hazard.into_iter().chain(collision).collect()
 }
 
-/// Returns the instants to show, in order of time, each with its letter and text: the moments of the paper that the run reached, and
-/// the collision. If there are none, instants at equal distances up to the critical moment are returned.
+/// Returns the instants to show, in order of time, each with its letter and text: the moments of
+/// the paper that the run reached, and the collision. If there are none, instants at equal
+/// distances up to the critical moment are returned.
 fn instants(film: &Film) -> Vec<Instant> {
     let moments = film.moments().iter();
     let mut instants: Vec<_> = moments
@@ -133,7 +137,8 @@ fn instants(film: &Film) -> Vec<Instant> {
     instants
 }
 
-/// Returns the position of the ego along the road (m) at each instant, with the letter of the instant.
+/// Returns the position of the ego along the road (m) at each instant, with the letter of the
+/// instant.
 fn ego_positions(film: &Film, instants: &[Instant]) -> Vec<(f64, char)> {
     let ego_s_m = |time: Time| film.frame_at(time).map(|frame| frame.states[film.ego].s_m);
     instants.iter().filter_map(|(time, letter, _)| Some((ego_s_m(*time)?, *letter))).collect()
@@ -148,11 +153,11 @@ fn stroke(films: &[Film], film_index: usize, colour: &'static str) -> Stroke<'st
 /// Returns all charts, with the trajectories first.
 fn charts(films: &[Film]) -> Vec<Chart<'static>> {
     let span = span(films);
-    let headways = over_time(films, &[("front", FRONT), ("rear", REAR)], |frame, which| match which {
+    let headways = over_time(films, &[("front", FRONT), ("rear", REAR)], |frame, curve| match curve {
         0 => frame.margins.thw_front_s.ok(),
         _ => frame.margins.thw_rear_s.ok(),
     });
-    let gaps = over_time(films, &[("front", FRONT), ("rear", REAR)], |frame, which| match which {
+    let gaps = over_time(films, &[("front", FRONT), ("rear", REAR)], |frame, curve| match curve {
         0 => frame.margins.gap_front_m.ok(),
         _ => frame.margins.gap_rear_m.ok(),
     });
@@ -188,14 +193,16 @@ fn charts(films: &[Film]) -> Vec<Chart<'static>> {
     ]
 }
 
-/// Returns the range that the speed axis contains at least: 1 m/s below and above the initial speed of the ego.
+/// Returns the range that the speed axis contains at least: 1 m/s below and above the initial speed
+/// of the ego.
 fn initial_speed_range(films: &[Film]) -> Range {
     let first = films.last().and_then(|film| Some(film.frames.first()?.states[film.ego].speed_mps));
     first.map_or([0.0, 1.0], |speed_mps| [speed_mps - 1.0, speed_mps + 1.0])
 }
 
-/// Returns the time span of the plots (s): from the first instant of any film until [`AFTER_S`] after the last of the
-/// moments and critical moments, or until the end if that comes first.
+/// Returns the time span of the plots (s). It begins at the first instant of any film. It ends
+/// [`AFTER_S`] after the last of the moments and critical moments, or at the end of the films if
+/// that comes first.
 fn span(films: &[Film]) -> Range {
     let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time.s());
     let ends = films.iter().map(|film| {
@@ -212,23 +219,23 @@ fn frames_shown(films: &[Film], film: &Film) -> std::ops::Range<usize> {
     0..film.frames.partition_point(|frame| frame.time.s() <= end)
 }
 
-/// Returns a curve over time for each film and each of `curves`, which are pairs of a name and a colour. `of` reads the
-/// value of the curve with the given index from a frame.
+/// Returns a curve over time for each film and each of `curves`, which are pairs of a name and a
+/// colour. `value` reads the value of the curve with the given index from a frame.
 fn over_time(
     films: &[Film],
     curves: &[(&str, &'static str)],
-    of: impl Fn(&Frame, usize) -> Option<f64>,
+    value: impl Fn(&Frame, usize) -> Option<f64>,
 ) -> Vec<Curve<'static>> {
-    let curve = |film_index: usize, which: usize| {
-        let (name, colour) = curves[which];
+    let curve = |film_index: usize, curve_index: usize| {
+        let (name, colour) = curves[curve_index];
         Curve {
             name: named(films, film_index, name),
             stroke: stroke(films, film_index, colour),
-            points: films[film_index].frames.iter().map(|frame| (frame.time.s(), of(frame, which))).collect(),
+            points: films[film_index].frames.iter().map(|frame| (frame.time.s(), value(frame, curve_index))).collect(),
         }
     };
     (0..films.len())
-        .flat_map(|film_index| (0..curves.len()).map(move |which| (film_index, which)))
+        .flat_map(|film_index| (0..curves.len()).map(move |curve_index| (film_index, curve_index)))
         .map(|(a, b)| curve(a, b))
         .collect()
 }
@@ -253,8 +260,9 @@ fn encounters(films: &[Film]) -> Vec<Curve<'static>> {
     (0..films.len()).map(curve).collect()
 }
 
-/// Returns a quantity of each vehicle over time for each film. Only the curves of the last film have names.
-fn motion(films: &[Film], of: fn(&closecall_traffic::VehicleState) -> f64) -> Vec<Curve<'static>> {
+/// Returns a quantity of each vehicle over time for each film. Only the curves of the last film
+/// have names.
+fn motion(films: &[Film], value: fn(&closecall_traffic::VehicleState) -> f64) -> Vec<Curve<'static>> {
     let curve = |film_index: usize, actor: usize| {
         let film = &films[film_index];
         let is_named = film_index + 1 == films.len();
@@ -264,7 +272,7 @@ fn motion(films: &[Film], of: fn(&closecall_traffic::VehicleState) -> f64) -> Ve
             points: (0..film.frames.len())
                 .map(|index| {
                     let frame = &film.frames[index];
-                    (frame.time.s(), film.is_present(actor, index).then(|| of(&frame.states[actor])))
+                    (frame.time.s(), film.is_present(actor, index).then(|| value(&frame.states[actor])))
                 })
                 .collect(),
         }
@@ -305,7 +313,8 @@ fn trajectories(films: &[Film]) -> Chart<'static> {
     }
 }
 
-/// Draws the state of the ego stack of each film as a coloured band below the plots, on their time axis.
+/// Draws the state of the ego stack of each film as a coloured band below the plots, on their time
+/// axis.
 fn bands(svg: &mut Svg, films: &[Film], top: f64) {
     let [start, end] = span(films);
     let x_of = |time_s: f64| LEFT + (time_s - start) / (end - start) * INNER;

@@ -1,13 +1,14 @@
-//! Figures of an encounter, which need no viewer: for a report, for the index page of a campaign's recordings, and on incident
-//! cards.
+//! Figures of an encounter, which need no viewer: for a report, for the index page of a campaign's
+//! recordings, and on incident cards.
 //!
 //! ```text
 //!   Film ─▶ road strips at (a) … (e) ─┐
 //!        ─▶ trajectories, plots ──────┴─▶ SVG ─(bundled font)─▶ PNG, PDF
 //! ```
 //!
-//! The same film gives the same bytes on every machine: this module writes the SVG itself, and renders its text with
-//! the bundled font (a subset of DejaVu Sans; see `font/`), never with the fonts of the machine.
+//! The same film gives the same bytes on every machine: this module writes the SVG itself, and
+//! renders its text with the bundled font (a subset of DejaVu Sans; see `font/`), never with the
+//! fonts of the machine.
 
 mod card;
 mod chart;

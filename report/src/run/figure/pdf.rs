@@ -1,8 +1,8 @@
 //! A picture as a PDF file of one page.
 //!
-//! The page has the shapes of the SVG picture, and its text as outlines of the bundled font: it looks alike everywhere,
-//! and needs no font. Only what the figures use is translated: paths in plain colours, dashes, opacity, and rectangles
-//! that clip.
+//! The page has the shapes of the SVG picture, and its text as outlines of the bundled font: it
+//! looks alike everywhere, and needs no font. Only the elements of the figures are translated:
+//! paths in plain colours, dashes, opacity, and rectangles that clip.
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
@@ -19,7 +19,8 @@ const POINTS_PER_MM: f32 = 72.0 / 25.4;
 /// Points of PDF in a pixel of SVG. An inch has 96 pixels.
 const POINTS_PER_PX: f32 = 72.0 / 96.0;
 
-/// Returns the bytes of a PDF file with the picture, which is `width_mm` wide, or as wide as the picture says.
+/// Returns the bytes of a PDF file with the picture, which is `width_mm` wide, or as wide as the
+/// picture says.
 pub(super) fn pdf(tree: &Tree, width_mm: Option<f32>) -> Vec<u8> {
     let size = tree.size();
     let scale = width_mm.map_or(POINTS_PER_PX, |width_mm| width_mm * POINTS_PER_MM / size.width());

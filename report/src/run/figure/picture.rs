@@ -11,13 +11,15 @@ use resvg::usvg::{Options, Tree};
 use super::pdf::pdf;
 use super::svg::FONT;
 
-/// A subset of DejaVu Sans with the characters that the figures use. Its licence is in the same folder.
+/// A subset of DejaVu Sans with the characters that the figures use. Its licence is in the same
+/// folder.
 const FONT_FILE: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
 /// Pixels per unit of the SVG: enough for sharp print at half a page's width.
 const SCALE: f32 = 2.0;
 /// Pixels per millimetre of a picture whose width is given: 300 per inch.
 const PIXELS_PER_MM: f32 = 300.0 / 25.4;
-/// Smallest and largest width of a picture (mm): in a narrower one no letter is legible, a wider one fits on no sheet.
+/// Smallest and largest width of a picture (mm): a narrower one has no legible letter, a wider one
+/// fits on no sheet.
 const WIDTHS_MM: [f32; 2] = [50.0, 1_200.0];
 
 /// The reason why a picture cannot be written.
@@ -81,8 +83,8 @@ impl PictureFile {
         &self.path
     }
 
-    /// Writes an SVG picture that is `width_mm` wide, or as wide as it says. A PNG file of a given width has 300 pixels
-    /// per inch.
+    /// Writes an SVG picture that is `width_mm` wide, or as wide as it says. A PNG file of a given
+    /// width has 300 pixels per inch.
     ///
     /// # Errors
     /// [`PictureError`] if the text is not valid SVG, or the picture cannot be rendered or written.
@@ -99,7 +101,7 @@ impl PictureFile {
 /// Parses the width of a picture (mm).
 ///
 /// # Errors
-/// A message if the text is no number, or not within the widths that make sense.
+/// A message if the text is no number, or not within these widths.
 pub fn parse_width_mm(text: &str) -> Result<f32, String> {
     let [least, most] = WIDTHS_MM;
     match text.parse::<f32>() {
@@ -132,8 +134,8 @@ fn tree(svg: &str) -> Result<Tree, PictureError> {
 fn resized(svg: &str, width_mm: f32) -> Result<String, PictureError> {
     let size = tree(svg)?.size();
     let height_mm = width_mm * size.height() / size.width();
-    let own = format!("width=\"{}\" height=\"{}\"", size.width(), size.height());
-    Ok(svg.replacen(&own, &format!("width=\"{width_mm}mm\" height=\"{height_mm:.2}mm\""), 1))
+    let written_size = format!("width=\"{}\" height=\"{}\"", size.width(), size.height());
+    Ok(svg.replacen(&written_size, &format!("width=\"{width_mm}mm\" height=\"{height_mm:.2}mm\""), 1))
 }
 
 #[cfg(test)]

@@ -11,7 +11,8 @@ pub(super) const STRETCH: f64 = 2.0;
 /// Room above and below the road (m in the picture).
 const ROOM_M: f64 = 1.5;
 
-/// Returns the road of a film with these vehicles on it. Lengths are in metres, widths are stretched by [`STRETCH`].
+/// Returns the road of a film with these vehicles on it. Lengths are in metres, widths are
+/// stretched by [`STRETCH`].
 pub(super) fn road(film: &Film, vehicles: &Markup) -> Markup {
     let right_m = -film.road.right_edge_m() * STRETCH;
     let [rear_m, front_m] = REACH_M;

@@ -1,4 +1,5 @@
-//! The view from above of each film, to be moved along in time by a slider, for a page that is opened as a file.
+//! The view from above of each film, to be moved along in time by a slider, for a page that is
+//! opened as a file.
 //!
 //! The page's script moves the vehicles. The positions stand in the page, [`EVERY`]-th frame only.
 
@@ -12,7 +13,8 @@ use crate::run::film::Film;
 
 /// Number of frames between two positions of the slider.
 const EVERY: usize = 5;
-/// Returns the views of the films below each other, with one slider, which stands at the critical moment of the last.
+/// Returns the views of the films below each other, with one slider, which stands at the critical
+/// moment of the last.
 pub(crate) fn scrubber(films: &[Film]) -> Markup {
     let last = |film: &Film| film.frames.len().saturating_sub(1) / EVERY;
     let Some(tested) = films.last() else { return Markup::default() };
@@ -53,7 +55,8 @@ fn boxes(film: &Film) -> Markup {
     }
 }
 
-/// Returns one row per position of the slider: time, front and rear headway, then two coordinates per vehicle.
+/// Returns one row per position of the slider: time, front and rear headway, then two coordinates
+/// per vehicle.
 fn rows(film: &Film) -> String {
     let mut rows = String::from("[");
     for (number, (index, frame)) in film.frames.iter().enumerate().step_by(EVERY).enumerate() {

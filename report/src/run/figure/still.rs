@@ -1,4 +1,5 @@
-//! A small picture of the critical moment of a film: the road from above, and the time headways up to then and beyond.
+//! A small picture of the critical moment of a film: the road from above, and the time headways up
+//! to then and beyond.
 
 use super::chart::{Chart, Curve, range_of};
 use super::colours::{FRONT, REAR};
@@ -32,10 +33,10 @@ pub fn still(film: &Film) -> String {
     );
     strip::draw(&mut svg, (film, None), frame_index, (STRIP, REACH_M));
     let start = film.frames.first().map_or(0.0, |frame| frame.time.s());
-    let curve = |name: &str, colour, of: fn(&Frame) -> Option<f64>| Curve {
+    let curve = |name: &str, colour, value: fn(&Frame) -> Option<f64>| Curve {
         name: name.to_owned(),
         stroke: Stroke::solid(colour, 1.8),
-        points: film.frames.iter().map(|frame| (frame.time.s(), of(frame))).collect(),
+        points: film.frames.iter().map(|frame| (frame.time.s(), value(frame))).collect(),
     };
     let curves = vec![
         curve("front", FRONT, |frame| frame.margins.thw_front_s.ok()),

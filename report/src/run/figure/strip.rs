@@ -30,7 +30,8 @@ const FONT_SIZE_PX: f64 = 10.0;
 /// Rear and front end of the visible part of the road, relative to the ego (m).
 pub(super) type Reach = [f64; 2];
 
-/// Returns the lateral positions of the left and the right edge of the road (m), which bound the strip.
+/// Returns the lateral positions of the left and the right edge of the road (m), which bound the
+/// strip.
 fn road_edges_m(film: &Film) -> [f64; 2] {
     [0.0, film.road.right_edge_m()]
 }
@@ -43,7 +44,8 @@ struct Strip<'a> {
     reach: Reach,
 }
 
-/// Draws the frame `frame_index` into `area`. The vehicles of `other`, another film of the same sample, appear as outlines.
+/// Draws the frame `frame_index` into `area`. The vehicles of `other`, another film of the same
+/// sample, appear as outlines.
 pub(super) fn draw(
     svg: &mut Svg,
     (film, other): (&Film, Option<&Film>),
@@ -154,8 +156,9 @@ impl Strip<'_> {
         if !self.film.is_main(actor) {
             return;
         }
-        // The name of the ego is below its body, those of the others are above: a vehicle beside the ego covers
-        // neither. The others' names extend away from the ego, so that the headway has room.
+        // The name of the ego is below its body, and the names of the others are above: a vehicle
+        // beside the ego covers neither. The others' names extend away from the ego, so that the
+        // headway has room.
         let text = format!("{} {:.1} m/s", self.film.vehicle_label(actor), state.speed_mps);
         let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
         let own_m = self.frame.states[self.film.ego].s_m;
@@ -175,7 +178,7 @@ impl Strip<'_> {
 
     /// Draws the gaps in front of and behind the ego with their time headways.
     fn gaps(&self, svg: &mut Svg) {
-        let (own, margins) = (&self.frame.states[self.film.ego], &self.frame.margins);
+        let (ego, margins) = (&self.frame.states[self.film.ego], &self.frame.margins);
         let half_m = 0.5 * self.film.actors[self.film.ego].vehicle.dimensions.length_m;
         let mut draw = |sign: f64, gap_m: Measured, thw_s: Measured| {
             let (Ok(gap_m), Ok(thw_s)) = (gap_m, thw_s) else { return };
@@ -183,7 +186,7 @@ impl Strip<'_> {
                 return;
             }
             let colour = if thw_s < CRITICAL_THW_S { CRITICAL } else { SAFE };
-            let ends = [half_m, half_m + gap_m].map(|along_m| self.at(own.s_m + sign * along_m, own.d_m));
+            let ends = [half_m, half_m + gap_m].map(|along_m| self.at(ego.s_m + sign * along_m, ego.d_m));
             svg.line(ends[0], ends[1], Stroke::solid(colour, 2.0));
             if (ends[1][0] - ends[0][0]).abs() < HEADWAY_PX {
                 return;

@@ -1,4 +1,5 @@
-//! The timeline strip of a sample: for each arm what the ego did, why the margin increase system (MIS) did not, and when what happened.
+//! The timeline strip of a sample: for each arm the states of the ego, the reasons of the margin
+//! increase system (MIS), and the moments.
 //!
 //! ```text
 //!  with MIS   ┌ following ──────┬ increasing ┬ braking ┐    states of the ego stack
@@ -72,7 +73,8 @@ impl Axis {
         (time_s - self.start_s) / self.span_s * WIDTH_PX
     }
 
-    /// Returns a band with its text, if that has room. The colours are those of the band and of the text.
+    /// Returns a band with its text, if the text has room. The colours belong to the band and to
+    /// the text.
     fn band(&self, (from_s, until_s, top_px): (f64, f64, f64), text: &str, [fill, ink]: [&str; 2]) -> Markup {
         let (left, width) = (self.x(from_s), self.x(until_s) - self.x(from_s));
         let has_room = LETTER_PX * text.chars().count() as f64 + 8.0 < width;

@@ -1,4 +1,5 @@
-//! Why a run ended as it did: the sentence about it, the letters of its vehicles, and how long the reason of the system held.
+//! The cause of a run's end: the sentence about it, the letters of its vehicles, and how long the
+//! reason of the system held.
 
 use closecall_scenarios::causal::CausalSentence;
 use closecall_scenarios::outcome::{Collision, Outcome};
@@ -7,8 +8,8 @@ use closecall_traffic::Time;
 use super::{Film, Part};
 
 impl Film {
-    /// Returns the sentence about the run: who struck whom, after what, what the system did and why, which faults held. `None` for
-    /// recorded traffic.
+    /// Returns the sentence about the run: who struck whom, after what, what the system did and
+    /// why, which faults held. `None` for recorded traffic.
     pub(in crate::run) fn sentence(&self) -> Option<CausalSentence<'_>> {
         let outcome = self.outcome.as_ref()?;
         let reason_span_s = self.reason_span_s(outcome);
@@ -37,11 +38,12 @@ impl Film {
         sentence.map_or_else(String::new, |told| format!("{} ({})", told.struck(collision), told.delta_v(collision)))
     }
 
-    /// Returns the name of a vehicle after its letter: E is the ego, F the lead vehicle, R the rear vehicle of an encounter.
+    /// Returns the name of a vehicle after its letter: E is the ego, F the lead vehicle, R the rear
+    /// vehicle of an encounter.
     pub(in crate::run) fn vehicle_label(&self, actor: usize) -> String {
         let name = &self.actors[actor].name;
         let letter = match self.actors[actor].part {
-            // In the film of a lane change, the numbers of the tracks are what a reader looks up.
+            // In the film of a lane change, a reader looks up the numbers of the tracks.
             _ if name.starts_with("track-") => return name.clone(),
             Part::Ego => "E",
             Part::Lead => "F",

@@ -1,7 +1,8 @@
-//! EncounterComparison of a recorded encounter with the run that re-enacts it, by the metrics that say how close it was.
+//! Compares a recorded encounter with the run that re-enacts it, by metrics of closeness.
 //!
-//! Both are evaluated over the same part of the encounter: from the start until the rear vehicle crosses the lane
-//! marking. A collision of the ego or the end of the run ends the evaluation earlier.
+//! Both are evaluated over the same part of the encounter: from the start until the rear vehicle
+//! crosses the lane marking. A collision of the ego or the end of the run ends the evaluation
+//! earlier.
 
 use std::fmt::Write as _;
 
@@ -40,8 +41,8 @@ pub struct EncounterComparison {
 }
 
 impl EncounterComparison {
-    /// Evaluates both films of an encounter. The ego, the lead and the rear vehicle must have the same indices in the
-    /// simulated film as in the encounter.
+    /// Evaluates both films of an encounter. The ego, the lead and the rear vehicle must have the
+    /// same indices in the simulated film as in the encounter.
     pub fn new(encounter: &RecordedEncounter, recorded: &Film, simulated: &Film) -> Self {
         let from_lane = encounter.home;
         let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR_INDEX].d_m) != from_lane;
@@ -52,7 +53,8 @@ impl EncounterComparison {
         }
     }
 
-    /// Returns the name of each metric with its text for the recorded encounter and for the simulated run.
+    /// Returns the name of each metric with its text for the recorded encounter and for the
+    /// simulated run.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, [String; 2])> {
         ROWS.iter().map(|(name, unit, metric)| {
             let text = |course| match metric(course) {
@@ -64,18 +66,18 @@ impl EncounterComparison {
         })
     }
 
-    /// Says that the rear vehicle never crosses the marking in the simulation, if so: the metrics at the crossing are then
-    /// missing, and those until then cover the whole run.
+    /// Says that the rear vehicle never crosses the marking in the simulation, if so. The metrics
+    /// at the crossing are then missing, and the other metrics cover the whole run.
     pub fn never_crosses(&self) -> Option<String> {
         (self.simulated.crossing_s == Err(Absent::NeverCrossed)).then(|| {
-            "the rear vehicle never crosses the marking, so that the encounter is not comparable with the recorded one from \
-             the recorded crossing on"
+            "the rear vehicle never crosses the marking: from the recorded crossing on, the encounter is not comparable \
+             with the recorded one"
                 .to_owned()
         })
     }
 
-    /// Returns the comparison as Markdown: the vehicles, the metrics of each side, and how the run deviates from the recorded
-    /// encounter.
+    /// Returns the comparison as Markdown: the vehicles, the metrics of each side, and how the run
+    /// deviates from the recorded encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
         let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm_label(), encounter.start.s());
@@ -132,7 +134,8 @@ impl EncounterMetrics {
         }
     }
 
-    /// Evaluates a film up to `crossing`, the time at which the rear vehicle crosses the marking, if it does.
+    /// Evaluates a film up to `crossing`, the time at which the rear vehicle crosses the marking,
+    /// if it does.
     fn measure(film: &Film, crossing: Option<Time>) -> Self {
         let collided_at = film.worst_collision().map(|collision| collision.time);
         let until = [crossing, collided_at].into_iter().flatten().min();
@@ -141,9 +144,9 @@ impl EncounterMetrics {
         // A crossing after the collision is not part of the encounter and does not count.
         let crossing = crossing.filter(|crossing| collided_at.is_none_or(|collided_at| *crossing <= collided_at));
         let before = frames().last().filter(|_| crossing.is_some());
-        let at_crossing = |of: &dyn Fn(&Frame) -> Measured| before.map_or(Err(Absent::NeverCrossed), of);
-        let smallest = |of: &dyn Fn(&Frame) -> Measured, absent| {
-            frames().filter_map(|frame| of(frame).ok()).min_by(f64::total_cmp).ok_or(absent)
+        let at_crossing = |value: &dyn Fn(&Frame) -> Measured| before.map_or(Err(Absent::NeverCrossed), value);
+        let smallest = |value: &dyn Fn(&Frame) -> Measured, absent| {
+            frames().filter_map(|frame| value(frame).ok()).min_by(f64::total_cmp).ok_or(absent)
         };
         let decelerations = frames().map(|frame| -frame.states[film.ego].acceleration_mps2);
         Self {
@@ -157,9 +160,10 @@ impl EncounterMetrics {
     }
 }
 
-/// Returns the time headway of a vehicle to the ego along the road (s), whichever lanes the two are in.
+/// Returns the time headway of a vehicle to the ego along the road (s), whichever lanes the two are
+/// in.
 fn headway_s(film: &Film, frame: &Frame, actor: usize) -> Measured {
-    let (own, other) = (&frame.states[film.ego], &frame.states[actor]);
+    let (ego, other) = (&frame.states[film.ego], &frame.states[actor]);
     let half_lengths_m = [film.ego, actor].map(|actor| 0.5 * film.actors[actor].vehicle.dimensions.length_m);
-    time_headway_s(own.s_m - other.s_m - half_lengths_m.iter().sum::<f64>(), other.speed_mps)
+    time_headway_s(ego.s_m - other.s_m - half_lengths_m.iter().sum::<f64>(), other.speed_mps)
 }

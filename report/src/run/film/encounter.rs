@@ -1,8 +1,8 @@
 //! The film of a recorded encounter, to be viewed beside the run that re-enacts it.
 //!
-//! The recorded vehicle that the simulated ego replaces is the ego of the film. Clock, road and vehicle indices are
-//! those of the scenario that is made from the encounter, so that one film can be drawn into the other. The frames are
-//! one control step of the simulation apart.
+//! The recorded vehicle that the simulated ego replaces is the ego of the film. The film has the
+//! clock, the road and the vehicle indices of the scenario that is made from the encounter, so one
+//! film can be drawn into the other. The frames are one control step of the simulation apart.
 
 use closecall_recorded::encounter::{EGO_INDEX, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};

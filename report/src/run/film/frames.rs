@@ -25,7 +25,7 @@ const ENCOUNTER_HORIZON_S: f64 = 10.0;
 pub enum Level {
     /// The states of the vehicles, the events and the plots.
     Events,
-    /// Also the 3D scene: the vehicles, and what the ego perceives.
+    /// Also the 3D scene: the vehicles, and the ego's perception.
     Objects,
     /// Also the LiDAR points and camera images of the rear sensors, if these are simulated.
     #[default]
@@ -41,13 +41,13 @@ pub struct FilmActor {
     pub vehicle: Vehicle,
     /// Indices of the frames in which the vehicle is present.
     pub present_frames: Range<usize>,
-    /// Its part in what the film shows, which decides its colour.
+    /// The vehicle's part in the film, which decides its colour.
     pub part: Part,
     /// True if the plots show its speed and acceleration.
     pub is_plotted: bool,
 }
 
-/// The part of a vehicle in what a film shows.
+/// The part of a vehicle in a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The ego; in the film of a recorded lane change, the vehicle that changes lanes.
@@ -56,15 +56,15 @@ pub enum Part {
     Lead,
     /// The rear vehicle.
     Rear,
-    /// Another vehicle of the scenario, with its number among these.
+    /// Another vehicle of the scenario, with its number among the other vehicles.
     Other(usize),
     /// A vehicle that is part of the traffic around. It is grey and has no name.
     Background,
 }
 
 impl Part {
-    /// Returns the part of a simulated vehicle: by convention the first vehicle besides the ego is the lead vehicle and
-    /// the second the rear vehicle.
+    /// Returns the part of a simulated vehicle: by convention the first vehicle besides the ego is
+    /// the lead vehicle and the second the rear vehicle.
     pub(super) fn of_index(index: usize, ego: usize) -> Self {
         match if index > ego { index - 1 } else { index } {
             _ if index == ego => Self::Ego,
@@ -79,8 +79,8 @@ impl Part {
 #[derive(Clone, Debug)]
 pub struct Frame {
     pub(in crate::run) time: Time,
-    /// States of the vehicles, in the order of [`Film::actors`]. A vehicle that is absent has the nearest of its states
-    /// in time.
+    /// States of the vehicles, in the order of [`Film::actors`]. A vehicle that is absent has the
+    /// nearest of its states in time.
     pub(in crate::run) states: Vec<VehicleState>,
     /// Pitch of each body, positive nose down (rad).
     pub(in crate::run) pitches_rad: Vec<f64>,
@@ -95,9 +95,11 @@ pub struct Frame {
     pub(in crate::run) phase: Option<Phase>,
     /// Health of the sensors as the ego knows it; `None` for recorded traffic.
     pub(in crate::run) health: Option<SensorHealth>,
-    /// Fields of view of the rear sensors; none if they are not simulated or below [`Level::Objects`].
+    /// Fields of view of the rear sensors; none if they are not simulated or below
+    /// [`Level::Objects`].
     pub(in crate::run) rear_fields: Vec<FieldOfView>,
-    /// Scan of the rear LiDAR, the first one if there are several, in the frames whose scan is kept.
+    /// Scan of the rear LiDAR, the first one if there are several, in the frames whose scan is
+    /// kept.
     pub(in crate::run) scan: Option<Scan>,
     /// Scans of the other LiDARs with their names, likewise.
     pub(in crate::run) other_scans: Vec<(&'static str, Scan)>,
@@ -118,7 +120,8 @@ pub struct Film {
     pub(in crate::run) title: String,
     /// Name of the arm, which controls the ego; `recorded` for recorded traffic.
     pub(in crate::run) arm: String,
-    /// Whether the ego stack of the scenario has a margin increase system, so that the arm `acc` is the one without it.
+    /// Whether the ego stack of the scenario has a margin increase system. If so, the arm `acc` is
+    /// the arm without it.
     pub(in crate::run) has_mis: bool,
     pub(in crate::run) level: Level,
     /// Time between two frames.
@@ -127,8 +130,8 @@ pub struct Film {
     pub(in crate::run) environment: Environment,
     /// The vehicles, in the order of the scenario's actors.
     pub(in crate::run) actors: Vec<FilmActor>,
-    /// Index of the ego among the actors. In the film of a recorded lane change, the vehicle that changes lanes is the
-    /// ego.
+    /// Index of the ego among the actors. In the film of a recorded lane change, the vehicle that
+    /// changes lanes is the ego.
     pub(in crate::run) ego: usize,
     pub(in crate::run) frames: Vec<Frame>,
     pub(in crate::run) happenings: Vec<(Time, RunEvent)>,
@@ -172,7 +175,8 @@ impl Film {
         Self { arm, ..self }
     }
 
-    /// Makes all vehicles but the first `count` traffic around these: grey, without name and curves.
+    /// Makes all vehicles but the first `count` traffic around these: grey, without name and
+    /// curves.
     #[must_use]
     pub fn with_plots_of_first(mut self, count: usize) -> Self {
         for actor in self.actors.iter_mut().skip(count) {
@@ -182,8 +186,9 @@ impl Film {
         self
     }
 
-    /// Makes all vehicles traffic around that are neither ego, lead vehicle nor rear vehicle, and neither collide nor are ever the
-    /// vehicle ahead of or behind the ego. Those that are relevant are named, but not plotted.
+    /// Gives all vehicles the part of traffic around, except the ego, the lead vehicle, the rear
+    /// vehicle, and every vehicle that collides or is ever directly ahead of or behind the ego.
+    /// These relevant vehicles are named, but not plotted.
     pub(super) fn mark_relevant(&mut self) {
         let collides = |name: &str| {
             let mut vehicles = self.collisions().iter().flat_map(|collision| &collision.between);
@@ -258,14 +263,14 @@ impl Film {
         self.actors[actor].present_frames.contains(&frame_index)
     }
 
-    /// Returns the ego's closest encounter that comes next after a frame, or `None` if there is none within the
-    /// horizon. Both vehicles are assumed to keep their velocities.
+    /// Returns the ego's next closest encounter after a frame, or `None` if there is none within
+    /// the horizon. Both vehicles are assumed to keep their velocities.
     pub(in crate::run) fn soonest_encounter(&self, frame_index: usize) -> Option<Encounter> {
         let frame = &self.frames[frame_index];
-        let own = self.moving_box(frame, self.ego);
+        let ego = self.moving_box(frame, self.ego);
         let others = (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
         let encounters = others
-            .filter_map(|actor| closest_encounter(&own, &self.moving_box(frame, actor), ENCOUNTER_HORIZON_S).ok());
+            .filter_map(|actor| closest_encounter(&ego, &self.moving_box(frame, actor), ENCOUNTER_HORIZON_S).ok());
         encounters.min_by(|a, b| a.ttce_s.total_cmp(&b.ttce_s))
     }
 
@@ -310,12 +315,13 @@ impl Film {
         Scene { time: frame.time, road: &self.road, environment: &self.environment, ego, others }
     }
 
-    /// Returns the pose of a vehicle in the ego frame: x forward (m), y to the left (m), heading (rad).
+    /// Returns the pose of a vehicle in the ego frame: x forward (m), y to the left (m), heading
+    /// (rad).
     pub(in crate::run) fn in_ego_frame(&self, frame: &Frame, actor: usize) -> [f64; 3] {
         let pose = |state: &VehicleState| self.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
-        let (own, other) = (pose(&frame.states[self.ego]), pose(&frame.states[actor]));
-        let (sin, cos) = maths::sin_cos(own.yaw_rad);
-        let (dx, dy) = (other.x_m - own.x_m, other.y_m - own.y_m);
-        [cos * dx + sin * dy, cos * dy - sin * dx, other.yaw_rad - own.yaw_rad]
+        let (ego, other) = (pose(&frame.states[self.ego]), pose(&frame.states[actor]));
+        let (sin, cos) = maths::sin_cos(ego.yaw_rad);
+        let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
+        [cos * dx + sin * dy, cos * dy - sin * dx, other.yaw_rad - ego.yaw_rad]
     }
 }

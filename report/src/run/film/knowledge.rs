@@ -1,12 +1,13 @@
-//! What the ego knew of the vehicle behind it: since when it was tracked, how far away it was then, when it was lost.
+//! The ego's knowledge of the vehicle behind it: since when it was tracked, its distance at that
+//! time, and when it was lost.
 
 use closecall_sensors::SceneVehicle;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
 
 use super::{Film, Frame};
 
-/// Largest distance along the road between a track and the vehicle that it belongs to (m): an assumption; 3 to 10 are
-/// plausible.
+/// Largest distance along the road between a track and the vehicle that it belongs to (m): an
+/// assumption; 3 to 10 are plausible.
 const SAME_VEHICLE_M: f64 = 5.0;
 
 /// A vehicle behind the ego, as the rear sensors know it.
@@ -47,28 +48,29 @@ impl KnownSpan {
     }
 }
 
-/// Returns the confirmed tracks of vehicles behind the ego. A track that has passed the rear bumper is no longer behind.
+/// Returns the confirmed tracks of vehicles behind the ego. A track that has passed the rear bumper
+/// is not behind.
 pub(super) fn rear_seen(tracks: &[Track], vehicles: &[SceneVehicle], ego: usize) -> Vec<RearSeen> {
-    let own = &vehicles[ego];
+    let ego_vehicle = &vehicles[ego];
     let is_known = |track: &&Track| {
         track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
     };
     let belongs = |track: &Track| {
-        let lateral_m = |index: &usize| (vehicles[*index].state.d_m - own.state.d_m - track.y_m()).abs();
+        let lateral_m = |index: &usize| (vehicles[*index].state.d_m - ego_vehicle.state.d_m - track.y_m()).abs();
         let is_near = |index: &usize| {
-            (vehicles[*index].state.s_m - own.state.s_m - track.x_m()).abs() < SAME_VEHICLE_M && *index != ego
+            (vehicles[*index].state.s_m - ego_vehicle.state.s_m - track.x_m()).abs() < SAME_VEHICLE_M && *index != ego
         };
         (0..vehicles.len()).filter(is_near).min_by(|a, b| lateral_m(a).total_cmp(&lateral_m(b)))
     };
-    let ego_length_m = own.vehicle.dimensions.length_m;
-    let seen =
+    let ego_length_m = ego_vehicle.vehicle.dimensions.length_m;
+    let rear_vehicle =
         |track: &Track| RearSeen { actor: belongs(track), gap_m: -track.x_m() - 0.5 * (track.length_m + ego_length_m) };
-    tracks.iter().filter(is_known).map(seen).filter(|seen| seen.gap_m > 0.0).collect()
+    tracks.iter().filter(is_known).map(rear_vehicle).filter(|rear_vehicle| rear_vehicle.gap_m > 0.0).collect()
 }
 
 impl Film {
-    /// Returns the spans in which a vehicle behind the ego was or was not known, in order of time. Recorded traffic has
-    /// none.
+    /// Returns the spans in which a vehicle behind the ego was or was not known, in order of time.
+    /// Recorded traffic has none.
     pub(in crate::run) fn known_spans(&self) -> Vec<KnownSpan> {
         let mut spans: Vec<KnownSpan> = Vec::new();
         if self.outcome.is_none() {
@@ -76,16 +78,17 @@ impl Film {
         }
         let relevant = self.relevant_rear();
         for (first_frame, frame) in self.frames.iter().enumerate() {
-            let seen = known(frame, relevant);
-            if spans.last().is_none_or(|span| span.from_m.is_some() != seen.is_some()) {
+            let gap_m = nearest_gap(frame, relevant);
+            if spans.last().is_none_or(|span| span.from_m.is_some() != gap_m.is_some()) {
                 let is_later = spans.iter().any(|span| span.from_m.is_some());
-                spans.push(KnownSpan { first_frame, time: frame.time, from_m: seen, is_later });
+                spans.push(KnownSpan { first_frame, time: frame.time, from_m: gap_m, is_later });
             }
         }
         spans
     }
 
-    /// Returns a sentence on when the ego first saw a vehicle behind it, with the weather if that is not clear.
+    /// Returns a sentence on when the ego first saw a vehicle behind it, with the weather if that
+    /// is not clear.
     pub(in crate::run) fn sight(&self) -> Option<String> {
         let spans = self.known_spans();
         if spans.is_empty() {
@@ -105,8 +108,8 @@ impl Film {
 }
 
 impl Film {
-    /// Returns the vehicle behind that matters: the one that collides with the ego, else the last one behind it in its lane at
-    /// the critical moment. `None` if there is none.
+    /// Returns the relevant vehicle behind: the vehicle that collides with the ego, else the last
+    /// vehicle behind it in its lane at the critical moment. `None` if there is none.
     fn relevant_rear(&self) -> Option<usize> {
         let critical = self.critical_moment();
         let until = self.frames.partition_point(|frame| frame.time <= critical);
@@ -123,7 +126,8 @@ impl Film {
         struck.filter(was_behind).or(follower)
     }
 
-    /// Returns a sentence on the spans before the critical moment in which a vehicle that was known is out of sight.
+    /// Returns a sentence on the spans before the critical moment in which a known vehicle is out
+    /// of sight.
     fn lost(&self, spans: &[KnownSpan]) -> String {
         let critical = self.critical_moment();
         let ends =
@@ -132,7 +136,7 @@ impl Film {
             ends.map(|pair| format!("{:.2} to {:.2} s", pair[0].time.s(), pair[1].time.s())).collect();
         match texts.as_slice() {
             [] => String::new(),
-            [one] => format!(" It was lost from {one}."),
+            [sensor] => format!(" It was lost from {sensor}."),
             more => format!(" It was lost {} times, first from {}.", more.len(), more[0]),
         }
     }
@@ -143,8 +147,9 @@ fn closing(weather: &str) -> &'static str {
     if weather.is_empty() { "" } else { ")" }
 }
 
-/// Returns the distance of the nearest vehicle that is known, or of the vehicle `relevant` alone (m).
-fn known(frame: &Frame, relevant: Option<usize>) -> Option<f64> {
-    let seen = frame.rear_seen.iter().filter(|seen| relevant.is_none() || seen.actor == relevant);
-    seen.map(|seen| seen.gap_m).min_by(f64::total_cmp)
+/// Returns the distance of the nearest vehicle that is known, or of the vehicle `relevant` alone
+/// (m).
+fn nearest_gap(frame: &Frame, relevant: Option<usize>) -> Option<f64> {
+    let vehicles = frame.rear_seen.iter().filter(|vehicle| relevant.is_none() || vehicle.actor == relevant);
+    vehicles.map(|vehicle| vehicle.gap_m).min_by(f64::total_cmp)
 }

@@ -1,6 +1,7 @@
-//! A film: everything that the views of one run show, held in memory.
+//! A film: all data that the views of one run show, held in memory.
 //!
-//! A run is kept as a whole until its outcome is known, because the outcome decides which moment the views open at.
+//! A run is kept as a whole until its end, because the outcome decides at which moment the views
+//! open.
 //!
 //! ```text
 //!  simulation ─▶ FilmRecorder ─(outcome)─┐

@@ -11,7 +11,8 @@ impl Film {
     /// This is the first of these that exists:
     /// 1. the first collision of the ego, else of any vehicles
     /// 2. in a recorded encounter: the time at which the rear vehicle crosses the lane marking
-    /// 3. in a recorded lane change: the time of a critical metric, else that at which another vehicle is closest to the ego
+    /// 3. in a recorded lane change: the time of a critical metric, else the time at which another
+    ///    vehicle is closest to the ego
     /// 4. in a run: the time of the smallest time headway of the vehicle behind
     /// 5. the end
     pub fn critical_moment(&self) -> Time {
@@ -29,16 +30,16 @@ impl Film {
         closest.unwrap_or_else(|| self.end())
     }
 
-    /// Returns the time of the frame that shows the critical moment: of a collision the first frame in which the vehicles
-    /// touch.
+    /// Returns the time of the frame that shows the critical moment: for a collision, the first
+    /// frame in which the vehicles touch.
     pub(in crate::run) fn critical_frame_time(&self) -> Time {
         let critical = self.critical_moment();
         let at = self.frames.partition_point(|frame| frame.time < critical);
         self.frames.get(at).map_or_else(|| self.end(), |frame| frame.time)
     }
 
-    /// Returns the moment at which a recording of these films opens, the same in all of them: the collision of the last film that has
-    /// one, else the critical moment of the last film.
+    /// Returns the moment at which a recording of these films opens, the same in all of them: the
+    /// collision of the last film that has one, else the critical moment of the last film.
     pub(in crate::run) fn shown_moment(films: &[Self]) -> Time {
         let collided = films.iter().rev().find(|film| film.worst_collision().is_some());
         collided.or(films.last()).map_or(Time::ZERO, Self::critical_frame_time)
@@ -54,14 +55,14 @@ impl Film {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.moments)
     }
 
-    /// Returns the time at which the distance from the box of the ego to that of another vehicle is smallest.
+    /// Returns the time at which the box of another vehicle is closest to the box of the ego.
     fn closest_moment(&self) -> Time {
         let distance_m = |frame_index: usize| {
             let frame = &self.frames[frame_index];
-            let own = self.moving_box(frame, self.ego).shape;
+            let ego = self.moving_box(frame, self.ego).shape;
             let others =
                 (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
-            others.map(|actor| own.distance_m(&self.moving_box(frame, actor).shape)).min_by(f64::total_cmp)
+            others.map(|actor| ego.distance_m(&self.moving_box(frame, actor).shape)).min_by(f64::total_cmp)
         };
         let distances = (0..self.frames.len()).filter_map(|index| Some((index, distance_m(index)?)));
         let closest = distances.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| self.frames[index].time);

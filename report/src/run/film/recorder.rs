@@ -13,14 +13,14 @@ use closecall_scenarios::causal::VehicleLetters;
 use closecall_scenarios::outcome::{Outcome, Phase};
 use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView};
 
-/// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest deceleration that the
-/// road allows.
+/// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest
+/// deceleration that the road allows.
 const GRAVITY_MPS2: f64 = 9.81;
 
-// A run has more than a million LiDAR points, so that a film keeps only some of its scans: sparse ones throughout,
-// dense ones in the critical and the overtaking phase up to a maximum number, and always the one nearest to the smallest
-// rear headway. The dense ones lack the bare road: the simulation traces none of it, and to add it costs more than a
-// control step.
+// A run has more than a million LiDAR points, so a film keeps only some of its scans: sparse ones
+// throughout, dense ones in the critical and the overtaking phase up to a maximum number, and
+// always the scan nearest to the smallest rear headway. The dense ones lack the bare road: the
+// simulation traces none of it, and adding it costs more than a control step.
 
 /// Number of frames between two pairs of kept scans, one of each side of the mirror, in all phases.
 const SPARSE_SCAN_INTERVAL: usize = 200;
@@ -33,8 +33,8 @@ const MAX_DENSE_SCANS: usize = 40;
 pub struct FilmRecorder {
     film: Film,
     dense_scan_count: usize,
-    /// What to keep of each LiDAR: the number of new scans to keep next in all phases, and whether to keep the next one of the two
-    /// phases.
+    /// The kept scans of each LiDAR: the number of new scans until the next kept one in all phases,
+    /// and whether to keep the next scan of the two phases.
     due: Vec<(usize, bool)>,
     /// The smallest rear headway in the critical phase so far (s).
     smallest_s: f64,
@@ -42,10 +42,10 @@ pub struct FilmRecorder {
     closest: Option<(usize, Vec<KeptLidar>)>,
 }
 
-/// A LiDAR with its latest scan, which is completed if it remains the one to keep.
+/// A LiDAR with its latest scan, which is completed if the film keeps it.
 struct KeptLidar {
     name: &'static str,
-    /// Whether it is the first of those that look back.
+    /// Whether the LiDAR is the first one that looks back.
     is_main: bool,
     looks_ahead: bool,
     lidar: RearLidar,
@@ -122,7 +122,8 @@ impl FilmRecorder {
         film
     }
 
-    /// Returns the scans of a control step that are to be kept: that of the first rear LiDAR, and those of the others.
+    /// Returns the scans of a control step that the film keeps: the scan of the first rear LiDAR,
+    /// and the scans of the others.
     fn scans(&mut self, view: &StepView<'_>) -> (Option<Scan>, Vec<(&'static str, Scan)>) {
         if self.film.level < Level::Full {
             return (None, Vec::new());
@@ -138,7 +139,7 @@ impl FilmRecorder {
         let (mut main, mut others) = (None, Vec::new());
         for (at, lidar) in lidars.iter().enumerate() {
             let due = &mut self.due[at];
-            // Two successive scans are those of both sides of the mirror.
+            // Two successive scans show both sides of the mirror.
             *due = (if index.is_multiple_of(SPARSE_SCAN_INTERVAL) { 2 } else { due.0 }, due.1 || is_dense);
             // A sensor below the rate of the control loop has no new scan in some steps.
             if lidar.lidar.latest().end != view.time {
@@ -222,7 +223,7 @@ impl Observer for FilmRecorder {
         });
     }
 
-    fn event(&mut self, time: Time, what: &RunEvent) {
-        self.film.happenings.push((time, what.clone()));
+    fn event(&mut self, time: Time, event: &RunEvent) {
+        self.film.happenings.push((time, event.clone()));
     }
 }

@@ -19,11 +19,13 @@ pub(crate) struct Scan {
 impl Scan {
     /// Returns the latest scan of the LiDAR with all its points.
     pub(super) fn completed(lidar: &RearLidar, boxes: &[Detection]) -> Option<Self> {
-        // The scan of the simulation has clustered without an error before, and so does the complete one.
+        // The scan of the simulation has clustered without an error before, and so does the
+        // complete scan.
         Some(Self::of(&lidar.completed().ok()?, boxes))
     }
 
-    /// Returns the latest scan of the LiDAR. It lacks most points of the bare road, which the detector discards.
+    /// Returns the latest scan of the LiDAR. It lacks most points of the bare road, which the
+    /// detector discards.
     pub(super) fn of(lidar: &RearLidar, boxes: &[Detection]) -> Self {
         let points = lidar.latest().clone();
         let mut clusters = vec![NO_CLUSTER; points.len()];
@@ -36,13 +38,13 @@ impl Scan {
         Self { points, clusters, boxes: boxes.to_vec() }
     }
 
-    /// Returns the same scan in the ego's frame, of a LiDAR that may look ahead.
+    /// Returns the same scan in the ego's frame. The LiDAR may look ahead.
     pub(super) fn in_ego_frame(mut self, looks_ahead: bool) -> Self {
         if looks_ahead {
             let LidarScan { x_m, y_m, .. } = &mut self.points;
             x_m.iter_mut().chain(y_m).for_each(|at_m| *at_m = -*at_m);
-            for found in &mut self.boxes {
-                (found.face_x_m, found.face_y_m) = (-found.face_x_m, -found.face_y_m);
+            for detection in &mut self.boxes {
+                (detection.face_x_m, detection.face_y_m) = (-detection.face_x_m, -detection.face_y_m);
             }
         }
         self

@@ -46,7 +46,8 @@ impl Film {
         }
     }
 
-    /// Returns a summary of what the margin increase system did and why, or `None` if the arm has no such system.
+    /// Returns a summary of the actions of the margin increase system and their reasons, or `None`
+    /// if the arm has no such system.
     pub fn mis_summary(&self) -> Option<String> {
         let mis = self.outcome.as_ref()?.mis.as_ref().ok()?;
         Some(match mis.engaged_at_s {
@@ -66,7 +67,7 @@ impl Film {
 
     /// Returns the events of the film in order of time, one line each.
     pub(crate) fn story(&self) -> Vec<StoryLine> {
-        let happenings = self.happenings.iter().filter_map(|(time, what)| self.line(*time, what));
+        let happenings = self.happenings.iter().filter_map(|(time, event)| self.line(*time, event));
         let moments = self.moments().iter().map(|noted| StoryLine {
             time: noted.time,
             text: noted.moment.label(),
@@ -74,17 +75,17 @@ impl Film {
         });
         let notes =
             self.notes.iter().map(|(time, text)| StoryLine { time: *time, text: text.clone(), is_severe: false });
-        let known = self.known_spans().into_iter().filter(|span| span.time > self.frames[0].time).map(|span| {
+        let spans = self.known_spans().into_iter().filter(|span| span.time > self.frames[0].time).map(|span| {
             StoryLine { time: span.time, text: format!("vehicle behind the ego: {}", span.words()), is_severe: false }
         });
-        let mut lines: Vec<StoryLine> = happenings.chain(moments).chain(notes).chain(known).collect();
+        let mut lines: Vec<StoryLine> = happenings.chain(moments).chain(notes).chain(spans).collect();
         lines.sort_by_key(|line| line.time);
         lines
     }
 
-    fn line(&self, time: Time, what: &RunEvent) -> Option<StoryLine> {
+    fn line(&self, time: Time, event: &RunEvent) -> Option<StoryLine> {
         let plain = |text: String| Some(StoryLine { time, text, is_severe: false });
-        match what {
+        match event {
             RunEvent::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
             RunEvent::DriverNote { actor, note } => {
                 plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note)))
@@ -102,16 +103,18 @@ impl Film {
         }
     }
 
-    /// Returns the collision `reported` as the outcome has it, or `reported` itself if the outcome lacks it.
+    /// Returns the collision `reported` with the values of the outcome, or `reported` itself if the
+    /// outcome lacks it.
     ///
-    /// A collision is reported at first contact, when the changes of velocity are not known yet. The outcome has them.
+    /// A collision is reported at first contact, before the changes of velocity are known. The
+    /// outcome has them.
     pub(crate) fn collision_in_outcome<'a>(&'a self, reported: &'a Collision) -> &'a Collision {
         let same = |collision: &&Collision| collision.time == reported.time && collision.between == reported.between;
         self.collisions().iter().find(same).unwrap_or(reported)
     }
 }
 
-/// Returns what a driver does, as a phrase that follows the name of its vehicle.
+/// Returns a driver's action, as a phrase that follows the name of its vehicle.
 pub(crate) fn driver_note_text(note: DriverNote) -> &'static str {
     match note {
         DriverNote::CutOutStarted => "begins to change lanes to overtake",

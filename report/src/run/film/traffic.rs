@@ -1,9 +1,11 @@
-//! The film of a lane change in recorded traffic. The vehicle that changes lanes is the ego of the film.
+//! The film of a lane change in recorded traffic. The vehicle that changes lanes is the ego of the
+//! film.
 //!
-//! The film shows the smoothed trajectories from which the metrics are computed, from [`CONTEXT_TIME`] before the lane
-//! change until the same time after it, with all vehicles that come within [`REACH_M`] of the ego. The road is drawn
-//! straight, with lanes of the typical width in the trajectory data. Trajectory data have no brake lights and no
-//! indicators, so that none are shown.
+//! The film shows the smoothed trajectories from which the metrics are computed, from
+//! [`CONTEXT_TIME`] before the lane change until the same time after it, with all vehicles that
+//! come within [`REACH_M`] of the ego. The road is drawn straight, with lanes of the typical width
+//! in the trajectory data. Trajectory data have no brake lights and no indicators, so the film
+//! shows none.
 
 use closecall_recorded::criticality::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
@@ -25,7 +27,8 @@ use closecall_simulation::{CurrentMargins, Lead};
 const CONTEXT_TIME: Time = Time::from_ms(2_000);
 /// Vehicles that never come closer to the ego than this along the road are left out (m).
 const REACH_M: f64 = 150.0;
-/// Lateral distance beyond which a vehicle is on another carriageway (m). The readers put carriageways 1 km apart.
+/// Lateral distance beyond which a vehicle is on another carriageway (m). The readers put
+/// carriageways 1 km apart.
 const SEPARATE_M: f64 = 200.0;
 /// Largest number of vehicles that are named and coloured. All others are the traffic around them.
 const MAX_MAIN: usize = 5;
@@ -35,7 +38,7 @@ const MAX_PLOTTED: usize = 3;
 const LANE_WIDTH_RANGE_M: [f64; 2] = [2.5, 5.0];
 /// Largest number of lanes that the drawn road may have.
 const MAX_LANES: u8 = 8;
-/// Speed below which the direction of the velocity is mostly noise, so that the heading is set to 0 (m/s).
+/// Speed below which the direction of the velocity is mostly noise (m/s). The heading is then 0.
 const MIN_HEADING_SPEED_MPS: f64 = 1.0;
 /// Speed limit of the drawn road (m/s). The film does not depend on it.
 const SPEED_LIMIT_MPS: f64 = 120.0 / 3.6;
@@ -57,22 +60,23 @@ pub enum TrafficFilmError {
 /// Returns the film of one lane change in trajectory data.
 ///
 /// # Errors
-/// [`TrafficFilmError`] if the trajectory data do not contain the track, or no road can be built from its lanes.
+/// [`TrafficFilmError`] if the trajectory data do not contain the track, or no road can be built
+/// from its lanes.
 pub fn film_lane_change(
     recording: &SmoothedTrajectoryData,
     change: &CriticalLaneChange,
 ) -> Result<Film, TrafficFilmError> {
     let track_id = change.lane_change.track_id;
-    let own = recording.trajectories().find(|track| track.track_id == track_id);
-    let own = own.ok_or(TrafficFilmError::NoTrack { track_id })?;
-    let carriageway = Carriageway::of(recording, own);
-    let own = &carriageway.moved(own);
+    let changer = recording.trajectories().find(|track| track.track_id == track_id);
+    let changer = changer.ok_or(TrafficFilmError::NoTrack { track_id })?;
+    let carriageway = Carriageway::of(recording, changer);
+    let changer = &carriageway.moved(changer);
     let (from, to) = (Time::from_s(change.lane_change.start_s), Time::from_s(change.lane_change.end_s));
     let is_shown = |point: &&TrajectoryPoint| point.time >= from - CONTEXT_TIME && point.time <= to + CONTEXT_TIME;
-    let instants: Vec<&TrajectoryPoint> = own.points.iter().filter(is_shown).collect();
+    let instants: Vec<&TrajectoryPoint> = changer.points.iter().filter(is_shown).collect();
     let others: Vec<Trajectory> =
         recording.trajectories().filter(|track| carriageway.has(track)).map(|track| carriageway.moved(track)).collect();
-    let tracks = nearby_tracks(&others, own, &instants);
+    let tracks = nearby_tracks(&others, changer, &instants);
     let frames = instants.iter().map(|point| frame_at(&tracks, point.time)).collect();
     let film_actor = |track: &&Trajectory| FilmActor {
         name: format!("track-{}", track.track_id),
@@ -107,8 +111,9 @@ pub fn film_lane_change(
     Ok(film)
 }
 
-/// The carriageway on which a lane change is shown. The readers put the second carriageway of a recording 1 km to the right of the first,
-/// and continue its lane numbers; the film shows it as a road of its own.
+/// The carriageway on which a lane change is shown. The readers put the second carriageway of a
+/// recording 1 km to the right of the first, and continue its lane numbers; the film shows it as a
+/// separate road.
 struct Carriageway {
     /// Lateral position of its left edge in the recording (m).
     left_m: f64,
@@ -120,8 +125,8 @@ struct Carriageway {
 
 impl Carriageway {
     /// Returns the carriageway of a track.
-    fn of(recording: &SmoothedTrajectoryData, own: &Trajectory) -> Self {
-        let own_m = own.points.first().map_or(0.0, |point| point.d_m);
+    fn of(recording: &SmoothedTrajectoryData, changer: &Trajectory) -> Self {
+        let own_m = changer.points.first().map_or(0.0, |point| point.d_m);
         let edge_m = |lane: u8| recording.markings.right_edge_m(Lane(lane));
         let is_before = |lane: &u8| edge_m(*lane).is_some_and(|edge_m| edge_m > own_m + SEPARATE_M);
         let lanes_before = (1..u8::MAX).filter(is_before).max().map_or(0, |last| last + 1);
@@ -147,20 +152,23 @@ impl Carriageway {
     }
 }
 
-/// Returns the track `own`, followed by all other tracks that come near it.
+/// Returns the track `changer`, followed by all other tracks that come near it.
 fn nearby_tracks<'a>(
     others: &'a [Trajectory],
-    own: &'a Trajectory,
+    changer: &'a Trajectory,
     instants: &[&TrajectoryPoint],
 ) -> Vec<&'a Trajectory> {
     let is_near = |track: &&Trajectory| {
-        track.track_id != own.track_id
-            && instants.iter().any(|own| track.at(own.time).is_some_and(|at| (at.s_m - own.s_m).abs() < REACH_M))
+        track.track_id != changer.track_id
+            && instants
+                .iter()
+                .any(|instant| track.at(instant.time).is_some_and(|at| (at.s_m - instant.s_m).abs() < REACH_M))
     };
-    std::iter::once(own).chain(others.iter().filter(is_near)).collect()
+    std::iter::once(changer).chain(others.iter().filter(is_near)).collect()
 }
 
-/// Gives the vehicle that changes lanes, its neighbours and the nearest others their parts, at the critical moment.
+/// Gives the vehicle that changes lanes, its neighbours and the nearest others their parts, at the
+/// critical moment.
 fn mark_main(film: &mut Film) {
     let critical = film.critical_moment();
     let Some(frame) = film.frame_at(critical) else { return };
@@ -182,7 +190,8 @@ fn mark_main(film: &mut Film) {
     }
 }
 
-/// Returns the range of frames in which a track is present, where frame i shows the i-th of `instants`.
+/// Returns the range of frames in which a track is present, where frame i shows the i-th of
+/// `instants`.
 pub(super) fn present_frames(track: &Trajectory, instants: impl Iterator<Item = Time>) -> std::ops::Range<usize> {
     let mut present = instants.enumerate().filter(|(_, time)| track.at(*time).is_some()).map(|(index, _)| index);
     match present.next() {
@@ -196,7 +205,8 @@ fn road(recording: &SmoothedTrajectoryData, tracks: &[&Trajectory]) -> Result<Ro
     straight_road(lanes.unwrap_or(1).clamp(1, MAX_LANES), recording.markings.typical_lane_width_m())
 }
 
-/// Returns a straight road on which recorded traffic is drawn. The lane width is clamped to the permitted range.
+/// Returns a straight road on which recorded traffic is drawn. The lane width is clamped to the
+/// permitted range.
 pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, ConfigError> {
     let config = RoadConfig {
         lanes,
@@ -250,20 +260,22 @@ fn state(point: TrajectoryPoint) -> VehicleState {
     }
 }
 
-/// Returns the margins of the first track to the nearest vehicles ahead and behind in its recorded lane.
+/// Returns the margins of the first track to the nearest vehicles ahead and behind in its recorded
+/// lane.
 fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> CurrentMargins {
-    let own = present.iter().find(|(index, _)| *index == 0).map(|(_, point)| *point);
+    let changer = present.iter().find(|(index, _)| *index == 0).map(|(_, point)| *point);
     let nearest_in_lane = |ahead: bool| {
-        let own = own?;
-        let others =
-            present.iter().filter(move |(index, at)| *index != 0 && at.lane == own.lane && (at.s_m > own.s_m) == ahead);
-        let nearest = others.min_by(|a, b| (a.1.s_m - own.s_m).abs().total_cmp(&(b.1.s_m - own.s_m).abs()))?;
+        let changer = changer?;
+        let others = present
+            .iter()
+            .filter(move |(index, at)| *index != 0 && at.lane == changer.lane && (at.s_m > changer.s_m) == ahead);
+        let nearest = others.min_by(|a, b| (a.1.s_m - changer.s_m).abs().total_cmp(&(b.1.s_m - changer.s_m).abs()))?;
         let lengths_m = tracks[0].dimensions.length_m + tracks[nearest.0].dimensions.length_m;
-        Some((nearest.0, nearest.1.speed_mps, (nearest.1.s_m - own.s_m).abs() - 0.5 * lengths_m))
+        Some((nearest.0, nearest.1.speed_mps, (nearest.1.s_m - changer.s_m).abs() - 0.5 * lengths_m))
     };
     let (lead, follower) = (nearest_in_lane(true), nearest_in_lane(false));
-    let own_mps = own.map_or(0.0, |own| own.speed_mps);
-    let gap_m = |found: Option<(usize, f64, f64)>, absent| found.map(|(_, _, gap_m)| gap_m).ok_or(absent);
+    let own_mps = changer.map_or(0.0, |changer| changer.speed_mps);
+    let gap_m = |neighbour: Option<(usize, f64, f64)>, absent| neighbour.map(|(_, _, gap_m)| gap_m).ok_or(absent);
     let behind = follower.ok_or(Absent::NoFollower);
     CurrentMargins {
         lead: lead.map(|(actor, speed_mps, _)| Lead { actor, speed_mps }).ok_or(Absent::NoLead),
@@ -279,7 +291,8 @@ fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> Curr
     }
 }
 
-/// Returns the time of the critical headway or, if that is not critical, of another critical metric between two vehicles.
+/// Returns the time of the critical headway. If the headway is not critical, returns the time of
+/// another critical metric between two vehicles.
 fn critical_time(change: &CriticalLaneChange) -> Option<Time> {
     let at = |(name, metric): (&'static str, MetricResult)| match metric {
         MetricResult::Value { opponent: Some(_), time_s, critical: true, .. } => Some((name != "thw_s", time_s)),
@@ -291,11 +304,14 @@ fn critical_time(change: &CriticalLaneChange) -> Option<Time> {
 
 /// Returns notes about the lane change and its metrics, each with the time at which it applies.
 fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
-    let found = &change.lane_change;
+    let lane_change = &change.lane_change;
     let mut notes = vec![
-        (Time::from_s(found.start_s), format!("track {} begins to change lanes", found.track_id)),
-        (Time::from_s(found.crossing_s), format!("it crosses from lane {} to {}", found.from_lane, found.to_lane)),
-        (Time::from_s(found.end_s), "the lane change ends".to_owned()),
+        (Time::from_s(lane_change.start_s), format!("track {} begins to change lanes", lane_change.track_id)),
+        (
+            Time::from_s(lane_change.crossing_s),
+            format!("it crosses from lane {} to {}", lane_change.from_lane, lane_change.to_lane),
+        ),
+        (Time::from_s(lane_change.end_s), "the lane change ends".to_owned()),
     ];
     for (name, metric) in change.metrics.named() {
         if let MetricResult::Value { value, opponent, time_s, critical } = metric {

@@ -1,4 +1,5 @@
-//! The verdict on a run or on a pair, in words: which vehicles collided, whether the system prevented it, how close it was.
+//! The verdict on a run or on a pair, in words: the collisions, whether the system prevented them,
+//! and how close they were.
 
 use closecall_campaign::ledger::{PairFate, Tally};
 use closecall_scenarios::outcome::Outcome;
@@ -6,10 +7,11 @@ use closecall_traffic::Light;
 
 use super::Film;
 
-/// Visibility below which the weather is named (m). Koschmieder's visibility of clear air is far above it.
+/// Visibility below which the weather is named (m). Koschmieder's visibility of clear air is far
+/// above it.
 const CLEAR_VISIBILITY_M: f64 = 2_000.0;
 
-/// Returns what the system under test changes, by the rule of the campaigns.
+/// Returns the change by the system under test, by the rule of the campaigns.
 fn fate(baseline: &Outcome, tested: &Outcome) -> Option<PairFate> {
     let [baseline, tested] = [baseline, tested].map(|outcome| Tally {
         collided: Some(outcome.ego_collided()),
@@ -39,7 +41,8 @@ impl Film {
         }
     }
 
-    /// Returns the verdict on a pair of films of runs, or `None` if one of them is recorded traffic.
+    /// Returns the verdict on a pair of films of runs, or `None` if one of them is recorded
+    /// traffic.
     pub fn pair_fate(films: &[Self]) -> Option<PairFate> {
         match films {
             [baseline, tested] => fate(baseline.outcome()?, tested.outcome()?),
@@ -47,8 +50,8 @@ impl Film {
         }
     }
 
-    /// Returns the words for the arm: `without MIS` and `with MIS` for the built-in ego stack of a scenario that has the system, the
-    /// controller's name for others.
+    /// Returns the words for the arm: `without MIS` and `with MIS` for the built-in ego stack of a
+    /// scenario that has the system, the controller's name for others.
     pub fn arm_label(&self) -> &str {
         match (self.arm.as_str(), self.has_mis) {
             ("acc", true) => "without MIS",
@@ -57,7 +60,8 @@ impl Film {
         }
     }
 
-    /// Returns the collision, or its absence, and the smallest headways. `None` for recorded traffic.
+    /// Returns the collision, or its absence, and the smallest headways. `None` for recorded
+    /// traffic.
     pub fn result(&self) -> Option<String> {
         let outcome = self.outcome.as_ref()?;
         let collision = match self.worst_collision() {
@@ -73,7 +77,8 @@ impl Film {
         Some(format!("Smallest headway: {}.{sight}", headways(self.outcome.as_ref()?)))
     }
 
-    /// Returns what the system did, and since when it saw the vehicle behind, as a line of a list.
+    /// Returns the actions of the system, and since when it saw the vehicle behind, as a line of a
+    /// list.
     pub(in crate::run) fn system_line(&self) -> Option<String> {
         let sight = self.sight().map_or(String::new(), |sight| format!(" {sight}"));
         Some(format!("- {}{sight}\n", self.mis_summary()?))

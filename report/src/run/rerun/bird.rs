@@ -1,5 +1,5 @@
-//! The view from above (bird's-eye view), in a frame that moves with the ego, E. The direction of travel points to the
-//! right. F is the lead vehicle, R the rear vehicle.
+//! The view from above (bird's-eye view), in a frame that moves with the ego, E. The direction of
+//! travel points to the right. F is the lead vehicle, R the rear vehicle.
 //!
 //! ```text
 //!   with MIS · 11.88 s   rear 36.7 m/s · 0.20 s behind
@@ -12,7 +12,7 @@
 //!   -20 m        0 m         20 m         40 m
 //! ```
 //!
-//! Of a pair, the roads lie below each other, so that both have one metre axis.
+//! In a pair, the roads lie below each other, so both have one metre axis.
 
 mod names;
 
@@ -37,7 +37,8 @@ const ABOVE_M: f64 = 4.8;
 const BELOW_M: f64 = 4.6;
 /// Room for the axis below the last road (m in the picture).
 const AXIS_M: f64 = 4.6;
-/// Distance of the clock and the names above from the road (m in the picture). A label hangs below its point.
+/// Distance of the clock and the names above from the road (m in the picture). A label hangs below
+/// its point.
 const NAMES_ABOVE_M: f64 = 4.4;
 /// Distance of the names below and of the axis from the road (m in the picture).
 const NAMES_BELOW_M: f64 = 0.3;
@@ -79,7 +80,7 @@ impl<'a> Canvas<'a> {
         canvases
     }
 
-    /// Returns the upper and the lower end of what is drawn (m in the picture).
+    /// Returns the upper and the lower end of the drawing (m in the picture).
     pub(super) fn range_m(&self) -> [f64; 2] {
         [self.top_m - ABOVE_M, self.bottom_m() + BELOW_M + if self.has_axis { AXIS_M } else { 0.0 }]
     }
@@ -276,12 +277,12 @@ fn write_gaps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Resul
     let film = canvas.film;
     let half_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let gaps = |frame: &Frame| -> Vec<Gap> {
-        let own = &frame.states[film.ego];
+        let ego = &frame.states[film.ego];
         let margins = &frame.margins;
         let sides = [(1.0, margins.gap_front_m, margins.thw_front_s), (-1.0, margins.gap_rear_m, margins.thw_rear_s)];
         let line = |(sign, gap_m, thw_s): (f64, Measured, Measured)| {
             let (gap_m, thw_s) = (gap_m.ok().filter(|&gap_m| gap_m > 0.0)?, thw_s.ok()?);
-            let ends = [half_m, half_m + gap_m].map(|along_m| canvas.at(frame, own.s_m + sign * along_m, own.d_m));
+            let ends = [half_m, half_m + gap_m].map(|along_m| canvas.at(frame, ego.s_m + sign * along_m, ego.d_m));
             let colour = if thw_s < CRITICAL_THW_S { palette::CRITICAL } else { palette::SAFE };
             Some((ends, colour))
         };
@@ -303,7 +304,7 @@ fn write_gaps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Resul
 fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
     let film = canvas.film;
     let outlines = |frame: &Frame| -> Vec<Vec<[f32; 2]>> {
-        let own = &frame.states[film.ego];
+        let ego = &frame.states[film.ego];
         let is_shown = |track: &&closecall_traffic::Track| {
             track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
         };
@@ -311,7 +312,7 @@ fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Res
             let (half_m, side_m) = (0.5 * track.length_m, 0.5 * track.width_m);
             let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]];
             let corner = |[along, across]: [f64; 2]| {
-                canvas.at(frame, own.s_m + track.x_m() + along * half_m, own.d_m + track.y_m() + across * side_m)
+                canvas.at(frame, ego.s_m + track.x_m() + along * half_m, ego.d_m + track.y_m() + across * side_m)
             };
             corners.map(corner).to_vec()
         };

@@ -1,4 +1,5 @@
-//! The layout with which the viewer opens a recording (its blueprint), stored in the recording itself.
+//! The layout with which the viewer opens a recording (its blueprint), stored in the recording
+//! itself.
 //!
 //! ```text
 //!  ┌───────────────────────┬─────────────────────┐      ┌───────────────────────┬─────────────────────┐
@@ -63,7 +64,7 @@ pub(super) struct FilmContents {
     pub(super) plots: Vec<Plot>,
     /// Times of the first and the last frame.
     pub(super) span: [Time; 2],
-    /// The weather, if it is not that of a clear day.
+    /// The weather, except on a clear day.
     pub(super) weather: Option<String>,
 }
 
@@ -112,7 +113,7 @@ fn scenes_share(films: &[FilmContents], has_camera: bool) -> f32 {
     }
 }
 
-/// Returns the room for the verdict. That on recorded traffic is longer.
+/// Returns the room for the verdict. The verdict on recorded traffic is longer.
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
@@ -125,7 +126,8 @@ fn verdict() -> Node {
     View::new("TextDocument", "Verdict", "verdict").into()
 }
 
-/// Returns the 3D views of the films with the images of the rear cameras: those of one film below each other, those of a pair as tabs.
+/// Returns the 3D views of the films with the images of the rear cameras. The views of one film lie
+/// below each other, and the views of a pair are tabs.
 fn scenes(films: &[FilmContents]) -> Option<Node> {
     let scenes: Vec<(f32, Node)> = films.iter().filter(|film| film.has_scene).map(|film| (1.0, scene(film))).collect();
     let camera = |film: &FilmContents| {
@@ -171,7 +173,8 @@ fn scene(film: &FilmContents) -> Node {
     view.into()
 }
 
-/// Returns the view from above, in which the roads of all films lie below each other on one metre axis.
+/// Returns the view from above, in which the roads of all films lie below each other on one metre
+/// axis.
 fn bird(films: &[FilmContents]) -> Option<Node> {
     let shown: Vec<&FilmContents> = films.iter().filter(|film| film.has_scene).collect();
     let low = shown.iter().map(|film| film.bird_range[0]).min_by(f64::total_cmp)?;
@@ -199,7 +202,7 @@ fn films_plots(films: &[FilmContents]) -> Vec<Node> {
         let contents = of_kind.iter().map(|(film, _)| format!("/{}plots/{}/**", film.root, kind.name()));
         let low = of_kind.iter().map(|(_, plot)| plot.range[0]).fold(f64::INFINITY, f64::min);
         let high = of_kind.iter().map(|(_, plot)| plot.range[1]).fold(f64::NEG_INFINITY, f64::max);
-        // The first plot says what the thin curves of all plots are.
+        // The title of the first plot explains the thin curves of all plots.
         let is_first = films.len() > 1 && nodes.is_empty();
         let note = if is_first { " · thin: " } else { "" };
         let baseline = films.first().filter(|_| is_first).map_or("", |film| film.name.as_str());
@@ -235,7 +238,8 @@ fn log(films: &[FilmContents]) -> Node {
         .into()
 }
 
-/// Returns the view of the bands of states of all films. The moments have the colours of their lines in the plots.
+/// Returns the view of the bands of states of all films. The moments have the colours of their
+/// lines in the plots.
 fn states() -> Node {
     View::new("StateTimeline", "States · moments: colours of the lines", super::plots::STATES_ENTITY).into()
 }

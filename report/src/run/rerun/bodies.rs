@@ -12,9 +12,11 @@ use rerun::Mesh3D;
 
 use super::palette::{self, Rgba};
 
-/// A solid between two horizontal rectangles. Lengths are shares of the vehicle's half length, half width and height.
+/// A solid between two horizontal rectangles. Lengths are shares of the vehicle's half length, half
+/// width and height.
 struct Frustum {
-    /// Rear and front end of the lower and of the upper rectangle: −1 is the rear bumper, 1 the front bumper.
+    /// Rear and front end of the lower and of the upper rectangle: −1 is the rear bumper, 1 the
+    /// front bumper.
     along: [[f64; 2]; 2],
     /// Half width of the lower and of the upper rectangle.
     across: [f64; 2],
@@ -127,8 +129,8 @@ impl Solid {
         self.add_face([below[3], below[2], below[1], below[0]], frustum.colour);
     }
 
-    /// Adds a quadrilateral, whose corners are counter-clockwise as seen from outside. It has vertices and a normal of
-    /// its own, so that it is shaded flat.
+    /// Adds a quadrilateral, whose corners are counter-clockwise as seen from outside. It has
+    /// vertices and a normal of its own, so that it is shaded flat.
     fn add_face(&mut self, corners: [[f64; 3]; 4], colour: Rgba) {
         #[expect(clippy::cast_possible_truncation, reason = "a vehicle has some hundred vertices")]
         let first = self.vertices.len() as u32;

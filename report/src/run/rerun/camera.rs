@@ -1,12 +1,13 @@
-//! Images of the rear camera with what its network says: the windows that the crop classifier evaluates, or the instances of the
-//! Mask R-CNN.
+//! Images of the rear camera with the results of its network: the windows that the crop classifier
+//! evaluates, or the instances of the Mask R-CNN.
 //!
-//! The closed loop never renders a whole camera image. This module renders it afterwards, from the same scene and the
-//! same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected instants, since an image costs as much as
-//! a hundred control steps. An image and its marks stay visible until the next image. Faults of the camera do not appear in the images.
+//! The closed loop never renders a whole camera image. This module renders it afterwards, from the
+//! same scene and the same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected
+//! instants, since an image costs as much as a hundred control steps. An image and its marks stay
+//! visible until the next image. Faults of the camera do not appear in the images.
 //!
-//! The instances are those that the network found in the loop, at the moment of the exposure. An image of the Mask R-CNN is therefore
-//! one that was evaluated.
+//! The instances are the ones that the network found in the loop, at the moment of the exposure. So
+//! every image of the Mask R-CNN is one that the network evaluated.
 
 use closecall_sensors::camera::{
     Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
@@ -27,18 +28,21 @@ mod windows;
 const PIXEL_STEP: u16 = 5;
 /// Rendered rows of the image, from above the horizon down to the road just behind the ego (px).
 const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
-/// Times before the critical moment for which an image is rendered, besides the first scan and the moments of the encounter.
+/// Times before the critical moment for which an image is rendered, besides the first scan and the
+/// moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
-/// Least time between an image and the one before it. That of the critical moment is rendered in any case.
+/// Least time between an image and the one before it. The image of the critical moment is rendered
+/// in any case.
 const LEAST_INTERVAL: Time = Time::from_ms(2_500);
 
 /// Entity of the camera, which moves with the ego.
 pub(super) const ENTITY: &str = "world/ego/camera";
-/// Distance at which the scene shows the image behind the camera (m): near, so that it hides no vehicle.
+/// Distance at which the scene shows the image behind the camera (m). It is near, so the image
+/// hides no vehicle.
 const IMAGE_DISTANCE_M: f32 = 1.2;
 
-/// Writes position and projection of the camera, so that the scene shows its image where it is taken. The pitch of the
-/// body is left out.
+/// Writes position and projection of the camera, so that the scene shows its image where it is
+/// taken. The pitch of the body is left out.
 fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
     let ahead_m = camera.mount_from_rear_m - 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let (sin, cos) = maths::sin_cos(camera.pitch_rad);
@@ -97,14 +101,15 @@ fn fixed_marks() -> Boxes2D {
     Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true)
 }
 
-/// Returns the row of the frame that the image taken in a row shows: an earlier one if the camera is frozen.
+/// Returns the row of the frame that the image taken in a row shows: an earlier one if the camera
+/// is frozen.
 fn shown_row(film: &Film, row: usize) -> usize {
     let time = film.frames[row].rear_image.as_ref().map_or(film.frames[row].time, |image| image.shown_time);
     film.frames[..row].partition_point(|frame| frame.time < time)
 }
 
-/// Returns the rows of the frames whose images are shown: for each selected instant, the latest frame with a scan or, if the network
-/// reads whole images, with an image.
+/// Returns the rows of the frames whose images are shown: for each selected instant, the latest
+/// frame with a scan or, if the network reads whole images, with an image.
 fn frames_to_show(film: &Film, is_whole: bool) -> Vec<usize> {
     let critical = film.critical_moment();
     let instants =
@@ -141,9 +146,11 @@ fn render(
     (image, exposure.into_buffers())
 }
 
-/// Returns the least corner and the size in the shown picture of a box in the image: left, top, right, bottom (px).
+/// Returns the least corner and the size in the shown picture of a box in the image: left, top,
+/// right, bottom (px).
 ///
-/// A box that reaches beyond the picture is cut off: the viewer would make the picture smaller until the box fits.
+/// A box that reaches beyond the picture is cut off: the viewer would make the picture smaller
+/// until the box fits.
 fn in_picture([left, top, right, bottom]: [f32; 4]) -> ([f32; 2], [f32; 2]) {
     let scale = 1.0 / f32::from(PIXEL_STEP);
     let first_row = f32::from(PIXEL_ROWS.start);
@@ -153,7 +160,8 @@ fn in_picture([left, top, right, bottom]: [f32; 4]) -> ([f32; 2], [f32; 2]) {
     (low, [0, 1].map(|axis| high[axis] - low[axis]))
 }
 
-/// Width of a letter and height of a label in the picture, where the camera has the room of a window of 1280 px (px).
+/// Width of a letter and height of a label in the picture, where the camera has the room of a
+/// window of 1280 px (px).
 const LETTER_PX: f32 = 3.4;
 const LABEL_PX: f32 = 9.0;
 
@@ -161,7 +169,7 @@ const LABEL_PX: f32 = 9.0;
 fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String]) {
     let area = |index: usize| boxes[index].1[0] * boxes[index].1[1];
     let mut order: Vec<usize> = (0..boxes.len().min(labels.len())).collect();
-    order.sort_by(|&one, &other| area(other).total_cmp(&area(one)));
+    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
     let mut taken: Vec<[f32; 4]> = Vec::new();
     for index in order {
         let ([left, top], [width, height]) = boxes[index];
@@ -179,7 +187,7 @@ fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String]) {
     }
 }
 
-/// Returns the colour of what the camera takes for a vehicle of this class.
+/// Returns the colour of a detection that the camera takes for a vehicle of this class.
 fn class_colour(class: VehicleClass) -> Rgba {
     match class {
         VehicleClass::Car => palette::TRACK,

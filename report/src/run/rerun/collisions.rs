@@ -1,8 +1,8 @@
 //! The collisions of a run as a table, for programs that query the recording. No view shows it.
 //!
-//! One row for each collision, at the time of the first contact. The names of the components are those of the table of
-//! outcomes, without `collision_`. The unit is in the name, and in the metadata of the column, as the type of the
-//! component.
+//! One row for each collision, at the time of the first contact. The components have the names of
+//! the table of outcomes, without `collision_`. The unit is in the name, and in the metadata of the
+//! column, as the type of the component.
 
 use std::sync::Arc;
 
@@ -57,17 +57,17 @@ pub(super) const fn side_word(side: BoxSide) -> &'static str {
 fn texts(
     name: &'static str,
     collisions: &[Collision],
-    of: impl Fn(&Collision) -> &str,
+    text: impl Fn(&Collision) -> &str,
 ) -> SerializationResult<SerializedComponentColumn> {
-    column(name, Arc::new(StringArray::from_iter_values(collisions.iter().map(of))))
+    column(name, Arc::new(StringArray::from_iter_values(collisions.iter().map(text))))
 }
 
 fn numbers(
     name: &'static str,
     collisions: &[Collision],
-    of: impl Fn(&Collision) -> f64,
+    number: impl Fn(&Collision) -> f64,
 ) -> SerializationResult<SerializedComponentColumn> {
-    column(name, Arc::new(Float64Array::from_iter_values(collisions.iter().map(of))))
+    column(name, Arc::new(Float64Array::from_iter_values(collisions.iter().map(number))))
 }
 
 /// Returns a column with one value in each row.

@@ -7,7 +7,8 @@ use closecall_traffic::atomic::WriteError;
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The environment switches recording off. The library would then write no file and report no error.
+    /// The environment switches recording off. The library would then write no file and report no
+    /// error.
     #[error("failed to record: the environment variable RERUN switches recording off; unset it")]
     Disabled,
     /// The library reports an error.

@@ -1,7 +1,9 @@
-//! Fog in the 3D scene: upright curtains ahead of the ego, behind which everything is paler. The eye looks ahead.
+//! Fog in the 3D scene: upright curtains ahead of the ego, behind which everything is paler. The
+//! eye looks ahead.
 //!
-//! After Koschmieder, contrast falls with the distance r as exp(-3.912·r/V), with the meteorological visibility V at which 2 %
-//! of it are left. Each curtain takes the share that its distance from the one before accounts for.
+//! After Koschmieder, contrast falls with the distance r as exp(-3.912·r/V), with the
+//! meteorological visibility V at which 2 % of it are left. Each curtain removes the share of its
+//! distance from the curtain before.
 
 use closecall_traffic::maths;
 use nalgebra::Vector3;
@@ -15,7 +17,8 @@ use crate::run::film::{Film, Frame};
 
 /// Extinction over the visibility: -ln(0.02).
 const KOSCHMIEDER: f64 = 3.912;
-/// Visibility above which the scene shows no fog (m). At 2 km, a vehicle at 100 m keeps four fifths of its contrast.
+/// Visibility above which the scene shows no fog (m). At 2 km, a vehicle at 100 m keeps four fifths
+/// of its contrast.
 const MAX_VISIBILITY_M: f64 = 2_000.0;
 /// Number of curtains.
 const CURTAINS: u32 = 5;
@@ -27,7 +30,8 @@ const MAX_DISTANCE_M: f64 = 300.0;
 const HEIGHT_M: f64 = 60.0;
 const HALF_WIDTH_M: f64 = 200.0;
 
-/// Returns the share of the light of distant things that passes the weather, for the colour of the sky.
+/// Returns the share of the light of distant things that passes the weather, for the colour of the
+/// sky.
 pub(super) fn clear_share(film: &Film) -> f64 {
     let visibility_m = film.environment.visibility_m;
     if visibility_m >= MAX_VISIBILITY_M { 1.0 } else { visibility_m / MAX_VISIBILITY_M }
@@ -53,8 +57,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         writer.write_static(&format!("world/fog/{curtain}"), &mesh)?;
     }
     let along = |frame: &Frame| {
-        let own = &frame.states[film.ego];
-        film.road.plane_pose(own.s_m, 0.0, 0.0)
+        let ego = &frame.states[film.ego];
+        film.road.plane_pose(ego.s_m, 0.0, 0.0)
     };
     let poses: Vec<_> = film.frames.iter().map(along).collect();
     writer.write_rows("world/fog", &film.times(), |range| {

@@ -1,4 +1,5 @@
-//! The text log: every event at the time at which it happened. Its lines have the colour of the viewer's theme.
+//! The text log: every event at the time at which it happened. Its lines have the colour of the
+//! viewer's theme.
 
 use std::collections::BTreeMap;
 
@@ -20,18 +21,18 @@ struct Line {
     text: String,
 }
 
-/// Writes the log of a film. Unless the film is the only one of the recording, each line begins with the name of its
-/// arm.
+/// Writes the log of a film. Unless the film is the only one of the recording, each line begins
+/// with the name of its arm.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordingError> {
     let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
     let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, text };
     let mut lines = vec![plain("log/run", start, film.title.clone())];
-    lines.extend(film.happenings.iter().map(|(time, what)| line(film, *time, what)));
+    lines.extend(film.happenings.iter().map(|(time, event)| line(film, *time, event)));
     lines.extend(film.moments().iter().map(|noted| {
         let text = noted.moment.label();
         plain("log/moment", noted.time, text)
     }));
-    lines.extend(known(film));
+    lines.extend(sight_lines(film));
     lines.extend(reasons(film));
     lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
     lines.push(plain("log/critical", film.critical_frame_time(), "the critical moment".to_owned()));
@@ -55,7 +56,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
 }
 
 /// Returns a line for each time at which a vehicle behind the ego came into sight or was lost.
-fn known(film: &Film) -> Vec<Line> {
+fn sight_lines(film: &Film) -> Vec<Line> {
     let line = |span: KnownSpan| Line {
         time: span.time,
         entity: "log/sight",
@@ -65,7 +66,8 @@ fn known(film: &Film) -> Vec<Line> {
     film.known_spans().into_iter().map(line).collect()
 }
 
-/// Returns a line for each change of the reason that the ego's controller gives without changing its state.
+/// Returns a line for each change of the reason that the ego's controller gives without changing
+/// its state.
 fn reasons(film: &Film) -> Vec<Line> {
     let mut lines = Vec::new();
     for pair in film.frames.windows(2) {
@@ -84,10 +86,10 @@ fn reasons(film: &Film) -> Vec<Line> {
 }
 
 /// Returns the log line of an event.
-fn line(film: &Film, time: Time, what: &RunEvent) -> Line {
+fn line(film: &Film, time: Time, event: &RunEvent) -> Line {
     let info = |entity, text| Line { time, entity, level: TextLogLevel::INFO, text };
     let warn = |entity, text| Line { time, entity, level: TextLogLevel::WARN, text };
-    match what {
+    match event {
         RunEvent::EventTriggered { event } => warn("log/event", format!("event `{event}` sets in")),
         RunEvent::DriverNote { actor, note } => {
             let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());

@@ -1,12 +1,13 @@
-//! A recording that plays in a viewer in a loop: the seconds around its critical moments, over and over, with a cursor in every plot.
+//! A recording that plays in a viewer in a loop: the seconds around its critical moments, over and
+//! over, with a cursor in every plot.
 //!
 //! ```text
 //!  file ─▶ messages ─▶ layout, time panel with the loop, activation of the layout ─▶ rest ─▶ viewer that runs
 //! ```
 //!
-//! The viewer forgets a selection of time that stands in a file, and keeps one that it is sent. The messages of the file are therefore
-//! sent to the viewer, and the loop with them. The time panel must precede the message that makes the layout the active one: the
-//! viewer copies the layout then.
+//! The viewer ignores a selection of time in a file, and keeps a selection that it is sent. So the
+//! messages of the file are sent to the viewer, and the loop with them. The time panel must precede
+//! the message that makes the layout the active one: the viewer copies the layout then.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -64,7 +65,7 @@ impl LoopedRecording {
         sink.flush_blocking(SEND_TIME).map_err(RecordingError::send)
     }
 
-    /// Returns the messages with that of the loop.
+    /// Returns the messages with the message of the loop.
     pub(super) fn with_loop(self) -> Result<Vec<LogMsg>, RecordingError> {
         let mut messages = Vec::with_capacity(self.messages.len() + 1);
         for message in self.messages {
@@ -72,7 +73,7 @@ impl LoopedRecording {
                 let stream = Stream::new(&command.blueprint_id)?;
                 let time = TimeColumn::new_sequence(BLUEPRINT_TIMELINE, [1]);
                 stream.send(EntityPath::from("time_panel"), time, &panel(self.span))?;
-                messages.extend(stream.taken()?.into_iter().filter(|one| matches!(one, LogMsg::ArrowMsg(..))));
+                messages.extend(stream.taken()?.into_iter().filter(|message| matches!(message, LogMsg::ArrowMsg(..))));
             }
             messages.push(message);
         }
@@ -104,9 +105,9 @@ fn critical_moments(message: &LogMsg) -> Vec<f64> {
 
 /// Returns the numbers of a column, or of the lists in it.
 fn numbers(column: &dyn Array) -> Vec<f64> {
-    let of = |values: &Float64Array| values.iter().flatten().collect();
+    let flattened = |values: &Float64Array| values.iter().flatten().collect();
     match column.as_any().downcast_ref::<ListArray>() {
-        Some(lists) => lists.values().as_primitive_opt::<Float64Type>().map_or_else(Vec::new, of),
-        None => column.as_primitive_opt::<Float64Type>().map_or_else(Vec::new, of),
+        Some(lists) => lists.values().as_primitive_opt::<Float64Type>().map_or_else(Vec::new, flattened),
+        None => column.as_primitive_opt::<Float64Type>().map_or_else(Vec::new, flattened),
     }
 }

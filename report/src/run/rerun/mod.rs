@@ -1,15 +1,17 @@
-//! Recordings: one film, or a pair of films, as an .rrd file for the Rerun viewer, with a layout of its own.
+//! Recordings: one film, or a pair of films, as an .rrd file for the Rerun viewer, with a layout of
+//! its own.
 //!
 //! ```text
 //!  Film ─▶ road, vehicles, tracks, points │ from above │ camera │ plots │ log │ story │ blueprint ─▶ FILE.rrd
 //! ```
 //!
-//! A recording is written as a whole when the outcome of the run is known. It is therefore small and never incomplete,
-//! and it opens at the critical moment. Two films share one timeline and the same plots. Each has a 3D scene of its
-//! own, in which the vehicles of the other film appear as outlines.
+//! A recording is written as a whole when the outcome of the run is known. It is therefore small
+//! and never incomplete, and it opens at the critical moment. Two films share one timeline and the
+//! same plots. Each has its own 3D scene, in which the vehicles of the other film appear as
+//! outlines.
 //!
-//! This folder is the only one that uses the rerun library: its public interface, and parts of it in
-//! `parts.rs` alone.
+//! Only this folder uses the rerun library: its public interface, and, in `parts.rs` alone, parts
+//! of it.
 
 mod bird;
 mod blueprint;

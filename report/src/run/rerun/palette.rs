@@ -1,5 +1,6 @@
-//! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its
-//! curves in the plots can be matched. Curves are legible on the viewer's dark and on its light background.
+//! The colours of a recording. Each actor has the same colour in all views, so a vehicle in the
+//! scene can be matched with its curves in the plots. Curves are legible on the viewer's dark and
+//! on its light background.
 
 use closecall_scenarios::outcome::Moment;
 use closecall_traffic::Light;
@@ -29,9 +30,10 @@ const MOMENTS: [Rgba; 7] = [
     [104, 142, 72, 255],
     [130, 130, 140, 255],
 ];
-/// The ground beside the road in the view from above. It is dark in both themes of the viewer, so that labels are legible.
+/// The ground beside the road in the view from above. It is dark in both themes of the viewer,
+/// which makes labels legible.
 pub(super) const GROUND: Rgba = [24, 27, 31, 255];
-/// Fog, as the scene shows it. It is darker than by day, so that labels are legible.
+/// Fog in the scene. It is darker than by day, which makes labels legible.
 const FOG: Rgba = [118, 122, 128, 255];
 /// Text beside the road.
 pub(super) const NOTE: Rgba = [222, 226, 230, 255];
@@ -47,7 +49,8 @@ pub(super) const BRAKE_LIGHT: Rgba = [255, 32, 24, 255];
 pub(super) const INDICATOR: Rgba = [255, 170, 0, 255];
 /// The sky by day, at dusk and at night.
 const SKY: [Rgba; 3] = [[112, 130, 150, 255], [62, 58, 84, 255], [9, 12, 22, 255]];
-/// Share of the light of the day that lies on the ground at dusk and at night, so that vehicles stay legible.
+/// Share of the light of the day that lies on the ground at dusk and at night. Vehicles stay
+/// legible.
 const GROUND_LIGHT: [f64; 3] = [1.0, 0.7, 0.45];
 pub(super) const BOX_FIT: Rgba = [255, 255, 255, 255];
 pub(super) const TRUTH: Rgba = [110, 214, 120, 255];
@@ -106,8 +109,8 @@ pub(super) fn with_opacity([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
     [red, green, blue, opacity]
 }
 
-/// Returns a paler shade of a colour, for text. The viewer puts text on a box that is dark in its dark theme, and grey in
-/// its light theme.
+/// Returns a paler shade of a colour, for text. The viewer puts text on a box that is dark in its
+/// dark theme, and grey in its light theme.
 pub(super) fn text([red, green, blue, opacity]: Rgba) -> Rgba {
     let paler = |channel: u8| 255 - (u16::from(255 - channel) * 3 / 10) as u8;
     [paler(red), paler(green), paler(blue), opacity]
@@ -136,7 +139,8 @@ pub(super) fn cluster(number: u8) -> Rgba {
     CLUSTERS[usize::from(number) % CLUSTERS.len()]
 }
 
-/// Returns the colour of an intensity, from dark blue over green to yellow. Eight shades compress well.
+/// Returns the colour of an intensity, from dark blue over green to yellow. Eight shades compress
+/// well.
 pub(super) fn intensity(intensity: u8) -> Rgba {
     const SHADES: [Rgba; 8] = [
         [68, 1, 84, 255],
@@ -148,7 +152,7 @@ pub(super) fn intensity(intensity: u8) -> Rgba {
         [159, 218, 58, 255],
         [253, 231, 37, 255],
     ];
-    // Most returns are weak, so that the scale follows the square root.
+    // Most returns are weak, so the scale follows the square root.
     let root = f32::from(intensity).sqrt() / f32::from(u8::MAX).sqrt();
     SHADES[((root * 8.0) as usize).min(7)]
 }
@@ -157,7 +161,7 @@ pub(super) fn intensity(intensity: u8) -> Rgba {
 mod tests {
     use super::*;
 
-    /// Backgrounds of the plots in the viewer's dark and in its light theme (Rerun 0.36).
+    /// Backgrounds of the plots in the viewer's dark theme and in its light theme (Rerun 0.36).
     const DARK: Rgba = [13, 16, 17, 255];
     const LIGHT: Rgba = [255, 255, 255, 255];
     /// Least contrast of a graphical object (WCAG 2.2, 1.4.11) and of text (1.4.3).
@@ -173,9 +177,9 @@ mod tests {
         0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
     }
 
-    fn contrast(one: Rgba, other: Rgba) -> f64 {
-        let [one, other] = [one, other].map(luminance);
-        (one.max(other) + 0.05) / (one.min(other) + 0.05)
+    fn contrast(first: Rgba, second: Rgba) -> f64 {
+        let [first, second] = [first, second].map(luminance);
+        (first.max(second) + 0.05) / (first.min(second) + 0.05)
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! The ego's perception in the ego frame: the fields of view of the rear sensors, and the tracks as boxes with the
-//! covariance of their position. Each group of sensors has entities of its own, so that the user can switch each group
-//! off.
+//! The ego's perception in the ego frame: the fields of view of the rear sensors, and the tracks as
+//! boxes with the covariance of their position. Each group of sensors has its own entities, so the
+//! user can switch each group off.
 
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus, maths};
@@ -15,9 +15,11 @@ use crate::run::film::Film;
 
 /// Height of the boxes of tracks (m), since tracks have no height.
 const TRACK_HEIGHT_M: f64 = 1.7;
-/// Distance of the faces of a box from those of the track (m), so that the box is visible around the vehicle.
+/// Distance of the faces of a box from the faces of the track (m): the box is visible around the
+/// vehicle.
 const CLEARANCE_M: f64 = 0.15;
-/// Half axis of an ellipse in standard deviations. The ellipse contains about 95 % of the probability: √χ²₂(0.95).
+/// Half axis of an ellipse in standard deviations. The ellipse contains about 95 % of the
+/// probability: √χ²₂(0.95).
 const ELLIPSE_SIGMAS: f64 = 2.448;
 /// Height at which ellipses are drawn (m).
 const ELLIPSE_Z_M: f64 = 0.08;
@@ -28,7 +30,8 @@ const FIELD_Z_M: f64 = 0.2;
 /// Number of straight pieces of the arc that bounds the field of view.
 const ARC_PIECES: u32 = 48;
 
-/// Time over which paths are predicted (s): the time for which the margin increase system lets the ego hold its speed.
+/// Time over which paths are predicted (s): the time for which the margin increase system lets the
+/// ego hold its speed.
 const PREDICTION_S: f64 = 2.0;
 /// Height at which paths are drawn (m).
 const PATH_Z_M: f32 = 0.12;
@@ -67,7 +70,7 @@ fn write_predictions(
         let rows = &tracks[range];
         let all = || rows.iter().flatten().filter(is_shown);
         let path = |track: &Track| {
-            let ahead = |of: f64, speed_mps: f64| (of + PREDICTION_S * speed_mps) as f32;
+            let ahead = |start_m: f64, speed_mps: f64| (start_m + PREDICTION_S * speed_mps) as f32;
             let (x, y) = (track.x_m(), track.y_m());
             [[x as f32, y as f32, PATH_Z_M], [ahead(x, track.vx_mps()), ahead(y, track.vy_mps()), PATH_Z_M]]
         };
@@ -122,7 +125,8 @@ fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<
     })
 }
 
-/// Returns the outline of the field of view: from the sensor along one side, along the arc, and back to the sensor.
+/// Returns the outline of the field of view: from the sensor along one side, along the arc, and
+/// back to the sensor.
 fn edge(field: &FieldOfView, bumper_m: f64) -> Vec<[f32; 3]> {
     let half_rad = maths::atan(field.half_angle_tan);
     let [x_m, y_m] = [bumper_m + field.inset_m, field.left_m];
@@ -188,7 +192,8 @@ fn ellipse(track: &Track) -> ([f32; 3], Quaternion) {
     ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], yaw_rotation(maths::atan2(first[1], first[0])))
 }
 
-/// Returns the colour of a track by its status. A track that is probably no vehicle is inconspicuous.
+/// Returns the colour of a track by its status. A track that is probably no vehicle is
+/// inconspicuous.
 fn colour(track: &Track) -> Rgba {
     match track.status {
         _ if track.class.vehicle() < 0.5 => palette::QUIET,

@@ -1,4 +1,5 @@
-//! Plots over time: curves of margins, speeds and accelerations, with the moments of the encounter as vertical lines.
+//! Plots over time: curves of margins, speeds and accelerations, with the moments of the encounter
+//! as vertical lines.
 
 mod bands;
 
@@ -98,7 +99,8 @@ impl Kind {
         KINDS.into_iter().find(|kind| entity.starts_with(&format!("plots/{}/", kind.name())))
     }
 
-    /// Returns the smallest span of the value axis, so that noise does not look like an event.
+    /// Returns the smallest span of the value axis. With a smaller one, noise would look like an
+    /// event.
     const fn least_range(self) -> [f64; 2] {
         match self {
             Self::Headway => [0.0, 3.0],
@@ -138,8 +140,8 @@ pub(super) struct Plot {
 /// Writes all curves and bands of a film, and returns the plots that have a curve.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<Vec<Plot>, RecordingError> {
     let plots = Plots { writer, film, role, times: film.times(), spans: RefCell::default() };
-    let mut found = Vec::new();
-    let mut note = |kind: Kind, has_curve: bool| found.extend(has_curve.then_some(kind));
+    let mut kinds = Vec::new();
+    let mut note = |kind: Kind, has_curve: bool| kinds.extend(has_curve.then_some(kind));
     note(Kind::Headway, plots.headways()?);
     note(Kind::Gap, plots.gaps()?);
     note(Kind::Ttc, plots.time_to_collision()?);
@@ -148,7 +150,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<Vec<
     note(Kind::Speed, true);
     note(Kind::Acceleration, true);
     note(Kind::Margin, plots.margin()?);
-    let ranges: Vec<Plot> = found.into_iter().map(|kind| Plot { kind, range: plots.range(kind) }).collect();
+    let ranges: Vec<Plot> = kinds.into_iter().map(|kind| Plot { kind, range: plots.range(kind) }).collect();
     for plot in &ranges {
         plots.moment_lines(plot)?;
         plots.collision_lines(plot)?;
@@ -175,14 +177,14 @@ struct CurveStyle<'a> {
 }
 
 impl Plots<'_> {
-    /// Writes a curve whose values `of` reads from the frames. Returns true if it has any value.
+    /// Writes a curve whose values `value` reads from the frames. Returns true if it has any value.
     fn curve(
         &self,
         entity: &str,
         style: &CurveStyle<'_>,
-        of: impl Fn(&Frame) -> Option<f64>,
+        value: impl Fn(&Frame) -> Option<f64>,
     ) -> Result<bool, RecordingError> {
-        self.series(entity, style, &self.film.frames.iter().map(of).collect::<Vec<_>>())
+        self.series(entity, style, &self.film.frames.iter().map(value).collect::<Vec<_>>())
     }
 
     /// Writes a curve of `values`, one per frame. Returns true if it has any value.
@@ -217,7 +219,7 @@ impl Plots<'_> {
         with_two_ticks([(low - room).max(largest[0]), (high + room).min(largest[1])])
     }
 
-    /// Writes a red vertical line at each collision. That of the baseline is thin.
+    /// Writes a red vertical line at each collision. The line of the baseline is thin.
     fn collision_lines(&self, plot: &Plot) -> Result<(), RecordingError> {
         let width = if self.role == Role::Baseline { THIN_LINE_WIDTH } else { LINE_WIDTH };
         for (number, collision) in self.film.collisions().iter().enumerate() {
@@ -232,13 +234,14 @@ impl Plots<'_> {
         Ok(())
     }
 
-    /// Returns the ends of a vertical line. The view of a pair can show more than the range of this film.
+    /// Returns the ends of a vertical line. The view of a pair can show more than the range of this
+    /// film.
     fn ends(&self, plot: &Plot) -> [f64; 2] {
         let largest = plot.kind.largest_range();
         [0, 1].map(|end| if largest[end].is_finite() { largest[end] } else { plot.range[end] })
     }
 
-    /// Returns the name of a curve, followed by that of the arm if there are several.
+    /// Returns the name of a curve, followed by the name of the arm if there are several.
     fn named(&self, name: &str) -> String {
         match self.role {
             Role::Alone => name.to_owned(),
@@ -281,8 +284,8 @@ impl Plots<'_> {
         self.writer.write_static(entity, &WithUnit { style, unit })
     }
 
-    /// Writes a reference level from the first to the last frame. The baseline writes none, since the tested film has
-    /// the same.
+    /// Writes a reference level from the first to the last frame. The baseline writes none, since
+    /// the tested film has the same.
     fn level(&self, entity: &str, name: &str, level: f64) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
@@ -312,9 +315,9 @@ impl Plots<'_> {
         let front = self.curve("plots/gap/front", &front, |frame| frame.margins.gap_front_m.ok())?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
         let rear = self.curve("plots/gap/rear", &rear, |frame| frame.margins.gap_rear_m.ok())?;
-        let seen = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
-        let seen = self.curve("plots/gap/rear_seen", &seen, |frame| Some(plan(frame)?.rear_gap_m))?;
-        Ok(front || rear || seen)
+        let style = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
+        let perceived = self.curve("plots/gap/rear_seen", &style, |frame| Some(plan(frame)?.rear_gap_m))?;
+        Ok(front || rear || perceived)
     }
 
     /// Writes the time to collision of the vehicle behind the ego.
@@ -323,41 +326,49 @@ impl Plots<'_> {
         self.curve("plots/ttc/rear", &rear, |frame| frame.margins.ttc_rear_s.ok())
     }
 
-    /// Writes the next closest encounter at the present velocities, in the ground truth and as the MIS estimates it.
+    /// Writes the next closest encounter at the present velocities, in the ground truth and as the
+    /// MIS estimates it.
     fn encounter(&self) -> Result<bool, RecordingError> {
         let encounters: Vec<Option<Encounter>> =
             (0..self.times.len()).map(|row| self.film.soonest_encounter(row)).collect();
-        let of = |of: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(of)).collect::<Vec<_>>();
+        let value =
+            |value: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(value)).collect::<Vec<_>>();
         let ttce = CurveStyle { name: "TTCE", colour: palette::REAR, width: LINE_WIDTH };
-        let has_ttce = self.series("plots/encounter/ttce", &ttce, &of(|encounter| encounter.ttce_s))?;
-        // The distance of an encounter that is far ahead says little, so that only near encounters are shown.
+        let has_ttce = self.series("plots/encounter/ttce", &ttce, &value(|encounter| encounter.ttce_s))?;
+        // The distance of an encounter that is far ahead says little, so only near encounters are
+        // shown.
         let near = |encounter: &Encounter| (encounter.ttce_s < CRITICAL_TTCE_S).then_some(encounter.dce_m);
         let distances: Vec<_> = encounters.iter().map(|at| at.as_ref().and_then(near)).collect();
         let dce = CurveStyle { name: "DCE if near", colour: palette::WARNING, width: LINE_WIDTH };
         self.series("plots/encounter/dce", &dce, &distances)?;
-        let seen = CurveStyle { name: "TTCE, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
-        let seen = self.curve("plots/encounter/ttce_seen", &seen, |frame| plan(frame)?.ttce_s.ok())?;
+        let style = CurveStyle { name: "TTCE, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
+        let perceived = self.curve("plots/encounter/ttce_seen", &style, |frame| plan(frame)?.ttce_s.ok())?;
         let planned = CurveStyle { name: "t_c, MIS", colour: palette::EGO, width: THIN_LINE_WIDTH };
         self.curve("plots/encounter/planned", &planned, |frame| plan(frame)?.time_to_critical_s.ok())?;
-        if has_ttce || seen {
+        if has_ttce || perceived {
             self.level("plots/encounter/critical_ttce", "2.6 s", CRITICAL_TTCE_S)?;
             self.level("plots/encounter/critical_dce", "1.0 m", CRITICAL_DCE_M)?;
         }
-        Ok(has_ttce || seen)
+        Ok(has_ttce || perceived)
     }
 
-    /// Writes speeds and accelerations of the vehicles, the commanded acceleration of the ego, and its limits.
+    /// Writes speeds and accelerations of the vehicles, the commanded acceleration of the ego, and
+    /// its limits.
     fn motion(&self) -> Result<(), RecordingError> {
         for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
             let colour = palette::part(actor.part);
             let style = CurveStyle { name: &actor.name, colour, width: LINE_WIDTH };
-            let of = |of: fn(&closecall_traffic::VehicleState) -> f64| {
+            let value = |value: fn(&closecall_traffic::VehicleState) -> f64| {
                 let rows = self.film.frames.iter().enumerate();
-                rows.map(|(row, frame)| actor.present_frames.contains(&row).then(|| of(&frame.states[index])))
+                rows.map(|(row, frame)| actor.present_frames.contains(&row).then(|| value(&frame.states[index])))
                     .collect::<Vec<_>>()
             };
-            self.series(&format!("plots/speed/{}", actor.name), &style, &of(|state| state.speed_mps))?;
-            self.series(&format!("plots/acceleration/{}", actor.name), &style, &of(|state| state.acceleration_mps2))?;
+            self.series(&format!("plots/speed/{}", actor.name), &style, &value(|state| state.speed_mps))?;
+            self.series(
+                &format!("plots/acceleration/{}", actor.name),
+                &style,
+                &value(|state| state.acceleration_mps2),
+            )?;
         }
         let commanded = CurveStyle { name: "ego, commanded", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         self.curve("plots/acceleration/commanded", &commanded, |frame| Some(frame.command?.acceleration_mps2))?;
@@ -385,7 +396,8 @@ impl Plots<'_> {
     }
 }
 
-/// Least share of a plot's height between two ticks of the value axis that have a number: 22 of the 85 px of the lowest plot.
+/// Least share of a plot's height between two ticks of the value axis that have a number: 22 of the
+/// 85 px of the lowest plot.
 const LEAST_TICK_SHARE: f64 = 0.26;
 
 /// Steps between the ticks of a value axis: the viewer puts them at multiples of a power of ten.
@@ -395,7 +407,7 @@ const TICK_ROOM: f64 = 0.05;
 
 /// Extends a range of a value axis until two of its ticks have a number.
 fn with_two_ticks([mut low, mut high]: [f64; 2]) -> [f64; 2] {
-    // Each extension makes the range longer, and with it perhaps the step.
+    // Each extension makes the range longer, and perhaps also the step.
     while let Some(step) = STEPS.into_iter().find(|step| *step >= LEAST_TICK_SHARE * (high - low)) {
         let [first, last] = [(low / step).ceil() * step, (high / step).floor() * step];
         if last > first {

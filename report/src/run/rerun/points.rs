@@ -1,5 +1,6 @@
-//! The points of the LiDARs, in layers that the user can switch, and the boxes fitted to the clusters. The layers of the rear LiDAR are
-//! below `lidar`, those of the other LiDARs below `lidars/NAME`.
+//! The points of the LiDARs, in layers that the user can switch, and the boxes fitted to the
+//! clusters. The layers of the rear LiDAR are below `lidar`, the layers of the other LiDARs below
+//! `lidars/NAME`.
 //!
 //! | layer | points | colour |
 //! |---|---|---|
@@ -7,8 +8,9 @@
 //! | `rejected` | points that belong to no box: ground, guard rails, spray, noise | by intensity |
 //! | `intensity` | the points of `clusters` again | by intensity; together with `rejected`, the raw scan |
 //!
-//! The points of `clusters` and `rejected` are those of the sensor to the bit. Each has its beam (`beam`: column · layers + layer), the
-//! time after the start of the sweep at which it was measured (`offset_ns`), and its intensity as a reflectivity (`intensity`).
+//! The points of `clusters` and `rejected` equal the sensor's points to the bit. Each has its beam
+//! (`beam`: column · layers + layer), the time after the start of the sweep at which it was
+//! measured (`offset_ns`), and its intensity as a reflectivity (`intensity`).
 
 use std::sync::Arc;
 
@@ -32,7 +34,8 @@ const SCANS_PER_PIECE: usize = 8;
 /// Radius of the ball that shows a point (m).
 const POINT_RADIUS_M: f32 = 0.05;
 
-/// Writes the layers of each LiDAR, and returns the entities that the scene hides until the user switches them on.
+/// Writes the layers of each LiDAR, and returns the entities that the scene hides until the user
+/// switches them on.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordingError> {
     let main = film.frames.iter().filter_map(|frame| Some((frame.time, frame.scan.as_ref()?))).collect();
     let mut hidden = write_lidar(writer, "world/ego/lidar", main)?;
@@ -99,8 +102,9 @@ fn layer(scans: &[&Scan], colour: &impl Fn(&Scan, usize) -> Option<Rgba>) -> Lay
     layer
 }
 
-/// Writes the layer of the points for which `colour` returns a colour, with what the sensor has measured of them unless
-/// another layer has the same ones. A few scans at a time are in memory as a layer.
+/// Writes the layer of the points for which `colour` returns a colour. The layer has the sensor's
+/// measurements of the points unless another layer has them. A few scans at a time are in memory as
+/// a layer.
 fn write_layer(
     writer: &Writer<'_>,
     entity: &str,
@@ -122,7 +126,7 @@ fn write_layer(
 }
 
 impl Layer {
-    /// Returns what the sensor has measured of the points besides their position.
+    /// Returns the sensor's measurements of the points besides their position.
     fn measured(&self) -> SerializationResult<[SerializedComponentColumn; 3]> {
         let column = |name: &'static str, array: ArrayRef| {
             let component = ComponentIdentifier::from(name);
@@ -149,15 +153,17 @@ fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], scans: &[&Scan
         let scans = &scans[range];
         let all = || scans.iter().flat_map(|scan| &scan.boxes);
         let half = |extent_m: f64| (0.5 * extent_m) as f32;
-        let centre = |found: &Detection| {
-            let (x_m, y_m) = found.centre_m();
-            [x_m as f32, y_m as f32, half(found.top_m)]
+        let centre = |detection: &Detection| {
+            let (x_m, y_m) = detection.centre_m();
+            [x_m as f32, y_m as f32, half(detection.top_m)]
         };
         Boxes3D::update_fields()
             .with_centers(all().map(centre))
-            .with_half_sizes(all().map(|found| [half(found.length_m), half(found.width_m), half(found.top_m)]))
-            .with_quaternions(all().map(|found| yaw_rotation(found.heading_rad)))
-            .with_labels(all().map(|found| format!("{} points", found.points)))
+            .with_half_sizes(
+                all().map(|detection| [half(detection.length_m), half(detection.width_m), half(detection.top_m)]),
+            )
+            .with_quaternions(all().map(|detection| yaw_rotation(detection.heading_rad)))
+            .with_labels(all().map(|detection| format!("{} points", detection.points)))
             .columns(scans.iter().map(|scan| scan.boxes.len()).collect::<Vec<_>>())
     })
 }

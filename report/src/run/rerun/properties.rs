@@ -1,4 +1,5 @@
-//! Typed properties of a recording, for programs that query it: scenario, seed, sample, parameters, and per arm the outcome.
+//! Typed properties of a recording, for programs that query it: scenario, seed, sample, parameters,
+//! and per arm the outcome.
 //!
 //! ```text
 //!  __properties                   name of the recording
@@ -8,7 +9,8 @@
 //!  __properties/arms/ARM/collision_N   each collision: who struck whom, struck sides, ΔV, phase
 //! ```
 //!
-//! The unit is in the name of each property, and in the metadata of its column, as the type of the component.
+//! The unit is in the name of each property, and in the metadata of its column, as the type of the
+//! component.
 
 use std::sync::Arc;
 

@@ -4,11 +4,12 @@
 //!  layout │ what holds for the whole run │ what changes in time     the order in the file
 //! ```
 //!
-//! The viewer can show a view only when it knows the fixed properties of its entities. Rows that hold for the whole run
-//! therefore precede the others, whenever they are logged.
+//! The viewer can show a view only when it knows the fixed properties of its entities. Rows that
+//! hold for the whole run therefore precede the others, whenever they are logged.
 //!
-//! The library's own sink for files writes on a thread, and reports an error of the disk as a line of its log at most.
-//! Here the messages stay in memory until the recording is complete. They are then encoded into the file one by one.
+//! The library's own sink for files writes on a thread, and at most logs an error of the disk as a
+//! line. Here the messages stay in memory until the recording is complete. They are then encoded
+//! into the file one by one.
 
 use std::io::Write;
 
@@ -36,21 +37,21 @@ impl Recording {
     /// Creates an empty recording. The viewer keeps one layout for each `application`.
     pub(super) fn new(application: &'static str, name: &str) -> Result<Self, RecordingError> {
         let stream = |kind| Stream::new(&StoreId::new(kind, application, name));
-        // The threads of the largest stream start first and end last. The allocator then gives them the memory that those of
-        // the recording before have left.
+        // The threads of the largest stream start first and end last. The allocator then gives them
+        // the memory that the threads of the previous recording have left.
         let moving = stream(StoreKind::Recording)?;
         let fixed = stream(StoreKind::Recording)?;
         Ok(Self { layout: stream(StoreKind::Blueprint)?, fixed, moving })
     }
 
     /// Adds components that hold on all timelines at all times.
-    pub(super) fn log_static(&self, entity: EntityPath, what: &dyn AsComponents) -> Result<(), RecordingError> {
-        Ok(self.fixed.stream.log_static(entity, what)?)
+    pub(super) fn log_static(&self, entity: EntityPath, archetype: &dyn AsComponents) -> Result<(), RecordingError> {
+        Ok(self.fixed.stream.log_static(entity, archetype)?)
     }
 
     /// Adds a property of the whole recording.
-    pub(super) fn send_property(&self, name: &str, what: &dyn AsComponents) -> Result<(), RecordingError> {
-        Ok(self.fixed.stream.send_property(name, what)?)
+    pub(super) fn send_property(&self, name: &str, archetype: &dyn AsComponents) -> Result<(), RecordingError> {
+        Ok(self.fixed.stream.send_property(name, archetype)?)
     }
 
     /// Sets the title under which the viewer lists the recording.
@@ -63,9 +64,9 @@ impl Recording {
         &self,
         entity: EntityPath,
         times: Vec<TimeColumn>,
-        what: &dyn AsComponents,
+        archetype: &dyn AsComponents,
     ) -> Result<(), RecordingError> {
-        self.send_columns(entity, times, as_columns(what))
+        self.send_columns(entity, times, as_columns(archetype))
     }
 
     /// Adds one row of components per time.
@@ -83,9 +84,9 @@ impl Recording {
         &self,
         entity: EntityPath,
         time: TimeColumn,
-        what: &dyn AsComponents,
+        archetype: &dyn AsComponents,
     ) -> Result<(), RecordingError> {
-        Ok(self.layout.stream.send_columns(entity, [time], as_columns(what))?)
+        Ok(self.layout.stream.send_columns(entity, [time], as_columns(archetype))?)
     }
 
     /// Tells the viewer that the layout is complete.
@@ -105,7 +106,8 @@ impl Recording {
         streams.try_for_each(|stream| stream.stream.flush_blocking()).map_err(RecordingError::encode)
     }
 
-    /// Writes the [complete](Self::complete) recording into `file`. Each message is dropped once it is written.
+    /// Writes the [complete](Self::complete) recording into `file`. Each message is dropped once it
+    /// is written.
     pub(super) fn encode(self, file: impl Write) -> Result<(), EncodeError> {
         let version = rerun::build_info().version;
         let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, file)?;
@@ -125,7 +127,8 @@ impl Recording {
         self.fixed.stream.store_info().map(|info| info.recording_id().to_string()).unwrap_or_default()
     }
 
-    /// Takes the chunks of the layout or of the data out of the recording, in the order of the file.
+    /// Takes the chunks of the layout or of the data out of the recording, in the order of the
+    /// file.
     pub(super) fn take_chunks(&self, kind: StoreKind) -> Vec<rerun::log::Chunk> {
         let streams = match kind {
             StoreKind::Blueprint => vec![&self.layout],
@@ -161,9 +164,9 @@ impl Stream {
         &self,
         entity: EntityPath,
         time: TimeColumn,
-        what: &dyn AsComponents,
+        archetype: &dyn AsComponents,
     ) -> Result<(), RecordingError> {
-        Ok(self.stream.send_columns(entity, [time], as_columns(what))?)
+        Ok(self.stream.send_columns(entity, [time], as_columns(archetype))?)
     }
 
     /// Waits for all messages, and takes them out of the stream.
@@ -174,20 +177,20 @@ impl Stream {
 }
 
 impl Drop for Stream {
-    /// Ends the threads of the stream. The memory sink holds the stream, and the stream's thread the sink: neither would
-    /// ever end.
+    /// Ends the threads of the stream. The memory sink holds the stream, and the stream's thread
+    /// the sink: neither would ever end.
     fn drop(&mut self) {
         self.stream.disconnect();
     }
 }
 
 /// Returns a column with one row for each component.
-fn as_columns(what: &dyn AsComponents) -> impl Iterator<Item = SerializedComponentColumn> {
-    what.as_serialized_batches().into_iter().map(SerializedComponentColumn::from)
+fn as_columns(archetype: &dyn AsComponents) -> impl Iterator<Item = SerializedComponentColumn> {
+    archetype.as_serialized_batches().into_iter().map(SerializedComponentColumn::from)
 }
 
-/// Returns the name of a recording: the first digits of the hash of its texts, which hold all results. The viewer takes
-/// two recordings of the same name for one.
+/// Returns the name of a recording: the first digits of the hash of its texts, which hold all
+/// results. The viewer takes two recordings of the same name for one.
 pub(super) fn name(texts: &[String]) -> String {
     let mut hasher = blake3::Hasher::new();
     for text in texts {

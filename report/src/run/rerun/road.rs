@@ -11,17 +11,19 @@ use crate::run::film::Film;
 
 /// Length of road shown beyond the smallest and the largest position of any vehicle (m).
 const MARGIN_M: f64 = 300.0;
-/// Length of the straight pieces of a curved road (m). At the tightest radius they deviate from the arc by 3 cm.
+/// Length of the straight pieces of a curved road (m). At the tightest radius they deviate from the
+/// arc by 3 cm.
 const PIECE_M: f64 = 10.0;
 /// Width of the hard shoulder beside the lanes (m).
 const SHOULDER_M: f64 = 2.5;
 /// Width of the verge beside the hard shoulder (m).
 const VERGE_M: f64 = 40.0;
-// Lane markings of German motorways (RMS): dashes of 6 m with gaps of 12 m, 0.15 m wide; edge lines 0.30 m wide.
+// Lane markings of German motorways (RMS): dashes of 6 m with gaps of 12 m, 0.15 m wide; edge lines
+// 0.30 m wide.
 
 /// Length of a dash (m).
 const DASH_M: f64 = 6.0;
-/// Distance from the start of a dash to that of the next one (m).
+/// Distance from the start of a dash to the start of the next one (m).
 const DASH_PERIOD_M: f64 = 18.0;
 const DASH_WIDTH_M: f64 = 0.15;
 const EDGE_WIDTH_M: f64 = 0.30;
@@ -32,7 +34,7 @@ const POST_PERIOD_M: f64 = 4.0;
 /// Lateral distance of the guard rail from the edge of the lanes (m).
 const RAIL_OFFSET_M: f64 = SHOULDER_M - 0.5;
 
-/// Height of the verge (m). Flat layers lie at different heights, so that each of them is visible.
+/// Height of the verge (m). Flat layers lie at different heights, which keeps each of them visible.
 const VERGE_Z_M: f64 = -0.30;
 /// Height of the lane markings (m).
 const MARKING_Z_M: f64 = 0.03;
@@ -47,7 +49,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let left_m = SHOULDER_M;
     let right_m = road.right_edge_m() - SHOULDER_M;
 
-    // Half of the fog's colour lies on the ground, so that near things stay legible.
+    // Half of the fog's colour lies on the ground. Near things stay legible.
     let light = film.environment.light;
     let tint = |colour| palette::through_fog(palette::lit(colour, light), 0.5 + 0.5 * fog::clear_share(film), light);
     let mut verge = Ribbons::new(road, VERGE_Z_M);
@@ -95,7 +97,8 @@ fn guard_rails(road: &Road, [from_m, to_m]: [f64; 2]) -> LineStrips3D {
     LineStrips3D::new(strips).with_colors([palette::RAIL]).with_radii([0.08_f32])
 }
 
-/// Returns the multiples of `period_m` in a range. Dashes and posts are thus at the same positions in every recording.
+/// Returns the multiples of `period_m` in a range. Dashes and posts are thus at the same positions
+/// in every recording.
 fn multiples(period_m: f64, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f64> {
     let first = (from_m / period_m).ceil();
     let mut count = 0.0;
@@ -106,7 +109,8 @@ fn multiples(period_m: f64, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f6
     })
 }
 
-/// Returns the positions along the road (m) at which a stretch of it is divided into straight pieces.
+/// Returns the positions along the road (m) at which a stretch of it is divided into straight
+/// pieces.
 fn piece_ends(road: &Road, [from_m, to_m]: [f64; 2]) -> Vec<f64> {
     if road.curvature_per_m() == 0.0 {
         return vec![from_m, to_m];

@@ -1,9 +1,10 @@
 //! The writer of a film's entities, on the timelines of the recording.
 //!
-//! The timelines `time` and `step` hold the run as it was. A file cannot tell the viewer at which moment to open: the
-//! viewer opens a timeline at its first moment. A third timeline, [`OPENING_TIMELINE`], therefore repeats `time`, but
-//! begins one step earlier with a copy of the critical moment. The file opens at that copy. Playing on from there shows
-//! the whole run, and so does a change to `time`.
+//! The timelines `time` and `step` hold the run without changes. A file cannot tell the viewer at
+//! which moment to open: the viewer opens a timeline at its first moment. So a third timeline,
+//! [`OPENING_TIMELINE`], repeats `time`, but begins one step earlier with a copy of the critical
+//! moment. The file opens at the copy. Playing on from there shows the whole run, and so does a
+//! change to `time`.
 //!
 //! ```text
 //!  opening   ◉ critical moment │ 0.00 s  0.04 s  …  end
@@ -48,7 +49,7 @@ pub(super) struct Writer<'a> {
     recording: &'a Recording,
     /// Prefix of the entity paths of this film.
     root: String,
-    /// Whether the recording has no other film, so that the scene has room for speeds and headways.
+    /// Whether the recording has no other film. The scene then has room for speeds and headways.
     pub(super) is_alone: bool,
     /// Duration of a control step.
     period: Time,
@@ -59,8 +60,8 @@ pub(super) struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Creates the writer of one film whose entity paths begin with `root`. `span` holds the first and the last moment of any
-    /// film, `critical` the moment at which the recording opens.
+    /// Creates the writer of one film whose entity paths begin with `root`. `span` holds the first
+    /// and the last moment of any film, `critical` the moment at which the recording opens.
     pub(super) fn new(
         recording: &'a Recording,
         film: &Film,
@@ -81,16 +82,21 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes components that hold for the whole run.
-    pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
-        self.recording.log_static(self.path(entity), what)
+    pub(super) fn write_static(&self, entity: &str, archetype: &impl AsComponents) -> Result<(), RecordingError> {
+        self.recording.log_static(self.path(entity), archetype)
     }
 
-    /// Writes components that hold for the whole run, of an entity beside those of the films.
-    pub(super) fn write_static_of_all(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
-        self.recording.log_static(entity.into(), what)
+    /// Writes components that hold for the whole run, of an entity beside the entities of the
+    /// films.
+    pub(super) fn write_static_of_all(
+        &self,
+        entity: &str,
+        archetype: &impl AsComponents,
+    ) -> Result<(), RecordingError> {
+        self.recording.log_static(entity.into(), archetype)
     }
 
-    /// Writes rows like [`Self::write_curve`], of an entity beside those of the films.
+    /// Writes rows like [`Self::write_curve`], of an entity beside the entities of the films.
     pub(super) fn write_curve_of_all(
         &self,
         entity: &str,
@@ -108,8 +114,8 @@ impl<'a> Writer<'a> {
         self.recording.send_columns(path, self.timelines(times), columns)
     }
 
-    /// Writes one row of components for each of `times`, which must ascend, and a copy of the row that holds at the
-    /// critical moment. `build` returns the columns of a range of rows.
+    /// Writes one row of components for each of `times`, which must ascend, and a copy of the row
+    /// that holds at the critical moment. `build` returns the columns of a range of rows.
     pub(super) fn write_rows(
         &self,
         entity: &str,
@@ -125,8 +131,8 @@ impl<'a> Writer<'a> {
         self.write_curve(entity, times, build)
     }
 
-    /// Writes rows like [`Self::write_rows`], in pieces of at most `piece` rows, for rows of many values: a recording is
-    /// encoded piece by piece, and each is in memory several times then.
+    /// Writes rows like [`Self::write_rows`], in pieces of at most `piece` rows, for rows of many
+    /// values: a recording is encoded piece by piece, and each is in memory several times then.
     pub(super) fn write_rows_in_pieces(
         &self,
         entity: &str,
@@ -147,7 +153,8 @@ impl<'a> Writer<'a> {
         })
     }
 
-    /// Writes rows like [`Self::write_rows`], without a copy. For data that a view shows over the whole run at once.
+    /// Writes rows like [`Self::write_rows`], without a copy. For data that a view shows over the
+    /// whole run at once.
     pub(super) fn write_curve(
         &self,
         entity: &str,
@@ -158,19 +165,25 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes components that hold from `time` on.
-    pub(super) fn write_from(&self, entity: &str, time: Time, what: &dyn AsComponents) -> Result<(), RecordingError> {
-        self.write_each(entity, &[(time, what)])
+    pub(super) fn write_from(
+        &self,
+        entity: &str,
+        time: Time,
+        archetype: &dyn AsComponents,
+    ) -> Result<(), RecordingError> {
+        self.write_each(entity, &[(time, archetype)])
     }
 
-    /// Writes several things. Each holds from its time on until the time of the next. The times must ascend.
+    /// Writes several components. Each holds from its time until the time of the next. The times
+    /// must ascend.
     pub(super) fn write_each(&self, entity: &str, whats: &[(Time, &dyn AsComponents)]) -> Result<(), RecordingError> {
         let until_critical = whats.partition_point(|(time, _)| *time <= self.critical);
         if let Some(shown) = until_critical.checked_sub(1) {
             self.recording.send_row(self.path(entity), self.copy_time(), whats[shown].1)?;
             self.clear_copy(entity, whats[0].0)?;
         }
-        for (time, what) in whats {
-            self.recording.send_row(self.path(entity), self.timelines(&[*time]), *what)?;
+        for (time, archetype) in whats {
+            self.recording.send_row(self.path(entity), self.timelines(&[*time]), *archetype)?;
         }
         Ok(())
     }

@@ -1,4 +1,5 @@
-//! The texts of a recording: the verdict, which is read first, and the story with the table of each run.
+//! The texts of a recording: the verdict, which is read first, and the story with the table of each
+//! run.
 
 use std::fmt::Write as _;
 
@@ -9,7 +10,7 @@ use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
 use closecall_scenarios::causal::CausalSentence;
 
-/// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
+/// Returns the verdict in Markdown: the event, how close it was, and the actions of the system.
 pub(super) fn verdict(films: &[Film]) -> String {
     let mut page = String::new();
     match (films, Film::pair_fate(films)) {
@@ -65,10 +66,11 @@ fn push_head(page: &mut String, word: &str, film: &Film) {
     let _ = write!(page, "**{word}**{sample}\n\n");
 }
 
-/// How a note ends that says that a metric is not critical.
+/// The end of a note about a metric that is not critical.
 const NOT_CRITICAL: &str = ": not critical";
 
-/// Appends the verdict on one film. That of a re-enactment stands below the comparison with the recorded encounter.
+/// Appends the verdict on one film. The verdict of a re-enactment lies below the comparison with
+/// the recorded encounter.
 fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
     // What is critical is read first.
     let is_critical = |note: &&(Time, String)| note.1.contains(": CRITICAL");
@@ -82,7 +84,7 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         push_head(page, word, film);
     }
     match film.sentence() {
-        // The comparison has it, and what the system did.
+        // The comparison has it, and the actions of the system.
         Some(_) if is_reenactment => {
             push_head(page, "Simulated", film);
         }
@@ -97,7 +99,8 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
             for (time, note) in film.notes.iter().filter(is_critical) {
                 let _ = writeln!(page, "- {:.2} s: {note}", time.s());
             }
-            // The rest takes a line of each kind, so that the verdict fits its view. The log has each in full.
+            // Each other fact takes one line, and the verdict fits its view. The log has each fact
+            // in full.
             let rest = || film.notes.iter().filter(|note| !is_critical(note));
             let happened = rest().filter(|note| !note.1.contains(NOT_CRITICAL));
             let happened: Vec<String> = happened.map(|(time, note)| format!("{:.2} s: {note}", time.s())).collect();

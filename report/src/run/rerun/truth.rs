@@ -1,7 +1,9 @@
-//! EncounterComparison of perception with the ground truth behind the ego: known vehicles, missed vehicles, and false tracks.
+//! Compares perception with the ground truth behind the ego: known vehicles, missed vehicles, and
+//! false tracks.
 //!
-//! A vehicle in the field of view of the rear sensor counts as known if the near face of a confirmed rear track lies
-//! within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts as missed, even if another vehicle hides it.
+//! A vehicle in the field of view of the rear sensor counts as known if the near face of a
+//! confirmed rear track lies within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts
+//! as missed, even if another vehicle hides it.
 
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus, maths};
@@ -13,9 +15,11 @@ use super::stream::Writer;
 use super::vehicles::yaw_rotation;
 use crate::run::film::{Film, Frame};
 
-/// Distance of the near faces up to which a track belongs to a vehicle (m); the same as in the audit of the tracking.
+/// Largest distance of the near faces of a track and of its vehicle (m); the same as in the audit
+/// of the tracking.
 const MATCH_DISTANCE_M: f64 = 3.0;
-/// Distance of the faces of a ground-truth box from those of the vehicle (m), so that the box is visible around it.
+/// Distance of the faces of a ground-truth box from the faces of the vehicle (m): the box is
+/// visible around it.
 const CLEARANCE_M: f64 = 0.05;
 /// Height of the boxes of false tracks (m), since tracks have no height.
 const FALSE_HEIGHT_M: f64 = 1.5;
@@ -34,7 +38,7 @@ struct Shape {
 /// The comparison for one frame.
 #[derive(Default)]
 struct FrameComparison {
-    known: Vec<Shape>,
+    detected: Vec<Shape>,
     missed: Vec<Shape>,
     false_tracks: Vec<Shape>,
 }
@@ -42,7 +46,8 @@ struct FrameComparison {
 /// A layer: its name, its colour, and the function that selects its shapes.
 type Layer = (&'static str, Rgba, fn(&FrameComparison) -> &Vec<Shape>);
 
-/// Writes the layers, and returns the entities that the scene hides until the user switches them on.
+/// Writes the layers, and returns the entities that the scene hides until the user switches them
+/// on.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordingError> {
     if film.frames.iter().all(|frame| frame.tracks.is_empty() && frame.rear_fields.is_empty()) {
         return Ok(Vec::new());
@@ -50,12 +55,12 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     let times = film.times();
     let comparisons: Vec<FrameComparison> = film.frames.iter().map(|frame| compare(film, frame)).collect();
     let layers: [Layer; 3] = [
-        ("known", palette::TRUTH, |comparison| &comparison.known),
+        ("known", palette::TRUTH, |comparison| &comparison.detected),
         ("missed", palette::MISSED, |comparison| &comparison.missed),
         ("false_tracks", palette::FALSE_TRACK, |comparison| &comparison.false_tracks),
     ];
-    for (name, colour, of) in layers {
-        let shapes: Vec<&Vec<Shape>> = comparisons.iter().map(of).collect();
+    for (name, colour, shapes_of) in layers {
+        let shapes: Vec<&Vec<Shape>> = comparisons.iter().map(shapes_of).collect();
         let label = (name == "false_tracks").then_some(NO_VEHICLE);
         write_layer(writer, (&format!("world/ego/truth/{name}"), colour, label), &times, &shapes)?;
     }
@@ -75,7 +80,8 @@ fn write_layer(
         Some(label) => writer.write_static(entity, &fixed.with_labels([label]).with_show_labels(true))?,
         None => writer.write_static(entity, &fixed)?,
     }
-    // Rows are written for the frames with shapes and for the frame after them, which clears the shapes.
+    // Rows are written for the frames with shapes and for the frame after them, which clears the
+    // shapes.
     let rows: Vec<usize> =
         (0..shapes.len()).filter(|&row| row == 0 || !shapes[row].is_empty() || !shapes[row - 1].is_empty()).collect();
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
@@ -106,7 +112,7 @@ fn compare(film: &Film, frame: &Frame) -> FrameComparison {
         }
         let is_known = tracks.iter().any(|track| are_close(face, track_face_m(track)));
         let shape = true_shape(film, actor, pose);
-        if is_known { comparison.known.push(shape) } else { comparison.missed.push(shape) }
+        if is_known { comparison.detected.push(shape) } else { comparison.missed.push(shape) }
     }
     for track in tracks.iter().filter(|track| track.class.vehicle() > 0.5) {
         let of_any = |&(actor, pose): &(usize, [f64; 3])| are_close(face_m(pose, length_m(actor)), track_face_m(track));
@@ -151,11 +157,12 @@ fn track_face_m(track: &Track) -> [f64; 2] {
 }
 
 /// Returns true if two faces are close enough for a track to belong to a vehicle.
-fn are_close(one: [f64; 2], other: [f64; 2]) -> bool {
-    maths::hypot(one[0] - other[0], one[1] - other[1]) <= MATCH_DISTANCE_M
+fn are_close(first: [f64; 2], second: [f64; 2]) -> bool {
+    maths::hypot(first[0] - second[0], first[1] - second[1]) <= MATCH_DISTANCE_M
 }
 
-/// Returns true if a point in the ego frame lies in one of the fields of view, or if their limits are not simulated.
+/// Returns true if a point in the ego frame lies in one of the fields of view, or if their limits
+/// are not simulated.
 fn is_in_a_field(fields: &[FieldOfView], bumper_m: f64, [x_m, y_m]: [f64; 2]) -> bool {
     fields.is_empty() || fields.iter().any(|field| field.contains(bumper_m - x_m, y_m))
 }

@@ -1,4 +1,5 @@
-//! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around the ego.
+//! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around
+//! the ego.
 
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState, maths};
@@ -15,20 +16,19 @@ use closecall_scenarios::outcome::CRITICAL_THW_S;
 const ARROW_S: f64 = 0.25;
 /// Height of the arrows above the roof (m).
 const ARROW_ABOVE_M: f64 = 0.4;
-/// Heights of the names above the roof (m): different ones, so that the names of vehicles that touch do not cover each
-/// other.
-/// The name of the ego lies on the road, to its right.
+/// Heights of the names above the roof (m). They differ, and the names of vehicles that touch do
+/// not cover each other. The name of the ego lies on the road, to its right.
 const EGO_LABEL_AT_M: [f32; 3] = [5.0, -5.0, 0.0];
 const LEAD_LABEL_M: f64 = 5.8;
 const OTHER_LABEL_M: f64 = 1.6;
 const REAR_LABEL_M: f64 = 3.2;
-/// Distance of the text about the first collision behind the centre of the vehicle that carries it (m). The text lies
-/// on the road, clear of the names of the vehicles.
+/// Distance of the text about the first collision behind the centre of the vehicle that carries it
+/// (m). The text lies on the road, clear of the names of the vehicles.
 const COLLISION_TEXT_BEHIND_M: f32 = 11.0;
 /// Distance between the texts about two collisions (m).
 const COLLISION_TEXT_SPACING_M: f32 = 4.0;
-/// Position of the headways beside the ego (m): the rear one to its right and thus nearer to the eye, the front one to its
-/// left, away from the name of the ego.
+/// Position of the headways beside the ego (m): the rear one to its right and thus nearer to the
+/// eye, the front one to its left, away from the name of the ego.
 const REAR_TEXT_Y_M: f32 = -6.0;
 const FRONT_TEXT_Y_M: f32 = 7.0;
 /// Gap below which the vehicles touch and no headway is written (m).
@@ -91,19 +91,20 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     write_rig(writer, film, &all_times)
 }
 
-/// Share of the rear gap by which the rig stays behind the ego, so that the rear vehicle is in the picture.
+/// Share of the rear gap by which the rig stays behind the ego. The rear vehicle is then in the
+/// picture.
 const RIG_SHARE: f64 = 0.75;
 /// Largest distance of the rig behind the ego (m).
 const MAX_RIG_M: f64 = 80.0;
 
-/// Writes the rig of the scene's eye. It moves along the road with the ego, but does not turn with it. As long as the rear
-/// vehicle is far, the rig stays back.
+/// Writes the rig of the scene's eye. It moves along the road with the ego, but does not turn with
+/// it. As long as the rear vehicle is far, the rig stays back.
 fn write_rig(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let rear = film.actors.iter().position(|actor| actor.part == Part::Rear);
     let pose = |frame: &Frame| {
-        let own = &frame.states[film.ego];
-        let gap_m = rear.map_or(0.0, |rear| own.s_m - frame.states[rear].s_m);
-        let s_m = own.s_m - (RIG_SHARE * gap_m).clamp(0.0, MAX_RIG_M);
+        let ego = &frame.states[film.ego];
+        let gap_m = rear.map_or(0.0, |rear| ego.s_m - frame.states[rear].s_m);
+        let s_m = ego.s_m - (RIG_SHARE * gap_m).clamp(0.0, MAX_RIG_M);
         film.road.plane_pose(s_m, 0.5 * film.road.right_edge_m(), 0.0)
     };
     let poses: Vec<_> = film.frames.iter().map(pose).collect();
@@ -160,8 +161,9 @@ fn write_velocity(
     })
 }
 
-/// Returns the name of a vehicle, with its rounded speed if there is room, for each frame in which it is present. A vehicle that
-/// touches the ego has none: the names would lie on each other, and the collision's text has both.
+/// Returns the name of a vehicle, with its rounded speed if there is room, for each frame in which
+/// it is present. A vehicle that touches the ego has none: the names would lie on each other, and
+/// the collision's text has both.
 fn names(film: &Film, actor: usize, has_room: bool) -> Vec<String> {
     let name = film.vehicle_label(actor);
     let text = |frame: &Frame| {
@@ -224,7 +226,7 @@ fn write_lights(
             half_m: [0.16, 0.12, 0.11],
             colour: palette::INDICATOR,
         };
-        // The indicators do not blink, so that every single frame shows them.
+        // The indicators do not blink: every single frame shows them.
         let lit: Vec<bool> = states.iter().map(|state| state.indicator == side).collect();
         write_lamps(writer, entity, times, &lamps, &lit)?;
     }
@@ -265,12 +267,14 @@ fn write_lamps(
     })
 }
 
-/// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A critical gap is red.
+/// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A
+/// critical gap is red.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| {
         let (gap_m, thw_s) = (frame.margins.gap_front_m, frame.margins.thw_front_s);
-        // In the smaller scenes of a pair, the headways would lie on the names; the view from above has them.
+        // In the smaller scenes of a pair, the headways would lie on the names; the view from above
+        // has them.
         if !writer.is_alone {
             return Gap::new([bumper_m, 1.0], gap_m, thw_s, f64::INFINITY);
         }
@@ -318,8 +322,8 @@ struct Gap {
 }
 
 impl Gap {
-    /// Returns the gap that begins at `bumper_m` and extends in the direction of `sign`, in the ego frame, or `None` if
-    /// there is no positive gap. Below `named_m` it has no text.
+    /// Returns the gap that begins at `bumper_m` and extends in the direction of `sign`, in the ego
+    /// frame, or `None` if there is no positive gap. Below `named_m` it has no text.
     fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured, named_m: f64) -> Option<Self> {
         let gap_m = gap_m.ok().filter(|&gap_m| gap_m > 0.0)?;
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
@@ -342,8 +346,8 @@ impl Gap {
     }
 }
 
-/// Writes a mark on the struck side of the first vehicle of each collision, and the changes of velocity as a text on
-/// the road behind it. Both move with the vehicle.
+/// Writes a mark on the struck side of the first vehicle of each collision, and the changes of
+/// velocity as a text on the road behind it. Both move with the vehicle.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let mut text_x_m = -COLLISION_TEXT_BEHIND_M;
     for (number, collision) in film.collisions().iter().enumerate() {
@@ -363,7 +367,8 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
             .with_radii([0.45_f32, 0.05])
             .with_labels([String::new(), film.mark_text(collision)])
             .with_show_labels(true);
-        // The mark appears at the first frame at or after the contact: in earlier frames the vehicles are still apart.
+        // The mark appears at the first frame at or after the contact: in earlier frames the
+        // vehicles are still apart.
         let appears_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
         writer.write_from(&entity, appears_at.unwrap_or(collision.time), &mark)?;
         text_x_m -= COLLISION_TEXT_SPACING_M;

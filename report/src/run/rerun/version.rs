@@ -1,4 +1,5 @@
-//! The version of Rerun that a recording was written by, and of the viewer that is to show it.
+//! The version of Rerun that a recording was written by, and the version of the viewer that shows
+//! it.
 
 use std::fmt;
 use std::fs::File;
@@ -24,7 +25,7 @@ pub enum VersionError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] io::Error),
-    /// The file is no recording, or one of a Rerun that is too old.
+    /// The file is no recording, or its Rerun is too old.
     #[error("{reason}")]
     Foreign {
         /// The reason that the library gives.

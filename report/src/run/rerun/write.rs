@@ -42,7 +42,8 @@ pub fn write_recording_unchecked(path: &Path, films: &[Film]) -> Result<(), Reco
     write(path, record(films)?)
 }
 
-/// Writes films like [`write_recording`], and drops them before the recording is encoded, so that never both are in memory.
+/// Writes films like [`write_recording`], and drops them before the recording is encoded. Films and
+/// encoded recording are never in memory together.
 ///
 /// # Errors
 /// [`RecordingError`] if the file cannot be written completely.
@@ -101,7 +102,8 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
     Ok(recording)
 }
 
-/// Returns the application id. The viewer keeps one layout per application, so that each kind of recording has its own.
+/// Returns the application id. The viewer keeps one layout per application, so each kind of
+/// recording has its own id.
 fn application(films: &[Film]) -> &'static str {
     match films {
         [film] if film.outcome.is_none() => "closecall-traffic",
@@ -113,8 +115,8 @@ fn application(films: &[Film]) -> &'static str {
 
 /// Returns the film whose vehicles appear as outlines in the film of this index.
 ///
-/// The vehicles of the baseline appear in the tested film, but not the other way round. If one film is recorded traffic
-/// and the other its re-enactment, the vehicles of each appear in the other.
+/// The vehicles of the baseline appear in the tested film, but not the other way round. If one film
+/// is recorded traffic and the other its re-enactment, the vehicles of each appear in the other.
 fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
     match (films, index) {
         (_, 1..) => films.first(),
@@ -123,7 +125,7 @@ fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
     }
 }
 
-/// Writes a film and returns what its views can show.
+/// Writes a film and returns the possible contents of its views.
 fn write_film(
     writer: &Writer<'_>,
     canvas: &bird::Canvas<'_>,

@@ -3,7 +3,8 @@ use closecall_traffic::maths;
 
 use super::*;
 
-/// Returns a leader that drives in waves, and a follower that drives by the model with these values.
+/// Returns a leader that drives in waves, and a follower that drives by the model with these
+/// values.
 fn synthetic(name: &str, model: FollowingModel, values: &[f64]) -> FollowingPair {
     let phase = f64::from(closecall_recorded::following::name_hash(name));
     let mut leader_rear_m = 25.0;
@@ -38,18 +39,18 @@ fn the_parameters_of_a_simulated_driver_are_found_again() {
     let names: Vec<String> = (0..12).map(|index| format!("pair {index}")).collect();
     let pairs = names.iter().map(|name| synthetic(name, FollowingModel::Idm, &truth)).collect();
     let data = FollowingData { pairs, ..FollowingData::default() };
-    let found = calibrate(FollowingModel::Idm, &data).unwrap();
-    assert!(!found.held_out.is_empty() && found.held_out.len() + found.pairs.len() == 12);
-    assert!(found.errors_of_held_out.unwrap().rmse_m < 0.02, "{found:?}");
-    for (value, truth) in found.pooled.iter().zip(truth) {
-        assert!((value / truth - 1.0).abs() < 0.05, "{:?}", found.pooled);
+    let calibration = calibrate(FollowingModel::Idm, &data).unwrap();
+    assert!(!calibration.held_out.is_empty() && calibration.held_out.len() + calibration.pairs.len() == 12);
+    assert!(calibration.errors_of_held_out.unwrap().rmse_m < 0.02, "{calibration:?}");
+    for (value, truth) in calibration.pooled.iter().zip(truth) {
+        assert!((value / truth - 1.0).abs() < 0.05, "{:?}", calibration.pooled);
     }
-    let predictive = found.predictive.clone().unwrap();
+    let predictive = calibration.predictive.clone().unwrap();
     for (recorded_s, simulated_s) in predictive.recorded_s.iter().zip(predictive.simulated_s) {
         assert!((recorded_s / simulated_s - 1.0).abs() < 0.05, "{predictive:?}");
     }
     // The same data give the same bits.
-    assert_eq!(calibrate(FollowingModel::Idm, &data).unwrap(), found);
+    assert_eq!(calibrate(FollowingModel::Idm, &data).unwrap(), calibration);
 }
 
 #[test]
@@ -58,9 +59,9 @@ fn a_simulated_wiedemann_driver_is_followed_closely() {
     let pair = synthetic("a", FollowingModel::Wiedemann99, &truth);
     let data = FollowingData { pairs: vec![pair], ..FollowingData::default() };
     // With one pair, the hash decides on which side it falls.
-    if let Some(found) = calibrate(FollowingModel::Wiedemann99, &data) {
-        assert!(found.errors_of_single.rmse_m < 1.0, "{:?}", found.errors_of_single);
-        assert!(found.errors_of_held_out.is_none() && found.predictive.is_none());
+    if let Some(calibration) = calibrate(FollowingModel::Wiedemann99, &data) {
+        assert!(calibration.errors_of_single.rmse_m < 1.0, "{:?}", calibration.errors_of_single);
+        assert!(calibration.errors_of_held_out.is_none() && calibration.predictive.is_none());
     }
 }
 
@@ -71,11 +72,11 @@ fn recorded_pairs_are_followed_within_the_errors_of_the_literature() {
     let mut data = read(&[path]).unwrap();
     assert!(data.pairs.len() > 80, "{:?}", data.left_out);
     data.pairs.truncate(20);
-    let found = calibrate(FollowingModel::Idm, &data).unwrap();
-    assert!((0.05..0.29).contains(&found.errors_of_single.relative), "{:?}", found.errors_of_single);
-    assert!(found.errors_of_pooled.rmse_m > found.errors_of_single.rmse_m);
+    let calibration = calibrate(FollowingModel::Idm, &data).unwrap();
+    assert!((0.05..0.29).contains(&calibration.errors_of_single.relative), "{:?}", calibration.errors_of_single);
+    assert!(calibration.errors_of_pooled.rmse_m > calibration.errors_of_single.rmse_m);
     // A default driver is worse than a calibrated one.
     let used: Vec<&FollowingPair> = data.pairs.iter().filter(|pair| !is_held_out(pair)).collect();
     let default = rmse_m(FollowingModel::Idm, &[33.3, 1.5, 2.0, 0.73, 1.67], &used);
-    assert!(found.errors_of_pooled.rmse_m < default, "{default}");
+    assert!(calibration.errors_of_pooled.rmse_m < default, "{default}");
 }

@@ -1,9 +1,9 @@
-//! One child process, from its start to its end. Every wait has a time limit, whatever the process does, and the process
-//! is always reaped.
+//! One child process, from its start to its end. Every wait has a time limit, whatever the process
+//! does, and the process is always reaped.
 //!
-//! Three threads serve the process, each blocked on one pipe: one writes requests, one reads answers, one drains standard
-//! error. Full pipes in both directions can therefore not block both sides. The threads end with the process, whose pipes
-//! then close.
+//! Three threads serve the process, each blocked on one pipe: one writes requests, one reads
+//! answers, one drains standard error. Full pipes in both directions can therefore not block both
+//! sides. The threads end with the process, whose pipes then close.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,8 @@ use super::settings::ExecSettings;
 /// Interval at which the memory of the process is checked while its answer is awaited.
 const MEMORY_CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Time that a process has to end by itself once its standard input is closed or its standard output has ended.
+/// Time that a process has to end by itself once its standard input is closed or its standard
+/// output has ended.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Interval at which a process is polled for its end.
@@ -32,7 +33,8 @@ const EXIT_POLL_INTERVAL: Duration = Duration::from_millis(1);
 /// Interval at which a process is looked at that has to end.
 const FINISH_POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Time in which the last lines of a process that has ended arrive, if another process holds its pipe open.
+/// Time in which the last lines of a process that has ended arrive, if another process holds its
+/// pipe open.
 const DRAIN_TIMEOUT: Duration = Duration::from_millis(50);
 
 /// Number of lines that are buffered. A process that writes more lines than that has to wait.
@@ -56,14 +58,14 @@ pub struct Child {
     answered: u64,
     /// When the memory of its descendants was looked at last.
     tree_looked: Instant,
-    /// Whether the process has failed, so that it is killed without time to end by itself.
+    /// Whether the process has failed. It is then killed without time to end by itself.
     has_failed: bool,
     /// The entry in the registry of processes; `None` once the process is reaped.
     entry: Option<Entry>,
 }
 
 impl Child {
-    /// Starts the process in the given folder, or in that of this program.
+    /// Starts the process in the given folder, or in the folder of this program.
     ///
     /// # Errors
     /// [`ExecError`] if it cannot be started.
@@ -87,7 +89,8 @@ impl Child {
         let (answer_sender, answers) = sync_channel(BUFFERED_LINES);
         let (end_sender, stderr_end) = channel();
         let stderr_tail = Arc::new(Mutex::new(Tail::default()));
-        // Created before the threads, so that the process is killed and reaped if a thread cannot be started.
+        // Created before the threads: if a thread cannot be started, the process is killed and
+        // reaped.
         let mut child = Self {
             process,
             requests: Some(requests),
@@ -128,8 +131,8 @@ impl Child {
         }
     }
 
-    /// Sends a line and waits for its answer. Returns `None` if there is none within `limit`: the process is then killed when this
-    /// value is dropped.
+    /// Sends a line and waits for its answer. Returns `None` if there is none within `limit`: the
+    /// process is then killed when this value is dropped.
     ///
     /// # Errors
     /// [`ExecError`] if the process ends, or does not keep to its limits.
@@ -145,11 +148,12 @@ impl Child {
         answer
     }
 
-    /// Closes the standard input of the process, and checks that it has written nothing but its answers. The process has a short time
-    /// to end by itself.
+    /// Closes the standard input of the process, and checks that it has written only its answers.
+    /// The process has a short time to end by itself.
     ///
     /// # Errors
-    /// [`ExecError`] if a line is left over: an earlier line may have been taken for the answer to another question.
+    /// [`ExecError`] if a line is left over: an earlier line may have been taken for the answer to
+    /// another question.
     pub fn finish(&mut self) -> Result<(), ExecError> {
         self.requests = None;
         let started = Instant::now();
@@ -163,7 +167,8 @@ impl Child {
                     self.has_failed = true;
                     break None;
                 }
-                // A descendant may hold the pipe open after the end of the process. What the process has written still arrives.
+                // A descendant may hold the pipe open after the end of the process. What the
+                // process has written still arrives.
                 Err(RecvTimeoutError::Timeout) if ended.is_some_and(|at| at.elapsed() >= DRAIN_TIMEOUT) => break None,
                 Err(RecvTimeoutError::Timeout) => {
                     if ended.is_none() && self.has_ended() {
@@ -232,7 +237,8 @@ impl Child {
     }
 
     fn exchange(&mut self, line: Vec<u8>, limit: Duration) -> Result<Vec<u8>, ExecError> {
-        // A greeting that the process writes before it is greeted is accepted as the answer to the greeting.
+        // A greeting that the process writes before it is greeted is accepted as the answer to the
+        // greeting.
         if self.answered > 0 {
             self.reject_unrequested_line()?;
         }
@@ -250,7 +256,8 @@ impl Child {
         }
     }
 
-    /// Returns an error if the process has written a line since its last answer, which would be mistaken for the next one.
+    /// Returns an error if the process has written a line since its last answer, which would be
+    /// mistaken for the next one.
     fn reject_unrequested_line(&mut self) -> Result<(), ExecError> {
         match self.answers.try_recv() {
             Ok(Line::Whole(line)) => Err(ExecError::OutOfTurn { answered: self.answered, line: excerpt(&line) }),
@@ -275,7 +282,8 @@ impl Child {
                 Ok(Line::Whole(line)) => return Ok(Some(line)),
                 Ok(Line::TooLong) => return Err(ExecError::LongLine { limit: MAX_LINE_BYTES }),
                 Err(RecvTimeoutError::Disconnected) => return Err(self.exit_error()),
-                // A descendant may hold the pipe open after the end of the process. What the process has written still arrives.
+                // A descendant may hold the pipe open after the end of the process. What the
+                // process has written still arrives.
                 Err(RecvTimeoutError::Timeout) if self.has_ended() => match self.answers.recv_timeout(EXIT_TIMEOUT) {
                     Ok(Line::Whole(line)) => return Ok(Some(line)),
                     _ => return Err(self.exit_error()),
@@ -286,8 +294,8 @@ impl Child {
         }
     }
 
-    /// Returns the peak resident memory of the process (MiB), or 0 if the system does not report it, for example because the
-    /// process has just ended.
+    /// Returns the peak resident memory of the process (MiB), or 0 if the system does not report
+    /// it, for example because the process has just ended.
     fn peak_memory_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap_or_default();
         let peak_kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -296,19 +304,20 @@ impl Child {
             .map_or(0, |kib| kib.div_ceil(1_024))
     }
 
-    /// Returns the memory of the process and its descendants (MiB), each page counted once, or 0 if the process has none, or they have been
-    /// looked at just before. A peak between two looks is not seen.
+    /// Returns the memory of the process and its descendants (MiB), each page counted once, or 0 if
+    /// the process has none, or they have been looked at just before. A peak between two looks is
+    /// not seen.
     fn tree_memory_mib(&mut self) -> u64 {
         if self.tree_looked.elapsed() < MEMORY_CHECK_INTERVAL {
             return 0;
         }
         self.tree_looked = Instant::now();
-        let own = self.process.id();
-        let descendants = processes::descendants(own);
+        let process = self.process.id();
+        let descendants = processes::descendants(process);
         if descendants.is_empty() {
             return 0;
         }
-        descendants.into_iter().chain([own]).map(proportional_kib).sum::<u64>().div_ceil(1_024)
+        descendants.into_iter().chain([process]).map(proportional_kib).sum::<u64>().div_ceil(1_024)
     }
 
     /// Returns why standard output has ended: with the process, or before it.
@@ -386,7 +395,7 @@ fn spawn_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Re
 
 /// Writes every received line to standard input.
 fn write_all(mut stdin: ChildStdin, lines: &Receiver<Vec<u8>>) {
-    // A process that no longer reads does not answer, which `request` reports.
+    // A process that has stopped reading does not answer, which `request` reports.
     while let Ok(line) = lines.recv() {
         if stdin.write_all(&line).and_then(|()| stdin.flush()).is_err() {
             return;

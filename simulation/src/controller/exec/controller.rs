@@ -29,12 +29,14 @@ pub struct ExecFactory {
 }
 
 impl ExecFactory {
-    /// Creates a factory of processes with these settings. They run in the given folder, or in that of this program.
+    /// Creates a factory of processes with these settings. They run in the given folder, or in the
+    /// folder of this program.
     pub fn new(settings: ExecSettings, folder: Option<&Path>) -> Self {
         Self { settings, folder: folder.map(Path::to_owned), name: NAME.to_owned(), repeats_time: false }
     }
 
-    /// Returns a factory of processes each of whose answers must repeat the time of its control step.
+    /// Returns a factory of processes each of whose answers must repeat the time of its control
+    /// step.
     #[must_use]
     pub(in crate::controller) fn repeating_time(self) -> Self {
         Self { repeats_time: true, ..self }
@@ -47,8 +49,8 @@ impl ExecFactory {
     }
 }
 
-/// Starts a process in the given folder, or in that of this program, greets it, and returns what it states about itself in its first answer,
-/// and the files that it has open.
+/// Starts a process in the given folder, or in the folder of this program, and greets it. Returns
+/// the statements in its first answer, and the files that it has open.
 ///
 /// # Errors
 /// [`ExecError`] if the process cannot be started, or does not give a valid first answer.
@@ -80,7 +82,8 @@ impl ControllerFactory for ExecFactory {
         &self.name
     }
 
-    /// The outcome summarises the states that the process reports if the scenario has a margin increase system.
+    /// The outcome summarises the states that the process reports if the scenario has a margin
+    /// increase system.
     fn has_mis(&self, settings: &EgoSettings) -> bool {
         settings.mis().is_some()
     }
@@ -97,7 +100,8 @@ impl ControllerFactory for ExecFactory {
     }
 }
 
-/// A process that controls the ego in one run. It is started at the first step and ended when this value is dropped.
+/// A process that controls the ego in one run. It is started at the first step and ended when this
+/// value is dropped.
 struct ExecController {
     settings: ExecSettings,
     folder: Option<PathBuf>,
@@ -108,7 +112,8 @@ struct ExecController {
 }
 
 impl ExecController {
-    /// Sends the message of a control step and returns the answer. Starts the process if there is none yet.
+    /// Sends the message of a control step and returns the answer. Starts the process if there is
+    /// none yet.
     fn request(&mut self, input: &EgoInput<'_>) -> Result<protocol::Answer, ExecError> {
         let front = self.lead_selector.update(input);
         let child = match &mut self.child {

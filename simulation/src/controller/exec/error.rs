@@ -3,9 +3,10 @@
 use std::io;
 use std::process::ExitStatus;
 
-/// Why a process did not give a valid answer. The process has been killed, and the sample has no outcome.
+/// Why a process did not give a valid answer. The process has been killed, and the sample has no
+/// outcome.
 ///
-/// The messages depend on what the process did, not on how long it took, so that they are reproducible.
+/// The messages depend on the actions of the process, not on their duration: they are reproducible.
 #[derive(Debug, thiserror::Error)]
 pub enum ExecError {
     /// The quotes of the command do not match, or the command is empty.
@@ -133,7 +134,8 @@ impl ExecError {
     }
 }
 
-/// Describes when an error happened by the number of answers before it. The first answer is the greeting.
+/// Describes when an error happened by the number of answers before it. The first answer is the
+/// greeting.
 fn when(answered: u64) -> String {
     match answered {
         0 => "before its greeting".to_owned(),

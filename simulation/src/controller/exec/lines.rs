@@ -16,8 +16,8 @@ const QUOTED_LINES: usize = 5;
 /// Longest excerpt of a line in an error message (characters).
 const MAX_EXCERPT_CHARS: usize = 120;
 
-/// Written to standard error by a worker process when a sample begins, so that no message quotes what an earlier sample wrote: the
-/// record separator of ASCII.
+/// The record separator of ASCII. A worker process writes it to standard error when a sample
+/// begins: no message quotes the output of a previous sample.
 pub const NEW_SAMPLE: u8 = 0x1e;
 
 /// A line of standard output.
@@ -44,8 +44,8 @@ pub(super) fn read_lines(source: impl Read, lines: &SyncSender<Line>) {
     }
 }
 
-/// Returns the next line, or `None` at the end of the source. Text after the last line feed counts as a line if it is not
-/// empty.
+/// Returns the next line, or `None` at the end of the source. Text after the last line feed counts
+/// as a line if it is not empty.
 fn next_line(source: &mut impl BufRead) -> io::Result<Option<Line>> {
     let mut line = Vec::new();
     source.take(MAX_LINE_BYTES as u64 + 1).read_until(b'\n', &mut line)?;

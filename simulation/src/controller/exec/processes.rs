@@ -6,9 +6,10 @@
 //!      └───────▶ guard (sh) ── waits for the end of closecall, then kills every process with a mark
 //! ```
 //!
-//! The environment of each controller holds a *mark*, which its descendants inherit. [`adopt_orphans`] makes the program
-//! the subreaper of its descendants: a process whose parent has ended becomes a child of this program, whatever session
-//! it belongs to. The end of a controller kills the orphans with its mark.
+//! The environment of each controller holds a *mark*, which its descendants inherit.
+//! [`adopt_orphans`] makes the program the subreaper of its descendants: a process whose parent has
+//! ended becomes a child of this program, whatever session it belongs to. The end of a controller
+//! kills the orphans with its mark.
 //!
 //! The guard covers the case in which this program is killed by SIGKILL and can do nothing itself. One case remains: a
 //! process that has both left the process group and cleared its environment survives a SIGKILL of this program.
@@ -30,16 +31,17 @@ use rustix::process::{
 
 /// The environment variable that holds the mark of a controller's process.
 const MARK: &str = "CLOSECALL_CONTROLLER_PROCESS";
-/// Largest number of times that the orphans are looked for. Each round finds the children of those that the round before
-/// has killed.
+/// Largest number of searches for orphans. Each round finds the children of the processes that the
+/// round before has killed.
 const MAX_ROUNDS: usize = 64;
 /// Time that a killed process has to end.
 const KILL_TIMEOUT: Duration = Duration::from_secs(1);
 /// Interval at which a killed process is polled for its end.
 const POLL_INTERVAL: Duration = Duration::from_micros(200);
 
-/// Waits for the end of standard input, which is the end of Closecall, and kills every process whose environment holds
-/// the first argument. The exit status of `grep` says nothing: it is that of the last file that cannot be read.
+/// Waits for the end of standard input, which is the end of Closecall, and kills every process
+/// whose environment holds the first argument. The exit status of `grep` says nothing: the last
+/// file that cannot be read decides it.
 const GUARD: &str = r#"
 trap '' HUP INT TERM
 read -r end
@@ -67,7 +69,8 @@ static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
 
 /// The processes of this program.
 struct Registry {
-    /// True if this program is the subreaper of its descendants, and has no other children than those listed here.
+    /// True if this program is the subreaper of its descendants, and has no other children than
+    /// those listed here.
     adopts: bool,
     /// True if no further process may be started.
     is_closed: bool,
@@ -88,10 +91,12 @@ pub(super) struct Entry {
     mark: String,
 }
 
-/// Makes this program responsible for all descendants of its controllers, also for those that leave their process group.
+/// Makes this program responsible for all descendants of its controllers, also for those that leave
+/// their process group.
 ///
-/// The program must have no other children: it kills and reaps every child that is not a running controller. On systems
-/// other than Linux this does nothing, and only the process groups of the controllers are killed.
+/// The program must have no other children: it kills and reaps every child that is not a running
+/// controller. On systems other than Linux this does nothing, and only the process groups of the
+/// controllers are killed.
 pub fn adopt_orphans() {
     lock().adopts = set_child_subreaper(Some(rustix::process::getpid())).is_ok();
 }
@@ -115,9 +120,9 @@ pub fn end_all() {
     registry.end_orphans(None);
 }
 
-/// Starts a controller in a process group of its own.
+/// Starts a controller in a separate process group.
 pub(super) fn start(command: &mut Command) -> io::Result<(Child, Entry)> {
-    // The lock is held until the process is listed, so that no other thread takes it for an orphan.
+    // The lock is held until the process is listed: no other thread takes it for an orphan.
     let mut registry = lock();
     if registry.is_closed {
         return Err(io::Error::new(io::ErrorKind::Interrupted, "the program is ending"));
@@ -131,7 +136,8 @@ pub(super) fn start(command: &mut Command) -> io::Result<(Child, Entry)> {
     Ok((process, Entry { number, mark }))
 }
 
-/// Kills the process group of a controller, reaps the controller, and kills what is left of its descendants.
+/// Kills the process group of a controller, reaps the controller, and kills its remaining
+/// descendants.
 pub(super) fn end(process: &mut Child, entry: &Entry) -> io::Result<ExitStatus> {
     // Until it is reaped, its process ID identifies it and its group, even if it has ended.
     let _ = kill_process_group(Pid::from_child(process), Signal::KILL);
@@ -147,7 +153,8 @@ fn lock() -> MutexGuard<'static, Registry> {
 }
 
 impl Registry {
-    /// Returns the part of the mark that all processes of this program share. Starts the guard at the first call.
+    /// Returns the part of the mark that all processes of this program share. Starts the guard at
+    /// the first call.
     fn prefix(&mut self) -> &str {
         if self.adopts && self.guard.is_none() {
             let prefix = self.prefix.get_or_insert_with(new_prefix);
@@ -157,7 +164,8 @@ impl Registry {
         self.prefix.get_or_insert_with(new_prefix)
     }
 
-    /// Kills and reaps the orphans with this mark, or all orphans. Reaps those that have ended by themselves.
+    /// Kills and reaps the orphans with this mark, or all orphans. Reaps processes that have ended
+    /// by themselves.
     fn end_orphans(&mut self, mark: Option<&str>) {
         if !self.adopts {
             return;
@@ -212,20 +220,21 @@ fn kill_and_reap(pid: Pid) {
     }
 }
 
-/// Returns the descendants of a process. Those whose parents have ended are children of this program, and not among them.
+/// Returns the descendants of a process. Those whose parents have ended are children of this
+/// program, and not among them.
 pub(super) fn descendants(process: u32) -> Vec<u32> {
-    let mut found = vec![process];
+    let mut tree = vec![process];
     let mut index = 0;
-    while let Some(parent) = found.get(index).copied() {
+    while let Some(parent) = tree.get(index).copied() {
         let threads = fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten().flatten();
         let lists = threads.filter_map(|thread| fs::read_to_string(thread.path().join("children")).ok());
         let children: Vec<u32> = lists
             .flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>())
             .collect();
-        found.extend(children.into_iter().filter(|child| !found.contains(child)).collect::<Vec<_>>());
+        tree.extend(children.into_iter().filter(|child| !tree.contains(child)).collect::<Vec<_>>());
         index += 1;
     }
-    found.split_off(1)
+    tree.split_off(1)
 }
 
 /// Returns the children of this program, which include adopted ones.

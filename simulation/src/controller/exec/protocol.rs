@@ -141,7 +141,7 @@ pub(super) struct Answer {
     pub(super) state: EgoState,
 }
 
-/// What a process states about itself in its first answer.
+/// The statements of a process in its first answer.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Its name.
@@ -158,9 +158,9 @@ pub(super) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
     if object.get("type").and_then(Value::as_str) != Some("hello") {
         return Err(key_error(line, &object, "type", "\"hello\" in the first answer"));
     }
-    let found =
+    let version =
         object.get("protocol").ok_or_else(|| key_error(line, &object, "protocol", "the version of the protocol"))?;
-    if found.as_u64() == Some(PROTOCOL.into()) {
+    if version.as_u64() == Some(PROTOCOL.into()) {
         let stated = |key| match object.get(key) {
             None | Some(Value::Null) => None,
             Some(Value::String(text)) => Some(excerpt(text.as_bytes())),
@@ -168,7 +168,7 @@ pub(super) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
         };
         Ok(Identity { name: stated("name"), version: stated("version") })
     } else {
-        Err(ExecError::Version { found: found.to_string(), own: PROTOCOL })
+        Err(ExecError::Version { found: version.to_string(), own: PROTOCOL })
     }
 }
 
@@ -189,9 +189,14 @@ pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecErro
     let repeated = object.get(TIME_KEY);
     let is_own = repeated.map_or(!asked.must_be_repeated, |time| time.as_i64() == Some(asked.time_ns));
     if !is_own {
-        let found = repeated.map_or_else(|| "an unstated number of".to_owned(), ToString::to_string);
-        let (line, found) = (excerpt(line), excerpt(found.as_bytes()));
-        return Err(ExecError::OtherStep { line, expected: asked.time_ns, found, answered: asked.answered });
+        let repeated_time = repeated.map_or_else(|| "an unstated number of".to_owned(), ToString::to_string);
+        let (line, repeated_time) = (excerpt(line), excerpt(repeated_time.as_bytes()));
+        return Err(ExecError::OtherStep {
+            line,
+            expected: asked.time_ns,
+            found: repeated_time,
+            answered: asked.answered,
+        });
     }
     let acceleration_mps2 = object
         .get(ACCELERATION_KEY)
@@ -229,8 +234,8 @@ fn not_finite(line: &[u8]) -> Option<String> {
 
 /// Returns the error that `key` does not have the `expected` value.
 fn key_error(line: &[u8], object: &Map<String, Value>, key: &'static str, expected: &'static str) -> ExecError {
-    let found = object.get(key).map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
-    ExecError::Key { line: excerpt(line), key, expected, found }
+    let value = object.get(key).map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
+    ExecError::Key { line: excerpt(line), key, expected, found: value }
 }
 
 #[cfg(test)]

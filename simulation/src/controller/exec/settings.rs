@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 /// The name of an external controller in reports, and the prefix of its `--controller` argument.
 pub const NAME: &str = "exec";
 
-/// Default time limit of one answer (ms): 25 control steps, longer than the pauses of an interpreter.
+/// Default time limit of one answer (ms): 25 control steps, longer than the pauses of an
+/// interpreter.
 pub const DEFAULT_TIMEOUT_MS: u64 = 1_000;
 
-/// Default memory limit (MiB): enough for an interpreter with its numerical libraries, with a reserve.
+/// Default memory limit (MiB): enough for an interpreter with its numerical libraries, with a
+/// reserve.
 pub const DEFAULT_MEMORY_MIB: u64 = 1_024;
 
 /// The settings of a controller that runs as a separate process.
@@ -26,7 +28,8 @@ pub struct ExecSettings {
 }
 
 impl ExecSettings {
-    /// Returns the command and its arguments, or `None` if the quotes do not match or the command is empty.
+    /// Returns the command and its arguments, or `None` if the quotes do not match or the command
+    /// is empty.
     pub fn words(&self) -> Option<Vec<String>> {
         shlex::split(&self.command).filter(|words| !words.is_empty())
     }

@@ -61,9 +61,9 @@ impl Run<'_> {
 
     /// Moves the world by one step and reports new collisions to the observer.
     pub(super) fn advance(&mut self, observer: &mut dyn Observer) {
-        let (known, known_touches) = (self.world.collisions().len(), self.world.touches().len());
+        let (collisions_before, touches_before) = (self.world.collisions().len(), self.world.touches().len());
         self.world.step(&self.actions, self.encounter.phase());
-        for index in known..self.world.collisions().len() {
+        for index in collisions_before..self.world.collisions().len() {
             let collision = &self.world.collisions()[index];
             if collision.involves(self.scenario.ego_id()) {
                 let is_ahead = self.is_ahead_of_ego(index);
@@ -71,13 +71,13 @@ impl Run<'_> {
             }
             observer.event(collision.time, &RunEvent::Collision(collision.clone()));
         }
-        for touch in &self.world.touches()[known_touches..] {
+        for touch in &self.world.touches()[touches_before..] {
             observer.event(touch.time, &RunEvent::Touch(touch.clone()));
         }
     }
 
-    /// Returns whether the other vehicle of a collision of the ego has its centre ahead of the ego's. `collision` is an
-    /// index into the list of collisions.
+    /// Returns whether the other vehicle of a collision of the ego has its centre ahead of the
+    /// ego's. `collision` is an index into the list of collisions.
     fn is_ahead_of_ego(&self, collision: usize) -> bool {
         let ego = self.scenario.ego;
         let between = &self.world.collisions()[collision].between;
@@ -102,16 +102,16 @@ impl Run<'_> {
         (time >= self.scenario.duration).then_some(EndReason::Duration)
     }
 
-    /// Returns whether the ego, its lead vehicle and all vehicles behind it stand still, so that the ego can no longer
-    /// collide.
+    /// Returns whether the ego, its lead vehicle and all vehicles behind it stand still. The ego
+    /// can then not collide.
     fn stands_still(&self) -> bool {
         let ego = self.scenario.ego;
-        let own = self.world.state(ego);
+        let ego_state = self.world.state(ego);
         let lead = self.neighbours[ego].own.lead.map(|lead| lead.actor);
-        own.speed_mps == 0.0
+        ego_state.speed_mps == 0.0
             && (0..self.world.len()).all(|actor| {
                 let state = self.world.state(actor);
-                let matters = state.s_m <= own.s_m || Some(actor) == lead;
+                let matters = state.s_m <= ego_state.s_m || Some(actor) == lead;
                 !matters || state.speed_mps == 0.0
             })
     }

@@ -1,4 +1,4 @@
-//! What an approach counts, against values worked by hand.
+//! The counts of an approach, against values worked by hand.
 
 use closecall_sensors::SensorHealth;
 use closecall_traffic::{ClassScores, Environment, Time, TrackId};
@@ -39,18 +39,21 @@ fn gospa_is_that_of_worked_examples() {
     close(gospa_of(&[], &[[-30.0, 0.0], [-60.0, 0.0]]), 5.0);
     // 3 m along and 2 m across.
     close(gospa_of(&[[-30.0, 0.0]], &[[-33.0, 2.0]]), 13.0_f64.sqrt());
-    // At the cut-off, a pair costs as much as a missed vehicle and a false track.
+    // At the cut-off, a pair costs as much as a missed vehicle and a false track together.
     close(gospa_of(&[[-30.0, 0.0]], &[[-35.0, 0.0]]), 5.0);
     close(gospa_of(&[[-30.0, 0.0]], &[[-80.0, 0.0]]), 5.0);
-    // Two vehicles, two tracks and a false one: the pairs that cross would cost 16 + 9 m², the others 1 + 4 m².
+    // Two vehicles, two tracks and a false one: the pairs that cross would cost 16 + 9 m², the
+    // others 1 + 4 m².
     let truths_m = [[-30.0, 0.0], [-30.0, 3.0]];
     let tracks_m = [[-30.0, 5.0], [-31.0, 0.0], [-90.0, 0.0]];
     close(gospa_of(&truths_m, &tracks_m), (1.0_f64 + 4.0 + alone_m2).sqrt());
-    // The nearest track of the first vehicle is left to the second, which no other track reaches: 4 + 1 m² instead of 1 m² and two alone.
+    // The nearest track of the first vehicle is left to the second vehicle, which no other track
+    // reaches: 4 + 1 m² instead of 1 m² and two alone.
     close(gospa_of(&[[-30.0, 0.0], [-30.0, 2.0]], &[[-30.0, 1.0], [-30.0, -2.0]]), 5.0_f64.sqrt());
 }
 
-/// Perception that reports the truth, from step 100 on under another id, and between steps 50 and 60 one more track 30 m farther away.
+/// Perception that reports the truth, from step 100 on under another id, and between steps 50 and
+/// 60 one more track 30 m farther away.
 struct Scripted {
     step: u32,
     class: ClassScores,
@@ -84,15 +87,15 @@ fn a_forced_change_of_the_id_and_a_forced_false_track_are_counted() {
         let traffic = Traffic::new(&case, &road, 150.0, 10.0);
         observe((&case, &road), traffic, &mut Scripted { step: 0, class, tracks: Vec::new() }).unwrap()
     };
-    let found = with_class(ClassScores::certain(VehicleClass::Car));
-    assert_eq!((found.id_switches, found.false_tracks, found.failed_steps), (1, 1, 0));
+    let approach = with_class(ClassScores::certain(VehicleClass::Car));
+    assert_eq!((approach.id_switches, approach.false_tracks, approach.failed_steps), (1, 1, 0));
     // The true track has no error; the false one costs its share in each of its ten steps.
-    for (step, seen) in found.observations.iter().enumerate() {
+    for (step, observation) in approach.observations.iter().enumerate() {
         let expected = if (50..60).contains(&step) { 12.5_f64.sqrt() } else { 0.0 };
-        assert!((seen.gospa_m - expected).abs() < 1e-6, "step {step}: {}", seen.gospa_m);
-        assert!(seen.tracked.is_some_and(|it| it.position_m[0].abs() < 1e-6 && it.is_class_right));
+        assert!((observation.gospa_m - expected).abs() < 1e-6, "step {step}: {}", observation.gospa_m);
+        assert!(observation.tracked.is_some_and(|track| track.position_m[0].abs() < 1e-6 && track.is_class_right));
     }
-    // What is known to be no vehicle is no false track.
+    // A track that is known to be no vehicle is no false track.
     let background = ClassScores([0.0, 0.0, 0.0, 1.0]);
     assert_eq!(with_class(background).false_tracks, 0);
 }

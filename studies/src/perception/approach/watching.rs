@@ -1,4 +1,5 @@
-//! What the sensors show of a vehicle, step by step: on an approach, after it appears, and while it brakes and changes lanes.
+//! The sensors' view of a vehicle, step by step: on an approach, after it appears, and while it
+//! brakes and changes lanes.
 
 use closecall_sensors::{Perception, Scene, SensorError, Sensors};
 use closecall_traffic::{CONTROL_STEP, Road, Track, TrackStatus, maths};
@@ -8,24 +9,29 @@ use crate::perception::cases::Case;
 
 /// Fewest steps that the sensors watch an empty road before a vehicle appears.
 const EMPTY_STEPS: i64 = 10;
-/// Number of different times of appearance, in steps: a second, which holds each phase of a mirror and of a camera at 5 Hz.
+/// Number of different times of appearance, in steps: a second, which holds each phase of a mirror
+/// and of a camera at 5 Hz.
 const PHASES: i64 = 25;
-/// Gap (m) and closing speed (m/s) at which a vehicle that will brake and change lanes begins, and the time for which it keeps
-/// its speed and lane (steps): 2 s. All vehicles are then within the range of the full chain in fog (100 m).
+/// Gap (m) and closing speed (m/s) at which a vehicle that will brake and change lanes begins, and
+/// the time for which it keeps its speed and lane (steps): 2 s. All vehicles are then within the
+/// range of the full chain in fog (100 m).
 const BEFORE_MANOEUVRE_M: f64 = 35.0;
 const BEFORE_MANOEUVRE_MPS: f64 = 5.0;
 const BEFORE_MANOEUVRE_STEPS: i64 = 50;
-/// Its deceleration (m/s²) and its speed across the road (m/s): firm braking, and a usual lane change.
+/// Its deceleration (m/s²) and its speed across the road (m/s): firm braking, and a usual lane
+/// change.
 const BRAKING_MPS2: f64 = 3.0;
 const ACROSS_MPS: f64 = 1.0;
-/// Changes at which the lag is taken: of the speed (m/s), and of the position across the road (m).
+/// Changes at which the lag is measured: of the speed (m/s), and of the position across the road
+/// (m).
 const CHANGES: [f64; 2] = [2.0, 0.5];
-/// Longest time for which a manoeuvre is watched (steps): 2 s, in which the vehicle neither stops nor leaves the next lane.
+/// Longest time for which a manoeuvre is watched (steps): 2 s, in which the vehicle neither stops
+/// nor leaves the next lane.
 const MANOEUVRE_STEPS: i64 = 50;
-/// Number of steps before a manoeuvre whose mean error is that of the track at rest.
+/// Number of steps before a manoeuvre whose mean error is the error of the track at rest.
 const REST_STEPS: usize = 10;
 
-/// What the sensors show of a vehicle in one control step.
+/// The sensors' view of a vehicle in one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Step {
     /// True gap from the front of the vehicle to the ego's rear (m).
@@ -37,18 +43,21 @@ pub(crate) struct Step {
 /// A confirmed track in one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Errors along (m), across (m), of the speed along the road (m/s), and of that across it (m/s).
+    /// Errors along (m), across (m), of the speed along the road (m/s), and of the speed across it
+    /// (m/s).
     pub(crate) errors: [f64; 4],
     /// Whether the latest scan has not detected the vehicle.
     pub(crate) is_coasting: bool,
 }
 
-/// Times from the appearance of a vehicle until its track reaches a state (s); `None` if it does not within 4 s.
+/// Times from the appearance of a vehicle until its track reaches a state (s); `None` if it does
+/// not within 4 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Delays {
     /// The track is confirmed.
     pub(crate) confirmed_s: Option<f64>,
-    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle: what a function waits for.
+    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle:
+    /// the state that a function waits for.
     pub(crate) classified_s: Option<f64>,
 }
 
@@ -73,11 +82,11 @@ pub(crate) fn steps(
 }
 
 fn seen(track: &Track, traffic: &Traffic) -> Seen {
-    let found = errors(track, traffic.truths_m()[0], &traffic.others[0]);
+    let errors = errors(track, traffic.truths_m()[0], &traffic.others[0]);
     let state = &traffic.others[0].state;
     let across_mps = state.speed_mps * maths::sin(state.heading_rad);
     Seen {
-        errors: [found.position_m[0], found.position_m[1], found.speed_mps, track.vy_mps() - across_mps],
+        errors: [errors.position_m[0], errors.position_m[1], errors.speed_mps, track.vy_mps() - across_mps],
         is_coasting: track.status == TrackStatus::Coasting,
     }
 }
@@ -95,7 +104,8 @@ fn track_of<'a>(
     Ok(traffic.truths_m().first().and_then(|truth_m| nearest(&tracks, *truth_m)))
 }
 
-/// Returns the delays of a vehicle that appears 40 m behind the ego and keeps its distance, on a road that was empty before.
+/// Returns the delays of a vehicle that appears 40 m behind the ego on an empty road, and keeps its
+/// distance.
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
@@ -147,7 +157,8 @@ pub(crate) fn lags_s(
         let state = &mut traffic.others[0].state;
         match track {
             Some(seen) if step < before => at_rest.push([-seen.errors[2], seen.errors[1]]),
-            // Errors are those of the track relative to the truth: their sum is what the track shows.
+            // Errors are the errors of the track relative to the truth. Truth and error add up to
+            // the value of the track.
             Some(seen) => {
                 moving.push([start_mps - state.speed_mps - seen.errors[2], state.d_m - start_d_m + seen.errors[1]])
             }
@@ -164,14 +175,15 @@ pub(crate) fn lags_s(
     }
     let rest = &at_rest[at_rest.len().saturating_sub(REST_STEPS)..];
     let lag_s = |axis: usize, per_s: f64| {
-        let bias = rest.iter().map(|it| it[axis]).sum::<f64>() / rest.len().max(1) as f64;
-        let shown: Vec<f64> = moving.iter().map(|it| it[axis] - bias).collect();
+        let bias = rest.iter().map(|errors| errors[axis]).sum::<f64>() / rest.len().max(1) as f64;
+        let shown: Vec<f64> = moving.iter().map(|errors| errors[axis] - bias).collect();
         Some(crossing_s(&shown, CHANGES[axis])? - CHANGES[axis] / per_s)
     };
     Ok(lag_s(0, BRAKING_MPS2).zip(lag_s(1, ACROSS_MPS)).map(|(along_s, across_s)| [along_s, across_s]))
 }
 
-/// Returns the time at which values, one of each control step, first reach a level (s); between two steps, they change evenly.
+/// Returns the time at which values, one of each control step, first reach a level (s); between two
+/// steps, they change evenly.
 fn crossing_s(values: &[f64], level: f64) -> Option<f64> {
     let index = values.iter().position(|value| *value >= level)?;
     let share = match index.checked_sub(1).map(|before| values[before]) {

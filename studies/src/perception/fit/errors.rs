@@ -5,13 +5,15 @@
 //!   errors ─▶ object-level sensor ─▶ tracks ─▶ figures ─▶ ratios ─▶ errors    ... until both err alike
 //! ```
 //!
-//! In each point of the grid, errors are adapted by the ratios of figures of the tracks: the white errors along and across the road
-//! by the errors of the two speeds, the slow errors by those of the positions, and their correlation times by those of the positions. The
-//! white and slow errors of a far vehicle have ratios of their own. The errors with the least sum of squared logarithms of all these ratios are
-//! kept. The losses are those of the full chain: the distance from which on, and the share in which, its tracks coast. A vehicle beyond
-//! that distance is far.
+//! In each point of the grid, errors are adapted by the ratios of figures of the tracks. The errors
+//! of the two speeds adapt the white errors along and across the road. The errors of the positions
+//! adapt the slow errors and their correlation times. The white and slow errors of a far vehicle
+//! have separate ratios. The errors with the least sum of squared logarithms of all these ratios
+//! are kept. The losses come from the full chain: the distance from which on, and the share in
+//! which, its tracks coast. A vehicle beyond this distance is far.
 //!
-//! A slow error stands for all that lasts longer than a scan: noise, and what the full chain errs in the same way at the same distance.
+//! A slow error covers everything that lasts longer than a scan: noise, and errors that the full
+//! chain repeats at the same distance.
 
 use closecall_sensors::{ErrorGrid, ErrorGrids, FittedErrors, NamedGrid, RearFit, SensorMode, Sensors};
 use closecall_traffic::{Appearance, CONTROL_STEP, Plate, Vehicle, VehicleClass, maths};
@@ -24,32 +26,37 @@ use crate::perception::behaviour::GAPS_M as ERROR_GAPS_M;
 use crate::perception::cases::Case;
 use crate::perception::study::StudyError;
 
-/// Reflectivities of the paint (-) and visibilities (m) of the grid. The validation has no point of it but the clear day.
+/// Reflectivities of the paint (-) and visibilities (m) of the grid. The validation shares only the
+/// clear day with it.
 const PAINTS: [f64; 4] = [0.05, 0.14, 0.3, 0.7];
 const VISIBILITIES_M: [f64; 7] = [10_000.0, 700.0, 400.0, 250.0, 150.0, 80.0, 50.0];
 /// Number of times that the errors of a point are adapted.
 const ITERATIONS: usize = 16;
-/// Number of approaches of the object-level sensor in each of them. A slow error is often one draw in an approach, and a deviation of
-/// 64 draws scatters by 9 %.
+/// Number of approaches of the object-level sensor in each adaptation. A slow error is often one
+/// draw in an approach, and a deviation of 64 draws scatters by 9 %.
 const OBJECT_APPROACHES: u64 = 64;
-/// Least number of steps with a track that tell the errors of a point. With fewer, those in less fog hold.
+/// Smallest number of steps with a track that determine the errors of a point. With fewer, the
+/// errors in less fog hold.
 const LEAST_STEPS: usize = 100;
-/// Least number of steps with a far track that tell its errors. With fewer, they are those of a near one.
+/// Smallest number of steps with a far track that determine its errors. With fewer, the errors of a
+/// near track hold.
 const LEAST_FAR_STEPS: usize = 50;
-/// Bounds of the deviations (m), and of the correlation times (s): a shorter one is that of a white error.
+/// Bounds of the deviations (m), and of the correlation times (s): an error with a shorter time is
+/// a white error.
 const SD_BOUNDS_M: [f64; 2] = [0.001, 1.0];
 const TIME_BOUNDS_S: [f64; 2] = [0.2, 20.0];
-/// Largest ratio of the deviation of a measurement's error to the error of the track (-), an assumption: beyond it, the filter takes a
-/// vehicle that changes lanes for noise.
+/// Largest ratio of the deviation of a measurement's error to the error of the track (-): an
+/// assumption. Beyond it, the filter takes a vehicle that changes lanes for noise.
 const MOST_OF_TRACK: f64 = 1.5;
-/// Share of the logarithm of a ratio by which errors are adapted (-), because they depend on each other; and the bounds of a ratio.
+/// Share of the logarithm of a ratio by which errors are adapted (-), because they depend on each
+/// other; and the bounds of a ratio.
 const ADAPTED_SHARE: f64 = 0.7;
 const RATIO_BOUNDS: [f64; 2] = [0.2, 5.0];
 /// Longest lag at which correlations are taken (control steps): 3 s.
 const LONGEST_LAG_STEPS: usize = 75;
 /// Bounds of a correlation that has not fallen to 1/e by then (-), which leave its time finite.
 const CORRELATION_BOUNDS: [f64; 2] = [0.37, 0.999];
-/// Distance between the candidates for the one from which on scans are lost (m).
+/// Distance between the candidates for the distance from which on scans are lost (m).
 const LOSS_STEP_M: f64 = 1.0;
 /// The errors that a fit begins with.
 const START: FittedErrors = FittedErrors {
@@ -65,14 +72,15 @@ const START: FittedErrors = FittedErrors {
 /// Errors of tracks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Figures {
-    /// Of near vehicles, up to 80 m: root mean squares of those of the position along and across the road (m), and of those of the speed
-    /// along and across it (m/s), and the correlation times of the former two (s), within the bounds of the fit.
+    /// Of near vehicles, up to 80 m: root mean squares of the errors of the position along and
+    /// across the road (m), and of the speed along and across it (m/s), and the correlation times
+    /// of the position errors (s), within the bounds of the fit.
     pub(super) near: [f64; 6],
     /// Of far vehicles: the same root mean squares; `None` with too few steps.
     pub(super) far: Option<[f64; 4]>,
 }
 
-/// Returns which of the fitted errors lie on a bound, and what that means.
+/// Returns the fitted errors that lie on a bound, and the consequence.
 pub fn at_bounds(fit: &RearFit) -> Vec<String> {
     let grids = &fit.errors;
     let of_class = |class: &str, grid: &ErrorGrid| {
@@ -121,11 +129,15 @@ impl Fitter<'_> {
 
     /// Returns the errors of all vehicles, which have the ranges of this fit.
     pub(super) fn error_grids(&self, ranges: &RearFit) -> Result<ErrorGrids, StudyError> {
-        // A sensor refers to its fit for as long as the program runs, and a program makes few fits.
+        // A sensor refers to its fit until the program ends, and a program makes few fits.
         let ranges: &'static RearFit = Box::leak(Box::new(ranges.clone()));
         let sensors = self.scenario.sensors.with_mode(SensorMode::Object).with_rear_fit(ranges);
-        let of = |class| self.class_errors(class, &sensors, ranges);
-        Ok(self.grids([of(VehicleClass::Car)?, of(VehicleClass::Truck)?, of(VehicleClass::Motorcycle)?]))
+        let errors_of = |class| self.class_errors(class, &sensors, ranges);
+        Ok(self.grids([
+            errors_of(VehicleClass::Car)?,
+            errors_of(VehicleClass::Truck)?,
+            errors_of(VehicleClass::Motorcycle)?,
+        ]))
     }
 
     fn class_errors(&self, class: VehicleClass, sensors: &Sensors, ranges: &RearFit) -> Result<ErrorGrid, StudyError> {
@@ -137,16 +149,17 @@ impl Fitter<'_> {
                 let appearance =
                     Appearance { paint_reflectivity: paint, plate: case.plate, ..Vehicle::typical(class).appearance };
                 let range_m = ranges.range_m(class, &appearance, &case.environment);
-                let found = self.errors_at(&case, sensors, range_m)?;
-                row.push(found.or_else(|| row.last().copied()).unwrap_or(START));
+                let errors = self.errors_at(&case, sensors, range_m)?;
+                row.push(errors.or_else(|| row.last().copied()).unwrap_or(START));
             }
             rows.push(row);
         }
         Ok(ErrorGrid::of(&rows))
     }
 
-    /// Returns the errors and losses of one case, with which the tracks of `sensors`, at object level, err as those of the full chain;
-    /// `None` if the full chain sees the vehicle for too short a time. The vehicle has the range `range_m` (m) at object level.
+    /// Returns the errors and losses of one case. With them, the tracks of `sensors`, at object
+    /// level, have the errors of the full chain's tracks. Returns `None` if the full chain sees the
+    /// vehicle for too short a time. The vehicle has the range `range_m` (m) at object level.
     pub(super) fn errors_at(
         &self,
         case: &Case,
@@ -168,9 +181,9 @@ impl Fitter<'_> {
         };
         let (mut best, mut least) = (errors, f64::INFINITY);
         for _ in 0..ITERATIONS {
-            let own = self.steps(case, &sensors.with_rear_errors(errors), OBJECT_APPROACHES, !self.plan.seed)?;
-            let Some(own) = figures(&own, from_m) else { break };
-            let ratios = Ratios::of(&goal, &own);
+            let achieved = self.steps(case, &sensors.with_rear_errors(errors), OBJECT_APPROACHES, !self.plan.seed)?;
+            let Some(achieved) = figures(&achieved, from_m) else { break };
+            let ratios = Ratios::of(&goal, &achieved);
             if ratios.distance() < least {
                 (best, least) = (errors, ratios.distance());
             }
@@ -185,11 +198,11 @@ impl Fitter<'_> {
 
     /// Returns all steps of the first approaches of a case, with this seed.
     fn steps(&self, case: &Case, sensors: &Sensors, approaches: u64, seed: u64) -> Result<Vec<Vec<Step>>, StudyError> {
-        let one = |run| {
+        let approach = |run| {
             steps(case, sensors, &self.scenario.road, Address { seed, run }, ERROR_GAPS_M[0])
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
-        (0..approaches).into_par_iter().map(one).collect()
+        (0..approaches).into_par_iter().map(approach).collect()
     }
 }
 
@@ -197,20 +210,20 @@ fn within([low, high]: [f64; 2]) -> impl Fn(f64) -> f64 {
     move |value| rounded(value.clamp(low, high), 1e4)
 }
 
-/// The figures that tracks should have, as multiples of those that they have.
+/// The ratios of the figures that tracks should have to the figures that they have.
 #[derive(Clone, Copy, Debug)]
 struct Ratios {
     near: [f64; 6],
-    /// Of far vehicles; 1 where either has too few steps.
+    /// The ratios of far vehicles; 1 if either has too few steps.
     far: [f64; 4],
 }
 
 impl Ratios {
-    fn of(goal: &Figures, own: &Figures) -> Self {
+    fn of(goal: &Figures, achieved: &Figures) -> Self {
         Self {
-            near: std::array::from_fn(|index| goal.near[index] / own.near[index]),
-            far: match (goal.far, own.far) {
-                (Some(goal), Some(own)) => std::array::from_fn(|index| goal[index] / own[index]),
+            near: std::array::from_fn(|index| goal.near[index] / achieved.near[index]),
+            far: match (goal.far, achieved.far) {
+                (Some(goal), Some(achieved)) => std::array::from_fn(|index| goal[index] / achieved[index]),
                 _ => [1.0; 4],
             },
         }
@@ -248,18 +261,19 @@ impl Ratios {
     }
 }
 
-/// Returns the figures of tracks, of vehicles that are far beyond `from_m` (m); `None` with too few steps.
+/// Returns the figures of tracks. Vehicles beyond `from_m` (m) are far. Returns `None` with too few
+/// steps.
 pub(super) fn figures(series: &[Vec<Step>], from_m: f64) -> Option<Figures> {
     let [near_m, _, far_m] = ERROR_GAPS_M;
     let between = |[low_m, high_m]: [f64; 2]| -> Vec<Vec<[f64; 4]>> {
         let is_within = |step: &&Step| step.gap_m >= low_m && step.gap_m <= high_m;
         let errors = |steps: &Vec<Step>| {
-            steps.iter().filter(is_within).filter_map(|step| step.seen.map(|seen| seen.errors)).collect()
+            steps.iter().filter(is_within).filter_map(|step| step.seen.map(|perceived| perceived.errors)).collect()
         };
         series.iter().map(errors).collect()
     };
     let root_mean_squares = |all: &[[f64; 4]]| {
-        [0, 1, 2, 3].map(|axis| mean(&all.iter().map(|it| it[axis] * it[axis]).collect::<Vec<_>>()).sqrt())
+        [0, 1, 2, 3].map(|axis| mean(&all.iter().map(|errors| errors[axis] * errors[axis]).collect::<Vec<_>>()).sqrt())
     };
     let near = between([near_m, far_m.min(from_m)]);
     let all_near = near.concat();
@@ -267,7 +281,7 @@ pub(super) fn figures(series: &[Vec<Step>], from_m: f64) -> Option<Figures> {
         return None;
     }
     let [along_m, across_m, along_mps, across_mps] = root_mean_squares(&all_near);
-    // Times beyond the bounds of the fit are all the same to it.
+    // The fit does not tell apart times beyond its bounds.
     let time_s = |axis| within(TIME_BOUNDS_S)(correlation_time_s(&near, axis));
     let far = between([from_m.max(near_m), f64::INFINITY]).concat();
     Some(Figures {
@@ -276,8 +290,8 @@ pub(super) fn figures(series: &[Vec<Step>], from_m: f64) -> Option<Figures> {
     })
 }
 
-/// Returns the time after which the correlation of an error has fallen to 1/e (s); if it has not within the longest lag, the time that
-/// its value there implies.
+/// Returns the time after which the correlation of an error has fallen to 1/e (s). If it has not
+/// within the longest lag, returns the time that its value there implies.
 fn correlation_time_s(errors: &[Vec<[f64; 4]>], axis: usize) -> f64 {
     let correlation = |lag: usize| {
         let (mut product, mut square) = (0.0, f64::MIN_POSITIVE);
@@ -303,7 +317,7 @@ fn correlation_time_s(errors: &[Vec<[f64; 4]>], axis: usize) -> f64 {
     -(LONGEST_LAG_STEPS as f64) * CONTROL_STEP.s() / maths::ln(before.clamp(low, high))
 }
 
-/// Which scans lose a vehicle.
+/// The scans that lose a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Losses {
     /// Gap up to which every scan measures it (m).
@@ -312,7 +326,7 @@ pub(super) struct Losses {
     pub(super) lost_share: f64,
 }
 
-/// Returns the losses that leave the least squared error of what was lost.
+/// Returns the losses with the least squared error to the lost scans.
 pub(super) fn losses(series: &[Vec<Step>]) -> Losses {
     let tracked: Vec<(f64, bool)> =
         series.iter().flatten().filter_map(|step| Some((step.gap_m, step.seen?.is_coasting))).collect();

@@ -22,8 +22,8 @@ struct Name {
     colour: Rgba,
 }
 
-/// Writes the names of the vehicles with their speeds and headways: above the road those behind the ego or left of it,
-/// below it the others. Names in one row are kept apart.
+/// Writes the names of the vehicles with their speeds and headways. Names of vehicles behind the
+/// ego or left of it lie above the road, the others below it. Names in one row are kept apart.
 pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
     let entity = "bird/names";
     let film = canvas.film;
@@ -47,24 +47,24 @@ pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) ->
 fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let film = canvas.film;
     let frame = &film.frames[row];
-    let own = &frame.states[film.ego];
+    let ego = &frame.states[film.ego];
     let mut named: Vec<usize> =
         (0..film.actors.len()).filter(|&actor| film.is_main(actor) && film.is_present(actor, row)).collect();
     // Ego, lead vehicle and rear vehicle first, then the nearest others.
     let rank = |actor: &usize| match film.actors[*actor].part {
-        Part::Other(_) | Part::Background => (frame.states[*actor].s_m - own.s_m).abs(),
+        Part::Other(_) | Part::Background => (frame.states[*actor].s_m - ego.s_m).abs(),
         Part::Ego | Part::Lead | Part::Rear => 0.0,
     };
-    named.sort_by(|one, other| rank(one).total_cmp(&rank(other)));
+    named.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     named.truncate(NAMED);
     let mut names: Vec<Name> = named
         .into_iter()
         .filter_map(|actor| {
             let (state, label) = (&frame.states[actor], film.vehicle_label(actor));
-            let x_m = state.s_m - own.s_m;
+            let x_m = state.s_m - ego.s_m;
             let is_shown = x_m > X_RANGE_M[0] && x_m < X_RANGE_M[1];
             let is_above =
-                film.actors[actor].part == Part::Rear || state.d_m - own.d_m > 0.5 * film.road.lane_width_m();
+                film.actors[actor].part == Part::Rear || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m();
             let headway = headway_of(frame, actor);
             let text = format!("{label} {:.1} m/s{headway}", state.speed_mps);
             is_shown.then(|| Name {
@@ -81,7 +81,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         let room_m = [X_RANGE_M[0] + clock_m, X_RANGE_M[1] - mark_m];
         let (mut of_row, rest): (Vec<Name>, Vec<Name>) = names.into_iter().partition(|name| name.is_above == is_above);
         names = rest;
-        // The names are in the order of their rank. What has no room is left out.
+        // The names are in the order of their rank. A name without room is left out.
         while of_row.len() > 1 && of_row.iter().map(Name::width_m).sum::<f64>() > room_m[1] - room_m[0] {
             of_row.pop();
         }
@@ -106,7 +106,8 @@ fn headway_of(frame: &Frame, actor: usize) -> String {
     }
 }
 
-/// Moves names along the row so that all lie in its room and none covers another. They are in the order of the row.
+/// Moves names along the row so that all lie in its room and none covers another. They are in the
+/// order of the row.
 fn keep_apart([from_m, to_m]: [f64; 2], names: &mut [Name]) {
     let mut free_from_m = from_m;
     for name in names.iter_mut() {

@@ -1,6 +1,6 @@
 //! Containers and views of a layout.
 //!
-//! The identifier of a node is its place in the layout, so that the same films give the same layout.
+//! The identifier of a node is its place in the layout, so the same films give the same layout.
 
 use closecall_traffic::Time;
 use rerun::blueprint::components::{ColumnShare, ContainerKind, PanelState, PlayState, RowShare, TimelineName};
@@ -22,7 +22,7 @@ pub(super) struct View {
     title: String,
     origin: String,
     contents: Vec<String>,
-    /// Properties of the view, each with its path below that of the view.
+    /// Properties of the view, each with its path below the path of the view.
     properties: Vec<(String, Box<dyn AsComponents>)>,
 }
 
@@ -120,7 +120,7 @@ struct NodeWriter<'a> {
 }
 
 impl NodeWriter<'_> {
-    /// Writes a node and those below it, and returns its number.
+    /// Writes a node and the nodes below it, and returns its number.
     fn write(&mut self, node: Node) -> Result<u64, RecordingError> {
         self.count += 1;
         let number = self.count;
@@ -174,9 +174,9 @@ impl NodeWriter<'_> {
         self.push(&container_path(number), &blueprint)
     }
 
-    fn push(&self, path: &str, what: &dyn AsComponents) -> Result<(), RecordingError> {
+    fn push(&self, path: &str, node: &dyn AsComponents) -> Result<(), RecordingError> {
         let time = TimeColumn::new_sequence(BLUEPRINT_TIMELINE, [Time::ZERO.ns()]);
-        self.recording.send_layout(EntityPath::from(path), time, what)
+        self.recording.send_layout(EntityPath::from(path), time, node)
     }
 }
 

@@ -11,7 +11,8 @@ use crate::run::rerun::stream::Writer;
 use rerun::datatypes::ImageFormat;
 use rerun::{AnnotationContext, AsComponents, Boxes2D, ChannelDatatype, Rgba32, SegmentationImage};
 
-/// Score from which an instance is more likely right than not: it has the colour of its class, and its mask is shown.
+/// Score from which an instance is more likely right than not: it has the colour of its class, and
+/// its mask is shown.
 const LIKELY: f64 = 0.5;
 /// Opacity of the masks (0 to 1), which leaves the vehicles visible.
 const MASK_OPACITY: f32 = 0.4;
@@ -24,7 +25,7 @@ fn masks_entity() -> String {
     format!("{ENTITY}/masks")
 }
 
-/// Writes what holds for all images: the classes of the masks, and how boxes look.
+/// Writes the properties of all images: the classes of the masks, and the look of the boxes.
 pub(super) fn write_fixed(writer: &Writer<'_>) -> Result<(), RecordingError> {
     writer.write_static(&boxes_entity(), &fixed_marks())?;
     let class = |class: VehicleClass| (mask_class(class).into(), class.name(), colour_of(class_colour(class)));
@@ -39,21 +40,22 @@ pub(super) fn write_fixed(writer: &Writer<'_>) -> Result<(), RecordingError> {
 pub(super) fn write<'a>(writer: &Writer<'_>, frames: impl Iterator<Item = &'a Frame>) -> Result<(), RecordingError> {
     let images: Vec<(Time, &[Instance])> =
         frames.filter_map(|frame| frame.rear_image.as_ref().map(|image| (frame.time, &image.instances[..]))).collect();
-    let boxes: Vec<(Time, Boxes2D)> = images.iter().map(|(time, found)| (*time, boxes(found))).collect();
-    let masks: Vec<(Time, SegmentationImage)> = images.iter().map(|(time, found)| (*time, masks(found))).collect();
+    let boxes: Vec<(Time, Boxes2D)> = images.iter().map(|(time, instances)| (*time, boxes(instances))).collect();
+    let masks: Vec<(Time, SegmentationImage)> =
+        images.iter().map(|(time, instances)| (*time, masks(instances))).collect();
     writer.write_each(&boxes_entity(), &rows(&boxes))?;
     writer.write_each(&masks_entity(), &rows(&masks))
 }
 
 fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> {
-    whats.iter().map(|(time, what)| (*time, what as _)).collect()
+    whats.iter().map(|(time, archetype)| (*time, archetype as _)).collect()
 }
 
-/// Returns the boxes of the instances with class and score, as far as they reach into the shown picture.
-fn boxes(found: &[Instance]) -> Boxes2D {
+/// Returns the boxes of the instances with class and score, cut to the shown picture.
+fn boxes(instances: &[Instance]) -> Boxes2D {
     let ends = |instance: &Instance| in_picture(instance.box_px.map(|side| side as f32));
     let is_shown = |instance: &&Instance| ends(instance).1.iter().all(|side| *side > 0.0);
-    let shown: Vec<&Instance> = found.iter().filter(is_shown).collect();
+    let shown: Vec<&Instance> = instances.iter().filter(is_shown).collect();
     let colour = |instance: &&Instance| match instance.score >= LIKELY {
         true => class_colour(instance.class),
         false => palette::QUIET,
@@ -67,7 +69,8 @@ fn boxes(found: &[Instance]) -> Boxes2D {
         .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))))
 }
 
-/// Returns class and score. What is rather no vehicle has no label, so that the image stays visible.
+/// Returns class and score. An instance that is probably no vehicle has no label, so the image
+/// stays visible.
 fn label(instance: &Instance) -> String {
     if instance.score < LIKELY {
         return String::new();
@@ -75,10 +78,11 @@ fn label(instance: &Instance) -> String {
     format!("{} {:.2}", instance.class.name(), instance.score)
 }
 
-/// Returns the class of each pixel of the shown picture: that of the likeliest instance whose mask covers it, or 0.
-fn masks(found: &[Instance]) -> SegmentationImage {
-    let mut likely: Vec<&Instance> = found.iter().filter(|instance| instance.score >= LIKELY).collect();
-    likely.sort_by(|one, other| other.score.total_cmp(&one.score));
+/// Returns the class of each pixel of the shown picture: the class of the likeliest instance whose
+/// mask covers it, or 0.
+fn masks(instances: &[Instance]) -> SegmentationImage {
+    let mut likely: Vec<&Instance> = instances.iter().filter(|instance| instance.score >= LIKELY).collect();
+    likely.sort_by(|a, b| b.score.total_cmp(&a.score));
     let step = usize::from(PIXEL_STEP);
     let middle = |pixel: u32| f64::from(pixel) + 0.5 * f64::from(PIXEL_STEP);
     let columns = (0..PixelRect::IMAGE.width).step_by(step).map(middle);

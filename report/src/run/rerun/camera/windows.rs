@@ -1,4 +1,5 @@
-//! The windows of the image that the crop classifier evaluates, with the class that it finds in each.
+//! The windows of the image that the crop classifier evaluates, with the class that it finds in
+//! each.
 
 use closecall_sensors::Detection;
 use closecall_sensors::camera::{PixelRect, RearCamera};
@@ -13,32 +14,33 @@ pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
-        boxes.iter().filter_map(|found| Some((found, camera.detection_window(&ego, found)?))).collect();
+        boxes.iter().filter_map(|detection| Some((detection, camera.detection_window(&ego, detection)?))).collect();
     let ends = |window: &PixelRect| {
         let [left, top] = [window.left, window.top].map(|start| start as f32);
         in_picture([left, top, left + window.width as f32, top + window.height as f32])
     };
     let shown: Vec<([f32; 2], [f32; 2])> = in_image.iter().map(|(_, window)| ends(window)).collect();
-    let mut labels: Vec<String> = in_image.iter().map(|(found, _)| label(found)).collect();
+    let mut labels: Vec<String> = in_image.iter().map(|(detection, _)| label(detection)).collect();
     clear_covered(&shown, &mut labels);
     Boxes2D::from_mins_and_sizes(shown.iter().map(|ends| ends.0), shown.iter().map(|ends| ends.1))
-        .with_colors(in_image.iter().map(|(found, _)| colour(found)))
+        .with_colors(in_image.iter().map(|(detection, _)| colour(detection)))
         .with_labels(labels)
 }
 
-fn colour(found: &Detection) -> Rgba {
-    match (found.class.vehicle() >= 0.5, found.class.best_vehicle_class()) {
+fn colour(detection: &Detection) -> Rgba {
+    match (detection.class.vehicle() >= 0.5, detection.class.best_vehicle_class()) {
         (false, _) => palette::QUIET,
         (true, class) => class_colour(class),
     }
 }
 
-/// Returns the most likely class with its score. What is no vehicle has no label, so that the image stays visible.
-fn label(found: &Detection) -> String {
-    if found.class.vehicle() < 0.5 {
+/// Returns the most likely class with its score. A window without a vehicle has no label, so the
+/// image stays visible.
+fn label(detection: &Detection) -> String {
+    if detection.class.vehicle() < 0.5 {
         return String::new();
     }
-    let [car, truck, motorcycle, background] = found.class.0;
+    let [car, truck, motorcycle, background] = detection.class.0;
     let all = [("car", car), ("truck", truck), ("motorcycle", motorcycle), ("background", background)];
     let best = all.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     best.map_or(String::new(), |(name, score)| format!("{name} {score:.2}"))

@@ -1,12 +1,12 @@
-//! Bands of states over time, in one view: the ego stack with its reasons, the moments, the collisions, what the ego knew, the
-//! health of the sensors, the phase, the brake lights.
+//! Bands of states over time, in one view: the ego stack with its reasons, the moments, the
+//! collisions, the ego's knowledge, the health of the sensors, the phase, the brake lights.
 //!
 //! ```text
 //!  states/1_ego_stack/mis   states/2_reason/mis   states/3_moments/mis …
 //! ```
 //!
-//! The viewer shows the path of an entity as the name of its row, and orders the rows by it. The rows of the arms of a pair
-//! therefore lie below each other.
+//! The viewer shows the path of an entity as the name of its row, and orders the rows by it. The
+//! rows of the arms of a pair therefore lie below each other.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,8 @@ const BEFORE: &str = "-";
 const NO_REAR: &str = "no vehicle behind";
 const BRAKES: &str = "on";
 const DRIVES: &str = "off";
-/// Letters that fit into a bar as long as the time axis, in a window of 1280 px, and those that its padding takes.
+/// Number of letters in a bar as long as the time axis, in a window of 1280 px, and number of
+/// letters that its padding takes.
 const AXIS_LETTERS: f64 = 76.0;
 const PADDING_LETTERS: f64 = 1.5;
 
@@ -37,7 +38,7 @@ const PADDING_LETTERS: f64 = 1.5;
 #[derive(Clone, Copy)]
 struct Word<'a> {
     text: &'a str,
-    /// What a bar shows that is too short for the text.
+    /// The text of a bar that is too short for the whole text.
     short: &'a str,
     colour: Rgba,
 }
@@ -47,8 +48,8 @@ impl<'a> Word<'a> {
         Self { text, short, colour }
     }
 
-    /// Returns the state and the label of a bar with room for so many letters. A bar too short for the text has a state
-    /// of its own, since the viewer knows one label per state.
+    /// Returns the state and the label of a bar with room for this many letters. A bar too short
+    /// for the text has a separate state, since the viewer has one label per state.
     fn fitted(&self, letters: f64) -> (String, &'a str) {
         let fits = |label: &str| label.chars().count() as f64 <= letters;
         match [self.text, self.short].into_iter().position(fits) {
@@ -59,7 +60,8 @@ impl<'a> Word<'a> {
     }
 }
 
-/// The label of a bar that is too short for any letter. In place of an empty one the viewer shows the state.
+/// The label of a bar that is too short for any letter. In place of an empty label the viewer shows
+/// the state.
 const NO_LABEL: &str = " ";
 
 const HEALTHY: &str = "healthy";
@@ -107,7 +109,8 @@ pub(in super::super) const fn phase_name(phase: Phase) -> &'static str {
 /// Letters of a word that says little alone, such as *no*.
 const SHORT_WORD: usize = 3;
 
-/// Returns what a short bar shows of a text: its first word, and the second one if that says little.
+/// Returns the text of a short bar: the first word of a text, and the second word if the first says
+/// little.
 fn first_word(text: &str) -> &str {
     let ends: Vec<usize> = text.match_indices([' ', ':', ',']).map(|(at, _)| at).collect();
     match ends[..] {
@@ -146,7 +149,8 @@ impl Plots<'_> {
         Ok(())
     }
 
-    /// Writes a band that shows the reason for the state of the ego stack. A controller that never changes its reason has none.
+    /// Writes a band that shows the reason for the state of the ego stack. A controller that never
+    /// changes its reason has none.
     fn reasons(&self) -> Result<(), RecordingError> {
         let reason = |frame: &Frame| frame.command.map_or("", |command| command.reason.text());
         let words: Vec<&str> = self.film.frames.iter().map(reason).collect();
@@ -156,7 +160,7 @@ impl Plots<'_> {
         let colour = |frame: &Frame| match frame.command.map(|command| command.state) {
             Some(EgoState::Following) | None => palette::QUIET,
             Some(state) => {
-                STATES.iter().find(|word| word.text == ego_state_name(state)).map_or(palette::QUIET, |it| it.colour)
+                STATES.iter().find(|word| word.text == ego_state_name(state)).map_or(palette::QUIET, |word| word.colour)
             }
         };
         let frames = self.film.frames.iter().zip(&words);
@@ -187,22 +191,23 @@ impl Plots<'_> {
         )
     }
 
-    /// Writes a band for each group of sensors: its health as the ego knows it, and injected faults that the ego has not noticed. The
-    /// arms of a pair have the same sensors, so that the baseline writes none.
+    /// Writes a band for each group of sensors: its health as the ego knows it, and injected faults
+    /// that the ego has not noticed. The arms of a pair have the same sensors, so the baseline
+    /// writes none.
     fn health(&self) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
         }
-        for (row, of, group) in HEALTH_ROWS {
+        for (row, health, group) in HEALTH_ROWS {
             let text = |frame: &Frame| {
                 let held = self.film.faults.iter().filter(|fault| fault.group == group && fault.holds_at(frame.time));
                 let effects: Vec<String> = held.map(|fault| format!("{} {}", fault.sensor, fault.effects)).collect();
-                let what = if effects.is_empty() { String::new() } else { format!(": {}", effects.join("; ")) };
-                match frame.health.as_ref().map(of) {
-                    Some(Health::Failed) => format!("{FAILED}{what}"),
-                    Some(Health::Degraded) => format!("{DEGRADED}{what}"),
+                let suffix = if effects.is_empty() { String::new() } else { format!(": {}", effects.join("; ")) };
+                match frame.health.as_ref().map(health) {
+                    Some(Health::Failed) => format!("{FAILED}{suffix}"),
+                    Some(Health::Degraded) => format!("{DEGRADED}{suffix}"),
                     Some(Health::Ok) | None if effects.is_empty() => HEALTHY.to_owned(),
-                    Some(Health::Ok) | None => format!("faulty, not noticed{what}"),
+                    Some(Health::Ok) | None => format!("faulty, not noticed{suffix}"),
                 }
             };
             let texts: Vec<String> = self.film.frames.iter().map(text).collect();
@@ -221,7 +226,7 @@ impl Plots<'_> {
         Ok(())
     }
 
-    /// Writes a band that shows what the ego knew of the vehicle behind it.
+    /// Writes a band that shows the ego's knowledge of the vehicle behind it.
     fn sight(&self) -> Result<(), RecordingError> {
         let spans = self.film.known_spans();
         let texts: Vec<String> = spans.iter().map(KnownSpan::words).collect();
@@ -254,27 +259,27 @@ impl Plots<'_> {
         self.band("3_moments", &words, &states.collect::<Vec<_>>())
     }
 
-    /// Writes a band with one state per frame, and its end after the last frame. A bar shows as much of the state's name
-    /// as it has room for.
+    /// Writes a band with one state per frame, and its end after the last frame. A bar shows as
+    /// much of the state's name as fits.
     fn band(&self, row: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
         let entity = format!("{ENTITY}/{row}/{}", self.film.arm_label().replace(' ', "_"));
         let rows = changes(words);
         let end = self.film.end() + self.film.period;
         let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).chain([end]).collect();
-        let (mut shown, mut known) = (Vec::new(), BTreeMap::new());
+        let (mut shown, mut bars) = (Vec::new(), BTreeMap::new());
         for (&row, span) in rows.iter().zip(times.windows(2)) {
             let word = states.iter().find(|state| state.text == words[row]).copied();
             let word = word.unwrap_or(Word::new(words[row], words[row], palette::QUIET));
             let letters = AXIS_LETTERS * self.writer.share_of_run(span[1] - span[0]) - PADDING_LETTERS;
             let (state, label) = word.fitted(letters);
-            known.insert(state.clone(), (label, word.colour));
+            bars.insert(state.clone(), (label, word.colour));
             shown.push(state);
         }
         shown.push(String::new());
         let configuration = StateConfiguration::new()
-            .with_values(known.keys().map(String::as_str))
-            .with_labels(known.values().map(|(label, _)| *label))
-            .with_colors(known.values().map(|(_, colour)| *colour));
+            .with_values(bars.keys().map(String::as_str))
+            .with_labels(bars.values().map(|(label, _)| *label))
+            .with_colors(bars.values().map(|(_, colour)| *colour));
         self.writer.write_static_of_all(&entity, &configuration)?;
         self.writer.write_curve_of_all(&entity, &times, |range| {
             StateChange::new().with_state(shown[range].iter().map(String::as_str)).columns_of_unit_batches()

@@ -43,7 +43,8 @@ fn default_film() -> Film {
     filmed("low-thw-overtake", ControllerChoice::MIS, (None, Level::Full))
 }
 
-/// Returns the films of an encounter in simulated traffic, used as recorded traffic, and of its re-enactment with the MIS.
+/// Returns the films of an encounter in simulated traffic, used as recorded traffic, and of its
+/// re-enactment with the MIS.
 fn recorded_and_simulated(level: Level) -> [Film; 2] {
     let (sampling, key) = (Sampling { seed: 1, design: Design::Random, samples: 1 }, RunKey { seed: 1, sample: 0 });
     let arm = |controller: ControllerChoice| Arm { controller: controller.factory(), sensors: None };
@@ -53,14 +54,14 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
     simulate(&scenario, key, &arm(ControllerChoice::ACC), &mut traffic).unwrap();
     let recording = smooth(&traffic.finish("own"));
     let changes = detect(&recording);
-    let found = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
-    let again = reenact(&found, RearDriver::Model, (Path::new("own"), &[])).unwrap();
+    let encounter = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
+    let again = reenact(&encounter, RearDriver::Model, (Path::new("own"), &[])).unwrap();
     let again = again.concrete(&again.space().nominal()).unwrap();
     let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::MIS), level);
     let outcome = simulate(&again, key, &arm(ControllerChoice::MIS), &mut recorder).unwrap();
-    let (recorded, simulated) = (film_encounter(&found, level).unwrap(), recorder.finish(&outcome));
+    let (recorded, simulated) = (film_encounter(&encounter, level).unwrap(), recorder.finish(&outcome));
     let foreword =
-        EncounterComparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Model);
+        EncounterComparison::new(&encounter, &recorded, &simulated).markdown(&encounter, &simulated, RearDriver::Model);
     [recorded.with_foreword(foreword), simulated]
 }
 
@@ -86,8 +87,8 @@ fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
     texts
 }
 
-/// Returns the number of views, the entities that a view shows but the recording lacks, and the timelines that the
-/// blueprint selects.
+/// Returns the number of views, the entities that a view shows but the recording lacks, and the
+/// timelines that the blueprint selects.
 fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
     let data = chunks(films, StoreKind::Recording);
     let entities: BTreeSet<String> = data.iter().map(|chunk| chunk.entity_path().to_string()).collect();
@@ -212,20 +213,25 @@ fn every_lidar_has_its_points_and_boxes_where_it_looks() {
         }
     }
     let frames = &films[0].frames;
-    let of = |name: &str| -> Vec<&Scan> {
+    let scans_of = |name: &str| -> Vec<&Scan> {
         frames
             .iter()
             .flat_map(|frame| &frame.other_scans)
             .filter(|(other, _)| *other == name)
-            .map(|(_, of)| of)
+            .map(|(_, scan)| scan)
             .collect()
     };
-    // The lead vehicle is ahead, and its box there; the corner sensor sees more of its own side.
-    assert!(of("nose").iter().any(|scan| !scan.boxes.is_empty()));
-    assert!(of("nose").iter().all(|scan| scan.points_m().all(|[x, ..]| x > 0.0)));
-    assert!(of("nose").iter().flat_map(|scan| &scan.boxes).all(|found| found.centre_m().0 > found.face_x_m));
-    let left = of("left").iter().flat_map(|scan| scan.points_m()).filter(|[_, y, _]| *y > 0.8).count();
-    let all = of("left").iter().map(|scan| scan.points_m().count()).sum::<usize>();
+    // The lead vehicle and its box are ahead. The corner sensor sees more of its own side.
+    assert!(scans_of("nose").iter().any(|scan| !scan.boxes.is_empty()));
+    assert!(scans_of("nose").iter().all(|scan| scan.points_m().all(|[x, ..]| x > 0.0)));
+    assert!(
+        scans_of("nose")
+            .iter()
+            .flat_map(|scan| &scan.boxes)
+            .all(|detection| detection.centre_m().0 > detection.face_x_m)
+    );
+    let left = scans_of("left").iter().flat_map(|scan| scan.points_m()).filter(|[_, y, _]| *y > 0.8).count();
+    let all = scans_of("left").iter().map(|scan| scan.points_m().count()).sum::<usize>();
     assert!(all > 500 && 3 * left > 2 * all, "{left} of {all}");
     let (_, empty, _) = empty_views(&films);
     assert!(empty.is_empty(), "{empty:?}");
@@ -268,11 +274,11 @@ fn the_same_films_give_the_same_rows_and_other_films_another_name() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
     let pair = || [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     for kind in [StoreKind::Blueprint, StoreKind::Recording] {
-        let [one, two] = [chunks(&pair(), kind), chunks(&pair(), kind)];
-        assert_eq!(one.len(), two.len());
-        for (one, two) in one.iter().zip(&two) {
-            // Whatever but the numbers of chunks and rows, which follow the clock.
-            Chunk::ensure_similar(one, two).unwrap();
+        let [first, second] = [chunks(&pair(), kind), chunks(&pair(), kind)];
+        assert_eq!(first.len(), second.len());
+        for (first, second) in first.iter().zip(&second) {
+            // Everything except the numbers of chunks and rows, which follow the clock.
+            Chunk::ensure_similar(first, second).unwrap();
         }
     }
     let name = |films: &[Film]| record(films).unwrap().name();
@@ -424,7 +430,8 @@ fn the_file_is_complete_and_no_temporary_file_remains() {
     assert!(error.to_string().contains("no/folder.rrd"), "{error}");
 }
 
-/// A point as it was measured: beam, time after the start of the sweep (ns), and bits of the intensity.
+/// A point as it was measured: beam, time after the start of the sweep (ns), and bits of the
+/// intensity.
 type Measured = (u16, u32, u32);
 
 /// Returns the measured points of each step that a recording has in a layer.
@@ -432,7 +439,7 @@ fn measured_points(chunks: &[Chunk], entity: &str) -> BTreeMap<i64, Vec<Measured
     let mut steps = BTreeMap::new();
     let timeline = TimelineName::from_static_str(STEP_TIMELINE);
     for chunk in chunks.iter().filter(|chunk| chunk.entity_path().to_string() == entity) {
-        // What is static, and the copy of the critical moment, is at no step.
+        // Static values, and the copy of the critical moment, have no step.
         let Some(times) = chunk.timelines().get(&timeline) else { continue };
         let lists = |name: &str| {
             let mut columns = chunk.components().values();
@@ -447,7 +454,10 @@ fn measured_points(chunks: &[Chunk], entity: &str) -> BTreeMap<i64, Vec<Measured
             let intensities = intensities.as_primitive::<Float32Type>().values();
             assert!(beams.len() == offsets.len() && beams.len() == intensities.len());
             let points = beams.iter().zip(offsets).zip(intensities);
-            steps.insert(step, points.map(|((beam, offset), of)| (*beam, *offset, of.to_bits())).collect());
+            steps.insert(
+                step,
+                points.map(|((beam, offset), intensity)| (*beam, *offset, intensity.to_bits())).collect(),
+            );
         }
     }
     steps
@@ -459,24 +469,24 @@ fn recorded_beam_time_and_intensity_are_those_of_the_scan() {
     let data = chunks(&films, StoreKind::Recording);
     let film = &films[0];
     for (layer, is_clustered) in [("clusters", true), ("rejected", false)] {
-        let found = measured_points(&data, &format!("/mis/world/ego/lidar/{layer}"));
+        let recorded = measured_points(&data, &format!("/mis/world/ego/lidar/{layer}"));
         let mut points = 0;
         for frame in &film.frames {
             let Some(scan) = &frame.scan else { continue };
             let is_in_layer = |point: &usize| (scan.clusters[*point] != NO_CLUSTER) == is_clustered;
             let measured = |point: usize| {
-                let of = &scan.points;
-                (of.beam[point], of.offset_ns[point], of.intensity[point].to_bits())
+                let points = &scan.points;
+                (points.beam[point], points.offset_ns[point], points.intensity[point].to_bits())
             };
             let expected: Vec<Measured> = (0..scan.points.len()).filter(is_in_layer).map(measured).collect();
             let step = frame.time.ns() / film.period.ns();
-            assert_eq!(found.get(&step), Some(&expected), "{layer}, step {step}");
+            assert_eq!(recorded.get(&step), Some(&expected), "{layer}, step {step}");
             points += expected.len();
         }
         assert!(points > 1_000, "{layer}: {points}");
-        let all: Vec<&Measured> = found.values().flatten().collect();
-        let differs = |of: fn(&Measured) -> u32| all.iter().any(|point| of(point) != of(all[0]));
-        assert!(differs(|it| it.0.into()) && differs(|it| it.1) && differs(|it| it.2), "{layer}");
+        let all: Vec<&Measured> = recorded.values().flatten().collect();
+        let differs = |value: fn(&Measured) -> u32| all.iter().any(|point| value(point) != value(all[0]));
+        assert!(differs(|point| point.0.into()) && differs(|point| point.1) && differs(|point| point.2), "{layer}");
     }
 }
 

@@ -1,6 +1,7 @@
-//! Recordings of the pipeline `mask-rcnn` show the instances, and those of the crop classifier its windows.
+//! Recordings of the pipeline `mask-rcnn` show the instances, and recordings of the crop classifier
+//! show its windows.
 //!
-//! The instances are given: what the network finds is tested in `sensors/tests/mask_rcnn.rs`.
+//! The instances are given: `sensors/tests/mask_rcnn.rs` tests the results of the network.
 
 use arrow::array::{Array, BinaryArray, FixedSizeListArray, Float32Array, ListArray, UInt8Array};
 use closecall_sensors::RearImage;
@@ -15,13 +16,13 @@ const BOXES_PX: [[f64; 4]; 4] =
 const SCORES: [f64; 4] = [0.98, 0.75, 0.2, 0.9];
 
 fn instances() -> Vec<Instance> {
-    let found = BOXES_PX.iter().zip(SCORES).zip([
+    let instances = BOXES_PX.iter().zip(SCORES).zip([
         VehicleClass::Car,
         VehicleClass::Truck,
         VehicleClass::Motorcycle,
         VehicleClass::Car,
     ]);
-    found
+    instances
         .map(|((box_px, score), class)| {
             // The left half of the box belongs to the vehicle.
             let mask = Mask::new(*box_px, [4, 1], vec![1.0, 1.0, 0.0, 0.0]).unwrap();
@@ -56,20 +57,23 @@ fn the_image_shows_the_instances_of_the_network_and_no_windows() {
         film.frames.iter().step_by(5).map(|frame| frame.time.ns()).collect::<Vec<i64>>(),
         chunks(&[film], StoreKind::Recording),
     );
-    let of = |entity: &str| -> Vec<&Chunk> {
+    let chunks_of = |entity: &str| -> Vec<&Chunk> {
         all.iter().filter(|chunk| chunk.entity_path().to_string() == format!("/mis/world/ego/camera{entity}")).collect()
     };
-    assert!(of("/windows").is_empty());
+    assert!(chunks_of("/windows").is_empty());
     let time = TimelineName::from_static_str(TIME_TIMELINE);
     let moving = |entity: &str| -> Vec<&Chunk> {
-        of(entity).into_iter().filter(|chunk| chunk.timelines().contains_key(&time)).collect()
+        chunks_of(entity).into_iter().filter(|chunk| chunk.timelines().contains_key(&time)).collect()
     };
     let [images, boxes, masks] = ["", "/instances", "/masks"].map(moving);
     assert!(images.len() >= 3);
     for of_entity in [&images, &boxes, &masks] {
-        let own: Vec<i64> = of_entity.iter().map(|chunk| chunk.timelines()[&time].times_raw()[0]).collect();
-        assert_eq!(own.len(), images.len());
-        assert!(own.iter().all(|time| times.contains(time)), "only what the network saw: {own:?}");
+        let times_of_masks: Vec<i64> = of_entity.iter().map(|chunk| chunk.timelines()[&time].times_raw()[0]).collect();
+        assert_eq!(times_of_masks.len(), images.len());
+        assert!(
+            times_of_masks.iter().all(|time| times.contains(time)),
+            "only what the network saw: {times_of_masks:?}"
+        );
     }
     for chunk in boxes {
         // Every fifth pixel of the rows 230 to 610 is shown, and the fourth box lies above them.
@@ -81,10 +85,10 @@ fn the_image_shows_the_instances_of_the_network_and_no_windows() {
                     .map(|pair| pair.map(|x| x as f32))
             })
             .collect();
-        let found: Vec<_> =
+        let boxes: Vec<_> =
             pairs(chunk, "Boxes2D:centers").into_iter().zip(pairs(chunk, "Boxes2D:half_sizes")).collect();
-        assert_eq!(found.len(), expected.len());
-        for ((centre, half), [wanted_centre, wanted_half]) in found.iter().zip(&expected) {
+        assert_eq!(boxes.len(), expected.len());
+        for ((centre, half), [wanted_centre, wanted_half]) in boxes.iter().zip(&expected) {
             for axis in [0, 1] {
                 assert!((centre[axis] - wanted_centre[axis]).abs() < 1e-3, "{centre:?} {wanted_centre:?}");
                 assert!((half[axis] - wanted_half[axis]).abs() < 1e-3, "{half:?} {wanted_half:?}");
