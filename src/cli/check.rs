@@ -17,6 +17,7 @@ use super::actions::command_for;
 use super::args::{FittedArgs, Format, SetArgs};
 use super::help::{examples, heading};
 use super::output::{outln, print_failure};
+use super::saved::refuse_rare;
 use super::watching::{WatchingArgs, watch};
 use crate::exit_code::ExitCode;
 
@@ -59,6 +60,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         };
         return watch(scenario, (&args.set, &args.fitted), &args.watching);
     }
+    args.scenarios.iter().try_for_each(|path| refuse_rare(path))?;
     let is_campaign = |path: &&PathBuf| path.join("manifest.json").is_file() || path.join("journal.jsonl").is_file();
     let campaigns: Vec<&PathBuf> = args.scenarios.iter().filter(is_campaign).collect();
     if !campaigns.is_empty() {

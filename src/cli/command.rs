@@ -162,7 +162,7 @@ enum Command {
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
 /// know them by their name alone.
-const GROUPED: [(&str, &str); 26] = [
+const GROUPED: [(&str, &str); 27] = [
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
     ("completions", "tool completions"),
@@ -170,6 +170,7 @@ const GROUPED: [(&str, &str); 26] = [
     ("drift", "traffic drift"),
     ("export", "tool export"),
     ("exposure", "study exposure"),
+    ("fidelity", "study fidelity"),
     ("fit", "traffic fit"),
     ("frontier", "study frontier"),
     ("import", "tool import"),

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use clap::Args;
+use closecall_campaign::rare::RareManifest;
 use closecall_campaign::saved::SavedCampaign;
 
 use super::CliError;
@@ -30,6 +31,14 @@ impl TrustArgs {
         }
         Ok(saved)
     }
+}
+
+/// Refuses a folder with the weighted runs of a rare event. Any other path is none of its business.
+pub(super) fn refuse_rare(path: &Path) -> Result<(), CliError> {
+    if RareManifest::read(path).is_some() {
+        SavedCampaign::open(path)?;
+    }
+    Ok(())
 }
 
 /// The limits of the processes of controllers.

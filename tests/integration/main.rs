@@ -36,6 +36,7 @@ mod explorer;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod failing_calls;
 mod faulty_controllers;
+mod fidelity;
 mod fitted;
 mod fmu_controllers;
 mod foreign_folders;

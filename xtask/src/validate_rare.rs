@@ -35,8 +35,8 @@ const WIDTH: f64 = 0.5;
 const COVERED: [f64; 2] = [0.93, 0.97];
 /// Dimensions of the functions.
 const DIMENSIONS: usize = 4;
-/// Probability of a collision in the fixture: Φ(−4).
-const OF_FIXTURE: f64 = 3.167_124e-5;
+/// Probability of a collision in the fixture.
+const OF_FIXTURE: f64 = 3.166_793e-5;
 
 /// The regions of failure.
 #[derive(Clone, Copy, Debug)]

@@ -64,7 +64,9 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
     object.insert("failures".to_owned(), summary.failures_json());
     object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("flaky_gate".to_owned(), json!(judged.flaky));
-    object.insert("coverage".to_owned(), coverage_json(judged));
+    if !judged.coverage.is_empty() {
+        object.insert("coverage".to_owned(), coverage_json(judged));
+    }
     object.insert("wall_s".to_owned(), json!(wall_s));
     let scenarios: Map<String, Value> = summary
         .scenarios
