@@ -197,13 +197,13 @@ fn a_drawn_seed_is_stated_resumed_and_kept() {
     let place = folder();
     let out = place.path().join("out");
     let words = format!("--design importance --event collision -n 3000 --judge-seed secret --out {}", out.display());
-    let text = stdout(&rare(&words), 4);
+    let text = stdout(&rare(&words), 0);
     let seed: u64 = text.split("--seed ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap();
     let result = fs::read_to_string(out.join("rare.json")).unwrap();
     let result: serde_json::Value = serde_json::from_str(&result).unwrap();
     assert_eq!(result["seed"], seed);
     assert!(result["closecall_version"].is_string());
-    let resumed = stdout(&rare(&format!("{words} --resume")), 4);
+    let resumed = stdout(&rare(&format!("{words} --resume")), 0);
     assert!(resumed.contains(&format!("--seed {seed}")), "{resumed}");
 }
 
@@ -212,7 +212,7 @@ fn a_folder_of_weighted_runs_is_named_for_what_it_is() {
     let place = folder();
     let out = place.path().join("out");
     let path = out.to_str().unwrap();
-    stdout(&rare(&format!("--design importance --event collision -n 3000 --seed 1 --out {path}")), 4);
+    stdout(&rare(&format!("--design importance --event collision -n 3000 --seed 1 --out {path}")), 0);
     for words in
         [vec!["check", path], vec!["replay", path, "0"], vec!["compare", path, path], vec!["view", "--no-open", path]]
     {

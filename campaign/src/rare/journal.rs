@@ -27,6 +27,7 @@ use crate::journal::{line, parse, read_line};
 use crate::lock::Lock;
 use crate::manifest::Manifest;
 use crate::record::SampleFailure;
+use crate::sampling::Sampling;
 
 pub(crate) const MANIFEST: &str = "rare-manifest.json";
 const JOURNAL: &str = "rare-journal.jsonl";
@@ -95,7 +96,10 @@ pub struct RareManifest {
 
 impl RareManifest {
     fn differences(&self, other: &Self) -> Vec<String> {
-        let mut differences = self.campaign.differences(&other.campaign);
+        // The budget is compared below.
+        let sampling = Sampling { samples: other.campaign.sampling.samples, ..self.campaign.sampling };
+        let campaign = Manifest { sampling, ..self.campaign.clone() };
+        let mut differences = campaign.differences(&other.campaign);
         let mut compare = |name: &str, there: String, here: String| {
             if there != here {
                 differences.push(format!("{name}: {there} there, {here} here"));
