@@ -178,7 +178,9 @@ fn a_larger_budget_goes_on_to_the_bytes_of_a_campaign_that_had_it_from_the_start
         assert!(message(&refused).contains("budget: 4000 there, 3000 here"), "{}", message(&refused));
         let after = run(&grown, 60_000, "--resume");
         let at_once = run(&whole, 60_000, "");
-        assert_eq!(stdout(&after, 0), stdout(&at_once, 0), "{method}");
+        // The budget may end before an interval: both say so.
+        assert_eq!(code(&after), code(&at_once), "{method}");
+        assert_eq!(after.stdout, at_once.stdout, "{method}");
         for file in ["rare.json", "rare-journal.jsonl", "rare-manifest.json"] {
             let bytes = |folder: &Path| fs::read_to_string(folder.join(file)).unwrap();
             let plain = |text: String| text.lines().filter(|line| !is_command(line)).collect::<Vec<_>>().join("\n");
