@@ -230,6 +230,7 @@ fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
         },
         aeb: Some(AebConfig::default()),
         mis: Some(MisConfig::default()),
+        human: None,
         automated: true,
     })
 }

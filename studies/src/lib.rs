@@ -8,12 +8,14 @@
 //!  campaign       ─▶ cost          what the system costs where nothing happens
 //!                 ─▶ engagement    why the system does not engage
 //!  recordings     ─▶ exposure      how often the encounter happens on a road: the net effect per 10⁶ km
+//!  crash records  ─▶ anchor        whether emergency braking does in simulation what it does on the road
 //!  cases          ─▶ perception    where perception ends, how it errs, and what spoils it
 //! ```
 //!
 //! Stages and minimized cases rest on runs that can be repeated: each is a run of the same sample with settings, as `--set` applies
 //! them. Avoidability is computed: from the recorded motion, with another way of braking, and by a run with another driver as the ego.
 
+pub mod anchor;
 pub mod attribution;
 pub mod case;
 pub mod cost;
