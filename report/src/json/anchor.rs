@@ -40,7 +40,7 @@ fn row(row: &Row) -> Value {
         object.insert("without".to_owned(), json!(paired.without()));
         object.insert("with".to_owned(), json!(paired.with()));
         object.insert("both".to_owned(), json!(paired.both));
-        insert(&mut object, "ratio", paired.ratio(), "the outcome does not happen in one of the arms");
+        insert(&mut object, "ratio", paired.ratio(), "the outcome does not happen without emergency braking");
         Value::Object(object)
     };
     json!({

@@ -40,7 +40,7 @@ pub(super) fn conclusion(anchor: &Anchor, quantity: Quantity) -> String {
     let (what, published) = (quantity.text(), quantity.published());
     let Some([low, high]) = anchor.range(quantity) else {
         return format!(
-            "{what}: no member has {LEAST_COLLISIONS} collisions in each arm, so nothing can be said: run more samples"
+            "{what}: no drivers have {LEAST_COLLISIONS} collisions without emergency braking, so nothing can be said: run more samples"
         );
     };
     let verdict = if anchor.covers(quantity) == Some(true) { "COVERED" } else { "MISSED" };
@@ -79,8 +79,8 @@ impl Display for AnchorText<'_> {
         }
         writeln!(
             f,
-            "Published: Cicchino 2017, doi 10.1016/j.aap.2016.11.009, all rear-end collisions that the police recorded. A ratio over fewer \
-             than {LEAST_COLLISIONS} collisions in an arm is no part of a range."
+            "Published: Cicchino 2017, doi 10.1016/j.aap.2016.11.009, all rear-end collisions that the police recorded. With fewer \
+             than {LEAST_COLLISIONS} collisions without emergency braking a ratio is no part of a range."
         )
     }
 }

@@ -2,13 +2,15 @@
 //!
 //! The logarithm of the ratio n₁/n₀ of two paired counts has the variance (b + c)/(n₀·n₁), where b samples have the outcome only
 //! without the system, and c only with it. It follows from the delta method for a multinomial distribution, and is 0 if both arms
-//! agree in every sample.
+//! agree in every sample. If the outcome never happens with the system, the ratio is 0, and its upper bound is that of the share of
+//! the n₀ samples that keep the outcome (Clopper-Pearson).
 
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::maths;
+use closecall_traffic::statistics::interval::clopper_pearson;
 use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 
-/// Number of collisions in each arm from which on a ratio is part of a range: the protocol's.
+/// Number of collisions without the system from which on a ratio is part of a range: the protocol's.
 pub const LEAST_COLLISIONS: u64 = 10;
 
 /// The quantile of the standard normal distribution with 97.5 % below it.
@@ -67,20 +69,28 @@ impl Paired {
         self.both + self.only_with
     }
 
-    /// Returns the ratio of the count with the system to the count without it; `None` if the outcome does not happen in one of them.
+    /// Returns the ratio of the count with the system to the count without it; `None` if the outcome does not happen without it.
     pub fn ratio(&self) -> Option<Estimate> {
-        let [without, with] = [self.without(), self.with()].map(|count| count as f64);
-        if !(without > 0.0 && with > 0.0) {
+        if self.without() == 0 {
             return None;
         }
+        if self.with() == 0 {
+            return Some(Estimate { value: 0.0, interval_95: clopper_pearson(0, self.without(), 0.95) });
+        }
+        let [without, with] = [self.without(), self.with()].map(|count| count as f64);
         let value = with / without;
         let half = Z_975 * ((self.only_without + self.only_with) as f64 / (without * with)).sqrt();
         Some(Estimate { value, interval_95: [value * maths::exp(-half), value * maths::exp(half)] })
     }
 
-    /// Returns true if there are enough collisions in each arm for a range.
+    /// Returns true if there are enough collisions without the system for a range.
     pub const fn is_enough(&self) -> bool {
-        self.without() >= LEAST_COLLISIONS && self.with() >= LEAST_COLLISIONS
+        self.without() >= LEAST_COLLISIONS
+    }
+
+    /// Returns the logarithm of the ratio, with half a collision added to each count, so that it is finite.
+    pub fn log_ratio(&self) -> f64 {
+        maths::ln((self.with() as f64 + 0.5) / (self.without() as f64 + 0.5))
     }
 }
 
@@ -111,12 +121,16 @@ mod tests {
     }
 
     #[test]
-    fn an_outcome_that_does_not_happen_in_an_arm_has_no_ratio() {
-        for paired in [
-            Paired::default(),
-            Paired { only_without: 30, ..Paired::default() },
-            Paired { only_with: 1, ..Paired::default() },
-        ] {
+    fn an_outcome_that_never_happens_with_the_system_has_the_ratio_0_and_an_upper_bound() {
+        let Estimate { value, interval_95: [low, high] } =
+            Paired { only_without: 15, ..Paired::default() }.ratio().unwrap();
+        // 1 − 0.025^(1/15).
+        assert!(value == 0.0 && low == 0.0 && (high - 0.2180).abs() < 1e-4, "{high}");
+    }
+
+    #[test]
+    fn an_outcome_that_does_not_happen_without_the_system_has_no_ratio() {
+        for paired in [Paired::default(), Paired { only_with: 1, ..Paired::default() }] {
             assert_eq!(paired.ratio(), None);
         }
     }

@@ -1,7 +1,6 @@
 //! The result of the study: a row for each member and each variation, and what follows from them.
 
 use closecall_campaign::sensitivity::RunErrors;
-use closecall_traffic::maths;
 use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 
 use super::paired::{Happened, Paired};
@@ -134,10 +133,11 @@ impl Anchor {
     /// Returns the variation that moves the ratio furthest from that of the scenario's own drivers, by its logarithm, with both
     /// ratios; `None` if too few collide.
     pub fn mover(&self, quantity: Quantity) -> Option<(&Row, [f64; 2])> {
-        let own = self.members.first()?.ranged(quantity)?.value;
+        let own = self.members.first()?;
+        let (of_own, own) = (own.paired(quantity).log_ratio(), own.ranged(quantity)?.value);
         let moved = |row| {
             let ratio = Row::ranged(row, quantity)?.value;
-            Some((row, ratio, maths::ln(ratio / own).abs()))
+            Some((row, ratio, (Row::paired(row, quantity).log_ratio() - of_own).abs()))
         };
         let furthest = self.variations.iter().filter_map(moved).max_by(|one, other| one.2.total_cmp(&other.2));
         furthest.map(|(row, ratio, _)| (row, [own, ratio]))
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn the_mover_is_furthest_by_the_logarithm() {
-        let variations = vec![row("to a half", 100, 50), row("by a half", 100, 150), row("few", 100, 9)];
+        let variations = vec![row("to a half", 100, 50), row("by a half", 100, 150), row("few", 9, 90)];
         let anchor = anchor(vec![row("own", 100, 100)], variations);
         let (mover, ratios) = anchor.mover(Quantity::Struck).unwrap();
         assert_eq!((mover.name.as_str(), ratios), ("to a half", [1.0, 0.5]));
