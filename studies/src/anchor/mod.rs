@@ -223,7 +223,7 @@ mod tests {
         assert_eq!(plan.members.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>(), [OF_SCENARIO, "glances"]);
         assert_eq!(plan.without_effect, ["steer-none"]);
         let text = plan.members[1].file.text();
-        assert_eq!(text.matches("lapse").count() >= 2, true, "{text}");
+        assert!(text.matches("lapse").count() >= 2, "{text}");
         for entry in &plan.variations {
             assert_ne!(entry.file.text(), plan.file.text(), "{}", entry.name);
         }
