@@ -229,20 +229,25 @@ mod tests {
         }
     }
 
-    /// Where nobody has to brake hard, emergency braking does nothing: every count is the same in both arms.
+    /// Where the ego never has to brake hard, emergency braking does nothing. A follower that is close and late strikes in both arms.
     #[test]
     fn an_arm_without_effect_has_the_ratio_1() {
-        let gentle =
-            ["brake-mps2=2", "ego-cc1-s=0.3", "ego-reaction-s=2.5", "actor.ego.driver.ego-stack.aeb.trigger-mps2=9"];
-        let mut plan = plan(&gentle, 40);
+        let gentle = [
+            "brake-mps2=2",
+            "ego-cc1-s=2.0",
+            "ego-reaction-s=0.5",
+            "rear-cc1-s=0.1",
+            "rear-reaction-s=2.5",
+            "actor.ego.driver.ego-stack.aeb.trigger-mps2=9",
+        ];
+        let mut plan = plan(&gentle, 12);
         plan.variations.clear();
         plan.members.truncate(1);
         let anchor = plan.run(&StopFlag::default(), &mut || {}).unwrap().unwrap();
-        let row = &anchor.members[0];
-        assert_eq!((anchor.errors.points, row.samples), (0, 40));
-        for paired in [row.striking, row.struck] {
-            assert_eq!((paired.only_without, paired.only_with), (0, 0), "{row:?}");
-        }
+        let Row { samples, striking, struck, .. } = anchor.members[0];
+        assert_eq!((anchor.errors.points, samples), (0, 12));
+        assert_eq!((striking, struck), (Paired::default(), Paired { both: 12, ..Paired::default() }));
+        assert_eq!(struck.ratio().map(|ratio| ratio.value), Some(1.0));
     }
 
     /// A built case: the ego follows at 0.3 s, reacts late, and the lead vehicle brakes hard; the follower is far away.
