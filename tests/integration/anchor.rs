@@ -4,12 +4,11 @@ use serde_json::Value;
 
 use crate::support::{closecall, code, folder, json, library, message, stdout};
 
+/// A small study in which most egos strike, and are struck, without emergency braking.
 fn study(more: &[&str]) -> Vec<String> {
-    ["study", "anchor", "-n", "60", "--seed", "5", "--ensemble", "glances", "steer-none"]
-        .iter()
-        .chain(more)
-        .map(|word| (*word).to_owned())
-        .collect()
+    let small = ["study", "anchor", "-n", "16", "--seed", "5", "--ensemble", "glances", "steer-none"];
+    let close = ["--set", "brake-mps2=7", "--set", "ego-cc1-s=0.4", "--set", "rear-cc1-s=0.2"];
+    small.iter().chain(&close).chain(more).map(|word| (*word).to_owned()).collect()
 }
 
 #[test]
@@ -24,7 +23,7 @@ fn the_study_counts_both_outcomes_and_compares_them_with_what_was_published() {
     assert_eq!(found["variations"].as_array().unwrap().len(), 10);
     assert_eq!(found["controllers"], serde_json::json!(["human-aeb", "human+aeb"]));
     for row in found["members"].as_array().unwrap().iter().chain(found["variations"].as_array().unwrap()) {
-        assert_eq!(row["samples"], 60, "{row}");
+        assert_eq!(row["samples"], 16, "{row}");
         for outcome in ["striking", "struck"] {
             let count = |key: &str| row[outcome][key].as_u64().unwrap();
             assert!(count("both") <= count("without").min(count("with")), "{row}");
@@ -54,11 +53,12 @@ fn the_study_repeats_to_the_last_figure_on_any_number_of_threads() {
 #[test]
 fn wrong_arguments_of_the_study_are_named() {
     for (more, exit, part) in [
-        (&["--ensemble", "no-such-member"][..], 3, "no-such-member"),
+        (&["--ensemble", "no-such-member"][..], 2, "no-such-member"),
         (&["--set", "no-such-value=1"], 2, "no-such-value"),
         (&["--set", "rear-cc1-s=-1"], 3, "cc1-s"),
+        (&["-n", "0"], 2, "1 or more"),
     ] {
-        let output = closecall(["study", "anchor", "-n", "2"].iter().chain(more));
+        let output = closecall(["study", "anchor"].iter().chain(more));
         assert_eq!(code(&output), exit, "{more:?}: {}", message(&output));
         assert!(message(&output).contains(part), "{more:?}: {}", message(&output));
     }
