@@ -38,7 +38,7 @@ pub use driver::{
 };
 pub use ego::{
     ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,
-    ControllerError, EgoCommand, EgoController, EgoDriver, EgoDriverConfig, EgoInput, EgoSettings, EgoStack,
-    EgoStackConfig, EgoState, Encounter, Front, GOAL_TOLERANCE_S, Horizon, LeadVehicleSelector, MisConfig, MisPlan,
-    MisSettings, Odometry, R157Driver, R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution, StackPatch,
+    ControllerError, EgoCommand, EgoController, EgoDriver, EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState,
+    Encounter, Front, GOAL_TOLERANCE_S, Horizon, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry,
+    R157Driver, R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution, StackPatch,
 };

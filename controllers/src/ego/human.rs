@@ -10,20 +10,8 @@
 //! tracks of the sensors. Emergency braking is the only function beside it: no cruise control, and no margin increase system.
 
 use closecall_traffic::{Check, ConfigError, Parameters};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::driver::{Driver, Idm, IdmConfig, Wiedemann99, Wiedemann99Config, Wiedemann99Driver};
-
-/// The human driver of the ego as a scenario file describes it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum EgoDriverConfig {
-    /// A human driver that follows by Wiedemann's model of 1999.
-    Wiedemann99(Wiedemann99Config),
-    /// A human driver that follows by the Intelligent Driver Model.
-    Idm(IdmConfig),
-}
+use crate::driver::{Driver, FollowConfig, Idm, Wiedemann99, Wiedemann99Driver};
 
 /// The checked human driver of the ego.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +23,19 @@ pub enum EgoDriver {
 }
 
 impl EgoDriver {
+    /// Checks the table `human` of an ego stack. Reaction, lapses and perception belong to the car-following model here.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if a value is out of range.
+    pub(super) fn check(config: &FollowConfig, parameters: &Parameters) -> Result<Self, ConfigError> {
+        match config {
+            FollowConfig::Wiedemann99(config) => {
+                config.check(parameters).map(Self::Wiedemann99).map_err(|error| error.within("wiedemann99"))
+            }
+            FollowConfig::Idm(config) => config.check(parameters).map(Self::Idm).map_err(|error| error.within("idm")),
+        }
+    }
+
     /// Returns the gap at which the driver follows a vehicle at `speed_mps` in equilibrium (m).
     pub fn settled_gap_m(&self, speed_mps: f64) -> f64 {
         match self {
@@ -48,19 +49,6 @@ impl EgoDriver {
         match self {
             Self::Wiedemann99(settings) => Box::new(Wiedemann99Driver::new(*settings)),
             Self::Idm(settings) => Box::new(settings.driver()),
-        }
-    }
-}
-
-impl Check for EgoDriverConfig {
-    type Checked = EgoDriver;
-
-    fn check(&self, parameters: &Parameters) -> Result<EgoDriver, ConfigError> {
-        match self {
-            Self::Wiedemann99(config) => {
-                config.check(parameters).map(EgoDriver::Wiedemann99).map_err(|error| error.within("wiedemann99"))
-            }
-            Self::Idm(config) => config.check(parameters).map(EgoDriver::Idm).map_err(|error| error.within("idm")),
         }
     }
 }

@@ -5,10 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::acc::{AccPatch, GapPolicy};
-use super::{
-    Acc, AccConfig, Aeb, AebConfig, EgoController, EgoDriver, EgoDriverConfig, EgoStack, Horizon, MisConfig,
-    MisSettings,
-};
+use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoDriver, EgoStack, Horizon, MisConfig, MisSettings};
+use crate::driver::FollowConfig;
 
 /// The ego stack as a scenario file describes it. An absent function is not part of the stack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -22,7 +20,7 @@ pub struct EgoStackConfig {
     pub mis: Option<MisConfig>,
     /// The human driver of the arms `human-aeb` and `human+aeb`, in which no cruise control drives.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub human: Option<EgoDriverConfig>,
+    pub human: Option<FollowConfig>,
     /// Whether the ego is in automated mode. If not, the margin increase system never engages; the
     /// same control laws then represent an attentive driver.
     #[serde(default = "default_automated")]
@@ -203,7 +201,10 @@ impl Check for EgoStackConfig {
     fn check(&self, parameters: &Parameters) -> Result<EgoSettings, ConfigError> {
         let aeb = self.aeb.as_ref().map(|config| config.check(parameters).map_err(|error| error.within("aeb")));
         let mis = self.mis.as_ref().map(|config| config.check(parameters).map_err(|error| error.within("mis")));
-        let human = self.human.as_ref().map(|config| config.check(parameters).map_err(|error| error.within("human")));
+        let human = self
+            .human
+            .as_ref()
+            .map(|config| EgoDriver::check(config, parameters).map_err(|error| error.within("human")));
         Ok(EgoSettings {
             acc: self.acc.check(parameters).map_err(|error| error.within("acc"))?,
             aeb: aeb.transpose()?,
