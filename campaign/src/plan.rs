@@ -235,15 +235,25 @@ impl Plan {
     }
 }
 
-/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none: it would be the baseline under another name.
+/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none: it would be the baseline under another name; and one in
+/// which a human drives, for a scenario whose ego has no human driver.
 ///
 /// # Errors
-/// [`PlanError::WithoutMis`] with the first such controller.
+/// [`PlanError::WithoutMis`] or [`PlanError::WithoutHuman`] with the first such controller.
 pub fn check_mis(file: &ScenarioFile, controllers: &[ControllerChoice]) -> Result<(), PlanError> {
     let lacks_mis = file.config().actors.iter().any(|actor| match &actor.driver {
         DriverConfig::EgoStack(stack) => stack.mis.is_none(),
         _ => false,
     });
+    let lacks_human = file.config().actors.iter().any(|actor| match &actor.driver {
+        DriverConfig::EgoStack(stack) => stack.human.is_none(),
+        _ => false,
+    });
+    let needs_human = |controller: &&ControllerChoice| controller.built_in().is_some_and(BuiltIn::needs_human);
+    if let Some(controller) = controllers.iter().find(needs_human).filter(|_| lacks_human) {
+        let (scenario, controller) = (file.config().name.clone(), controller.to_string());
+        return Err(PlanError::WithoutHuman { scenario, controller });
+    }
     let needs_mis = |controller: &&ControllerChoice| controller.built_in().is_some_and(BuiltIn::needs_mis);
     match controllers.iter().find(needs_mis).filter(|_| lacks_mis) {
         Some(controller) => {

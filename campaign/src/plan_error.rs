@@ -43,6 +43,16 @@ pub enum PlanError {
         /// The controller.
         controller: String,
     },
+    /// A human is to drive an ego that has no human driver.
+    #[error(
+        "{scenario}: `{controller}` needs a human driver of the ego, and the ego stack has none: add `human` to its `ego-stack`, as in `human = {{ wiedemann99 = {{}} }}`, or name another controller"
+    )]
+    WithoutHuman {
+        /// The scenario.
+        scenario: String,
+        /// The controller.
+        controller: String,
+    },
     /// Two arms have the same functions with the same settings.
     #[error(
         "{scenario}: `{first}` and `{second}` are the same stack in this scenario: switch a function off or on, as in `acc-aeb` and `acc+aeb`"

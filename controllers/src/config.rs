@@ -13,7 +13,6 @@ use crate::ego::{EgoSettings, EgoStackConfig};
 /// The driver of an actor as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them, read once")]
 pub enum DriverConfig {
     /// The controller under test: adaptive cruise control, emergency braking and margin increase
     /// system.

@@ -7,6 +7,7 @@
 //!  tracks ───────▶ ego/     surroundings ─▶ ACC ─┐
 //!                                           MIS ─┼─▶ arbitration (stack) ─▶ acceleration, state, reason
 //!                                           AEB ─┘
+//!  the ego may have a human driver in place of ACC and MIS: ground truth ─▶ driver/, tracks ─▶ AEB
 //! ```
 //!
 //! The types keep the ground truth from the ego: an ego controller receives its own odometry and
@@ -37,7 +38,7 @@ pub use driver::{
 };
 pub use ego::{
     ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,
-    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter,
-    Front, GOAL_TOLERANCE_S, Horizon, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry, R157Driver,
-    R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution, StackPatch,
+    ControllerError, EgoCommand, EgoController, EgoDriver, EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState,
+    Encounter, Front, GOAL_TOLERANCE_S, Horizon, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry,
+    R157Driver, R157Fuzzy, Reason, SensorAvailability, Slower, Slowing, Solution, StackPatch,
 };

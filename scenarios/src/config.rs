@@ -111,6 +111,8 @@ pub enum Function {
     Aeb,
     /// Adaptive cruise control: `cruise+aeb` and `acc+aeb`.
     Acc,
+    /// Emergency braking beside a human driver of the ego: `human-aeb` and `human+aeb`.
+    AebWithHuman,
 }
 
 impl Function {
@@ -120,6 +122,7 @@ impl Function {
             Self::Mis => "mis",
             Self::Aeb => "aeb",
             Self::Acc => "acc",
+            Self::AebWithHuman => "aeb-with-human",
         }
     }
 }

@@ -53,6 +53,9 @@ const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtak
 const AEB: [(&str, &str); 2] = embedded!["aeb": "aeb-lead-brakes", "aeb-lead-brakes-gently"];
 const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehicle-ahead"];
 
+/// The scenario of the folder `anchor`: emergency braking under a human driver, held against crash records.
+const ANCHOR: [(&str, &str); 1] = embedded!["anchor": "anchor-lead-brakes"];
+
 /// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
 /// base.
 const FAULTS: [(&str, &str); 82] = embedded![
@@ -155,7 +158,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Returns all scenarios that have no base.
 fn plain() -> impl Iterator<Item = (&'static str, &'static str)> {
-    LIBRARY.into_iter().chain(TRAFFIC).chain(AS_RECORDED).chain(AEB).chain(ACC)
+    LIBRARY.into_iter().chain(TRAFFIC).chain(AS_RECORDED).chain(AEB).chain(ACC).chain(ANCHOR)
 }
 
 /// Returns the names of the scenarios that can be a base.
@@ -287,7 +290,7 @@ mod tests {
             names
         };
         let mut expected = names_in(&folder);
-        for family in ["traffic", "as-recorded", "aeb", "acc", "faults"] {
+        for family in ["traffic", "as-recorded", "aeb", "acc", "anchor", "faults"] {
             expected.extend(names_in(&folder.join(family)));
         }
         assert_eq!(names().collect::<Vec<_>>(), expected);

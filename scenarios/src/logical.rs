@@ -331,6 +331,7 @@ fn ego_stack() -> Result<DriverConfig, String> {
         acc: AccConfig { time_gap_s: parameter("front-thw-s")?, set_speed_mps: None, standstill_gap_m: None },
         aeb: Some(AebConfig::default()),
         mis: Some(MisConfig::default()),
+        human: None,
         automated: true,
     }))
 }

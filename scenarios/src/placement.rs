@@ -183,10 +183,10 @@ impl Placement<'_> {
         }
         let gap_m = match &self.drivers[index] {
             CheckedDriver::Human(human) => human.settled_gap_m(speed_mps),
-            CheckedDriver::Ego(_) => None,
+            CheckedDriver::Ego(settings) => settings.human().map(|human| human.settled_gap_m(speed_mps)),
         };
         gap_m.ok_or_else(|| {
-            refuse("driver", "only drivers that follow by Wiedemann 99 or the Intelligent Driver Model have such a gap")
+            refuse("driver", "only drivers that follow by Wiedemann 99 or the Intelligent Driver Model have such a gap, and an ego with such a `human`")
         })
     }
 

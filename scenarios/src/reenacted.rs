@@ -237,6 +237,7 @@ fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
         },
         aeb: Some(AebConfig::default()),
         mis: Some(MisConfig::default()),
+        human: None,
         automated: true,
     })
 }

@@ -273,6 +273,7 @@ fn ego(encounter: &RecordedEncounter, others: &[&Participant]) -> Result<ActorCo
             acc,
             aeb: Some(AebConfig::default()),
             mis: None,
+            human: None,
             automated: true,
         }),
         lane_keeping: None,

@@ -19,7 +19,8 @@ use super::saved::LimitArgs;
 #[derive(Clone, Debug, Args)]
 pub(super) struct ControllerArgs {
     /// Controller of the ego vehicle [default: the function that the scenario judges, `mis` in most]: `acc`, `mis`, `mis-ttce`, `mis-extended`,
-    /// `acc-aeb`, `acc+aeb` and `cruise+aeb` (stacks whose functions are switched), `blind` and `crawl` (slower from the start,
+    /// `acc-aeb`, `acc+aeb` and `cruise+aeb` (stacks whose functions are switched), `human-aeb` and `human+aeb` (the human driver
+    /// that the scenario gives the ego), `blind` and `crawl` (slower from the start,
     /// without looking back), `gap-SECONDS` (cruise control with a longer time gap:
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
     /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a

@@ -35,7 +35,7 @@ struct Cli {
 }
 
 /// The commands that may run the camera's network, each as the words that name it.
-const WITH_NETWORK: [&[&str]; 20] = [
+const WITH_NETWORK: [&[&str]; 21] = [
     &["run"],
     &["campaign"],
     &["replay"],
@@ -50,6 +50,7 @@ const WITH_NETWORK: [&[&str]; 20] = [
     &["traffic", "reenact"],
     &["traffic", "record"],
     &["traffic", "sample"],
+    &["study", "anchor"],
     &["study", "frontier"],
     &["study", "map"],
     &["study", "sensitivity"],
@@ -162,7 +163,8 @@ enum Command {
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
 /// know them by their name alone.
-const GROUPED: [(&str, &str); 27] = [
+const GROUPED: [(&str, &str); 28] = [
+    ("anchor", "study anchor"),
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
     ("completions", "tool completions"),

@@ -284,7 +284,9 @@ impl From<&CliError> for ExitCode {
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
-            CliError::Plan(PlanError::Controller { .. } | PlanError::WithoutMis { .. }) => Self::InvalidInput,
+            CliError::Plan(
+                PlanError::Controller { .. } | PlanError::WithoutMis { .. } | PlanError::WithoutHuman { .. },
+            ) => Self::InvalidInput,
             CliError::Usage { .. }
             | CliError::Gates(_)
             | CliError::Arms(_)

@@ -1,6 +1,7 @@
-//! `closecall study sensitivity` and `closecall study frontier`: studies that vary the assumptions, or the system, of a scenario.
+//! `closecall study sensitivity`, `closecall study frontier` and `closecall study anchor`: studies that vary the assumptions, or the
+//! system, of a scenario.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::arguments::count;
@@ -13,10 +14,12 @@ use closecall_campaign::stop::StopFlag;
 use closecall_campaign::workers::Workers;
 use closecall_report::study::{Study, write_study};
 use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::member::members;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_sensors::camera::Pipeline;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_studies::anchor::{self, AnchorError, AnchorPlan};
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
@@ -102,6 +105,37 @@ pub(super) struct FrontierArgs {
     samples: u64,
 }
 
+/// Arguments of `closecall study anchor`.
+#[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study anchor",
+    "closecall study anchor -n 500 --seed 7 --out anchor",
+    "closecall study anchor --ensemble glances distracted --set brake-mps2=6",
+]))]
+pub(super) struct AnchorArgs {
+    /// Number of samples of each row: of each member of the ensemble, and of each variation
+    #[arg(short = 'n', long = "samples", default_value = "400", value_parser = count, help_heading = heading::SAMPLES)]
+    samples: u64,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
+    seed: u64,
+    /// Members of the driver ensemble, beside the scenario's own drivers: files, folders of them, or names [default: all members
+    /// of the program]
+    #[arg(long, value_name = "DIR|FILE|NAME", num_args = 1.., help_heading = heading::SCENARIO)]
+    ensemble: Vec<PathBuf>,
+    /// Number of worker threads [default: one per processor]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
+    jobs: Option<u16>,
+    /// Folder for the page, the chart (SVG) and the figures (JSON)
+    #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArgs,
+    /// Output format
+    #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
+    format: Format,
+}
+
 impl StudyArgs {
     fn file(&self) -> Result<ScenarioFile, CliError> {
         let file = self.set.load(&self.scenario)?;
@@ -120,36 +154,39 @@ impl StudyArgs {
         Ok(if tested == baseline { vec![baseline] } else { vec![baseline, tested] })
     }
 
-    /// Runs a study of this many steps with a progress bar; `None` if a signal has ended it.
-    fn run<T, E>(
-        &self,
-        steps: u64,
-        study: impl FnOnce(&StopFlag, &mut dyn FnMut()) -> Result<Option<T>, E>,
-    ) -> Result<Option<T>, E> {
-        let (mut stop, bar) = (StopFlag::default(), progress_bar(steps));
-        session::stop_on_request(&mut stop);
-        let _heartbeat = heartbeat(&bar);
-        let found = study(&stop, &mut || bar.inc(1));
-        bar.finish_and_clear();
-        found
-    }
-
-    /// Prints a study, and writes its files. Without a result, a signal has ended it, and nothing is kept.
     fn print(&self, study: Option<Study>) -> Result<ExitCode, CliError> {
-        let signal = session::received();
-        let Some(study) = study else {
-            outln!("ENDED EARLY, without a result: nothing was kept");
-            return Ok(signal.map_or(ExitCode::Interrupted, ExitCode::from));
-        };
-        match self.format {
-            Format::Json => outln!("{:#}", study.json()),
-            Format::Human => out!("{study}"),
-        }
-        if let Some(out) = &self.out {
-            write_study(out, &study)?.iter().for_each(|path| print_written(path));
-        }
-        Ok(if study.errors() > 0 { ExitCode::SampleError } else { ExitCode::Pass })
+        print(study, self.format, self.out.as_deref())
     }
+}
+
+/// Runs a study of this many steps with a progress bar; `None` if a signal has ended it.
+fn run<T, E>(
+    steps: u64,
+    study: impl FnOnce(&StopFlag, &mut dyn FnMut()) -> Result<Option<T>, E>,
+) -> Result<Option<T>, E> {
+    let (mut stop, bar) = (StopFlag::default(), progress_bar(steps));
+    session::stop_on_request(&mut stop);
+    let _heartbeat = heartbeat(&bar);
+    let found = study(&stop, &mut || bar.inc(1));
+    bar.finish_and_clear();
+    found
+}
+
+/// Prints a study, and writes its files. Without a result, a signal has ended it, and nothing is kept.
+fn print(study: Option<Study>, format: Format, folder: Option<&Path>) -> Result<ExitCode, CliError> {
+    let signal = session::received();
+    let Some(study) = study else {
+        outln!("ENDED EARLY, without a result: nothing was kept");
+        return Ok(signal.map_or(ExitCode::Interrupted, ExitCode::from));
+    };
+    match format {
+        Format::Json => outln!("{:#}", study.json()),
+        Format::Human => out!("{study}"),
+    }
+    if let Some(folder) = folder {
+        write_study(folder, &study)?.iter().for_each(|path| print_written(path));
+    }
+    Ok(if study.errors() > 0 { ExitCode::SampleError } else { ExitCode::Pass })
 }
 
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
@@ -159,7 +196,7 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> 
     plan.method = args.method;
     (plan.trajectories, plan.rows, plan.top) = (number(args.trajectories), number(args.rows), number(args.top));
     (plan.seed, plan.workers) = (study.seed, Workers::with_jobs(study.jobs));
-    let found = study.run(plan.points() as u64, |stop, step| plan.run(stop, step))?;
+    let found = run(plan.points() as u64, |stop, step| plan.run(stop, step))?;
     study.print(found.map(Study::Sensitivity))
 }
 
@@ -175,6 +212,20 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     }
     let plan = FrontierPlan { file, grid, sampling, controllers, sensors, workers };
     let prepared = plan.prepare()?;
-    let found = study.run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
+    let found = run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
     study.print(found.map(Study::Frontier))
+}
+
+pub(super) fn anchor(args: &AnchorArgs) -> Result<ExitCode, CliError> {
+    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
+    let (file, members) = (args.set.load(anchor::path())?, members(&args.ensemble)?);
+    let is_full = file.may_have_mode(SensorMode::Full, None);
+    check_backend(is_full)?;
+    let plan =
+        AnchorPlan::new(file, &members, sampling, Workers::with_jobs(args.jobs)).map_err(|error| match error {
+            AnchorError::Apply(error) => CliError::from(error),
+            AnchorError::Scenario(error) => CliError::from(error),
+        })?;
+    let found = run(plan.samples(), |stop, step| plan.run(stop, step)).map_err(CampaignError::from)?;
+    print(found.map(Study::Anchor), args.format, args.out.as_deref())
 }

@@ -10,6 +10,7 @@
 //!                 ─▶ engagement    why the system does not engage
 //!  recordings     ─▶ exposure      how often the encounter happens on a road: the net effect per 10⁶ km
 //!  two campaigns  ─▶ fidelity      rates of the full chain, sharpened by runs with fast sensors
+//!  crash records  ─▶ anchor        whether emergency braking does in simulation what it does on the road
 //!  cases          ─▶ perception    where perception ends, how it errs, and what spoils it
 //! ```
 //!
@@ -17,6 +18,7 @@
 //! with settings, as `--set` applies them. Avoidability is computed: from the recorded motion, with
 //! another way of braking, and by a run with another driver as the ego.
 
+pub mod anchor;
 pub mod attribution;
 pub mod case;
 pub mod cost;

@@ -163,7 +163,7 @@ impl Judge {
         };
         let missing = |judged: &Judged| match judged.function {
             Function::Mis => "slowed the ego for a vehicle behind",
-            Function::Aeb | Function::Acc => "moved the ego otherwise than the baseline",
+            Function::Aeb | Function::Acc | Function::AebWithHuman => "moved the ego otherwise than the baseline",
         };
         self.scenarios
             .iter()
@@ -285,7 +285,7 @@ impl Judged {
                 // A journal without the value does not show that the system was idle.
                 slowed != Some(0.0)
             }
-            Function::Aeb | Function::Acc => {
+            Function::Aeb | Function::Acc | Function::AebWithHuman => {
                 let margins = |arm: Option<&ArmRecord>| {
                     arm.and_then(|arm| arm.result.as_ref().ok()).map(|outcome| outcome.margins)
                 };

@@ -4,6 +4,7 @@
 mod acc;
 mod aeb;
 mod following_distance;
+mod human;
 mod interface;
 mod mis;
 mod r157_driver;
@@ -18,6 +19,7 @@ mod surroundings;
 pub(crate) use acc::GapPolicy;
 pub use acc::{Acc, AccConfig};
 pub use aeb::{Aeb, AebConfig};
+pub use human::EgoDriver;
 pub use interface::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Odometry, SensorAvailability};
 pub use mis::{
     ACTUATOR_LAG_S, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse, Encounter, GOAL_TOLERANCE_S, Horizon,

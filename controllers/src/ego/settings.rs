@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::acc::{AccPatch, GapPolicy};
-use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoStack, Horizon, MisConfig, MisSettings};
+use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoDriver, EgoStack, Horizon, MisConfig, MisSettings};
+use crate::driver::FollowConfig;
 
 /// The ego stack as a scenario file describes it. An absent function is not part of the stack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -17,6 +18,9 @@ pub struct EgoStackConfig {
     pub aeb: Option<AebConfig>,
     /// The margin increase system.
     pub mis: Option<MisConfig>,
+    /// The human driver of the arms `human-aeb` and `human+aeb`, in which no cruise control drives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub human: Option<FollowConfig>,
     /// Whether the ego is in automated mode. If not, the margin increase system never engages; the
     /// same control laws then represent an attentive driver.
     #[serde(default = "default_automated")]
@@ -34,6 +38,12 @@ pub struct EgoSettings {
     pub(crate) aeb: Option<Aeb>,
     pub(crate) mis: Option<MisSettings>,
     pub(crate) automated: bool,
+    /// The human driver of the arms in which a human drives. No controller from outside is told of it.
+    #[serde(skip)]
+    pub(crate) human: Option<EgoDriver>,
+    /// Whether that driver drives in place of the cruise control.
+    #[serde(skip)]
+    pub(crate) is_human: bool,
 }
 
 impl EgoSettings {
@@ -97,6 +107,27 @@ impl EgoSettings {
         Self { acc: Acc { policy: GapPolicy::Unwatched, ..self.acc }, ..self }
     }
 
+    /// Returns the stack in which the human driver of the scenario drives: no cruise control and no margin increase system.
+    #[must_use]
+    pub fn with_human(self) -> Self {
+        Self { is_human: true, ..self.without_mis() }
+    }
+
+    /// Returns the human driver who drives the ego; `None` if a controller does.
+    pub fn driver(&self) -> Option<&EgoDriver> {
+        self.human.as_ref().filter(|_| self.is_human)
+    }
+
+    /// Returns true if a human is to drive, and the scenario has no human driver of the ego.
+    pub fn lacks_driver(&self) -> bool {
+        self.is_human && self.human.is_none()
+    }
+
+    /// Returns the human driver of the scenario, whether it drives or not.
+    pub fn human(&self) -> Option<&EgoDriver> {
+        self.human.as_ref()
+    }
+
     /// Returns the same stack with these settings in place of its own. A function that it lacks stays absent.
     #[must_use]
     pub fn patched(self, patch: &StackPatch) -> Self {
@@ -145,6 +176,8 @@ impl StackPatch {
             aeb: Some(Aeb::DEFAULT),
             mis: Some(MisSettings::PAPER),
             automated: true,
+            human: None,
+            is_human: false,
         };
         patch.over(stack, &Parameters::default()).map_err(|error| error.to_string())?;
         Ok(patch)
@@ -157,7 +190,7 @@ impl StackPatch {
             acc: self.acc.over(stack.acc, parameters).map_err(|error| error.within("acc"))?,
             aeb: aeb.transpose()?,
             mis: mis.transpose()?,
-            automated: stack.automated,
+            ..stack
         })
     }
 }
@@ -168,11 +201,17 @@ impl Check for EgoStackConfig {
     fn check(&self, parameters: &Parameters) -> Result<EgoSettings, ConfigError> {
         let aeb = self.aeb.as_ref().map(|config| config.check(parameters).map_err(|error| error.within("aeb")));
         let mis = self.mis.as_ref().map(|config| config.check(parameters).map_err(|error| error.within("mis")));
+        let human = self
+            .human
+            .as_ref()
+            .map(|config| EgoDriver::check(config, parameters).map_err(|error| error.within("human")));
         Ok(EgoSettings {
             acc: self.acc.check(parameters).map_err(|error| error.within("acc"))?,
             aeb: aeb.transpose()?,
             mis: mis.transpose()?,
             automated: self.automated,
+            human: human.transpose()?,
+            is_human: false,
         })
     }
 }

@@ -15,7 +15,8 @@
 //! command of the step before: while emergency braking acts, the comfort command goes on beneath
 //! it, and once emergency braking ends, the ego follows the comfort command at once. A ramp that
 //! started from the command of emergency braking would keep the ego braking for seconds after the
-//! lead vehicle has stopped braking. After emergency braking the MIS takes no further speed while
+//! lead vehicle has stopped braking. If a human drives, there is no comfort command: the command is that of emergency braking, and
+//! the loop lets the driver decide whenever emergency braking does not act. After emergency braking the MIS takes no further speed while
 //! the gap to the lead vehicle does not close.
 
 use closecall_traffic::Time;
@@ -71,6 +72,15 @@ impl EgoStack {
     /// Computes the command of ACC and MIS, with state, reason and plan.
     fn comfort_command(&mut self, input: &EgoInput<'_>, lead: Option<&Front>) -> EgoCommand {
         let speed_mps = input.odometry.speed_mps;
+        if self.settings.driver().is_some() {
+            // The driver decides between the control steps; the command repeats what the ego does.
+            return EgoCommand {
+                acceleration_mps2: input.odometry.acceleration_mps2,
+                state: EgoState::Following,
+                reason: Reason::NoMis,
+                plan: None,
+            };
+        }
         let (last_mps2, step_s) =
             self.last_comfort.map_or((0.0, 0.0), |(time, last_mps2)| (last_mps2, (input.time - time).s()));
         let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);

@@ -3,6 +3,7 @@
 //! An absent value is `null`, and the key `…_absent` beside it states the reason. The units are
 //! part of the keys.
 
+mod anchor;
 mod campaign;
 mod comparison;
 mod frontier;
@@ -12,6 +13,7 @@ mod sensitivity;
 mod stamp;
 mod trajectory_data;
 
+pub use anchor::anchor;
 pub use campaign::{campaign, campaign_report};
 pub use comparison::comparison;
 pub use frontier::frontier;

@@ -5,11 +5,16 @@ use std::path::{Path, PathBuf};
 
 use closecall_campaign::frontier::Frontier;
 use closecall_campaign::sensitivity::{FactorKind, RunErrors, Sensitivity};
+use closecall_studies::anchor::{Anchor, Quantity, Row};
 use closecall_traffic::atomic::{WriteError, write_file};
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
 use super::aligned::{error_lines, mean, with_interval};
+use super::anchor::{
+    AnchorText, HEADS as ANCHOR_HEADS, cells as anchor_cells, charts as anchor_charts, conclusion as anchor_conclusion,
+    name,
+};
 use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, short};
 use super::sensitivity::{SensitivityText, conclusion};
 use super::tornado::charts as tornado_charts;
@@ -23,6 +28,8 @@ pub enum Study {
     Sensitivity(Sensitivity),
     /// A frontier.
     Frontier(Frontier),
+    /// Emergency braking against crash records.
+    Anchor(Anchor),
 }
 
 impl Display for Study {
@@ -30,6 +37,7 @@ impl Display for Study {
         match self {
             Self::Sensitivity(study) => SensitivityText(study).fmt(f),
             Self::Frontier(frontier) => FrontierText(frontier).fmt(f),
+            Self::Anchor(anchor) => AnchorText(anchor).fmt(f),
         }
     }
 }
@@ -40,6 +48,7 @@ impl Study {
         let (value, seed) = match self {
             Self::Sensitivity(study) => (json::sensitivity(study), study.seed),
             Self::Frontier(frontier) => (json::frontier(frontier), frontier.seed),
+            Self::Anchor(anchor) => (json::anchor(anchor), anchor.seed),
         };
         json::stamped(value, Some(seed), None)
     }
@@ -49,6 +58,7 @@ impl Study {
         match self {
             Self::Sensitivity(study) => study.errors().points,
             Self::Frontier(frontier) => frontier.errors.points,
+            Self::Anchor(anchor) => anchor.errors.points,
         }
     }
 }
@@ -70,6 +80,11 @@ pub fn write_study(folder: &Path, study: &Study) -> Result<Vec<PathBuf>, WriteEr
             let charts = frontier_charts(frontier).map_err(fail)?;
             let page = frontier_page(frontier, &charts);
             ("frontier", "frontier", charts, page)
+        }
+        Study::Anchor(anchor) => {
+            let charts = anchor_charts(anchor).map_err(fail)?;
+            let page = anchor_page(anchor, &charts);
+            ("anchor", "anchor", charts, page)
         }
     };
     std::fs::create_dir_all(folder).map_err(fail)?;
@@ -161,6 +176,35 @@ fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
         }
     };
     document(&title, &body)
+}
+
+fn anchor_page(anchor: &Anchor, charts: &Charts) -> Markup {
+    let title = "Emergency braking against crash records";
+    let (arms, samples) = (anchor.controllers.join(" and "), anchor.samples);
+    let about = format!("{}: {arms}, {samples} samples of each row, seed {}", anchor.scenario, anchor.seed);
+    let rows = |head: &str, rows: &[Row]| {
+        let heads: Vec<&str> = std::iter::once(head).chain(ANCHOR_HEADS).collect();
+        table(
+            &text_heads(&heads),
+            &html! {
+                @for row in rows {
+                    tr {
+                        td { (name(row)) }
+                        @for cell in anchor_cells(row) { (number(cell)) }
+                    }
+                }
+            },
+        )
+    };
+    let body = html! {
+        (head(title, &anchor.settings, &about))
+        @for quantity in Quantity::ALL { p { strong { (anchor_conclusion(anchor, quantity)) } } }
+        (errors(&anchor.errors, "samples"))
+        @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
+        section { h2 { "Drivers" } (rows("drivers", &anchor.members)) }
+        section { h2 { "One assumption varied" } (rows("assumption", &anchor.variations)) }
+    };
+    document(title, &body)
 }
 
 fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {

@@ -1,11 +1,13 @@
-//! Output of studies that vary a scenario: sensitivity studies and frontiers.
+//! Output of studies that vary a scenario: sensitivity studies, frontiers, and the study against crash records.
 //!
 //! ```text
 //!  Sensitivity ─▶ text │ sensitivity.json │ tornado-{output}.svg │ sensitivity.html
 //!  Frontier    ─▶ text │ frontier.json    │ frontier-{…}.svg     │ frontier.html
+//!  Anchor      ─▶ text │ anchor.json      │ anchor-ratios.svg    │ anchor.html
 //! ```
 
 mod aligned;
+mod anchor;
 mod files;
 mod frontier;
 mod sensitivity;

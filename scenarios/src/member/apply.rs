@@ -30,6 +30,9 @@ pub enum Application {
     NoEffect,
 }
 
+/// Where the human driver of the ego stands, below `driver`.
+const HUMAN_OF_EGO: [&str; 2] = ["ego-stack", "human"];
+
 /// A place in the scenario that a member sets: the path of the key, and the index of the set.
 struct Place {
     path: Vec<String>,
@@ -37,7 +40,7 @@ struct Place {
 }
 
 impl Member {
-    /// Applies the member to every human driver of `file` that is not prescribed, and checks the result.
+    /// Applies the member to every human driver of `file` that is not prescribed, that of the ego included, and checks the result.
     ///
     /// A parameter that only the replaced values use keeps its name and gets the member's
     /// distribution. The other parameters then keep their values in every sampling design. Any
@@ -73,7 +76,15 @@ impl Member {
     /// places of the keys to set.
     fn change_actor(&self, document: &mut DocumentMut, index: usize, places: &mut Vec<Place>) {
         let Some(actor) = actor_mut(document, index) else { return };
-        let Some(driver) = actor.get_mut("driver").and_then(Item::as_table_like_mut) else { return };
+        let Some(mut driver) = actor.get_mut("driver").and_then(Item::as_table_like_mut) else { return };
+        let mut above = vec!["driver".to_owned()];
+        if driver.contains_key(HUMAN_OF_EGO[0]) {
+            for key in HUMAN_OF_EGO {
+                let Some(below) = driver.get_mut(key).and_then(Item::as_table_like_mut) else { return };
+                driver = below;
+                above.push(key.to_owned());
+            }
+        }
         let Some(kind) = KINDS.into_iter().find(|kind| driver.contains_key(kind)) else { return };
         let (kind, model) = self.with_model(driver, kind);
         let Some(table) = driver.get_mut(&kind).and_then(Item::as_table_like_mut) else { return };
@@ -85,7 +96,7 @@ impl Member {
         }
         let with_path = |(set, text): (usize, &Set)| {
             let below = path_in(&kind, &model, &text.key)?;
-            let path = ["driver".to_owned(), kind.clone()].into_iter().chain(below).collect();
+            let path = above.iter().cloned().chain([kind.clone()]).chain(below).collect();
             Some((path, set))
         };
         let paths: Vec<(Vec<String>, usize)> = sets.into_iter().filter_map(with_path).collect();

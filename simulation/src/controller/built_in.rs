@@ -80,6 +80,11 @@ impl BuiltIn {
         }
     }
 
+    /// Returns true if a human drives, so that the controller needs a scenario whose ego has a human driver.
+    pub const fn needs_human(self) -> bool {
+        matches!(self, Self::Stack(functions) if functions.needs_human())
+    }
+
     /// Returns true if the settings of the stack are all that makes the controller.
     pub const fn is_stack(self) -> bool {
         !matches!(self, Self::Blind | Self::Crawl | Self::R157Driver | Self::R157Fsm)

@@ -33,9 +33,9 @@ pub enum ControllerChoice {
 }
 
 /// The names and forms of the controllers, as messages list them.
-const KNOWN: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `acc-aeb`, `acc+aeb`, `cruise+aeb`, `blind`, `crawl`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
+const KNOWN: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `acc-aeb`, `acc+aeb`, `cruise+aeb`, `human-aeb`, `human+aeb`, `blind`, `crawl`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
 /// The words that are suggested for a misspelt one.
-const WORDS: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `acc-aeb`, `acc+aeb`, `cruise`, `cruise+aeb`, `blind`, `crawl`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
+const WORDS: &str = "`acc`, `mis`, `mis-ttce`, `mis-extended`, `acc-aeb`, `acc+aeb`, `cruise`, `cruise+aeb`, `human`, `human-aeb`, `human+aeb`, `blind`, `crawl`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
 /// The beginning of the name of a controller with another constant time gap.
 const GAP: &str = "gap-";
 
@@ -75,6 +75,10 @@ impl ControllerChoice {
             Function::Mis => [Self::ACC, Self::MIS],
             Function::Aeb => {
                 let [without, with] = [Functions::ACC_ALONE, Functions::ACC_AND_AEB];
+                [Self::BuiltIn(BuiltIn::Stack(without)), Self::BuiltIn(BuiltIn::Stack(with))]
+            }
+            Function::AebWithHuman => {
+                let [without, with] = [Functions::HUMAN_ALONE, Functions::HUMAN_AND_AEB];
                 [Self::BuiltIn(BuiltIn::Stack(without)), Self::BuiltIn(BuiltIn::Stack(with))]
             }
             Function::Acc => {
@@ -373,6 +377,9 @@ mod tests {
             "acc+aeb",
             "acc+aeb+mis",
             "cruise+aeb",
+            "human",
+            "human-aeb",
+            "human+aeb",
         ] {
             let choice: ControllerChoice = name.parse().unwrap();
             assert_eq!((choice.to_string(), choice.name()), (name.to_owned(), name.to_owned()));

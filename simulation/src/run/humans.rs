@@ -1,6 +1,6 @@
 //! The human drivers of a run, each with its own random streams.
 
-use closecall_controllers::{CheckedDriver, DesiredSpeedNoise, Driver, Looks, Weave};
+use closecall_controllers::{CheckedDriver, DesiredSpeedNoise, Driver, EgoDriver, EgoSettings, Looks, Weave};
 use closecall_traffic::{Road, Stream, stream};
 
 use super::RunKey;
@@ -21,15 +21,19 @@ pub(super) struct Human {
     pub(super) desired_speed_noise: Option<DesiredSpeedNoise>,
 }
 
-/// Creates the drivers of all vehicles other than the ego.
-pub(super) fn human_drivers(scenario: &Scenario, key: RunKey) -> Vec<Human> {
+/// Creates the human drivers of all vehicles: of the ego only if the arm has `settings` in which a human drives.
+pub(super) fn human_drivers(scenario: &Scenario, key: RunKey, settings: &EgoSettings) -> Vec<Human> {
     let mut humans = Vec::with_capacity(scenario.actors.len());
     for (actor, setup) in scenario.actors.iter().enumerate() {
-        if let CheckedDriver::Human(human) = &setup.driver {
+        let driver = match &setup.driver {
+            CheckedDriver::Human(human) => Some(human.build()),
+            CheckedDriver::Ego(_) => settings.driver().map(EgoDriver::build),
+        };
+        if let Some(driver) = driver {
             let rng = |channel| stream(key.seed, key.sample, &setup.id, channel);
             humans.push(Human {
                 actor,
-                driver: human.build(),
+                driver,
                 rng: rng(DRIVER_CHANNEL),
                 desired_speed_noise: setup.speed_keeping.and_then(|keeping| keeping.wander(rng(SPEED_CHANNEL))),
             });

@@ -8,7 +8,8 @@ use closecall_controllers::CheckedDriver;
 use closecall_controllers::{EgoCommand, EgoInput, EgoSettings, EgoState, Looks, MisSettings, Neighbours, Reason};
 use closecall_sensors::{Perception, Scene, SceneVehicle};
 use closecall_traffic::{
-    Absent, CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Source, Time, Track, VehicleState,
+    Absent, CONTROL_STEP, ConfigError, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Problem, Road, Source, Time,
+    Track, VehicleState,
 };
 
 use super::cost::{CostMeter, Instant, Rear};
@@ -101,7 +102,13 @@ impl<'a> Run<'a> {
     ) -> Result<Self, SampleError> {
         let settings = *settings_of(&scenario);
         let looks_back = arm.controller.looks_back(&settings);
-        let mis_settings = *arm.controller.settings(&settings).mis().or(settings.mis()).unwrap_or(&MisSettings::PAPER);
+        let of_arm = arm.controller.settings(&settings);
+        if of_arm.lacks_driver() {
+            let rule = format!("`{}` needs a human driver of the ego", arm.controller.name());
+            let problem = Problem::Contradiction { other: "ego-stack", rule };
+            return Err(SampleError::Scenario(ConfigError::new("human", problem)));
+        }
+        let mis_settings = *of_arm.mis().or(settings.mis()).unwrap_or(&MisSettings::PAPER);
         let own = key;
         // Noise and drivers draw from these random numbers; the outcome names the run itself.
         let key = scenario
@@ -125,7 +132,7 @@ impl<'a> Run<'a> {
         }
         let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
         let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
-        let humans = human_drivers(&scenario, key);
+        let humans = human_drivers(&scenario, key, &of_arm);
         let mut run = Self {
             key: own,
             perception: perception(&scenario, &arm, key, looks_back || is_observed)?,

@@ -350,4 +350,6 @@ fn the_keys_of_studies_are_those_documented() {
         ["study", "frontier", "low-thw-overtake", "-n", "20", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
     let errors = seeded(&[&frontier[..], &["--controller", "exec:false"]].concat(), 5);
     hold("frontier", [&seeded(&frontier, 0), &errors]);
+    let anchor = ["study", "anchor", "-n", "80", "--ensemble", "glances", "steer-none"];
+    hold("anchor", [&seeded(&anchor, 0)]);
 }

@@ -50,6 +50,7 @@ pub(crate) fn written(section: Section, size: Size) -> Result<String, Box<dyn Er
         Section::Faults => rows::faults(size),
         Section::Sensitivity => printed::sensitivity(size),
         Section::Frontier => printed::frontier(size),
+        Section::Anchor => printed::anchor(size),
     }?;
     Ok(format!("{}\n{table}", page::provenance(section, size)?))
 }

@@ -41,6 +41,8 @@ pub(crate) enum Section {
     Sensitivity,
     /// The settings of the system
     Frontier,
+    /// Emergency braking against crash records
+    Anchor,
 }
 
 /// The file of the outcomes' digests, below the folder of the repository.
@@ -49,7 +51,7 @@ const DIGESTS: &str = "docs/evidence/determinism.json";
 const DIGITS: usize = 12;
 
 impl Section {
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Scenarios,
         Self::Ensemble,
         Self::Arms,
@@ -60,6 +62,7 @@ impl Section {
         Self::Faults,
         Self::Sensitivity,
         Self::Frontier,
+        Self::Anchor,
     ];
 
     /// Returns the page, below the folder of the repository.
@@ -67,6 +70,7 @@ impl Section {
         match self {
             Self::Faults => "docs/evidence/faults.md",
             Self::Sensitivity | Self::Frontier => "docs/evidence/sensitivity.md",
+            Self::Anchor => "docs/evidence/anchor.md",
             _ => "docs/evidence/mis.md",
         }
     }
@@ -80,6 +84,7 @@ impl Section {
             Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
             Self::Twins => super::rows::TWINS.contains(&scenario),
             Self::Faults => is_headline || scenario.starts_with("faults/"),
+            Self::Anchor => scenario.starts_with("anchor/"),
             Self::Frontier => is_headline || scenario == "lead-brakes-at-any-time",
         }
     }

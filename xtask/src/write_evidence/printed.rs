@@ -36,3 +36,8 @@ pub(super) fn frontier(size: Size) -> Result<String, Box<dyn Error>> {
     }
     Ok(text)
 }
+
+/// Emergency braking against crash records.
+pub(super) fn anchor(size: Size) -> Result<String, Box<dyn Error>> {
+    printed(&["study", "anchor", "-n", &size.samples.to_string(), "--seed", &size.seed.to_string()])
+}

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::{Scenario, ScenarioFile};
+use closecall_scenarios::{Function, Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
-use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::{Arm, NoObserver, RunKey};
 use closecall_traffic::maths;
 use serde::{Deserialize, Serialize};
@@ -107,6 +107,14 @@ fn scenario_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn
     Ok(())
 }
 
+/// Returns the arms that are run: those of the function if a human drives the ego, and the two stacks otherwise.
+fn arms(file: &ScenarioFile) -> [ControllerChoice; 2] {
+    match file.config().function {
+        Function::AebWithHuman => ControllerChoice::of_function(Function::AebWithHuman),
+        Function::Mis | Function::Aeb | Function::Acc => [ControllerChoice::ACC, ControllerChoice::MIS],
+    }
+}
+
 /// Returns the digest of the outcomes of a scenario's first samples with `seed` and these sensors.
 /// A sample without an outcome counts by its error.
 pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> Result<String, Box<dyn Error>> {
@@ -114,7 +122,7 @@ pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> R
     let sampling = Sampling { seed, design: Design::Random, samples: SAMPLES };
     for sample in 0..SAMPLES {
         let scenario: Scenario = concrete(file, sampling, sample)?;
-        for controller in [BuiltIn::Acc, BuiltIn::Mis] {
+        for controller in arms(file) {
             let arm = Arm { controller: controller.factory(), sensors: Some(sensors) };
             // `serde_json` writes numbers so that they read back to the bit.
             let text = match run_guarded(&scenario, RunKey { seed, sample }, &arm, &mut NoObserver) {

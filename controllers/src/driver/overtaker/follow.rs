@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::driver::{Idm, IdmConfig, Lead, Wiedemann99, Wiedemann99Config, Wiedemann99Model};
 
-/// Car-following model of an overtaking driver.
+/// Car-following model of a human driver: of an overtaking one, or of the ego.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FollowConfig {

@@ -81,6 +81,8 @@ impl Bench {
         aeb: None,
         mis: Some(MisSettings::PAPER),
         automated: true,
+        human: None,
+        is_human: false,
     };
 
     fn with_automation(automated: bool) -> Self {

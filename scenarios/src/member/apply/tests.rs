@@ -45,6 +45,20 @@ fn a_sampled_parameter_of_the_driver_is_replaced_and_all_others_keep_their_value
 }
 
 #[test]
+fn the_human_driver_of_the_ego_is_changed_as_the_others_are_with_draws_of_its_own() {
+    let file = scenario("anchor-lead-brakes");
+    let set = "[[set]]\nkey = 'reaction-s'\nvalue = { uniform = { min = 1.5, max = 2.5 } }\nsource = 'x'\n";
+    let entry = entry(&member(set), &file);
+    let [ego, rear] = ["ego-reaction-s", "rear-reaction-s"].map(|name| match sampled(&entry, name) {
+        Sampled::Number(reaction_s) => reaction_s,
+        other => panic!("{other:?}"),
+    });
+    assert!((1.5..2.5).contains(&ego) && (1.5..2.5).contains(&rear) && ego != rear, "{ego} {rear}");
+    let idm = self::entry(&members(&["idm".into()]).unwrap()[0], &file);
+    assert!(idm.text().contains("human = { idm = {"), "{}", idm.text());
+}
+
+#[test]
 fn a_distribution_for_a_fixed_value_becomes_a_new_parameter() {
     let file = scenario("paper-figure");
     let set = "[[set]]\nkey = 'reaction-s'\nvalue = { uniform = { min = 1.0, max = 2.0 } }\nsource = 'x'\n";

@@ -1,6 +1,6 @@
 //! The second half of a step: all vehicles act and move, and the run may end.
 
-use closecall_controllers::{DriverInput, DriverNote};
+use closecall_controllers::{DriverInput, DriverNote, EgoState};
 
 use super::Run;
 use crate::run::phase::AFTER_COLLISION;
@@ -10,7 +10,7 @@ use closecall_scenarios::outcome::{EndReason, Moment};
 
 impl Run<'_> {
     /// Determines the actions of all vehicles, from the current state: of the human drivers, of the scenario's events, and
-    /// of the ego controller.
+    /// of the ego controller. If a human drives the ego, the controller acts only by emergency braking.
     pub(super) fn decide_actions(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let time = self.world.time();
         self.events.update(&self.world, |event| {
@@ -46,6 +46,12 @@ impl Run<'_> {
                     }
                 }
                 observer.event(time, &RunEvent::DriverNote { actor, note });
+            }
+            if actor == ego {
+                let braking = self.command.filter(|command| command.state == EgoState::EmergencyBraking);
+                let most_mps2 = braking.map_or(f64::INFINITY, |command| command.acceleration_mps2);
+                self.actions[ego].acceleration_mps2 = action.acceleration_mps2.min(most_mps2);
+                continue;
             }
             self.actions[actor] = Action {
                 acceleration_mps2: self
