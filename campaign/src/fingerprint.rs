@@ -55,12 +55,7 @@ impl Fingerprint {
             CheckedDriver::Human(_) => None,
         });
         let (identity, open_files) = greeted.unwrap_or_default();
-        Self {
-            command: settings.command.clone(),
-            files: hashed(settings, folder),
-            identity,
-            open_files,
-        }
+        Self { command: settings.command.clone(), files: hashed(settings, folder), identity, open_files }
     }
 
     /// Returns the files that the process has mapped or opened after its greeting.
@@ -129,11 +124,7 @@ impl Fingerprint {
         ];
         for (key, there, here) in stated.into_iter().filter(|(_, there, here)| there != here) {
             let quoted = |text: &Option<String>| text.as_ref().map_or("none".to_owned(), |text| format!("`{text}`"));
-            differences.push(format!(
-                "the {who} states another {key}: {} there, {} here",
-                quoted(there),
-                quoted(here)
-            ));
+            differences.push(format!("the {who} states another {key}: {} there, {} here", quoted(there), quoted(here)));
         }
         differences
     }

@@ -13,15 +13,15 @@ use closecall_simulation::{Arm, RunKey, simulate};
 use closecall_traffic::maths;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-/// Runs a scenario with these sensors for four seconds, writes its tables into `folder`, and returns the error if there is one.
+/// Runs a scenario with these sensors for eight seconds, writes its tables into `folder`, and returns the error if there is one.
 fn write(folder: &Path, sensors: &str, names: [&str; 2]) -> Result<[PathBuf; 3], String> {
-    let text = format!("base = \"low-thw-overtake\"\nduration-s = 4.0\nsensors.rear-camera.pipeline = \"off\"\n{sensors}");
+    let text =
+        format!("base = \"low-thw-overtake\"\nduration-s = 8.0\nsensors.rear-camera.pipeline = \"off\"\n{sensors}");
     let file = ScenarioFile::parse(Path::new("tracks.toml"), &text, &[]).unwrap();
     let scenario = file.concrete(&file.space().nominal()).unwrap();
     let arm = Arm { controller: BuiltIn::Acc.factory(), sensors: None };
     let paths = [names[0], names[1], "trace.parquet"].map(|name| folder.join(name));
-    let files =
-        TableFiles { tracks: Some(&paths[0]), clusters: Some(&paths[1]), trace: Some(&paths[2]), scans: None };
+    let files = TableFiles { tracks: Some(&paths[0]), clusters: Some(&paths[1]), trace: Some(&paths[2]), scans: None };
     // A wrong request is answered before the run.
     let mut tables = RunTables::new((&scenario, Some(&arm)), files).map_err(|error| error.to_string())?;
     simulate(&scenario, RunKey { seed: 1, sample: 0 }, &arm, &mut tables).unwrap();
@@ -136,7 +136,7 @@ fn the_fate_of_every_box_is_known_and_its_points_are_those_of_its_clusters() {
             assert!(number("innovation_across_variance_m2").value(row) > 0.0);
         }
     }
-    assert!(boxes > 150 && roles["corrects"] > 100 && roles["starts"] > 0, "{boxes} {roles:?}");
+    assert!(boxes > 100 && roles["corrects"] > 90 && roles["starts"] > 1, "{boxes} {roles:?}");
 }
 
 #[test]

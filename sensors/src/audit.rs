@@ -73,7 +73,8 @@ impl TrackMatcher {
             Some(TrackMatch { actor, distance_m: face_distance_m(track, other), error: error.into() })
         });
         let matches: Vec<_> = matched.collect();
-        for (track, matched) in tracks.iter().zip(&matches).filter(|(track, _)| track.status != TrackStatus::Tentative) {
+        for (track, matched) in tracks.iter().zip(&matches).filter(|(track, _)| track.status != TrackStatus::Tentative)
+        {
             if let Some(TrackMatch { actor, .. }) = *matched {
                 note_owner(&mut self.owners, TrackOwner { id: track.id, actor });
             }

@@ -2,14 +2,14 @@
 //! model.
 
 use crate::tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
-use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Time};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
 use crate::external::{
-    BUILT_IN, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, PerceptionProgram, ProgramChecks,
-    ProgramSettings, check_program,
+    BUILT_IN, DEFAULT_IMAGE_STEP, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, OutsideCamera,
+    PerceptionProgram, ProgramChecks, ProgramSettings, check_program,
 };
 use crate::faults::{ActingSensors, Faults, OdometryErrors, StatedFault};
 use crate::image_detector::ImageDetector;
@@ -80,6 +80,14 @@ pub struct SensorsConfig {
     /// Memory limit of that program and its descendants (MiB). Default: 1024.
     #[serde(skip_serializing_if = "is_default_memory")]
     pub perception_memory_mib: u64,
+    /// Images of the rear camera that the program gets per second (Hz): 0 to 25. An image comes with
+    /// the first scan that is due. Default: 0, none.
+    #[serde(skip_serializing_if = "is_none")]
+    pub perception_image_hz: Num,
+    /// Distance of the columns and rows of 1280 × 800 pixels that such an image has (px): 1 to 8.
+    /// Default: 2, 640 × 400 pixels.
+    #[serde(skip_serializing_if = "is_default_step")]
+    pub perception_image_step: u8,
     /// The radar that looks ahead.
     pub front_radar: ObjectSensorConfig,
     /// The short-range sensors around the ego.
@@ -100,6 +108,15 @@ pub struct SensorsConfig {
     pub rear_camera: CameraConfig,
     /// The tracker that processes the boxes of the rear LiDAR.
     pub tracker: TrackerConfig,
+}
+
+fn is_none(rate: &Num) -> bool {
+    *rate == Num::Fixed(0.0)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default_step(step: &u8) -> bool {
+    *step == DEFAULT_IMAGE_STEP
 }
 
 fn is_one(factor: &Num) -> bool {
@@ -139,6 +156,8 @@ impl Default for SensorsConfig {
             perception: BUILT_IN.to_owned(),
             perception_timeout_ms: DEFAULT_PROGRAM_TIMEOUT_MS,
             perception_memory_mib: DEFAULT_PROGRAM_MEMORY_MIB,
+            perception_image_hz: Num::Fixed(0.0),
+            perception_image_step: DEFAULT_IMAGE_STEP,
             front_radar: ObjectSensorConfig::default(),
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
@@ -198,7 +217,7 @@ impl Check for SensorsConfig {
             rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
             altered: Alterations::default(),
             has_rear: true,
-            program: self.check_program()?,
+            program: self.check_program(parameters)?,
         };
         sensors.check_program_in_mode()?;
         Ok(sensors.with_lidars(|lidar| Lidar { clustering, ..lidar }))
@@ -206,11 +225,14 @@ impl Check for SensorsConfig {
 }
 
 impl SensorsConfig {
-    fn check_program(&self) -> Result<Option<ProgramSettings>, ConfigError> {
+    fn check_program(&self, parameters: &Parameters) -> Result<Option<ProgramSettings>, ConfigError> {
+        let image_hz = &self.perception_image_hz;
         check_program(&ProgramChecks {
             perception: &self.perception,
             timeout_ms: self.perception_timeout_ms,
             memory_mib: self.perception_memory_mib,
+            image_hz: parameters.number(image_hz, "perception-image-hz", Range::closed(0.0, 25.0))?,
+            image_step: self.perception_image_step,
         })
     }
 
@@ -482,7 +504,10 @@ impl Sensors {
                 if !self.has_rear {
                     return Ok(Box::new(perception.without_rear()));
                 }
-                let perception = perception.with_program(program);
+                let faults = self.altered.faults.rear_camera;
+                let images = self.program.and_then(|program| program.images);
+                let camera = images.map(|images| OutsideCamera::new(self.camera, images, key, faults));
+                let perception = perception.with_program(program, camera);
                 match (self.altered.classifier(), self.camera.pipeline) {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),

@@ -8,7 +8,7 @@ use crate::tracking::{TrackList, TrackerModel};
 use closecall_traffic::{CONTROL_STEP, Time, Track};
 
 use crate::detection_classifier::DetectionClassifier;
-use crate::external::{Outside, PerceptionProgram};
+use crate::external::{Outside, OutsideCamera, PerceptionProgram};
 use crate::faults::{Belief, Faults};
 use crate::front_lidar::FrontLidar;
 use crate::lidar::Lidar;
@@ -91,10 +91,14 @@ impl FullPerception {
     /// Returns the same sensors, whose scans behind the program processes in place of the built-in
     /// chain.
     #[must_use]
-    pub(crate) fn with_program(self, program: Option<Box<dyn PerceptionProgram>>) -> Self {
+    pub(crate) fn with_program(
+        self,
+        program: Option<Box<dyn PerceptionProgram>>,
+        camera: Option<OutsideCamera>,
+    ) -> Self {
         let latency_s = self.model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
         let lidars = self.model.rear_lidars();
-        Self { outside: program.map(|program| Outside::new(program, lidars.collect(), latency_s)), ..self }
+        Self { outside: program.map(|program| Outside::new(program, lidars.collect(), camera, latency_s)), ..self }
     }
 
     /// Returns the same sensors without the sensors that look back.

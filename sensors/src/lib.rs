@@ -34,7 +34,9 @@ mod tests;
 pub mod tracking;
 mod worker_classifier;
 
-pub use crate::tracking::{BoxRole, BoxUse, Detection, Extent, Innovation, SeenBy, SeenPart, TrackerConfig, TrackerModel};
+pub use crate::tracking::{
+    BoxRole, BoxUse, Detection, Extent, Innovation, SeenBy, SeenPart, TrackerConfig, TrackerModel,
+};
 pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit, TrackMatch, TrackMatcher};
 pub use closecall_traffic::{Scene, SceneVehicle};

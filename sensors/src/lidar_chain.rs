@@ -151,7 +151,7 @@ impl LidarChain {
             }
         }
         if !scans.is_empty() {
-            match outside.ask(seen.believed, &arrived)? {
+            match outside.ask([seen.scene, seen.believed], &arrived)? {
                 PerceptionAnswer::Detections(detections) => {
                     // The boxes belong to no LiDAR alone. They come with the first scan that has arrived.
                     let first = scans.iter().position(|(_, scan)| !scan.is_missing()).unwrap_or(0);
@@ -279,9 +279,9 @@ impl LidarChain {
     /// Returns what the tracker has made of the boxes in this step.
     pub(crate) fn used_boxes(&self) -> impl Iterator<Item = UsedBox> {
         let of_sensor = |used: &BoxUse| self.sensors.get(used.sensor).map(|sensor| sensor.model.name());
-        self.uses.iter().filter_map(move |(scan, used)| {
-            Some(UsedBox { sensor: of_sensor(used)?, scan: *scan, used: *used })
-        })
+        self.uses
+            .iter()
+            .filter_map(move |(scan, used)| Some(UsedBox { sensor: of_sensor(used)?, scan: *scan, used: *used }))
     }
 
     /// Returns the fields of view.

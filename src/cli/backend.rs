@@ -53,7 +53,10 @@ fn try_to_load(library: &Path, backend: &Backend) -> Result<(), ClassifierError>
 }
 
 /// Loads the networks of the scenario's own that classify crops, if there are any, and the Mask R-CNN of each camera.
-pub(super) fn check_networks<'a>(files: impl IntoIterator<Item = &'a str>, cameras: impl IntoIterator<Item = &'a CameraConfig>) -> Result<(), CliError> {
+pub(super) fn check_networks<'a>(
+    files: impl IntoIterator<Item = &'a str>,
+    cameras: impl IntoIterator<Item = &'a CameraConfig>,
+) -> Result<(), CliError> {
     files.into_iter().try_for_each(|file| Classifier::of(Some(file), inference_backend()).map(drop))?;
     check_cameras(cameras)
 }

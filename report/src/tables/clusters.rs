@@ -147,8 +147,7 @@ impl ClusterRecorder {
         let flag = |of: &dyn Fn(&Detection) -> bool| -> ArrayRef {
             Arc::new(rows.iter().map(|row| row.kind.detection().map(of)).collect::<BooleanArray>())
         };
-        let of_box =
-            |of: &dyn Fn(&Detection) -> f64| -> ArrayRef { number(&|row| row.kind.detection().map(of)) };
+        let of_box = |of: &dyn Fn(&Detection) -> f64| -> ArrayRef { number(&|row| row.kind.detection().map(of)) };
         let innovation = |axis: usize, is_variance: bool| {
             number(&|row| {
                 let innovation = row.kind.used()?.innovation?[axis];
@@ -170,10 +169,7 @@ impl ClusterRecorder {
             (required("points", DataType::UInt32, None), count(&|row| Some(row.points))),
             (required("x_m", DataType::Float64, length), number(&|row| Some(row.at_m[0]))),
             (required("y_m", DataType::Float64, length), number(&|row| Some(row.at_m[1]))),
-            (
-                field("actor", DataType::Utf8, None),
-                text(&|row| row.truth.as_ref().map(|(actor, _)| actor.as_str())),
-            ),
+            (field("actor", DataType::Utf8, None), text(&|row| row.truth.as_ref().map(|(actor, _)| actor.as_str()))),
             (optional("actor_share", None), number(&|row| row.truth.as_ref().map(|(_, share)| *share))),
             (
                 field("box", DataType::UInt32, None),
@@ -190,10 +186,7 @@ impl ClusterRecorder {
             (optional("lateral_sd_m", length), of_box(&|detection| detection.lateral_sd_m)),
             (optional("heading_rad", Some("rad")), of_box(&|detection| detection.heading_rad)),
             (optional("length_m", length), of_box(&|detection| detection.length_m)),
-            (
-                field("length_is_seen", DataType::Boolean, None),
-                flag(&|detection| detection.length == Extent::Seen),
-            ),
+            (field("length_is_seen", DataType::Boolean, None), flag(&|detection| detection.length == Extent::Seen)),
             (optional("width_m", length), of_box(&|detection| detection.width_m)),
             (field("width_is_seen", DataType::Boolean, None), flag(&|detection| detection.width == Extent::Seen)),
             (optional("top_m", length), of_box(&|detection| detection.top_m)),

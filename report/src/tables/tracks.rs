@@ -104,9 +104,7 @@ impl TrackRecorder {
             (
                 required("confirmed", DataType::Boolean, None),
                 Arc::new(
-                    rows.iter()
-                        .map(|row| Some(row.track.status != TrackStatus::Tentative))
-                        .collect::<BooleanArray>(),
+                    rows.iter().map(|row| Some(row.track.status != TrackStatus::Tentative)).collect::<BooleanArray>(),
                 ),
             ),
             (required("class", DataType::Utf8, None), text(&|track| track.class.best_vehicle_class().name())),
@@ -116,8 +114,7 @@ impl TrackRecorder {
             let values = rows.iter().map(|row| row.truth.as_ref().map(|(_, matched)| of(matched)));
             Arc::new(values.collect::<Float64Array>())
         };
-        let actors: StringArray =
-            rows.iter().map(|row| row.truth.as_ref().map(|(actor, _)| actor.as_str())).collect();
+        let actors: StringArray = rows.iter().map(|row| row.truth.as_ref().map(|(actor, _)| actor.as_str())).collect();
         all.push((field("actor", DataType::Utf8, None), Arc::new(actors)));
         all.push((field("distance_m", DataType::Float64, Some("m")), truth(&|matched| matched.distance_m)));
         for (index, (name, unit)) in ERRORS.into_iter().enumerate() {
@@ -135,7 +132,8 @@ impl Observer for TrackRecorder {
         }
         let ego = view.scenario.ego;
         self.others.clear();
-        self.others.extend(view.vehicles.iter().enumerate().filter(|(actor, _)| *actor != ego).map(|(_, other)| *other));
+        self.others
+            .extend(view.vehicles.iter().enumerate().filter(|(actor, _)| *actor != ego).map(|(_, other)| *other));
         let scene = Scene {
             time: view.time,
             road: &view.scenario.road,

@@ -93,9 +93,7 @@ pub enum ClassifierError {
         reason: String,
     },
     /// The output of the network is not four probabilities.
-    #[error(
-        "failed to read the answer of {model}: {actual:?} in its tensor `{tensor}` are not four probabilities"
-    )]
+    #[error("failed to read the answer of {model}: {actual:?} in its tensor `{tensor}` are not four probabilities")]
     Answer {
         /// The name of the network, or the path of its file.
         model: String,

@@ -10,16 +10,20 @@
 //! behind [`PerceptionProgram`], which the simulation implements.
 
 mod answered;
+mod image;
 mod mount;
 mod outside;
 mod pose;
 mod settings;
 
-pub(crate) use outside::Outside;
+pub(crate) use image::OutsideCamera;
+pub use image::{CameraMount, OutsideImage};
 pub use mount::LidarMount;
+pub(crate) use outside::Outside;
 pub use pose::Pose;
 pub use settings::{
-    BUILT_IN, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, EXEC_PREFIX, ProgramSettings, command_of,
+    BUILT_IN, DEFAULT_IMAGE_STEP, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, EXEC_PREFIX, ImageSettings,
+    ProgramSettings, command_of,
 };
 pub(crate) use settings::{ProgramChecks, check_program};
 
@@ -46,6 +50,10 @@ pub struct PerceptionQuestion<'a> {
     pub time: Time,
     /// The scans that have arrived. None if all sensors whose scans were due are silent.
     pub scans: &'a [OutsideScan],
+    /// The image of the rear camera, if one is due and the program gets images.
+    pub image: Option<&'a OutsideImage>,
+    /// The rear camera, if the program gets its images.
+    pub camera: Option<CameraMount>,
     /// The LiDARs that look back, in the order of the scenario.
     pub lidars: &'a [LidarMount],
     /// The ego's motion and place on the road, as its odometry and its map give them.

@@ -4,7 +4,7 @@ use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{Time, Track, VehicleState};
 
 use super::answered::OutsideTracks;
-use super::{LidarMount, OutsideScan, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, Pose};
+use super::{LidarMount, OutsideCamera, OutsideScan, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, Pose};
 use crate::lidar::Lidar;
 use crate::tracking::TrackList;
 use crate::{Scene, SensorError};
@@ -14,6 +14,7 @@ pub(crate) struct Outside {
     program: Box<dyn PerceptionProgram>,
     lidars: Vec<Lidar>,
     mounts: Vec<LidarMount>,
+    camera: Option<OutsideCamera>,
     latency_s: f64,
     /// The ego's state at the first question, which is the frame of all poses.
     first: Option<VehicleState>,
@@ -23,17 +24,22 @@ pub(crate) struct Outside {
 impl Outside {
     /// Creates the program of a run, whose LiDARs that look back are these, in their order. `latency_s` is the time from a scan to
     /// the tracks that a controller gets of it (s).
-    pub(crate) fn new(program: Box<dyn PerceptionProgram>, lidars: Vec<Lidar>, latency_s: f64) -> Self {
-        Self { program, lidars, mounts: Vec::new(), latency_s, first: None, tracks: OutsideTracks::default() }
+    pub(crate) fn new(
+        program: Box<dyn PerceptionProgram>,
+        lidars: Vec<Lidar>,
+        camera: Option<OutsideCamera>,
+        latency_s: f64,
+    ) -> Self {
+        Self { program, lidars, mounts: Vec::new(), camera, latency_s, first: None, tracks: OutsideTracks::default() }
     }
 
-    /// Asks the program about scans. `believed` is the scene as the ego believes it to be.
+    /// Asks the program about scans and an image of the scene. `believed` is the scene as the ego believes it to be.
     ///
     /// # Errors
     /// [`SensorError::Program`] if there is no valid answer.
     pub(crate) fn ask(
         &mut self,
-        believed: &Scene<'_>,
+        [scene, believed]: [&Scene<'_>; 2],
         scans: &[OutsideScan],
     ) -> Result<PerceptionAnswer, SensorError> {
         let pose = self.pose(believed);
@@ -41,9 +47,12 @@ impl Outside {
         if self.mounts.is_empty() {
             self.mounts.extend(self.lidars.iter().map(|lidar| LidarMount::of(lidar, length_m)));
         }
+        let image = self.camera.as_mut().and_then(|camera| camera.image(scene));
         self.program.perceive(&PerceptionQuestion {
             time: believed.time,
             scans,
+            image: image.as_ref(),
+            camera: self.camera.as_ref().map(|camera| camera.mount(length_m)),
             lidars: &self.mounts,
             ego: believed.ego.state,
             pose,

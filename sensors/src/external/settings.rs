@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
-use closecall_traffic::{ConfigError, Problem};
+use closecall_traffic::{ConfigError, Problem, Time};
 
 /// The value of `perception` that stands for the built-in chain.
 pub const BUILT_IN: &str = "built-in";
@@ -23,6 +23,21 @@ const MAX_TIMEOUT_MS: u64 = 600_000;
 /// Largest limit of memory (MiB), that of a controller.
 const MAX_MEMORY_MIB: u64 = 1_048_576;
 
+/// Default distance of the columns and rows of an image that a program gets (px).
+pub const DEFAULT_IMAGE_STEP: u8 = 2;
+
+/// Largest such distance (px).
+const MAX_IMAGE_STEP: u8 = 8;
+
+/// The images that a program gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageSettings {
+    /// Time from an image to the next.
+    pub period: Time,
+    /// Every so many columns and rows of the image are rendered.
+    pub step: u8,
+}
+
 /// The program that perceives in place of the built-in chain, with its limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProgramSettings {
@@ -32,6 +47,8 @@ pub struct ProgramSettings {
     pub timeout_ms: u64,
     /// Largest resident memory of the process (MiB).
     pub memory_mib: u64,
+    /// The images of the rear camera that it gets, if it gets any.
+    pub images: Option<ImageSettings>,
     /// The folder in which it runs; `None` for the folder of this program.
     pub folder: Option<&'static str>,
 }
@@ -53,6 +70,9 @@ pub(crate) struct ProgramChecks<'a> {
     pub(crate) perception: &'a str,
     pub(crate) timeout_ms: u64,
     pub(crate) memory_mib: u64,
+    /// Images per second (Hz), or 0 for none.
+    pub(crate) image_hz: f64,
+    pub(crate) image_step: u8,
 }
 
 /// Returns the command that a value of `perception` names; `None` if it names none.
@@ -66,18 +86,27 @@ pub(crate) fn check_program(keys: &ProgramChecks<'_>) -> Result<Option<ProgramSe
         value if (1..=most).contains(&value) => Ok(value),
         value => Err(ConfigError::new(key, Problem::WrongCount { value, allowed })),
     };
-    let timeout_ms =
-        limit("perception-timeout-ms", keys.timeout_ms, MAX_TIMEOUT_MS, "a number from 1 to 600000")?;
-    let memory_mib =
-        limit("perception-memory-mib", keys.memory_mib, MAX_MEMORY_MIB, "a number from 1 to 1048576")?;
+    let timeout_ms = limit("perception-timeout-ms", keys.timeout_ms, MAX_TIMEOUT_MS, "a number from 1 to 600000")?;
+    let memory_mib = limit("perception-memory-mib", keys.memory_mib, MAX_MEMORY_MIB, "a number from 1 to 1048576")?;
+    let image_step = keys.image_step;
+    if !(1..=MAX_IMAGE_STEP).contains(&image_step) {
+        let problem = Problem::WrongCount { value: image_step.into(), allowed: "a number from 1 to 8" };
+        return Err(ConfigError::new("perception-image-step", problem));
+    }
+    // Less than one image in 1,000 s is none.
+    let period = (keys.image_hz > 1e-3).then(|| Time::from_s(1.0 / keys.image_hz));
+    let images = period.map(|period| ImageSettings { period, step: image_step });
     if keys.perception == BUILT_IN {
         return Ok(None);
     }
     let Some(command) = command_of(keys.perception) else {
         let allowed = "`built-in`, `exec:COMMAND`".to_owned();
-        return Err(ConfigError::new("perception", Problem::UnknownWord { value: keys.perception.to_owned(), allowed }));
+        return Err(ConfigError::new(
+            "perception",
+            Problem::UnknownWord { value: keys.perception.to_owned(), allowed },
+        ));
     };
-    Ok(Some(ProgramSettings { command: kept(command), timeout_ms, memory_mib, folder: None }))
+    Ok(Some(ProgramSettings { command: kept(command), timeout_ms, memory_mib, images, folder: None }))
 }
 
 /// Returns the same text, which is kept until the process ends. A process sees few commands, and each is kept once.
@@ -97,7 +126,8 @@ mod tests {
     use super::*;
 
     fn check(perception: &str, timeout_ms: u64, memory_mib: u64) -> Result<Option<ProgramSettings>, String> {
-        check_program(&ProgramChecks { perception, timeout_ms, memory_mib }).map_err(|error| error.to_string())
+        let keys = ProgramChecks { perception, timeout_ms, memory_mib, image_hz: 5.0, image_step: DEFAULT_IMAGE_STEP };
+        check_program(&keys).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -105,6 +135,7 @@ mod tests {
         assert_eq!(check(BUILT_IN, 1_000, 1_024), Ok(None));
         let program = check("exec:python3 mine.py", 250, 64).unwrap().unwrap();
         assert_eq!((program.command, program.timeout_ms, program.memory_mib), ("python3 mine.py", 250, 64));
+        assert_eq!(program.images, Some(ImageSettings { period: Time::from_ms(200), step: 2 }));
         let again = check("exec:python3 mine.py", 1, 1).unwrap().unwrap();
         assert!(std::ptr::eq(program.command, again.command));
         assert_eq!(program.name(), "exec:python3 mine.py");

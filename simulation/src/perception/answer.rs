@@ -102,15 +102,10 @@ pub(super) fn parse(
         Err(error) => return Ok(Err(error)),
     };
     match object.get("time_ns").and_then(Value::as_i64) {
-        Some(time_ns) if time_ns == time.ns() => {
-            Ok(parsed(&object, kind, time).map_err(|wrong| wrong.in_line(line)))
+        Some(time_ns) if time_ns == time.ns() => Ok(parsed(&object, kind, time).map_err(|wrong| wrong.in_line(line))),
+        Some(time_ns) => {
+            Err(ExecError::OtherStep { line: excerpt(line), expected: time.ns(), found: time_ns.to_string(), answered })
         }
-        Some(time_ns) => Err(ExecError::OtherStep {
-            line: excerpt(line),
-            expected: time.ns(),
-            found: time_ns.to_string(),
-            answered,
-        }),
         None => {
             let needed = format!("{}, the `time_ns` of the question", time.ns());
             Ok(Err(Wrong::new("time_ns".to_owned(), needed, object.get("time_ns")).in_line(line)))
@@ -167,9 +162,9 @@ impl Object {
     /// Returns a whole number from `least` on.
     fn whole(&self, key: &str, least: u32) -> Result<u32, Wrong> {
         let value = self.object.get(key).and_then(Value::as_u64).and_then(|value| u32::try_from(value).ok());
-        value.filter(|value| *value >= least).ok_or_else(|| {
-            self.wrong(key, format!("a whole number from {least} to {}", u32::MAX))
-        })
+        value
+            .filter(|value| *value >= least)
+            .ok_or_else(|| self.wrong(key, format!("a whole number from {least} to {}", u32::MAX)))
     }
 
     /// Returns whether an extent is measured.
@@ -194,7 +189,8 @@ impl Object {
                 Some(column) => format!("{}.{KEY}[{index}][{column}]", self.path),
             };
             let numbers = values.as_array().filter(|numbers| numbers.len() == N);
-            let numbers = numbers.ok_or_else(|| Wrong::new(at(None), format!("a list of {N} numbers"), Some(values)))?;
+            let numbers =
+                numbers.ok_or_else(|| Wrong::new(at(None), format!("a list of {N} numbers"), Some(values)))?;
             for (column, (element, number)) in row.iter_mut().zip(numbers).enumerate() {
                 let value = number.as_f64().filter(|value| index != column || VARIANCE.contains(*value));
                 let needed = if index == column { format!("a variance: {VARIANCE}") } else { "a number".to_owned() };
@@ -390,7 +386,8 @@ mod tests {
     const TRACK: &str = r#"{"id":3,"status":"confirmed","x_m":-40.5,"y_m":0.25,"vx_mps":36,"vy_mps":0,"length_m":4.6,
         "width_m":1.8,"existence":0.9,"class":{"car":0.75,"truck":0.25},
         "covariance":[[0.04,0,0.01,0],[0,0.01,0,0],[0.01,0,0.25,0],[0,0,0,0.09]]}"#;
-    const DETECTION: &str = r#"{"x_m":-30,"y_m":40,"covariance":[[0.04,0],[0,0.04]],"length_m":4.6,"width_m":1.8,"points":12}"#;
+    const DETECTION: &str =
+        r#"{"x_m":-30,"y_m":40,"covariance":[[0.04,0],[0,0.04]],"length_m":4.6,"width_m":1.8,"points":12}"#;
 
     fn answer(kind: Kind, elements: &str) -> Result<PerceptionAnswer, String> {
         let line = format!("{{\"time_ns\":80000000,\"{}\":[{elements}]}}", kind.key()).replace('\n', "");
@@ -441,7 +438,10 @@ mod tests {
             (["[0,0.01,0,0]", "[0,0.01,0]"], "`tracks[0].covariance[1]` must be a list of 4 numbers"),
             ([",[0,0,0,0.09]", ""], "`tracks[0].covariance` must be a list of 4 lists of 4 numbers"),
             (["[0.01,0,0.25", "[0.02,0,0.25"], "`tracks[0].covariance` must be symmetric"),
-            (["0.01,0],[0,0.01,0,0],[0.01", "5,0],[0,0.01,0,0],[5"], "`tracks[0].covariance` must be positive definite"),
+            (
+                ["0.01,0],[0,0.01,0,0],[0.01", "5,0],[0,0.01,0,0],[5"],
+                "`tracks[0].covariance` must be positive definite",
+            ),
             (["\"truck\"", "\"bus\""], "`tracks[0].class.bus` must be a class: car, truck, motorcycle or background"),
             (["0.75", "0.85"], "`tracks[0].class` must be probabilities that add up to 1"),
             (["0.75", "1.75"], "`tracks[0].class.car` must be a number from 0 to 1, it is 1.75"),
@@ -462,7 +462,10 @@ mod tests {
             (["[0,0.04]", "[0,0]"], "`detections[0].covariance[1][1]` must be a variance"),
             (["4.6", "460"], "`detections[0].length_m` must be a number from 0.1 to 40, it is 460"),
             (["\"points\":12", "\"points\":12,\"time_ns\":90000000"], "`detections[0].time_ns` must be"),
-            (["\"points\":12", "\"points\":12,\"width_is_seen\":1"], "`detections[0].width_is_seen` must be true or false"),
+            (
+                ["\"points\":12", "\"points\":12,\"width_is_seen\":1"],
+                "`detections[0].width_is_seen` must be true or false",
+            ),
         ] {
             refused(Kind::Detections, change, stated);
         }
@@ -487,6 +490,8 @@ mod tests {
         let many = vec![TRACK; 257].join(",");
         assert!(answer(Kind::Tracks, &many).unwrap_err().contains("a list of at most 256"));
         assert_eq!(kind(br#"{"answers":"tracks"}"#), Ok(Kind::Tracks));
-        assert!(kind(br#"{"answers":"boxes"}"#).unwrap_err().to_string().contains("`answers` must be \"detections\" or"));
+        assert!(
+            kind(br#"{"answers":"boxes"}"#).unwrap_err().to_string().contains("`answers` must be \"detections\" or")
+        );
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use closecall_scenarios::Scenario;
 use closecall_sensors::SensorError;
 use closecall_sensors::external::{
-    LidarMount, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, ProgramSettings,
+    CameraMount, LidarMount, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, ProgramSettings,
 };
 use closecall_traffic::{CONTROL_STEP, Time};
 
@@ -66,7 +66,8 @@ impl PerceptionProcess {
         let answered = child.request(line, limit)?;
         let spent = begun.elapsed();
         let parsed = answer::parse(&answered, (*kind, question.time), child.answered());
-        let parsed = parsed.map_err(ProgramError::from).and_then(|parsed| Ok(parsed?)).inspect_err(|_| child.condemn())?;
+        let parsed =
+            parsed.map_err(ProgramError::from).and_then(|parsed| Ok(parsed?)).inspect_err(|_| child.condemn())?;
         let period_s = question.lidars.iter().map(|lidar| lidar.period_s).fold(f64::INFINITY, f64::min);
         match self.computing.exceeded(spent, 1e3 * period_s.max(CONTROL_STEP.s())) {
             Some(message) => Err(ProgramError::Slow(message)),
@@ -75,12 +76,7 @@ impl PerceptionProcess {
     }
 
     fn failure(&self, error: &ProgramError, time: Time) -> SensorError {
-        SensorError::Program {
-            program: self.program.name(),
-            reason: error.to_string(),
-            is_late: error.is_late(),
-            time,
-        }
+        SensorError::Program { program: self.program.name(), reason: error.to_string(), is_late: error.is_late(), time }
     }
 }
 
@@ -102,7 +98,8 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
     let size = scenario.actors[scenario.ego].vehicle.dimensions;
     let lidars: Vec<LidarMount> = model.rear_lidars().map(|lidar| LidarMount::of(&lidar, size.length_m)).collect();
     let latency_s = model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
-    let setup = Setup { size, road: &scenario.road, lidars: &lidars, latency_s };
+    let camera = program.images.map(|images| CameraMount::of(scenario.sensors.camera(), images, size.length_m));
+    let setup = Setup { size, road: &scenario.road, lidars: &lidars, camera, latency_s };
     let (child, identity, _) = greet(program, &setup).ok()?;
     let open_files = child.open_files();
     Some((identity, open_files))

@@ -2,7 +2,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use closecall_sensors::external::{LidarMount, OutsideScan, PerceptionQuestion, Pose};
+use closecall_sensors::external::{CameraMount, LidarMount, OutsideImage, OutsideScan, PerceptionQuestion, Pose};
 use closecall_sensors::lidar::MirrorSide;
 use closecall_traffic::{CONTROL_STEP, Dimensions, Road, Side};
 use serde::Serialize;
@@ -20,6 +20,7 @@ enum Message<'a> {
         ego: EgoMessage,
         road: RoadMessage,
         lidars: Vec<LidarMessage>,
+        camera: Option<CameraMessage>,
     },
     Scans {
         time_s: f64,
@@ -27,6 +28,7 @@ enum Message<'a> {
         odometry: OdometryMessage,
         pose: PoseMessage,
         scans: Vec<ScanMessage<'a>>,
+        image: Option<ImageMessage>,
     },
 }
 
@@ -57,6 +59,27 @@ struct LidarMessage {
     layers: usize,
     columns: usize,
     period_s: f64,
+}
+
+#[derive(Serialize)]
+struct CameraMessage {
+    x_m: f64,
+    z_m: f64,
+    pitch_rad: f64,
+    focal_px: f64,
+    distortion_k1: f64,
+    distortion_k2: f64,
+    width: usize,
+    height: usize,
+    period_s: f64,
+}
+
+#[derive(Serialize)]
+struct ImageMessage {
+    time_ns: i64,
+    width: u32,
+    height: u32,
+    rgb: String,
 }
 
 #[derive(Serialize)]
@@ -95,14 +118,15 @@ pub(super) struct Setup<'a> {
     pub(super) size: Dimensions,
     pub(super) road: &'a Road,
     pub(super) lidars: &'a [LidarMount],
+    pub(super) camera: Option<CameraMount>,
     pub(super) latency_s: f64,
 }
 
 impl<'a> Setup<'a> {
     /// Returns what is told before a question.
     pub(super) fn of(question: &PerceptionQuestion<'a>) -> Self {
-        let PerceptionQuestion { size, road, lidars, latency_s, .. } = *question;
-        Self { size, road, lidars, latency_s }
+        let PerceptionQuestion { size, road, lidars, camera, latency_s, .. } = *question;
+        Self { size, road, lidars, camera, latency_s }
     }
 
     /// Returns the first message.
@@ -122,6 +146,7 @@ impl<'a> Setup<'a> {
                 overtaking_side: road.overtaking_side(),
             },
             lidars: self.lidars.iter().map(lidar_message).collect(),
+            camera: self.camera.map(camera_message),
         })
     }
 }
@@ -142,12 +167,24 @@ pub(super) fn scans(question: &PerceptionQuestion<'_>) -> Vec<u8> {
         },
         pose: PoseMessage { x_m, y_m, yaw_rad },
         scans: question.scans.iter().map(scan_message).collect(),
+        image: question.image.map(image_message),
     })
 }
 
 fn lidar_message(lidar: &LidarMount) -> LidarMessage {
     let LidarMount { name, x_m, y_m, z_m, azimuth_rad, half_field_rad, range_m, layers, columns, period_s } = *lidar;
     LidarMessage { name, x_m, y_m, z_m, azimuth_rad, half_field_rad, range_m, layers, columns, period_s }
+}
+
+fn camera_message(camera: CameraMount) -> CameraMessage {
+    let CameraMount { x_m, z_m, pitch_rad, focal_px, distortion, size_px: [width, height], period_s } = camera;
+    let [distortion_k1, distortion_k2] = distortion;
+    CameraMessage { x_m, z_m, pitch_rad, focal_px, distortion_k1, distortion_k2, width, height, period_s }
+}
+
+fn image_message(image: &OutsideImage) -> ImageMessage {
+    let OutsideImage { time, width, height, ref rgb } = *image;
+    ImageMessage { time_ns: time.ns(), width, height, rgb: STANDARD.encode(rgb) }
 }
 
 fn scan_message(outside: &OutsideScan) -> ScanMessage<'_> {
