@@ -203,9 +203,13 @@ fn a_campaign_knows_its_perception_and_a_foreign_folder_does_not_run_it() {
     assert_eq!(stated["identity"]["name"], "groups", "{manifest}");
     assert!(stated["command"].as_str().unwrap().starts_with("sensors.perception=exec:python3 "));
     assert!(stated["files"].as_array().unwrap().iter().any(|file| file["name"] == script.to_str().unwrap()));
-    // No output may take the place of the program.
-    let output = closecall(["run", "low-thw-overtake", "--set", &perception, "--trace", script.to_str().unwrap()]);
+    // No output may take the place of a file that the program reads.
+    let read = folder.path().join("read.csv");
+    std::fs::write(&read, "1\n").unwrap();
+    let with_file = setting(&format!("python3 {} tracks none {}", script.display(), read.display()));
+    let output = closecall(["run", "low-thw-overtake", "--set", &with_file, "--trace", read.to_str().unwrap()]);
     assert_eq!(code(&output), 2, "{}", message(&output));
+    assert_eq!(std::fs::read_to_string(&read).unwrap(), "1\n");
     let replay = |more: &[&str]| closecall([&["replay", out.to_str().unwrap(), "1"], more].concat());
     stdout(&replay(&[]), 0);
     // A manifest that this program has not written is somebody else's.
