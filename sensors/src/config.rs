@@ -20,7 +20,7 @@ use crate::{
     ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, SensorError, TrackerConfig,
 };
 
-/// Default number of core points of DBSCAN: [`ClusteredPoints::CORE_POINTS`](crate::lidar::ClusteredPoints::CORE_POINTS).
+/// Default number of core points of DBSCAN, that of `ClusteredPoints::CORE_POINTS`.
 const DEFAULT_CORE_POINTS: u8 = 3;
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).
@@ -70,8 +70,8 @@ pub struct SensorsConfig {
     #[serde(skip_serializing_if = "is_default_core_points")]
     pub cluster_core_points: u8,
     /// What processes the scans of the rear LiDARs in mode `full`: `built-in` by default, or
-    /// `exec:COMMAND`, a program that answers detections or tracks. The file then runs a program: read
-    /// a file of somebody else before you run it.
+    /// `exec:COMMAND`, a program that answers detections or tracks. The file then runs a program:
+    /// read a file of somebody else before you run it.
     #[serde(skip_serializing_if = "is_built_in")]
     pub perception: String,
     /// Time limit of each answer of that program (ms). The first may take 10 s. Default: 1000.

@@ -1,4 +1,5 @@
-//! The tracks that a program has answered: they wait for the latency, and are predicted to the present.
+//! The tracks that a program has answered: they wait for the latency, and are predicted to the
+//! present.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -29,15 +30,16 @@ pub(crate) struct OutsideTracks {
 }
 
 impl OutsideTracks {
-    /// Appends an answer whose states hold at `time`, where the ego was at `pose`. It is due from `step` on.
+    /// Appends an answer whose states hold at `time`, where the ego was at `pose`. It is due from
+    /// `step` on.
     pub(crate) fn push(&mut self, (time, pose): (Time, Pose), tracks: Vec<Track>, step: u64) {
         // Answers arrive in their order.
         let due_step = step.max(self.answers.back().map_or(0, |answer| answer.due_step));
         self.answers.push_back(Answered { due_step, time, pose, tracks });
     }
 
-    /// Appends the tracks of the latest answer that is due in `step` to `list`, predicted to `time` at constant velocity, in the
-    /// ego's frame at that time.
+    /// Appends the tracks of the latest answer that is due in `step` to `list`, predicted to `time`
+    /// at constant velocity, in the ego's frame at that time.
     pub(crate) fn report(&mut self, step: u64, (time, pose): (Time, Pose), frame: &EgoFrame<'_>, list: &mut TrackList) {
         while self.answers.get(1).is_some_and(|next| next.due_step <= step) {
             self.answers.pop_front();

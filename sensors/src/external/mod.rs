@@ -6,8 +6,9 @@
 //!                     └ tracks ─────────────────────────────────────────────┘
 //! ```
 //!
-//! This crate asks the questions, and puts the answers in the place of boxes or tracks. How a program is started and spoken to is
-//! behind [`PerceptionProgram`], which the simulation implements.
+//! This crate asks the questions, and puts the answers in the place of boxes or tracks. How a
+//! program is started and spoken to is behind [`PerceptionProgram`], which the simulation
+//! implements.
 
 mod answered;
 mod image;
@@ -73,8 +74,8 @@ pub struct PerceptionQuestion<'a> {
 pub enum PerceptionAnswer {
     /// Boxes for the built-in tracker.
     Detections(Vec<Detection>),
-    /// Tracks at the time of the question, in the ego's frame at that time. Closecall gives them numbers of its own, and their
-    /// probabilities of lanes.
+    /// Tracks at the time of the question, in the ego's frame at that time. Closecall gives them
+    /// numbers of its own, and their probabilities of lanes.
     Tracks(Vec<Track>),
 }
 

@@ -22,8 +22,8 @@ pub(crate) struct Outside {
 }
 
 impl Outside {
-    /// Creates the program of a run, whose LiDARs that look back are these, in their order. `latency_s` is the time from a scan to
-    /// the tracks that a controller gets of it (s).
+    /// Creates the program of a run, whose LiDARs that look back are these, in their order.
+    /// `latency_s` is the time from a scan to the tracks that a controller gets of it (s).
     pub(crate) fn new(
         program: Box<dyn PerceptionProgram>,
         lidars: Vec<Lidar>,
@@ -33,7 +33,8 @@ impl Outside {
         Self { program, lidars, mounts: Vec::new(), camera, latency_s, first: None, tracks: OutsideTracks::default() }
     }
 
-    /// Asks the program about scans and an image of the scene. `believed` is the scene as the ego believes it to be.
+    /// Asks the program about scans and an image of the scene. `believed` is the scene as the ego
+    /// believes it to be.
     ///
     /// # Errors
     /// [`SensorError::Program`] if there is no valid answer.
@@ -62,8 +63,8 @@ impl Outside {
         })
     }
 
-    /// Keeps tracks that the program has answered, whose states hold `offset` after the time of the question. They are due from
-    /// `step` on.
+    /// Keeps tracks that the program has answered, whose states hold `offset` after the time of the
+    /// question. They are due from `step` on.
     pub(crate) fn keep(&mut self, believed: &Scene<'_>, offset: Time, tracks: Vec<Track>, step: u64) {
         let pose = self.pose(believed);
         self.tracks.push((believed.time + offset, pose), tracks, step);

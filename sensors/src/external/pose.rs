@@ -27,8 +27,8 @@ impl Pose {
         Matrix2::new(cos, -sin, sin, cos)
     }
 
-    /// Returns a state `[x, y, vx, vy]` with its covariance, given in the frame of this pose, in the frame of the pose `now`, after
-    /// `elapsed_s` at constant velocity over ground.
+    /// Returns a state `[x, y, vx, vy]` with its covariance, given in the frame of this pose, in
+    /// the frame of the pose `now`, after `elapsed_s` at constant velocity over ground.
     pub(crate) fn moved(
         &self,
         now: &Self,
@@ -53,12 +53,14 @@ mod tests {
 
     #[test]
     fn a_vehicle_at_constant_velocity_is_where_the_geometry_puts_it() {
-        // The ego drives 1.2 m ahead and turns by a quarter; a vehicle beside it keeps pace along the first heading.
+        // The ego drives 1.2 m ahead and turns by a quarter; a vehicle beside it keeps pace along
+        // the first heading.
         let (then, now) = (Pose::default(), Pose { x_m: 1.2, y_m: 0.0, yaw_rad: std::f64::consts::FRAC_PI_2 });
         let state = Vector4::new(-20.0, 3.5, 30.0, 0.0);
         let covariance = Matrix4::from_diagonal(&Vector4::new(0.04, 0.01, 0.25, 0.09));
         let (moved, spread) = then.moved(&now, (&state, &covariance), 0.04);
-        // In the first frame it is at (−18.8, 3.5): 20 m behind the ego, which looks to the left now.
+        // In the first frame it is at (−18.8, 3.5): 20 m behind the ego, which looks to the left
+        // now.
         assert!((moved - Vector4::new(3.5, 20.0, 0.0, -30.0)).norm() < 1e-9, "{moved}");
         assert!((spread[(1, 1)] - (0.04 + 0.04 * 0.04 * 0.25)).abs() < 1e-12);
         assert!((spread[(0, 0)] - (0.01 + 0.04 * 0.04 * 0.09)).abs() < 1e-12);

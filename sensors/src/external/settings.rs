@@ -109,7 +109,8 @@ pub(crate) fn check_program(keys: &ProgramChecks<'_>) -> Result<Option<ProgramSe
     Ok(Some(ProgramSettings { command: kept(command), timeout_ms, memory_mib, images, folder: None }))
 }
 
-/// Returns the same text, which is kept until the process ends. A process sees few commands, and each is kept once.
+/// Returns the same text, which is kept until the process ends. A process sees few commands, and
+/// each is kept once.
 fn kept(text: &str) -> &'static str {
     static KEPT: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
