@@ -471,8 +471,8 @@ mod tests {
     fn radius_and_core_points_are_those_of_the_model() {
         let points = candidates(&[(100.0, 0.0), (100.0, 0.22), (100.0, 2.0)]);
         let of = |radius, core_points| {
-            let mut clustering = Clustering::default();
-            clustering.model = ClusteringModel { radius, core_points, ..ClusteringModel::default() };
+            let model = ClusteringModel { radius, core_points, ..ClusteringModel::default() };
+            let mut clustering = Clustering { model, ..Clustering::default() };
             clustering.run(&points);
             assert_eq!(clustering.compare(ClusteringCheck::default(), Time::ZERO), Ok(()));
             clustering.labels
