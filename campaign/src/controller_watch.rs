@@ -16,7 +16,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use closecall_simulation::controller::ControllerChoice;
 
-use crate::fingerprint::{Fingerprint, named_files};
+use crate::fingerprint::{Fingerprint, exec_settings, named_files};
 use crate::manifest::{Manifest, file_hash};
 
 /// Shortest time between two looks at the files.
@@ -61,6 +61,12 @@ impl ControllerWatch {
                 ControllerChoice::Native(native) => vec![in_folder(folder, Path::new(&native.path))],
                 ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => continue,
             };
+            paths.extend(imports(&named));
+            paths.extend(named);
+        }
+        for program in manifest.programs() {
+            let named: Vec<PathBuf> =
+                named_files(&exec_settings(&program), folder).into_iter().map(|(_, path)| path).collect();
             paths.extend(imports(&named));
             paths.extend(named);
         }

@@ -43,7 +43,10 @@ impl From<&NativeError> for FailureKind {
     fn from(error: &NativeError) -> Self {
         match error {
             NativeError::Refused { is_io: true, .. } => Self::Io,
-            NativeError::Refused { .. } | NativeError::Crash { .. } | NativeError::Start { .. } => Self::InvalidInput,
+            NativeError::Refused { .. }
+            | NativeError::Crash { .. }
+            | NativeError::Start { .. }
+            | NativeError::StartProgram { .. } => Self::InvalidInput,
         }
     }
 }

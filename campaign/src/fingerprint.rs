@@ -10,9 +10,11 @@ use std::path::{Path, PathBuf};
 
 use closecall_controllers::CheckedDriver;
 use closecall_scenarios::Scenario;
+use closecall_sensors::external::ProgramSettings;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{ExecSettings, Identity, identify};
 use closecall_simulation::controller::native::NativeSettings;
+use closecall_simulation::perception::identify_program;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::file_hash;
@@ -29,7 +31,10 @@ pub struct FileHash {
     pub blake3: String,
 }
 
-/// What identifies a controller that runs as a process.
+/// The beginning of the command of a perception program, which tells it from a controller with the same command.
+const PERCEPTION: &str = "sensors.perception=";
+
+/// What identifies a controller or a perception program that runs as a process.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// The command.
@@ -49,22 +54,12 @@ impl Fingerprint {
     /// this program. The process is started once and greeted with the values of `scenario`. A
     /// process that cannot be greeted has no identity.
     pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
-        let hash = |(name, path): (String, PathBuf)| {
-            // A file that cannot be read has no hash: it differs from one that can.
-            let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
-            FileHash { name, blake3 }
-        };
         let greeted = scenario.and_then(|scenario| match &scenario.actors[scenario.ego].driver {
             CheckedDriver::Ego(ego) => identify(settings, folder, ego, &scenario.road).ok(),
             CheckedDriver::Human(_) => None,
         });
         let (identity, open_files) = greeted.unwrap_or_default();
-        Self {
-            command: settings.command.clone(),
-            files: named_files(settings, folder).into_iter().map(hash).collect(),
-            identity,
-            open_files,
-        }
+        Self { command: settings.command.clone(), files: hashed(settings, folder), identity, open_files }
     }
 
     /// Returns the files that the process has mapped or opened after its greeting.
@@ -78,6 +73,20 @@ impl Fingerprint {
             ControllerChoice::Exec(exec) => Some(Self::of(exec, folder, scenario)),
             ControllerChoice::Native(native) => Some(Self::of_native(native, folder)),
             ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => None,
+        }
+    }
+
+    /// Returns the fingerprint of a perception program. It is started once and greeted as in a run of `scenario`. One that cannot be
+    /// greeted has no identity.
+    pub fn of_program(program: &ProgramSettings, scenario: Option<&Scenario>) -> Self {
+        let settings = exec_settings(program);
+        let stated = scenario.and_then(|scenario| identify_program(program, scenario)).unwrap_or_default();
+        let (identity, open_files) = stated;
+        Self {
+            command: format!("{PERCEPTION}{}", program.name()),
+            files: hashed(&settings, program.folder.map(Path::new)),
+            identity,
+            open_files,
         }
     }
 
@@ -100,6 +109,7 @@ impl Fingerprint {
         let hash_in = |files: &[FileHash], name: &str| {
             files.iter().find(|file| file.name == name).map(|file| file.blake3.clone())
         };
+        let who = if self.command.starts_with(PERCEPTION) { "perception program" } else { "controller" };
         let names = self.files.iter().chain(now.files.iter().filter(|file| hash_in(&self.files, &file.name).is_none()));
         let mut differences = Vec::new();
         for FileHash { name, .. } in names {
@@ -110,7 +120,7 @@ impl Fingerprint {
                     None => "absent".to_owned(),
                 };
                 let (there, here) = (quoted(there), quoted(here));
-                differences.push(format!("the controller's file {name} has changed: {there} there, {here} here"));
+                differences.push(format!("the {who}'s file {name} has changed: {there} there, {here} here"));
             }
         }
         let stated = [
@@ -119,11 +129,7 @@ impl Fingerprint {
         ];
         for (key, there, here) in stated.into_iter().filter(|(_, there, here)| there != here) {
             let quoted = |text: &Option<String>| text.as_ref().map_or("none".to_owned(), |text| format!("`{text}`"));
-            differences.push(format!(
-                "the controller states another {key}: {} there, {} here",
-                quoted(there),
-                quoted(here)
-            ));
+            differences.push(format!("the {who} states another {key}: {} there, {} here", quoted(there), quoted(here)));
         }
         differences
     }
@@ -133,6 +139,22 @@ impl Fingerprint {
 pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<String> {
     let same = |earlier: &Fingerprint| here.iter().find(|other| other.command == earlier.command);
     there.iter().filter_map(|earlier| Some(earlier.differences(same(earlier)?))).flatten().collect()
+}
+
+/// Returns the command of a perception program as that of a process.
+pub(crate) fn exec_settings(program: &ProgramSettings) -> ExecSettings {
+    let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
+    ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
+}
+
+/// Returns the hashes of the files that the command names.
+fn hashed(settings: &ExecSettings, folder: Option<&Path>) -> Vec<FileHash> {
+    let hash = |(name, path): (String, PathBuf)| {
+        // A file that cannot be read has no hash: it differs from one that can.
+        let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
+        FileHash { name, blake3 }
+    };
+    named_files(settings, folder).into_iter().map(hash).collect()
 }
 
 /// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::{Scenario, Setting};
+use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
+use closecall_sensors::external::ProgramSettings;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use object::{Object, ReadCache};
@@ -269,15 +270,30 @@ impl Manifest {
         let fingerprint = |choice| Fingerprint::of_choice(choice, self.controller_folder(), Some(scenario));
         let arms = self.arms.iter().zip(self.arm_names());
         let chosen = arms.filter(|(_, name)| names.contains(&name.as_str())).map(|(arm, _)| arm);
-        let now: Vec<_> = chosen.filter_map(fingerprint).collect();
+        let program = scenario.sensors.running_program();
+        let program = program.map(|program| Fingerprint::of_program(&program, Some(scenario)));
+        let now: Vec<_> = chosen.filter_map(fingerprint).chain(program).collect();
         let is_asked = |one: &&Fingerprint| now.iter().any(|other| other.command == one.command);
         let there: Vec<_> = self.controllers.iter().filter(is_asked).cloned().collect();
         fingerprint::differences(&there, &now)
     }
 
-    /// Returns the commands, libraries and FMUs that the arms run.
+    /// Returns the perception programs that the scenarios name, each once. They run in the folder of the controllers.
+    pub fn programs(&self) -> Vec<ProgramSettings> {
+        let mut programs: Vec<ProgramSettings> = Vec::new();
+        for scenario in &self.scenarios {
+            let file = ScenarioFile::parse(Path::new(&scenario.path), &scenario.text, &[]);
+            // A text that is no scenario cannot run either.
+            let program = file.ok().and_then(|file| file.with_program_in(self.controller_folder()).program());
+            programs.extend(program.filter(|program| !programs.contains(program)));
+        }
+        programs
+    }
+
+    /// Returns the commands, libraries and FMUs that the arms and the sensors run.
     pub fn foreign_code(&self) -> Vec<String> {
-        self.arms.iter().filter(|arm| arm.exec().is_some() || arm.native().is_some()).map(ToString::to_string).collect()
+        let arms = self.arms.iter().filter(|arm| arm.exec().is_some() || arm.native().is_some());
+        arms.map(ToString::to_string).chain(self.programs().iter().map(ProgramSettings::name)).collect()
     }
 
     /// Returns the arms, the baseline first.

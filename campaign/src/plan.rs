@@ -16,6 +16,7 @@ use closecall_sensors::camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RC
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::{BuiltIn, ControllerChoice};
+use closecall_simulation::perception::try_program;
 
 use crate::execution::Campaign;
 use crate::fingerprint::Fingerprint;
@@ -104,6 +105,11 @@ impl Plan {
             let fail = |source| PlanError::Controller { scenario: file.config().name.clone(), source };
             native.check_variables(&nominal, folder).map_err(fail)?;
         }
+        for file in &scenarios {
+            let Some(program) = file.program() else { continue };
+            let fail = |source| PlanError::Controller { scenario: file.config().name.clone(), source };
+            try_program(&program).map_err(fail)?;
+        }
         Ok(Self {
             scenarios,
             sampling,
@@ -165,6 +171,14 @@ impl Plan {
         self.scenarios.iter().filter(may_need).map(|file| &file.config().sensors.rear_camera)
     }
 
+    /// Returns the files of the scenarios' own networks that classify crops in some sample.
+    pub fn crop_networks(&self) -> impl Iterator<Item = &str> {
+        let may_need = |file: &&ScenarioFile| {
+            file.may_have_mode(SensorMode::Full, self.sensors) && file.may_have_pipeline(Pipeline::CropClassifier)
+        };
+        self.scenarios.iter().filter(may_need).filter_map(|file| file.config().sensors.rear_camera.model.as_deref())
+    }
+
     /// Returns the networks that some sample may need.
     fn models(&self) -> Result<Vec<ManifestModel>, FolderError> {
         if !self.uses_classifier() {
@@ -172,6 +186,11 @@ impl Plan {
         }
         let classifier = rear_classifier()?;
         let mut models = Vec::new();
+        for path in self.crop_networks() {
+            let read = |source| FolderError::Read { path: path.into(), source };
+            let blake3 = file_hash(Path::new(path)).map_err(read)?.to_string();
+            models.push(ManifestModel { name: path.to_owned(), blake3, backend: classifier.backend.clone() });
+        }
         for camera in self.mask_rcnn_cameras() {
             let (name, blake3) = match &camera.mask_rcnn.model {
                 None => ("rear-mask-rcnn".to_owned(), blake3::hash(SHIPPED_MASK_RCNN).to_string()),
@@ -192,7 +211,18 @@ impl Plan {
     fn fingerprints(&self, folder: Option<&Path>) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
         let fingerprint = |choice| Fingerprint::of_choice(choice, folder, nominal.as_ref());
-        self.controllers.iter().filter_map(fingerprint).collect()
+        let controllers = self.controllers.iter().filter_map(fingerprint);
+        let mut programs: Vec<Fingerprint> = Vec::new();
+        for file in &self.scenarios {
+            let nominal = file.concrete(&file.space().nominal()).ok();
+            // A mode without scans runs no program.
+            let mode = self.sensors.or_else(|| nominal.as_ref().map(|nominal| nominal.sensors.mode()));
+            if let Some(program) = file.program().filter(|_| mode == Some(SensorMode::Full)) {
+                let fingerprint = Fingerprint::of_program(&program, nominal.as_ref());
+                programs.extend((!programs.contains(&fingerprint)).then_some(fingerprint));
+            }
+        }
+        controllers.chain(programs).collect()
     }
 
     /// Returns the manifest of the campaign. `command` is the command line that started it.

@@ -115,6 +115,9 @@ impl SavedCampaign {
     /// [`SavedError::UnknownArm`] if the campaign was not run with that controller,
     /// [`SavedError::NotTrusted`] if the folder names it and is not trusted.
     pub fn arm(&self, name: Option<&str>) -> Result<Arm, SavedError> {
+        if !self.manifest.programs().is_empty() {
+            self.check_trust()?;
+        }
         let (controllers, names) = (&self.manifest.arms, self.manifest.arm_names());
         let is_meant =
             |index: &usize| name.is_none_or(|name| names[*index] == name || controllers[*index].to_string() == name);
@@ -155,7 +158,8 @@ impl SavedCampaign {
         settings: &[Setting],
     ) -> Result<(Scenario, RunKey), SavedError> {
         let file = self.file(scenario)?;
-        let file = ScenarioFile::parse(file.path(), file.text(), settings)?;
+        let parsed = ScenarioFile::parse(file.path(), file.text(), settings)?;
+        let file = parsed.with_program_in(self.manifest.controller_folder());
         if let Some(mode) = self.manifest.sensors.filter(|_| !settings.is_empty()) {
             file.check_faults_in(mode)?;
         }
@@ -174,7 +178,8 @@ impl SavedCampaign {
     /// # Errors
     /// [`SavedError`] if the campaign has no such scenario, or it cannot be used.
     pub fn file(&self, scenario: Option<&str>) -> Result<ScenarioFile, SavedError> {
-        scenario_file(self.folder.path(), self.choose(scenario)?)
+        let file = scenario_file(self.folder.path(), self.choose(scenario)?)?;
+        Ok(file.with_program_in(self.manifest.controller_folder()))
     }
 
     fn choose(&self, name: Option<&str>) -> Result<&ManifestScenario, SavedError> {
@@ -198,7 +203,7 @@ impl SavedCampaign {
 pub fn works(folder: &Path, manifest: &Manifest) -> Result<Vec<Arc<Work>>, SavedError> {
     let arms = manifest.arms();
     let work = |scenario| {
-        let file = scenario_file(folder, scenario)?;
+        let file = scenario_file(folder, scenario)?.with_program_in(manifest.controller_folder());
         let (sampling, checks, retry_crashed) = (manifest.sampling, manifest.checks, manifest.retry_crashed);
         Ok(Arc::new(Work { file, sampling, arms: arms.clone(), checks, retry_crashed }))
     };

@@ -176,6 +176,17 @@ class Outcome:
         """
         return self._of_run().trace()
 
+    def tracks(self) -> _native.Table:
+        """Returns a table with a row for each control step and track: the columns of ``closecall run --tracks``."""
+        return self._of_run().tracks()
+
+    def clusters(self) -> _native.Table:
+        """Returns a table with a row for each cluster and each box of a scan: the columns of ``closecall run --clusters``.
+
+        It has no rows if no LiDAR is simulated.
+        """
+        return self._of_run().clusters()
+
     def figure(self) -> str:
         """Returns the figure of the encounter (SVG), as ``closecall plot`` draws it."""
         return self._of_run().figure()

@@ -12,7 +12,7 @@ use closecall_report::json;
 use closecall_report::run::figure::encounter;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::rerun::write_recording;
-use closecall_report::tables::trace_batch;
+use closecall_report::tables::{ClusterRecorder, TrackRecorder, trace_batch};
 use closecall_scenarios::Scenario as Concrete;
 use closecall_scenarios::outcome::Outcome;
 use closecall_sensors::SensorMode;
@@ -51,6 +51,8 @@ pub(crate) struct Run {
     outcome: Outcome,
     film: Film,
     trace: TraceRecorder,
+    tracks: TrackRecorder,
+    clusters: ClusterRecorder,
 }
 
 #[pymethods]
@@ -66,6 +68,18 @@ impl Run {
         Ok(batch.into())
     }
 
+    /// Returns the tracks: a row for each control step and track.
+    fn tracks(&self) -> PyResult<Table> {
+        let batch = self.tracks.batch().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(batch.into())
+    }
+
+    /// Returns the clusters and boxes: a row for each of each scan.
+    fn clusters(&self) -> PyResult<Table> {
+        let batch = self.clusters.batch().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(batch.into())
+    }
+
     /// Writes a recording (Rerun file).
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let written = py.detach(|| write_recording(&path, std::slice::from_ref(&self.film)));
@@ -78,16 +92,20 @@ impl Run {
     }
 }
 
-/// Records the film and the trace of a run.
+/// Records the film and the tables of a run.
 struct Recorders {
     film: FilmRecorder,
     trace: TraceRecorder,
+    tracks: TrackRecorder,
+    clusters: ClusterRecorder,
 }
 
 impl Observer for Recorders {
     fn step(&mut self, view: &StepView<'_>) {
         self.film.step(view);
         self.trace.step(view);
+        self.tracks.step(view);
+        self.clusters.step(view);
     }
 
     fn event(&mut self, time: Time, what: &RunEvent) {
@@ -155,7 +173,13 @@ pub(crate) fn run(
 
 fn record(scenario: &Concrete, key: RunKey, arm: &Arm) -> Result<Run, SampleError> {
     let film = FilmRecorder::new(scenario, key, arm, Level::Objects);
-    let mut recorders = Recorders { film, trace: TraceRecorder::default() };
+    let mut recorders = Recorders {
+        film,
+        trace: TraceRecorder::default(),
+        tracks: TrackRecorder::default(),
+        clusters: ClusterRecorder::default(),
+    };
     let outcome = run_guarded(scenario, key, arm, &mut recorders)?;
-    Ok(Run { film: recorders.film.finish(&outcome), outcome, trace: recorders.trace })
+    let Recorders { film, trace, tracks, clusters } = recorders;
+    Ok(Run { film: film.finish(&outcome), outcome, trace, tracks, clusters })
 }

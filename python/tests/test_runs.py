@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas
 import polars
 import pyarrow
+import pyarrow.parquet
 import pytest
 from support import SCENARIO, command
 
@@ -39,6 +40,19 @@ def test_a_trace_is_read_without_pyarrow_in_between(tmp_path: Path) -> None:
     assert polars.DataFrame(trace).shape == pandas.DataFrame.from_arrow(trace).shape == (len(trace), 9)
     assert table.schema.field("gap_front_m").metadata == {b"unit": b"m"}
     assert table.column("time_s").to_pylist()[:: len(set(table.column("actor").to_pylist()))][1] == 0.04
+
+
+def test_tracks_and_clusters_are_those_of_the_command_line(tmp_path: Path) -> None:
+    scenario = cc.Scenario.load(SCENARIO, set={"duration-s": 2, "sensors.rear-camera.pipeline": "off"})
+    outcome = cc.run(scenario, controller="mis", seed=4, sample=2, sensors="full")
+    tracks, clusters = tmp_path / "tracks.parquet", tmp_path / "clusters.parquet"
+    settings = ["--set", "duration-s=2", "--set", "sensors.rear-camera.pipeline=off"]
+    run = ["run", SCENARIO, "--seed", "4", "--sample", "2", "--sensors", "full", *settings]
+    command(*run, "--tracks", tracks, "--clusters", clusters)
+    for table, file in [(outcome.tracks(), tracks), (outcome.clusters(), clusters)]:
+        assert pyarrow.table(table).equals(pyarrow.parquet.read_table(file))
+        assert len(table) > 50
+    assert pyarrow.table(outcome.tracks()).schema.field("cov_x_vx").metadata == {b"unit": b"m\xc2\xb2/s"}
 
 
 def test_a_notebook_shows_the_figure(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use arrow::array::{Array, Float32Array, Float64Array, Int32Array, RecordBatch, StringArray, UInt16Array, UInt32Array};
-use closecall_report::tables::RunTables;
+use closecall_report::tables::{RunTables, TableFiles};
 use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, RunKey, simulate};
@@ -24,7 +24,8 @@ fn write(path: &Path, sensors: &str) -> Result<(), String> {
     let scenario = scenario(sensors);
     let arm = Arm { controller: BuiltIn::Acc.factory(), sensors: None };
     // A wrong request is answered before the run.
-    let mut tables = RunTables::new((&scenario, Some(&arm)), None, Some(path)).map_err(|error| error.to_string())?;
+    let files = TableFiles { scans: Some(path), ..TableFiles::default() };
+    let mut tables = RunTables::new((&scenario, Some(&arm)), files).map_err(|error| error.to_string())?;
     simulate(&scenario, RunKey { seed: 1, sample: 0 }, &arm, &mut tables).unwrap();
     tables.finish().unwrap();
     Ok(())

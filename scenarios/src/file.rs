@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use crate::coverage::CoveragePlan;
 use crate::parameters::ParameterSpace;
 use crate::sampling::Design;
-use closecall_sensors::SensorMode;
 use closecall_sensors::camera::Pipeline;
+use closecall_sensors::external::ProgramSettings;
+use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::input;
 use closecall_traffic::suggest::hint;
 use closecall_traffic::{ActorId, Check, ConfigError, KeyPath, ParameterName, Parameters, Problem, Segment, Value};
@@ -150,6 +151,8 @@ pub struct ScenarioFile {
     unused: Option<ParameterName>,
     trajectory_files: Vec<PathBuf>,
     settings: Vec<Setting>,
+    /// The folder in which a perception program runs; `None` for the folder of this program.
+    program_folder: Option<String>,
 }
 
 impl ScenarioFile {
@@ -255,6 +258,7 @@ impl ScenarioFile {
             unused,
             trajectory_files,
             settings: settings.to_vec(),
+            program_folder: None,
         })
     }
 
@@ -264,8 +268,25 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError`] if the text is not a scenario, or if a distribution is invalid.
     pub(super) fn with_text(&self, text: &str) -> Result<Self, ScenarioError> {
-        let Self { trajectory_files, settings, unused, .. } = self.clone();
-        Ok(Self { trajectory_files, settings, unused, ..Self::parse(&self.path, text, &[])? })
+        let Self { trajectory_files, settings, unused, program_folder, .. } = self.clone();
+        Ok(Self { trajectory_files, settings, unused, program_folder, ..Self::parse(&self.path, text, &[])? })
+    }
+
+    /// Returns the same file, whose perception program runs in this folder. A folder whose name is not UTF-8 is that of this program.
+    #[must_use]
+    pub fn with_program_in(self, folder: Option<&Path>) -> Self {
+        Self { program_folder: folder.and_then(Path::to_str).map(str::to_owned), ..self }
+    }
+
+    /// Returns the program that perceives in place of the built-in chain, if the file names one.
+    pub fn program(&self) -> Option<ProgramSettings> {
+        let sensors = self.config.sensors.check(&self.space.nominal()).ok()?;
+        self.with_folder(sensors).program()
+    }
+
+    /// Returns sensors whose program runs in the folder of this file's programs.
+    fn with_folder(&self, sensors: Sensors) -> Sensors {
+        self.program_folder.as_ref().map_or(sensors, |folder| sensors.with_program_in(folder))
     }
 
     /// Returns the path of the file, as given.
@@ -350,7 +371,9 @@ impl ScenarioFile {
 
     /// Works like [`Self::concrete`]. The message of an error has the values of `named`, too.
     fn concrete_at(&self, parameters: &Parameters, named: &[String]) -> Result<Scenario, ScenarioError> {
-        self.config.check(parameters).map_err(|source| {
+        let checked = self.config.check(parameters);
+        let in_folder = |scenario: Scenario| Scenario { sensors: self.with_folder(scenario.sensors), ..scenario };
+        checked.map(in_folder).map_err(|source| {
             let near = match parameters_near(&self.text, &source.path) {
                 Some(near) => near,
                 None if named.is_empty() => parameters.iter().map(|(name, _)| name.as_str().to_owned()).collect(),

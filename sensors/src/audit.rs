@@ -38,6 +38,52 @@ struct LatestTrack {
     last_id: TrackId,
 }
 
+/// The vehicle that a track is matched with, and the errors of the track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackMatch {
+    /// Index of the vehicle in the scenario's list of actors.
+    pub actor: usize,
+    /// Distance between the nearest faces of the track and of the vehicle (m).
+    pub distance_m: f64,
+    /// Errors of `[x, y, vx, vy]` of the nearest face (m, m/s): the errors whose NEES [`TrackAudit`]
+    /// computes.
+    pub error: [f64; 4],
+}
+
+/// Matches all tracks of a run with the vehicles, as [`TrackAudit`] matches the confirmed ones.
+#[derive(Clone, Debug, Default)]
+pub struct TrackMatcher {
+    others: Vec<OtherVehicle>,
+    owners: Vec<TrackOwner>,
+}
+
+impl TrackMatcher {
+    /// Returns the match of each track of a step, in their order; `None` for a track without a
+    /// vehicle within reach.
+    ///
+    /// # Errors
+    /// Returns [`SensorError::NotFinite`] if a vehicle's state in the scene is not finite.
+    pub fn observe(&mut self, tracks: &[Track], scene: &Scene<'_>) -> Result<Vec<Option<TrackMatch>>, SensorError> {
+        let mut others = std::mem::take(&mut self.others);
+        transform_scene(scene, &mut others)?;
+        let matched = tracks.iter().map(|track| {
+            let actor = owner(&self.owners, track, &others)?;
+            let other = others.iter().find(|other| other.actor == actor)?;
+            let error = face_error(track, other);
+            Some(TrackMatch { actor, distance_m: face_distance_m(track, other), error: error.into() })
+        });
+        let matches: Vec<_> = matched.collect();
+        for (track, matched) in tracks.iter().zip(&matches).filter(|(track, _)| track.status != TrackStatus::Tentative)
+        {
+            if let Some(TrackMatch { actor, .. }) = *matched {
+                note_owner(&mut self.owners, TrackOwner { id: track.id, actor });
+            }
+        }
+        self.others = others;
+        Ok(matches)
+    }
+}
+
 /// Statistics of the confirmed rear tracks of a run.
 #[derive(Clone, Debug, Default)]
 pub struct TrackAudit {
@@ -76,8 +122,7 @@ impl TrackAudit {
         for track in confirmed(tracks) {
             let owner = owner(&self.owners, track, &others);
             if let Some(actor) = owner {
-                self.owners.retain(|entry| entry.id != track.id);
-                self.owners.push(TrackOwner { id: track.id, actor });
+                note_owner(&mut self.owners, TrackOwner { id: track.id, actor });
             } else if track.class.vehicle() > 0.5 && !self.false_ids.contains(&track.id) {
                 self.false_ids.push(track.id);
             }
@@ -153,6 +198,12 @@ fn owner(owners: &[TrackOwner], track: &Track, others: &[OtherVehicle]) -> Optio
     }
     let nearest = others.iter().min_by(|a, b| face_distance_m(track, a).total_cmp(&face_distance_m(track, b)));
     nearest.filter(|other| face_distance_m(track, other) <= MATCH_DISTANCE_M).map(|other| other.actor)
+}
+
+/// Notes the vehicle that a track is matched with, in place of an earlier one.
+fn note_owner(owners: &mut Vec<TrackOwner>, owner: TrackOwner) {
+    owners.retain(|entry| entry.id != owner.id);
+    owners.push(owner);
 }
 
 /// Returns the rear tracks that a controller may act on.

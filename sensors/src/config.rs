@@ -2,19 +2,26 @@
 //! model.
 
 use crate::tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
-use closecall_traffic::{Check, Choice, ConfigError, Parameters, Problem};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
+use crate::external::{
+    BUILT_IN, DEFAULT_IMAGE_STEP, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, OutsideCamera,
+    PerceptionProgram, ProgramChecks, ProgramSettings, check_program,
+};
 use crate::faults::{ActingSensors, Faults, OdometryErrors, StatedFault};
 use crate::image_detector::ImageDetector;
-use crate::lidar::{ClusteringCheck, ClusteringMethod, FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
+use crate::lidar::{ClusteringCheck, ClusteringMethod, ClusteringModel, FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
     Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
     ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, SensorError, TrackerConfig,
 };
+
+/// Default number of core points of DBSCAN, that of `ClusteredPoints::CORE_POINTS`.
+const DEFAULT_CORE_POINTS: u8 = 3;
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).
 const MIN_LIDAR_HEIGHT_M: f64 = 0.1;
@@ -54,6 +61,33 @@ pub struct SensorsConfig {
     /// clusters are the same.
     #[serde(skip_serializing_if = "is_default_method")]
     pub clustering: Choice<ClusteringMethod>,
+    /// Factor of the radii of DBSCAN, 0.4 to 2.5. With 1 they are 0.8 m along and 0.5 m across the
+    /// road at the sensor, and 2.3 m and 1 m at 100 m. Default: 1.
+    #[serde(skip_serializing_if = "is_one")]
+    pub cluster_radius: Num,
+    /// Number of points within the radius, the point itself included, that make a core point of
+    /// DBSCAN: 2 to 20. Default: 3.
+    #[serde(skip_serializing_if = "is_default_core_points")]
+    pub cluster_core_points: u8,
+    /// What processes the scans of the rear LiDARs in mode `full`: `built-in` by default, or
+    /// `exec:COMMAND`, a program that answers detections or tracks. The file then runs a program:
+    /// read a file of somebody else before you run it.
+    #[serde(skip_serializing_if = "is_built_in")]
+    pub perception: String,
+    /// Time limit of each answer of that program (ms). The first may take 10 s. Default: 1000.
+    #[serde(skip_serializing_if = "is_default_timeout")]
+    pub perception_timeout_ms: u64,
+    /// Memory limit of that program and its descendants (MiB). Default: 1024.
+    #[serde(skip_serializing_if = "is_default_memory")]
+    pub perception_memory_mib: u64,
+    /// Images of the rear camera that the program gets per second (Hz): 0 to 25. An image comes with
+    /// the first scan that is due. Default: 0, none.
+    #[serde(skip_serializing_if = "is_none")]
+    pub perception_image_hz: Num,
+    /// Distance of the columns and rows of 1280 × 800 pixels that such an image has (px): 1 to 8.
+    /// Default: 2, 640 × 400 pixels.
+    #[serde(skip_serializing_if = "is_default_step")]
+    pub perception_image_step: u8,
     /// The radar that looks ahead.
     pub front_radar: ObjectSensorConfig,
     /// The short-range sensors around the ego.
@@ -76,6 +110,38 @@ pub struct SensorsConfig {
     pub tracker: TrackerConfig,
 }
 
+fn is_none(rate: &Num) -> bool {
+    *rate == Num::Fixed(0.0)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default_step(step: &u8) -> bool {
+    *step == DEFAULT_IMAGE_STEP
+}
+
+fn is_one(factor: &Num) -> bool {
+    *factor == Num::Fixed(1.0)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default_core_points(points: &u8) -> bool {
+    *points == DEFAULT_CORE_POINTS
+}
+
+fn is_built_in(perception: &str) -> bool {
+    perception == BUILT_IN
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default_timeout(timeout_ms: &u64) -> bool {
+    *timeout_ms == DEFAULT_PROGRAM_TIMEOUT_MS
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default_memory(memory_mib: &u64) -> bool {
+    *memory_mib == DEFAULT_PROGRAM_MEMORY_MIB
+}
+
 fn is_default_method(method: &Choice<ClusteringMethod>) -> bool {
     *method == Choice::Fixed(ClusteringMethod::default())
 }
@@ -85,6 +151,13 @@ impl Default for SensorsConfig {
         Self {
             mode: Choice::Fixed(SensorMode::default()),
             clustering: Choice::Fixed(ClusteringMethod::default()),
+            cluster_radius: Num::Fixed(1.0),
+            cluster_core_points: DEFAULT_CORE_POINTS,
+            perception: BUILT_IN.to_owned(),
+            perception_timeout_ms: DEFAULT_PROGRAM_TIMEOUT_MS,
+            perception_memory_mib: DEFAULT_PROGRAM_MEMORY_MIB,
+            perception_image_hz: Num::Fixed(0.0),
+            perception_image_step: DEFAULT_IMAGE_STEP,
             front_radar: ObjectSensorConfig::default(),
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
@@ -106,6 +179,7 @@ pub struct Sensors {
     rear_object: ObjectSensorModel,
     altered: Alterations,
     has_rear: bool,
+    program: Option<ProgramSettings>,
 }
 
 impl Check for SensorsConfig {
@@ -119,7 +193,16 @@ impl Check for SensorsConfig {
             None => None,
         };
         let additional_rear_lidars = self.check_additional([Some(rear_lidar), front_lidar], parameters)?;
-        let clustering = parameters.word(&self.clustering, "clustering")?;
+        let core_points = usize::from(self.cluster_core_points);
+        if !ClusteringModel::CORE_POINTS.contains(&core_points) {
+            let problem = Problem::WrongCount { value: core_points as u64, allowed: "a number from 2 to 20" };
+            return Err(ConfigError::new("cluster-core-points", problem));
+        }
+        let clustering = ClusteringModel {
+            method: parameters.word(&self.clustering, "clustering")?,
+            radius: parameters.number(&self.cluster_radius, "cluster-radius", ClusteringModel::RADII)?,
+            core_points,
+        };
         let sensors = Sensors {
             mode: parameters.word(&self.mode, "mode")?,
             full: FullModel {
@@ -134,12 +217,25 @@ impl Check for SensorsConfig {
             rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
             altered: Alterations::default(),
             has_rear: true,
+            program: self.check_program(parameters)?,
         };
+        sensors.check_program_in_mode()?;
         Ok(sensors.with_lidars(|lidar| Lidar { clustering, ..lidar }))
     }
 }
 
 impl SensorsConfig {
+    fn check_program(&self, parameters: &Parameters) -> Result<Option<ProgramSettings>, ConfigError> {
+        let image_hz = &self.perception_image_hz;
+        check_program(&ProgramChecks {
+            perception: &self.perception,
+            timeout_ms: self.perception_timeout_ms,
+            memory_mib: self.perception_memory_mib,
+            image_hz: parameters.number(image_hz, "perception-image-hz", Range::closed(0.0, 25.0))?,
+            image_step: self.perception_image_step,
+        })
+    }
+
     /// Checks the further rear LiDARs, whose names must differ from the names of the `configured`
     /// LiDARs.
     fn check_additional(
@@ -181,6 +277,36 @@ impl Sensors {
     /// Returns the level of detail at which the sensors are simulated.
     pub fn mode(&self) -> SensorMode {
         self.mode
+    }
+
+    /// Returns the program that perceives in place of the built-in chain, if there is one.
+    pub fn program(&self) -> Option<ProgramSettings> {
+        self.program
+    }
+
+    /// Returns the program that a run starts: there is none if the sensors that look back are not
+    /// simulated, or if an intervention replaces their boxes by the truth.
+    pub fn running_program(&self) -> Option<ProgramSettings> {
+        let is_asked = self.mode == SensorMode::Full && self.has_rear && !self.altered.has_true_clusters;
+        self.program.filter(|_| is_asked)
+    }
+
+    /// Returns the same sensors, whose program runs in the folder.
+    #[must_use]
+    pub fn with_program_in(self, folder: &str) -> Self {
+        Self { program: self.program.map(|program| program.in_folder(folder)), ..self }
+    }
+
+    /// Refuses a program in a mode in which it is not asked: the runs would pass for runs with it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] at `perception`.
+    pub fn check_program_in_mode(&self) -> Result<(), ConfigError> {
+        if self.program.is_none() || self.mode == SensorMode::Full {
+            return Ok(());
+        }
+        let rule = "a program perceives in mode `full` only, in which there are scans".to_owned();
+        Err(ConfigError::new("perception", Problem::Contradiction { other: "mode", rule }))
     }
 
     /// Returns the model of the rear camera, which exists in every mode.
@@ -345,6 +471,27 @@ impl Sensors {
     /// # Errors
     /// Returns [`SensorError`] if a model cannot be set up.
     pub fn build(&self, key: &NoiseKey) -> Result<Box<dyn Perception>, SensorError> {
+        match self.running_program() {
+            None => self.build_with(key, None),
+            // The built-in chain would pass for the program.
+            Some(program) => Err(SensorError::Program {
+                program: program.name(),
+                reason: "only a run starts a program".to_owned(),
+                is_late: false,
+                time: Time::ZERO,
+            }),
+        }
+    }
+
+    /// Does the same as [`Self::build`] with the program that [`Self::running_program`] names.
+    ///
+    /// # Errors
+    /// Returns [`SensorError`] if a model cannot be set up.
+    pub fn build_with(
+        &self,
+        key: &NoiseKey,
+        program: Option<Box<dyn PerceptionProgram>>,
+    ) -> Result<Box<dyn Perception>, SensorError> {
         Ok(match self.mode {
             SensorMode::GroundTruth => Box::new(GroundTruth::new()),
             SensorMode::Object => {
@@ -357,6 +504,10 @@ impl Sensors {
                 if !self.has_rear {
                     return Ok(Box::new(perception.without_rear()));
                 }
+                let faults = self.altered.faults.rear_camera;
+                let images = self.program.and_then(|program| program.images);
+                let camera = images.map(|images| OutsideCamera::new(self.camera, images, key, faults));
+                let perception = perception.with_program(program, camera);
                 match (self.altered.classifier(), self.camera.pipeline) {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),
@@ -403,12 +554,19 @@ mod tests {
     fn the_clustering_applies_to_all_lidars() {
         let method = |text: &str| -> Vec<ClusteringMethod> {
             let full = check(text).unwrap().full_model();
-            full.rear_lidars().chain(full.front_lidar).map(|lidar| lidar.clustering).collect()
+            full.rear_lidars().chain(full.front_lidar).map(|lidar| lidar.clustering.method).collect()
         };
         assert_eq!(method(""), [ClusteringMethod::Grid]);
         let several = "clustering = \"linfa\"\nfront-lidar = {}\nadditional-rear-lidars = [{ name = \"left\" }]";
         assert_eq!(method(several), [ClusteringMethod::Linfa; 3]);
         assert!(toml::from_str::<SensorsConfig>("clustering = \"k-means\"").is_err());
+        let model = |text: &str| check(text).unwrap().full_model().rear_lidar.clustering;
+        assert_eq!(model(""), ClusteringModel::default());
+        let other = model("cluster-radius = 1.5\ncluster-core-points = 2");
+        assert_eq!((other.radius, other.core_points), (1.5, 2));
+        let refused = |text: &str| check(text).unwrap_err().to_string();
+        assert!(refused("cluster-core-points = 1").starts_with("`cluster-core-points` is 1, but"));
+        assert!(refused("cluster-radius = 3").starts_with("`cluster-radius` is 3, but"));
     }
 
     #[test]

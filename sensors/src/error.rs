@@ -24,6 +24,18 @@ pub enum SensorError {
         /// End of the scan.
         time: Time,
     },
+    /// A perception program did not give a valid answer. It has been ended.
+    #[error("failed to perceive at {time}: `{program}`: {reason}")]
+    Program {
+        /// The program, as the scenario names it.
+        program: String,
+        /// What is wrong, with the field of the answer.
+        reason: String,
+        /// Whether the wall clock caused the error.
+        is_late: bool,
+        /// The time of the question.
+        time: Time,
+    },
     /// The classifier could not be loaded or run.
     #[error("failed to classify: {reason}")]
     Classifier {

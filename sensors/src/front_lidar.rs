@@ -17,7 +17,7 @@ use crate::half_turn::{HalfTurn, turn_back};
 use crate::lidar::Lidar;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::NoiseKey;
-use crate::perception::MountedLidar;
+use crate::perception::{MountedLidar, UsedBox};
 use crate::{Alterations, Health, Scene, SceneVehicle, SensorError};
 
 /// The front LiDAR with its processing.
@@ -63,6 +63,11 @@ impl FrontLidar {
     /// Returns the sensor with its latest scan, in the turned frame.
     pub(crate) fn lidar(&self) -> impl Iterator<Item = MountedLidar<'_>> {
         self.chain.lidars().map(|lidar| MountedLidar { looks_ahead: true, ..lidar })
+    }
+
+    /// Returns what the tracker has made of boxes in the latest step.
+    pub(crate) fn used_boxes(&self) -> impl Iterator<Item = UsedBox> {
+        self.chain.used_boxes()
     }
 
     /// Returns the health of the sensor.

@@ -5,16 +5,17 @@
 //! ([`crate::faults`]).
 
 use crate::tracking::{TrackList, TrackerModel};
-use closecall_traffic::Track;
+use closecall_traffic::{CONTROL_STEP, Time, Track};
 
 use crate::detection_classifier::DetectionClassifier;
+use crate::external::{Outside, OutsideCamera, PerceptionProgram};
 use crate::faults::{Belief, Faults};
 use crate::front_lidar::FrontLidar;
 use crate::lidar::Lidar;
 use crate::lidar_chain::MAX_ADDITIONAL_LIDARS;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
-use crate::perception::{FieldOfView, MountedLidar};
+use crate::perception::{FieldOfView, MountedLidar, UsedBox};
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Alterations, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
 
@@ -55,6 +56,9 @@ pub struct FullPerception {
     rear: Option<LidarChain>,
     belief: Belief,
     classifier: Option<Box<dyn DetectionClassifier>>,
+    /// The program that perceives in place of the chain of the sensors that look back.
+    outside: Option<Outside>,
+    model: FullModel,
     altered: Alterations,
     others: Vec<OtherVehicle>,
     list: TrackList,
@@ -70,6 +74,8 @@ impl FullPerception {
             rear: Some(LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"])),
             belief: Belief::default(),
             classifier: None,
+            outside: None,
+            model: *model,
             altered: Alterations::default(),
             others: Vec::new(),
             list: TrackList::with_capacity(RESERVED_TRACKS),
@@ -80,6 +86,19 @@ impl FullPerception {
     #[must_use]
     pub fn with_classifier(self, classifier: Box<dyn DetectionClassifier>) -> Self {
         Self { classifier: Some(classifier), ..self }
+    }
+
+    /// Returns the same sensors, whose scans behind the program processes in place of the built-in
+    /// chain.
+    #[must_use]
+    pub(crate) fn with_program(
+        self,
+        program: Option<Box<dyn PerceptionProgram>>,
+        camera: Option<OutsideCamera>,
+    ) -> Self {
+        let latency_s = self.model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
+        let lidars = self.model.rear_lidars();
+        Self { outside: program.map(|program| Outside::new(program, lidars.collect(), camera, latency_s)), ..self }
     }
 
     /// Returns the same sensors without the sensors that look back.
@@ -119,7 +138,13 @@ impl FullPerception {
         self.surround.scan(&input, &mut self.list);
         if let Some(rear) = &mut self.rear {
             let seen = Seen { scene, believed, others: &self.others, altered: &self.altered };
-            rear.detect(seen, self.classifier.as_mut())?;
+            match &mut self.outside {
+                None => rear.detect(seen, self.classifier.as_mut())?,
+                Some(outside) => {
+                    rear.ask(seen, self.classifier.as_mut(), outside)?;
+                    outside.report(rear.step(), believed, &frame, &mut self.list);
+                }
+            }
             rear.update_tracker(-0.5 * scene.ego.vehicle.dimensions.length_m, &mut self.list);
             rear.report(scene.time, &frame, &mut self.list);
         }
@@ -146,6 +171,10 @@ impl Perception for FullPerception {
         result.map(|()| &*self.list.tracks)
     }
 
+    fn finish(&mut self, time: Time) -> Result<(), SensorError> {
+        self.outside.as_mut().map_or(Ok(()), |outside| outside.finish(time))
+    }
+
     fn health(&self) -> SensorHealth {
         let front = self.front_lidar.as_ref().map_or_else(|| self.front.health(), FrontLidar::health);
         SensorHealth { front, surround: self.surround.health(), rear: self.rear_health() }
@@ -157,6 +186,11 @@ impl Perception for FullPerception {
             .flat_map(FrontLidar::lidar)
             .chain(self.rear.iter().flat_map(LidarChain::lidars))
             .collect()
+    }
+
+    fn used_boxes(&self) -> Vec<UsedBox> {
+        let front = self.front_lidar.iter().flat_map(FrontLidar::used_boxes);
+        front.chain(self.rear.iter().flat_map(LidarChain::used_boxes)).collect()
     }
 
     fn rear_image(&self) -> Option<&RearImage> {

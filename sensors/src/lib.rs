@@ -14,6 +14,7 @@ mod config;
 pub mod datasets;
 mod detection_classifier;
 mod error;
+pub mod external;
 pub mod faults;
 mod front_lidar;
 mod full;
@@ -33,9 +34,11 @@ mod tests;
 pub mod tracking;
 mod worker_classifier;
 
-pub use crate::tracking::{Detection, Extent, SeenBy, SeenPart, TrackerConfig, TrackerModel};
+pub use crate::tracking::{
+    BoxRole, BoxUse, Detection, Extent, Innovation, SeenBy, SeenPart, TrackerConfig, TrackerModel,
+};
 pub use alterations::Alterations;
-pub use audit::{NEES_QUANTILE_95, TrackAudit};
+pub use audit::{NEES_QUANTILE_95, TrackAudit, TrackMatch, TrackMatcher};
 pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use detection_classifier::DetectionClassifier;
@@ -47,5 +50,5 @@ pub use object::{
     ByClass, Chain, ErrorGrid, ErrorGrids, FitError, FittedErrors, NamedGrid, NoiseKey, ObjectPerception,
     ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
-pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth};
+pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth, UsedBox};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -19,16 +19,17 @@
 //! other sensors. The alternative, one cloud of all points (the concatenation of Autoware), gives
 //! denser clusters where fields of view overlap.
 
-use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
+use crate::tracking::{BoxUse, RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use closecall_traffic::Time;
 use closecall_traffic::ego_frame::EgoFrame;
 
+use crate::external::{Outside, PerceptionAnswer};
 use crate::faults::{FaultList, LidarFault};
 
 use crate::detection_classifier::DetectionClassifier;
-use crate::lidar::Lidar;
+use crate::lidar::{Lidar, RESERVED_CLUSTERS};
 use crate::object::NoiseKey;
-use crate::perception::{FieldOfView, MountedLidar};
+use crate::perception::{FieldOfView, MountedLidar, UsedBox};
 use crate::surroundings::OtherVehicle;
 use crate::{Alterations, Detection, Health, Scene, SensorError};
 
@@ -65,6 +66,8 @@ pub(crate) struct LidarChain {
     scans: Vec<(usize, NewScan)>,
     /// The detections of several scans.
     all: Vec<Detection>,
+    /// What the tracker has made of the boxes in this step, each with the number of its scan.
+    uses: Vec<(u64, BoxUse)>,
 }
 
 impl LidarChain {
@@ -92,6 +95,7 @@ impl LidarChain {
             tracker: Tracker::new(tracker.with_scan_period_s(period_s)),
             scans: Vec::with_capacity(MAX_LIDARS),
             all: Vec::new(),
+            uses: Vec::with_capacity(RESERVED_CLUSTERS),
         }
     }
 
@@ -119,7 +123,69 @@ impl LidarChain {
                 scans.push((index, sensor.scan(&seen)?));
             }
         }
-        match (classifier, &mut scans[..]) {
+        self.classify(&seen, classifier, &mut scans)?;
+        self.push(&seen, scans);
+        Ok(())
+    }
+
+    /// Scans the scene as [`Self::detect`] does, and lets a program process the scans. Its
+    /// detections take the place of boxes; its tracks are kept until they are due.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a model or the program fails.
+    pub(crate) fn ask(
+        &mut self,
+        seen: Seen<'_>,
+        classifier: Option<&mut Box<dyn DetectionClassifier>>,
+        outside: &mut Outside,
+    ) -> Result<(), SensorError> {
+        let mut scans = std::mem::take(&mut self.scans);
+        let mut arrived = Vec::with_capacity(self.sensors.len());
+        for (index, sensor) in self.sensors.iter_mut().enumerate() {
+            if sensor.is_due(seen.scene.time) {
+                let new = sensor.scan_only(&seen);
+                if !new.is_missing() {
+                    arrived.push(sensor.outside_scan());
+                }
+                scans.push((index, new));
+            }
+        }
+        if !scans.is_empty() {
+            match outside.ask([seen.scene, seen.believed], &arrived)? {
+                PerceptionAnswer::Detections(detections) => {
+                    // The boxes belong to no LiDAR alone. They come with the first scan that has arrived.
+                    let first = scans.iter().position(|(_, scan)| !scan.is_missing()).unwrap_or(0);
+                    scans[first].1.detections.extend(detections);
+                    self.classify(&seen, classifier, &mut scans)?;
+                }
+                PerceptionAnswer::Tracks(tracks) => {
+                    let late_steps = scans.iter().map(|(_, scan)| scan.late_steps).max().unwrap_or(0);
+                    let offset = scans.iter().find(|(_, scan)| !scan.is_missing()).map(|(_, scan)| scan.clock_offset());
+                    let step = self.step + self.latency_steps as u64 + late_steps;
+                    outside.keep(seen.believed, offset.unwrap_or(Time::ZERO), tracks, step);
+                    for (index, scan) in scans.drain(..) {
+                        self.sensors[index].recycle(scan);
+                    }
+                }
+            }
+        }
+        self.push(&seen, scans);
+        Ok(())
+    }
+
+    /// Returns the number of the next step.
+    pub(crate) fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Lets the classifier see the boxes of all scans at once.
+    fn classify(
+        &mut self,
+        seen: &Seen<'_>,
+        classifier: Option<&mut Box<dyn DetectionClassifier>>,
+        scans: &mut [(usize, NewScan)],
+    ) -> Result<(), SensorError> {
+        match (classifier, scans) {
             (None, _) | (_, []) => {}
             (Some(classifier), [(_, scan)]) => {
                 classifier.classify(seen.scene, &mut scan.detections)?;
@@ -139,25 +205,32 @@ impl LidarChain {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Appends scans to the queues of their sensors, and keeps the memory of the list.
+    fn push(&mut self, seen: &Seen<'_>, mut scans: Vec<(usize, NewScan)>) {
         for (index, scan) in scans.drain(..) {
-            self.sensors[index].push(scan, self.step + self.latency_steps as u64, &seen);
+            self.sensors[index].push(scan, self.step + self.latency_steps as u64, seen);
         }
         self.scans = scans;
-        Ok(())
     }
 
     /// Passes the scans whose latency has elapsed to the tracker: one of each sensor in each step,
     /// if no fault delays them. `rear_x_m` is the position of the ego's rear end (m).
     pub(crate) fn update_tracker(&mut self, rear_x_m: f64, list: &mut TrackList) {
+        self.uses.clear();
         while let Some(time) = self.earliest_due() {
             let mut idle: [Option<RearView>; MAX_LIDARS] = [None; MAX_LIDARS];
             let mut due: [Option<TrackerScan<'_>>; MAX_LIDARS] = [None; MAX_LIDARS];
+            let mut numbers = [0; MAX_LIDARS];
             for (number, ((sensor, due), idle)) in self.sensors.iter_mut().zip(&mut due).zip(&mut idle).enumerate() {
                 let view = sensor.view(rear_x_m);
                 let next = sensor.pending.iter_mut().find(|scan| !scan.is_processed && scan.due_step <= self.step);
                 match next.filter(|scan| scan.time == time) {
                     Some(scan) => {
                         scan.is_processed = true;
+                        numbers[number] = scan.number;
                         let range_m = if scan.is_missing { 0.0 } else { view.range_m };
                         *due = Some(TrackerScan {
                             sensor: number,
@@ -173,6 +246,7 @@ impl LidarChain {
                 }
             }
             self.tracker.update_together(due.into_iter().flatten(), idle.into_iter().flatten(), list);
+            self.uses.extend(self.tracker.uses().iter().map(|used| (numbers[used.sensor], *used)));
         }
         self.step += 1;
     }
@@ -196,9 +270,18 @@ impl LidarChain {
         self.sensors.iter().map(|sensor| MountedLidar {
             name: sensor.model.name(),
             looks_ahead: false,
+            scan: sensor.scans.saturating_sub(1),
             lidar: &sensor.lidar,
             detections: sensor.detections(),
         })
+    }
+
+    /// Returns what the tracker has made of the boxes in this step.
+    pub(crate) fn used_boxes(&self) -> impl Iterator<Item = UsedBox> {
+        let of_sensor = |used: &BoxUse| self.sensors.get(used.sensor).map(|sensor| sensor.model.name());
+        self.uses
+            .iter()
+            .filter_map(move |(scan, used)| Some(UsedBox { sensor: of_sensor(used)?, scan: *scan, used: *used }))
     }
 
     /// Returns the fields of view.

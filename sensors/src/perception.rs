@@ -1,7 +1,7 @@
 //! The interface between the sensors and the simulation loop.
 
 use crate::camera::Instance;
-use crate::tracking::RearView;
+use crate::tracking::{BoxUse, RearView};
 use closecall_traffic::{Time, Track};
 
 use crate::error::SensorError;
@@ -74,11 +74,24 @@ pub struct MountedLidar<'a> {
     /// Whether it looks ahead. Its points and boxes are then in the frame of an ego that is turned
     /// by half a turn: x and y have the opposite sign.
     pub looks_ahead: bool,
+    /// Number of its latest scan.
+    pub scan: u64,
     /// The sensor with its latest points and boxes.
     pub lidar: &'a RearLidar,
     /// The boxes of the latest scan, with the camera's class scores if a camera has classified
     /// them.
     pub detections: &'a [Detection],
+}
+
+/// What the tracker has made of one box, which may be a box of an earlier scan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UsedBox {
+    /// Name of the sensor.
+    pub sensor: &'static str,
+    /// Number of its scan, as [`MountedLidar::scan`] counts them.
+    pub scan: u64,
+    /// What has become of the box.
+    pub used: BoxUse,
 }
 
 /// The latest image that a network has evaluated as a whole, for display.
@@ -104,12 +117,26 @@ pub trait Perception: Send {
     /// result.
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError>;
 
+    /// Ends the sensors after the last step of a run.
+    ///
+    /// # Errors
+    /// Returns [`SensorError::Program`] if a perception program has written more than its answers.
+    fn finish(&mut self, _time: Time) -> Result<(), SensorError> {
+        Ok(())
+    }
+
     /// Returns the health of the sensors after the latest step.
     fn health(&self) -> SensorHealth;
 
     /// Returns the LiDARs with their latest points and boxes: the LiDAR that looks ahead, then the
     /// LiDARs that look back in the order of the scenario. Returns none if none are simulated.
     fn lidars(&self) -> Vec<MountedLidar<'_>> {
+        Vec::new()
+    }
+
+    /// Returns what the trackers have made of boxes in the latest step. Returns nothing if no boxes
+    /// are tracked.
+    fn used_boxes(&self) -> Vec<UsedBox> {
         Vec::new()
     }
 

@@ -6,6 +6,7 @@
 //! ```
 //!
 //! * [`controller`]: the controllers that can drive the ego vehicle, built in or as a separate process
+//! * [`perception`]: a perception of the user's own, as a separate process
 //! * [`run`](mod@run): the closed loop, and the observers of a run
 //! * [`calibration`]: car-following models fitted to recorded pairs
 //! * [`trajectories`]: simulated traffic as trajectory data
@@ -15,6 +16,7 @@
 
 pub mod calibration;
 pub mod controller;
+pub mod perception;
 pub mod run;
 pub mod trajectories;
 mod world;

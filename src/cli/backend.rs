@@ -56,6 +56,15 @@ fn try_to_load(library: &Path, backend: &Backend) -> Result<(), ClassifierError>
     }
 }
 
+/// Loads the networks of the scenario's own that classify crops, if there are any, and the Mask R-CNN of each camera.
+pub(super) fn check_networks<'a>(
+    files: impl IntoIterator<Item = &'a str>,
+    cameras: impl IntoIterator<Item = &'a CameraConfig>,
+) -> Result<(), CliError> {
+    files.into_iter().try_for_each(|file| Classifier::of(Some(file), inference_backend()).map(drop))?;
+    check_cameras(cameras)
+}
+
 /// Loads the Mask R-CNN of each camera.
 pub(super) fn check_cameras<'a>(cameras: impl IntoIterator<Item = &'a CameraConfig>) -> Result<(), CliError> {
     cameras.into_iter().try_for_each(|camera| Ok(camera.check_network(inference_backend())?))
@@ -71,10 +80,13 @@ pub(super) fn check_backend_of(scenario: &Scenario, arms: &[Arm]) -> Result<(), 
     check_backend(is_used)
 }
 
-/// Loads the Mask R-CNN of a camera that has that pipeline.
+/// Loads the network that the pipeline of a camera needs, if it is not the one that ships for crops.
 pub(super) fn check_camera(camera: &Camera) -> Result<(), CliError> {
     if camera.pipeline == Pipeline::MaskRcnn {
         camera.mask_rcnn.detector(inference_backend())?;
+    }
+    if camera.pipeline == Pipeline::CropClassifier && camera.model.is_some() {
+        Classifier::of(camera.model, inference_backend())?;
     }
     Ok(())
 }

@@ -42,7 +42,7 @@ use super::actions::command_for;
 use super::advice::after_verdict;
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs, tuned};
-use super::backend::{check_backend, check_cameras};
+use super::backend::{check_backend, check_networks};
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
@@ -395,7 +395,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
 pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) -> Result<ExitCode, CliError> {
     let Planned { plan, gates, .. } = planned;
     check_backend(plan.uses_classifier())?;
-    check_cameras(plan.mask_rcnn_cameras())?;
+    check_networks(plan.crop_networks(), plan.mask_rcnn_cameras())?;
     let replaceable = planned.results.place()? == Place::Default;
     let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
     campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;

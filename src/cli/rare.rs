@@ -28,7 +28,7 @@ use serde_json::{Value, json};
 use super::CliError;
 use super::actions::{command_for, quoted};
 use super::args::Format;
-use super::backend::{check_backend, check_cameras};
+use super::backend::{check_backend, check_networks};
 use super::campaign::progress_bar;
 use super::help::heading;
 use super::output::{heartbeat, out, outln, print_error, print_written};
@@ -149,7 +149,7 @@ impl Rare<'_> {
             check_event(nearness.expression(), work, self.gate.is_some())?;
         }
         check_backend(plan.uses_classifier())?;
-        check_cameras(plan.mask_rcnn_cameras())?;
+        check_networks(plan.crop_networks(), plan.mask_rcnn_cameras())?;
         let goal = Goal {
             relative_width: self.args.relative_width.unwrap_or(RELATIVE_WIDTH),
             budget: self.budget.unwrap_or(BUDGET),

@@ -10,6 +10,7 @@ use closecall_scenarios::causal::causal_sentence;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, Setting};
+use closecall_simulation::perception::try_program;
 use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
@@ -62,6 +63,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
         isolated.check_variables(&scenario, None)?;
     }
     arms.iter().filter_map(|arm| arm.sensors).try_for_each(|mode| file.check_faults_in(mode))?;
+    scenario.sensors.program().as_ref().map_or(Ok(()), try_program)?;
     let outcomes = run_watched(&scenario, key, &arms, (&args.watch, file.settings()))?;
     print((&scenario, &arms), &outcomes, args.format, file.settings());
     Ok(ExitCode::Pass)

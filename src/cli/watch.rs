@@ -9,7 +9,7 @@ use closecall_report::exchange::OsiRecorder;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
-use closecall_report::tables::RunTables;
+use closecall_report::tables::{RunTables, TableFiles};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, Setting};
 use closecall_simulation::{Arm, RunKey};
@@ -58,6 +58,12 @@ pub(super) struct WatchArgs {
     /// Write every return of the LiDARs (mode `full`) of the same run: a table with beam, range, position, intensity, time, box and truth, or a new folder with a point cloud for each scan
     #[arg(long, value_name = "FILE.parquet|FOLDER.pcd", help_heading = heading::OUTPUT)]
     pub(super) scans: Option<PathBuf>,
+    /// Write the tracks of the same run: a table with one row per control step and track, with state, covariance, class, and the vehicle that it is matched with
+    #[arg(long, value_name = "FILE.parquet", help_heading = heading::OUTPUT)]
+    pub(super) tracks: Option<PathBuf>,
+    /// Write the clusters and boxes of the LiDARs (mode `full`) of the same run before any is rejected: a table with what the tracker has made of each
+    #[arg(long, value_name = "FILE.parquet", help_heading = heading::OUTPUT)]
+    pub(super) clusters: Option<PathBuf>,
     /// Write the same run as messages of ASAM OSI 3.8, `GroundTruth` and `SensorData` of each control step: one MCAP file with the map, or a
     /// trace file for each type, whose name begins with date and type and ends with that of FILE
     #[arg(long, value_name = "FILE.mcap|FILE.osi", value_parser = osi_file, help_heading = heading::OUTPUT)]
@@ -79,13 +85,25 @@ fn osi_file(text: &str) -> Result<PathBuf, String> {
 
 impl WatchArgs {
     /// Returns the files to write.
-    pub(super) fn outputs(&self) -> [Output<'_>; 4] {
+    pub(super) fn outputs(&self) -> [Output<'_>; 6] {
         [
             ("--record", self.record.as_deref()),
             ("--trace", self.trace.as_deref()),
             ("--scans", self.scans.as_deref()),
+            ("--tracks", self.tracks.as_deref()),
+            ("--clusters", self.clusters.as_deref()),
             ("--osi", self.osi.as_deref()),
         ]
+    }
+
+    /// Returns the tables to write.
+    fn tables(&self) -> TableFiles<'_> {
+        TableFiles {
+            trace: self.trace.as_deref(),
+            scans: self.scans.as_deref(),
+            tracks: self.tracks.as_deref(),
+            clusters: self.clusters.as_deref(),
+        }
     }
 }
 
@@ -127,7 +145,7 @@ fn run(
 ) -> Result<(Vec<Outcome>, Vec<Film>), CliError> {
     watch.record.as_deref().map(check_recording_possible).transpose()?;
     check_backend_of(scenario, arms)?;
-    let mut tables = RunTables::new((scenario, arms.last()), watch.trace.as_deref(), watch.scans.as_deref())?;
+    let mut tables = RunTables::new((scenario, arms.last()), watch.tables())?;
     let mut osi = watch.osi.as_ref().map(|_| OsiRecorder::new(scenario, watch.osi_lanes));
     let (mut films, mut outcomes) = (Vec::new(), Vec::new());
     for (index, arm) in arms.iter().enumerate() {

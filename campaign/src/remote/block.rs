@@ -69,7 +69,7 @@ impl BlockRunner {
             RemoteError::Folder(FolderError::Content { path, line: 1, message })
         };
         let sample_timeout = Duration::try_from_secs_f64(sent.sample_timeout_s).map_err(too_long)?;
-        let files = works.iter().map(|work| work.file.clone()).collect();
+        let files: Vec<_> = works.iter().map(|work| work.file.clone()).collect();
         sent.arms.iter().try_for_each(|arm| arm.try_in(local.controller_folder()))?;
         let mut plan = Plan::new_in(local.controller_folder(), files, sent.sampling, sent.arms.clone())?;
         plan.use_sensors(sent.sensors).map_err(SavedError::from)?;

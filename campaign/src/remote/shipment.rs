@@ -8,7 +8,7 @@ use closecall_simulation::controller::ControllerChoice;
 use tempfile::TempDir;
 
 use super::error::RemoteError;
-use crate::fingerprint::named_files;
+use crate::fingerprint::{exec_settings, named_files};
 use crate::manifest::Manifest;
 
 /// The data that a machine needs to run blocks of a campaign.
@@ -43,7 +43,9 @@ impl Shipment {
     pub fn of(manifest: &Manifest) -> Result<Self, RemoteError> {
         let hosted = |arm: &&ControllerChoice| matches!(arm, ControllerChoice::Hosted(_));
         let mut files: Vec<ShippedFile> = Vec::new();
-        for (name, path) in manifest.arms.iter().flat_map(named) {
+        let programs = manifest.programs();
+        let of_programs = programs.iter().flat_map(|program| named_files(&exec_settings(program), None));
+        for (name, path) in manifest.arms.iter().flat_map(named).chain(of_programs) {
             // A program that was found by the search path, or has an absolute path, is a matter of each machine.
             if is_within(&name) && Path::new(&name) == path && files.iter().all(|file| file.name != name) {
                 let fail = |source| RemoteError::File { path: path.clone(), source };

@@ -144,7 +144,7 @@ mod tests {
         let checked = CheckedRun { scenario, key: RunKey { seed: 1, sample: 0 }, arm };
         let outcome = checked.run(scenario, arm).unwrap();
         assert_eq!(checked.check(&outcome).broken, []);
-        let planted = ClusteringCheck { core_points: ClusteredPoints::CORE_POINTS + 1 };
+        let planted = ClusteringCheck { core_points: Some(ClusteredPoints::CORE_POINTS + 1) };
         assert_eq!(checked.check_with(planted, &outcome).broken, [Invariance::Clustering]);
     }
 }

@@ -1,17 +1,23 @@
 //! The tables that one run leaves behind, as CSV or Parquet.
 //!
 //! ```text
-//!   StepView ─▶ TraceWriter   one row per control step and actor
-//!           └─▶ ScanWriter    one row per LiDAR return
+//!   StepView ─▶ TraceWriter    one row per control step and actor
+//!           ├─▶ ScanWriter     one row per LiDAR return
+//!           ├─▶ ClusterWriter  one row per cluster and box of a scan
+//!           └─▶ TrackWriter    one row per control step and track
 //! ```
 
+mod clusters;
 mod pcd;
 mod run_tables;
 mod scan_columns;
 mod scans;
 pub mod table;
 mod trace;
+mod tracks;
 
-pub use run_tables::RunTables;
+pub use clusters::{ClusterRecorder, ClusterWriter};
+pub use run_tables::{RunTables, TableFiles};
 pub use scans::ScanWriter;
 pub use trace::{TraceWriter, trace_batch};
+pub use tracks::{TrackRecorder, TrackWriter};

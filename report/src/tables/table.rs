@@ -47,6 +47,29 @@ pub fn required(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
     field(name, data_type, unit).with_nullable(false)
 }
 
+/// Checks that a path names a Parquet file.
+///
+/// # Errors
+/// [`WriteError`] with `message` if its extension is another.
+pub fn check_parquet(path: &Path, message: &'static str) -> Result<(), WriteError> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("parquet") => Ok(()),
+        _ => Err(WriteError::new(path, io::Error::new(io::ErrorKind::InvalidInput, message))),
+    }
+}
+
+/// Writes a record batch as a Parquet file.
+///
+/// # Errors
+/// [`WriteError`] if there is no batch, or if the file cannot be written. An existing file then stays as it is.
+pub fn write_batch(path: &Path, batch: impl FnOnce() -> io::Result<RecordBatch>) -> Result<(), WriteError> {
+    let batch = batch().map_err(|error| WriteError::new(path, error))?;
+    write_file(path, |file| {
+        let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties())).map_err(io::Error::other)?;
+        writer.write(&batch).and_then(|()| writer.close()).map(drop).map_err(io::Error::other)
+    })
+}
+
 /// A column of a small table.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {

@@ -93,10 +93,10 @@ pub enum ClassifierError {
         reason: String,
     },
     /// The output of the network is not four probabilities.
-    #[error(
-        "failed to read the answer of {SHIPPED_FILE}: {actual:?} in its tensor `{tensor}` are not four probabilities"
-    )]
+    #[error("failed to read the answer of {model}: {actual:?} in its tensor `{tensor}` are not four probabilities")]
     Answer {
+        /// The name of the network, or the path of its file.
+        model: String,
         /// The name of the output.
         tensor: String,
         /// The values that the network returned.
@@ -124,6 +124,8 @@ const SHIPPED_FILE: &str = "rear-classifier.onnx";
 pub struct Classifier {
     session: Session,
     planes: Vec<f32>,
+    /// The name of the network, or the path of its file.
+    name: String,
 }
 
 impl Classifier {
@@ -146,7 +148,28 @@ impl Classifier {
         let environment = environment(backend)?;
         let session = open_session(model, environment, backend)
             .map_err(|error| ClassifierError::Model { reason: error.to_string() })?;
-        Ok(Self { session, planes: vec![0.0; SAMPLES * CHANNELS] })
+        Ok(Self { session, planes: vec![0.0; SAMPLES * CHANNELS], name: SHIPPED_FILE.to_owned() })
+    }
+
+    /// Loads the network of a file, or the one that ships with Closecall, and evaluates a black crop.
+    ///
+    /// # Errors
+    /// Returns a [`ClassifierError`] with the path if the file cannot be read, or if its network has
+    /// another input, or another output than four probabilities.
+    pub fn of(file: Option<&str>, backend: &Backend) -> Result<Self, ClassifierError> {
+        let Some(path) = file else { return Self::shipped(backend) };
+        let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
+        let bytes = std::fs::read(path).map_err(|error| at(error.to_string()))?;
+        let classifier = Self::new(&bytes, backend).map_err(|error| match error {
+            ClassifierError::Model { reason } => at(reason),
+            other => other,
+        })?;
+        let mut classifier = Self { name: path.to_owned(), ..classifier };
+        classifier.classify(&Crop::default()).map_err(|error| match error {
+            ClassifierError::Run { reason } => at(reason),
+            other => other,
+        })?;
+        Ok(classifier)
     }
 
     /// Returns the class scores of a crop. The same crop always gives the same bits.
@@ -166,8 +189,10 @@ impl Classifier {
         clear_upper_parts();
         let outputs = outputs.map_err(run)?;
         let (_, output) = outputs[0].try_extract_tensor::<f32>().map_err(run)?;
-        let invalid =
-            |actual| ClassifierError::Answer { tensor: outputs.keys().next().unwrap_or("").to_owned(), actual };
+        let invalid = |actual| {
+            let (model, tensor) = (self.name.clone(), outputs.keys().next().unwrap_or("").to_owned());
+            ClassifierError::Answer { model, tensor, actual }
+        };
         scores_from(output).map_err(invalid)
     }
 }
@@ -244,6 +269,26 @@ mod tests {
     fn bytes_that_are_not_a_network_are_rejected() {
         let error = Classifier::new(b"no network", &Backend::Tract).unwrap_err();
         assert!(matches!(error, ClassifierError::Model { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_network_of_a_file_is_tried_and_a_wrong_file_is_named() {
+        let folder = std::env::temp_dir().join(format!("closecall-classifier-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+        let (good, bad) = (path("good.onnx"), path("bad.onnx"));
+        std::fs::write(&good, SHIPPED_MODEL).unwrap();
+        std::fs::write(&bad, &SHIPPED_MODEL[..SHIPPED_MODEL.len() / 2]).unwrap();
+        let crop = Crop::default();
+        let mut own = Classifier::of(Some(&good), &Backend::Tract).unwrap();
+        let mut shipped = Classifier::of(None, &Backend::Tract).unwrap();
+        assert_eq!(own.classify(&crop).unwrap(), shipped.classify(&crop).unwrap());
+        assert_eq!((own.name, shipped.name), (good, SHIPPED_FILE.to_owned()));
+        for wrong in [bad, path("none.onnx")] {
+            let error = Classifier::of(Some(&wrong), &Backend::Tract).unwrap_err();
+            assert!(matches!(&error, ClassifierError::Model { reason } if reason.starts_with(&wrong)), "{error}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

@@ -4,7 +4,7 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
+use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig, kept};
 use super::optics::{LensConfig, Optics};
 
 /// The processing of the camera's image.
@@ -43,6 +43,12 @@ impl Default for SunConfig {
 pub struct CameraConfig {
     /// Processing of the image.
     pub pipeline: Choice<Pipeline>,
+    /// ONNX file of another network for the pipeline `crop-classifier`, relative to the working
+    /// directory: it takes 1 × 3 × 32 × 32 pixel values from 0 to 255 (RGB), and returns the
+    /// probabilities of car, truck, motorcycle and background. Default: none; the one that ships with
+    /// Closecall.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
     /// The Mask R-CNN of the pipeline `mask-rcnn`.
     pub mask_rcnn: MaskRcnnConfig,
     /// Height of the lens above the ground (m).
@@ -75,6 +81,7 @@ impl Default for CameraConfig {
     fn default() -> Self {
         Self {
             pipeline: Choice::Fixed(Pipeline::CropClassifier),
+            model: None,
             mask_rcnn: MaskRcnnConfig::default(),
             mount_height_m: Num::Fixed(1.2),
             mount_from_rear_m: Num::Fixed(0.6),
@@ -104,6 +111,8 @@ pub struct Sun {
 pub struct Camera {
     /// Processing of the image.
     pub pipeline: Pipeline,
+    /// ONNX file of another network for the crops.
+    pub model: Option<&'static str>,
     /// The Mask R-CNN of the pipeline `mask-rcnn`.
     pub mask_rcnn: MaskRcnn,
     /// Height of the lens above the ground (m).
@@ -141,6 +150,7 @@ impl Check for CameraConfig {
         let sun = |error: ConfigError| error.within("sun");
         Ok(Camera {
             pipeline: parameters.word(&self.pipeline, "pipeline")?,
+            model: self.model.as_deref().map(kept),
             mask_rcnn: self.mask_rcnn.check(parameters).map_err(|error| error.within("mask-rcnn"))?,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", 0.4, 3.5)?,
             mount_from_rear_m: number(&self.mount_from_rear_m, "mount-from-rear-m", 0.0, 3.0)?,

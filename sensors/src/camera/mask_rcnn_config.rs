@@ -145,7 +145,7 @@ impl Check for MaskRcnnConfig {
 }
 
 /// Returns the same text, which is kept until the process ends. Each text is kept once.
-fn kept(text: &str) -> &'static str {
+pub(super) fn kept(text: &str) -> &'static str {
     static KEPT: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(interned) = all.get(text) {

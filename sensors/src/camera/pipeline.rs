@@ -43,12 +43,12 @@ pub struct CropClassifier {
 }
 
 impl CropClassifier {
-    /// Creates a camera with the network that ships with Closecall.
+    /// Creates a camera with the network that its configuration names.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] if the backend cannot be set up.
+    /// Returns the errors of [`Classifier::of`].
     pub fn new(camera: Camera, backend: &Backend) -> Result<Self, ClassifierError> {
-        let classifier = Classifier::shipped(backend)?;
+        let classifier = Classifier::of(camera.model, backend)?;
         Ok(Self {
             camera: RearCamera::new(camera),
             classifier,

@@ -28,6 +28,12 @@ impl Sampling {
         Self { columns: (0..i32::from(WIDTH_PX)).collect(), rows: (0..i32::from(HEIGHT_PX)).collect() }
     }
 
+    /// Returns every `step`-th column and row.
+    pub fn every(step: u8) -> Self {
+        let every = |size: u16| (0..i32::from(size)).step_by(usize::from(step.max(1))).collect();
+        Self { columns: every(WIDTH_PX), rows: every(HEIGHT_PX) }
+    }
+
     /// Reads columns and rows from whole numbers, separated by blanks.
     ///
     /// # Errors
@@ -63,6 +69,13 @@ impl Sampling {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_step_is_a_part_of_all() {
+        assert_eq!(Sampling::every(1), Sampling::all());
+        let second = Sampling::every(2);
+        assert_eq!((second.columns().len(), second.rows().len(), second.columns()[3]), (640, 400, 6));
+    }
 
     #[test]
     fn columns_and_rows_ascend_within_the_image() {

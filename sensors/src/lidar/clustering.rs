@@ -24,7 +24,9 @@
 //! neighbours in [`neighbours`](super::neighbours). Both give the same labels. A point that lies
 //! exactly at the radius is a neighbour.
 
-use closecall_traffic::{Time, maths};
+use std::ops::RangeInclusive;
+
+use closecall_traffic::{Range, Time, maths};
 use linfa::ParamGuard;
 use linfa::traits::Transformer;
 use linfa_clustering::Dbscan;
@@ -74,17 +76,34 @@ pub enum ClusteringMethod {
 }
 
 /// A second clustering of each scan by `linfa-clustering`, whose labels must be the same.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClusteringCheck {
-    /// Number of core points of the second clustering: [`ClusteredPoints::CORE_POINTS`], unless a
-    /// difference is planted.
-    pub core_points: usize,
+    /// Number of core points of the second clustering, if a difference is planted.
+    pub core_points: Option<usize>,
 }
 
-impl Default for ClusteringCheck {
+/// The parameters of DBSCAN.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClusteringModel {
+    /// The implementation.
+    pub(crate) method: ClusteringMethod,
+    /// Radius in the stretched plane: a factor of the radii along and across the road.
+    pub(crate) radius: f64,
+    /// Number of points within the radius, the point itself included, that make a core point.
+    pub(crate) core_points: usize,
+}
+
+impl Default for ClusteringModel {
     fn default() -> Self {
-        Self { core_points: CORE_POINTS }
+        Self { method: ClusteringMethod::default(), radius: RADIUS, core_points: CORE_POINTS }
     }
+}
+
+impl ClusteringModel {
+    /// Radii that the thinning allows: all points of a cell, whose diagonal is 0.28, are neighbours.
+    pub(crate) const RADII: Range = Range::closed(0.4, 2.5);
+    /// Numbers of core points that are allowed: `linfa-clustering` needs two.
+    pub(crate) const CORE_POINTS: RangeInclusive<usize> = 2..=20;
 }
 
 /// Label of a point that belongs to no cluster.
@@ -120,8 +139,8 @@ pub(crate) struct Clustering {
     pub(crate) labels: Vec<u32>,
     /// Number of clusters.
     pub(crate) count: usize,
-    /// For each cell, the number of candidates that were kept, at most [`CORE_POINTS`], and the row
-    /// of the latest.
+    /// For each cell, the number of candidates that were kept, at most as many as a core point needs,
+    /// and the row of the latest.
     cells: Vec<(u8, u32)>,
     /// Cell of each candidate.
     cell_of: Vec<u32>,
@@ -130,8 +149,8 @@ pub(crate) struct Clustering {
     row_of: Vec<u32>,
     /// Stretched coordinates of the candidates that were kept.
     rows: Vec<[f64; 2]>,
-    /// The implementation of DBSCAN.
-    pub(crate) method: ClusteringMethod,
+    /// The parameters of DBSCAN.
+    pub(crate) model: ClusteringModel,
     grid: GridDbscan,
     /// New number of each cluster that is merged into no other cluster.
     renumbered: Vec<u32>,
@@ -155,7 +174,7 @@ impl Clustering {
             cell_of: Vec::with_capacity(candidates),
             row_of: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(candidates),
-            method: ClusteringMethod::default(),
+            model: ClusteringModel::default(),
             grid: GridDbscan::with_capacity(candidates, GRID_CELLS),
             renumbered: Vec::with_capacity(super::RESERVED_CLUSTERS),
             vehicles: Vec::new(),
@@ -166,14 +185,15 @@ impl Clustering {
     pub(crate) fn run(&mut self, candidates: &[Candidate]) {
         self.thin(candidates);
         self.labels.clear();
-        match self.method {
+        let ClusteringModel { method, radius, core_points } = self.model;
+        match method {
             ClusteringMethod::Grid => {
-                self.count = self.grid.run(&self.rows, RADIUS, CORE_POINTS) as usize;
+                self.count = self.grid.run(&self.rows, radius, core_points) as usize;
                 let of_rows = &self.grid.labels;
                 self.labels.extend(self.row_of.iter().map(|&row| of_rows[row as usize].unwrap_or(NOISE)));
             }
             ClusteringMethod::Linfa => {
-                let of_rows = linfa_dbscan(&self.rows, RADIUS, CORE_POINTS);
+                let of_rows = linfa_dbscan(&self.rows, radius, core_points);
                 self.count = of_rows.iter().flatten().max().map_or(0, |last| last + 1);
                 let label = |row: u32| of_rows[row as usize].and_then(|label| u32::try_from(label).ok());
                 self.labels.extend(self.row_of.iter().map(|&row| label(row).unwrap_or(NOISE)));
@@ -187,7 +207,8 @@ impl Clustering {
     /// [`SensorError::Clusterings`] if a label differs. The clusters of the latest run remain.
     pub(crate) fn compare(&self, check: ClusteringCheck, time: Time) -> Result<(), SensorError> {
         let (points, labels) = self.rows();
-        let again = linfa_dbscan(points, RADIUS, check.core_points);
+        let core_points = check.core_points.unwrap_or(self.model.core_points);
+        let again = linfa_dbscan(points, self.model.radius, core_points);
         let different = labels.iter().zip(&again).filter(|(label, again)| label != again).count();
         if different > 0 {
             return Err(SensorError::Clusterings { different, points: points.len(), time });
@@ -260,7 +281,7 @@ impl Clustering {
             #[expect(clippy::cast_possible_truncation, reason = "a grid of 105,000 cells, a scan of 20,000 points")]
             self.cell_of.push(cell as u32);
             let (count, row) = &mut self.cells[cell];
-            if usize::from(*count) < CORE_POINTS {
+            if usize::from(*count) < self.model.core_points {
                 *count += 1;
                 #[expect(clippy::cast_possible_truncation, reason = "a scan has at most 20,000 points")]
                 let next = self.rows.len() as u32;
@@ -277,7 +298,7 @@ impl Clustering {
 
 /// Returns the cluster of each point by linfa's DBSCAN, `None` for noise. Needs two core points or
 /// more, and a radius above 0.
-#[expect(clippy::expect_used, reason = "the caller passes constants")]
+#[expect(clippy::expect_used, reason = "the callers pass checked values")]
 fn linfa_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<Option<usize>> {
     let params = Dbscan::params_with(core_points, L2Dist, GridSearch { cell: radius }).tolerance(radius);
     params.check().expect("two core points or more, a radius above 0").transform(&ArrayView2::from(points))
@@ -329,8 +350,8 @@ mod tests {
         // Three points that four core points make noise.
         clustering.run(&candidates(&[(100.0, 0.0), (100.0, 0.22), (100.0, 0.44)]));
         let compared = |core_points| clustering.compare(ClusteringCheck { core_points }, Time::ZERO);
-        assert_eq!(compared(CORE_POINTS), Ok(()));
-        assert_eq!(compared(4), Err(SensorError::Clusterings { different: 3, points: 3, time: Time::ZERO }));
+        assert_eq!(compared(None), Ok(()));
+        assert_eq!(compared(Some(4)), Err(SensorError::Clusterings { different: 3, points: 3, time: Time::ZERO }));
     }
 
     #[test]
@@ -444,6 +465,23 @@ mod tests {
             assert_eq!(clustering.count, 3, "at {back} m");
             assert!(!clustering.labels.contains(&NOISE));
         }
+    }
+
+    #[test]
+    fn radius_and_core_points_are_those_of_the_model() {
+        let points = candidates(&[(100.0, 0.0), (100.0, 0.22), (100.0, 2.0)]);
+        let of = |radius, core_points| {
+            let model = ClusteringModel { radius, core_points, ..ClusteringModel::default() };
+            let mut clustering = Clustering { model, ..Clustering::default() };
+            clustering.run(&points);
+            assert_eq!(clustering.compare(ClusteringCheck::default(), Time::ZERO), Ok(()));
+            clustering.labels
+        };
+        assert_eq!(of(1.0, 3), [NOISE; 3]);
+        assert_eq!(of(1.0, 2), [0, 0, NOISE]);
+        // Across the road the radius is 1 m there: 1.78 m are within 1.8 radii.
+        assert_eq!(of(1.85, 2), [0, 0, 0]);
+        assert_eq!(of(1.7, 2), [0, 0, NOISE]);
     }
 
     #[test]

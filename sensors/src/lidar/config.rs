@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::kind::NOMINAL_RANGE_M;
 use super::material::{DIRTY_PLATE, PLATE};
 use super::names::intern_name;
-use super::{ClusteringCheck, ClusteringMethod, LidarKind, LidarKindConfig, LidarModel};
+use super::{ClusteringCheck, ClusteringModel, LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
 
 /// The state of the registration plates.
@@ -159,8 +159,8 @@ pub struct Lidar {
     pub(crate) yaw_rad: f64,
     /// Whether the points are the truth: no noise, no loss, no weather.
     pub(crate) is_exact: bool,
-    /// The implementation of DBSCAN that clusters the points.
-    pub(crate) clustering: ClusteringMethod,
+    /// The parameters of DBSCAN that clusters the points.
+    pub(crate) clustering: ClusteringModel,
     /// Whether each clustering is compared with the clustering of another implementation.
     pub(crate) clustering_check: Option<ClusteringCheck>,
 }
@@ -271,7 +271,7 @@ impl LidarConfig {
             plate_reflectivity: parameters.word(&self.plates, "plates")?.reflectivity(),
             yaw_rad: 0.0,
             is_exact: false,
-            clustering: ClusteringMethod::default(),
+            clustering: ClusteringModel::default(),
             clustering_check: None,
         })
     }
@@ -322,7 +322,7 @@ impl Default for Lidar {
             plate_reflectivity: Plates::InUse.reflectivity(),
             yaw_rad: 0.0,
             is_exact: false,
-            clustering: ClusteringMethod::default(),
+            clustering: ClusteringModel::default(),
             clustering_check: None,
         }
     }

@@ -7,7 +7,7 @@ use super::across::across;
 use super::boxes::BoxFit;
 use super::candidate::Candidate;
 use super::classify::{class_scores, typical_size_m};
-use super::clustering::{ClusteredPoints, Clustering, ClusteringCheck, ClusteringMethod, NOISE};
+use super::clustering::{ClusteredPoints, Clustering, ClusteringCheck, ClusteringModel, NOISE};
 use super::ground::select_candidates;
 use super::parts::join_lamps;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
@@ -88,10 +88,10 @@ impl Detector {
         }
     }
 
-    /// Returns the detector with this implementation of DBSCAN, and compares it with another
+    /// Returns the detector with these parameters of DBSCAN, and compares it with another
     /// implementation if `check` is given.
-    pub(crate) fn with_clustering(mut self, method: ClusteringMethod, check: Option<ClusteringCheck>) -> Self {
-        self.clustering.method = method;
+    pub(crate) fn with_clustering(mut self, model: ClusteringModel, check: Option<ClusteringCheck>) -> Self {
+        self.clustering.model = model;
         self.check = check;
         self
     }
@@ -196,6 +196,16 @@ impl Detector {
     pub(crate) fn clustered(&self) -> ClusteredPoints {
         let (points, labels) = self.clustering.rows();
         ClusteredPoints { points: points.to_vec(), labels }
+    }
+
+    /// Returns a detector with the same parameters of DBSCAN, before its first scan.
+    pub(crate) fn alike(&self) -> Self {
+        Self::default().with_clustering(self.clustering.model, None)
+    }
+
+    /// Returns the points of each cluster of the latest clustering, by their indices in the scan.
+    pub(crate) fn clusters(&self) -> Vec<Vec<u32>> {
+        (0..self.clustering.count).map(|cluster| self.point_indices_of(cluster).to_vec()).collect()
     }
 
     /// Groups the indices of the candidates by cluster.

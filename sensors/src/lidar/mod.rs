@@ -54,7 +54,7 @@ mod viewpoint;
 pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
 pub use crate::tracking::LaneGeometry;
-pub use clustering::{ClusteredPoints, ClusteringCheck, ClusteringMethod};
+pub use clustering::{ClusteredPoints, ClusteringCheck, ClusteringMethod, ClusteringModel};
 pub(crate) use config::{FRONT_NAME, REAR_NAME};
 pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;

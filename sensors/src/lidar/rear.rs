@@ -86,6 +86,13 @@ impl RearLidar {
         Ok(completed)
     }
 
+    /// Returns the complete latest scan, as [`RearLidar::completed`] has it.
+    pub(crate) fn complete_scan(&self) -> LidarScan {
+        let mut scanner = self.scanner.clone();
+        scanner.complete();
+        scanner.latest().clone()
+    }
+
     /// Returns the latest scan, without the points of the bare road that the detector discards; see
     /// [`RearLidar::completed`].
     pub fn latest(&self) -> &LidarScan {
@@ -98,11 +105,25 @@ impl RearLidar {
     /// # Errors
     /// Returns the errors of [`Detector::detect`].
     pub fn clustered(&self) -> Result<ClusteredPoints, SensorError> {
-        let mut detector = Detector::default();
+        let mut detector = self.detector.alike();
         if let Some(lane) = &self.lane {
             detector.cluster(self.scanner.latest(), lane)?;
         }
         Ok(detector.clustered())
+    }
+
+    /// Clusters the latest scan once more, and returns the points of each cluster by their indices in
+    /// the scan, as DBSCAN gives them: before clusters of the same vehicle are merged. Returns none
+    /// before the first scan.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Detector::detect`].
+    pub fn clusters(&self) -> Result<Vec<Vec<u32>>, SensorError> {
+        let mut detector = self.detector.alike();
+        if let Some(lane) = &self.lane {
+            detector.cluster(self.scanner.latest(), lane)?;
+        }
+        Ok(detector.clusters())
     }
 
     /// Returns the ground truth of the points of [`RearLidar::latest`].

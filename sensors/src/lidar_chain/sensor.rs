@@ -9,6 +9,7 @@ use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleSt
 
 use super::Seen;
 use crate::alterations::give_true_boxes;
+use crate::external::OutsideScan;
 use crate::faults::{FaultList, LidarFault, NOTICED_AFTER_SCANS};
 use crate::lidar::{Lidar, LidarKind, RESERVED_CLUSTERS, RearLidar};
 use crate::object::{DEGRADED_SHARE, NoiseKey, range_in_weather_m};
@@ -22,6 +23,8 @@ const RESERVED_SCANS: usize = 8;
 /// One scan whose processing latency has not elapsed.
 #[derive(Clone, Debug)]
 pub(super) struct PendingScan {
+    /// Number of the scan.
+    pub(super) number: u64,
     pub(super) time: Time,
     pub(super) road: Road,
     pub(super) ego: VehicleState,
@@ -56,6 +59,8 @@ pub(super) struct ChainSensor {
     pub(super) health: Health,
     rng: Stream,
     pub(super) pending: VecDeque<PendingScan>,
+    /// Number of scans so far.
+    pub(super) scans: u64,
     /// Memory of the scans that the tracker has processed. Later scans use it again.
     spare: Vec<Vec<Detection>>,
 }
@@ -63,8 +68,20 @@ pub(super) struct ChainSensor {
 /// A scan before its boxes are classified.
 pub(super) struct NewScan {
     pub(super) detections: Vec<Detection>,
-    fault: Option<LidarFault>,
-    late_steps: u64,
+    pub(super) fault: Option<LidarFault>,
+    pub(super) late_steps: u64,
+}
+
+impl NewScan {
+    /// Returns whether no scan has arrived.
+    pub(super) fn is_missing(&self) -> bool {
+        self.fault.is_some_and(|fault| fault.is_dead)
+    }
+
+    /// Returns the time by which the scan is dated too late.
+    pub(super) fn clock_offset(&self) -> Time {
+        self.fault.map_or(Time::ZERO, |fault| offset(fault.clock_offset_s))
+    }
 }
 
 impl ChainSensor {
@@ -85,6 +102,7 @@ impl ChainSensor {
             health: Health::Ok,
             rng: key.stream(channel[0]),
             pending: VecDeque::with_capacity(RESERVED_SCANS),
+            scans: 0,
             spare: Vec::with_capacity(RESERVED_SCANS),
         }
     }
@@ -113,7 +131,20 @@ impl ChainSensor {
     /// # Errors
     /// [`SensorError`] if a model fails.
     pub(super) fn scan(&mut self, seen: &Seen<'_>) -> Result<NewScan, SensorError> {
-        let Seen { scene, believed, others, altered } = *seen;
+        let mut new = self.scan_only(seen);
+        let Seen { believed, others, altered, .. } = *seen;
+        let has_true_clusters = altered.has_true_clusters;
+        let measured = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
+        new.detections.extend_from_slice(measured);
+        if has_true_clusters {
+            give_true_boxes(&mut new.detections, others, believed);
+        }
+        Ok(new)
+    }
+
+    /// Scans the scene without detecting boxes.
+    pub(super) fn scan_only(&mut self, seen: &Seen<'_>) -> NewScan {
+        let Seen { scene, believed, altered, .. } = *seen;
         let (fault, late_steps) = self.fault_now(scene.time);
         let seen = match altered.has_true_points {
             true => &Scene { environment: &Environment::CLEAR_DAY, ..*scene },
@@ -126,36 +157,46 @@ impl ChainSensor {
         self.frozen_scans = if is_frozen { self.frozen_scans.saturating_add(1) } else { 0 };
         self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
         self.health = self.judge_health(scene, fault.as_ref());
-        let has_true_clusters = altered.has_true_clusters;
-        let measured = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
         while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {
             self.spare.push(scan.detections);
         }
         let mut detections = self.spare.pop().unwrap_or_else(|| Vec::with_capacity(RESERVED_CLUSTERS));
         detections.clear();
-        detections.extend_from_slice(measured);
-        if has_true_clusters {
-            give_true_boxes(&mut detections, others, believed);
+        NewScan { detections, fault, late_steps }
+    }
+
+    /// Returns the latest scan as a program gets it.
+    pub(super) fn outside_scan(&self) -> OutsideScan {
+        OutsideScan {
+            sensor: self.model.name(),
+            has_mirror_sides: self.lidar.has_mirror_sides(),
+            scan: self.lidar.complete_scan(),
         }
-        Ok(NewScan { detections, fault, late_steps })
+    }
+
+    /// Keeps the memory of a scan that the tracker does not get.
+    pub(super) fn recycle(&mut self, scan: NewScan) {
+        self.spare.push(scan.detections);
     }
 
     /// Appends a scan to the queue. The tracker may have it from `step` on, if it is not late.
     pub(super) fn push(&mut self, new: NewScan, step: u64, Seen { scene, believed, .. }: &Seen<'_>) {
         let mut scan = PendingScan {
+            number: self.scans,
             time: scene.time,
             road: *believed.road,
             ego: believed.ego.state,
+            is_missing: new.is_missing(),
             detections: new.detections,
             // Scans arrive in their order.
             due_step: (step + new.late_steps).max(self.pending.back().map_or(0, |scan| scan.due_step)),
             is_processed: false,
-            is_missing: new.fault.is_some_and(|fault| fault.is_dead),
         };
         if let Some(offset_s) = new.fault.map(|fault| fault.clock_offset_s).filter(|offset_s| *offset_s != 0.0) {
             scan.misdate(offset_s);
         }
         self.pending.push_back(scan);
+        self.scans += 1;
     }
 
     /// Returns the LiDAR's health: failed if no point has returned for a while, or if the same
@@ -210,12 +251,18 @@ fn scans_in(time_s: f64, period_s: f64) -> u32 {
     scans.max(1)
 }
 
+/// Returns the offset of a clock as a time.
+fn offset(offset_s: f64) -> Time {
+    #[expect(clippy::cast_possible_truncation, reason = "some milliseconds")]
+    let offset_ns = (offset_s * 1e9).round() as i64;
+    Time::from_ns(offset_ns)
+}
+
 impl PendingScan {
     /// Dates the scan `offset_s` later than it was measured: the ego then takes itself to have
     /// measured it from where it was at that time.
     fn misdate(&mut self, offset_s: f64) {
-        #[expect(clippy::cast_possible_truncation, reason = "some milliseconds")]
-        let offset = Time::from_ns((offset_s * 1e9).round() as i64);
+        let offset = offset(offset_s);
         self.time += offset;
         self.ego.s_m += self.ego.speed_mps * maths::cos(self.ego.heading_rad) * offset_s;
         self.ego.d_m += self.ego.speed_mps * maths::sin(self.ego.heading_rad) * offset_s;

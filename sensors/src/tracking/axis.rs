@@ -22,6 +22,7 @@ use closecall_traffic::{CONTROL_STEP, maths};
 use nalgebra::{Matrix4, Vector4};
 
 use self::estimate::{ModeEstimate, mixture};
+use super::box_use::Innovation;
 use super::motion::{MODES, Mode, Situation};
 use crate::tracking::gaussian::Gaussian;
 
@@ -200,6 +201,19 @@ impl AxisFilter {
             variance += estimate.probability * variance_m2;
         }
         AxisFit { squared_distance, cost: -2.0 * maths::ln(likelihood), log_variance: maths::ln(variance) }
+    }
+
+    /// Returns the innovation of a measurement, over all modes.
+    pub(crate) fn innovation(&self, measurement: &AxisMeasurement) -> Innovation {
+        let modes = || {
+            let estimates = self.estimates[..self.modes.len()].iter();
+            estimates.map(|estimate| (estimate.probability, estimate.innovation(measurement)))
+        };
+        let innovation_m = modes().map(|(probability, (innovation_m, _, _))| probability * innovation_m).sum();
+        let spread_m2 = |mode_m: f64| (mode_m - innovation_m) * (mode_m - innovation_m);
+        let variance_m2 =
+            modes().map(|(probability, (mode_m, _, mode_m2))| probability * (mode_m2 + spread_m2(mode_m))).sum();
+        Innovation { innovation_m, variance_m2 }
     }
 
     /// Forgets the slow error: the next measurement has another slow error.

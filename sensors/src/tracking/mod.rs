@@ -18,6 +18,7 @@
 mod assignment;
 mod association;
 pub mod axis;
+mod box_use;
 mod classes;
 mod config;
 mod detection;
@@ -33,6 +34,7 @@ mod track_list;
 mod tracker;
 mod view;
 
+pub use box_use::{BoxRole, BoxUse, Innovation};
 pub use config::{DETECTION_PROBABILITY, MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
 pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy, SeenPart};
 pub use gaussian::Gaussian;

@@ -6,6 +6,7 @@
 //! offset by ½·L·v_d/v_s to the side (L: length; v_s, v_d: speeds along and across the road).
 
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
+use super::box_use::Innovation;
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
 use crate::tracking::gaussian::Gaussian;
 use closecall_traffic::ego_frame::EgoFrame;
@@ -300,6 +301,14 @@ impl RoadFilter {
         let measurement = self.smoothed(measurement);
         let across = measurement.across_for(half_length_m, &self.estimate());
         [self.along.fit(&measurement.along), self.across.fit(&across)]
+    }
+
+    /// Returns the innovations of a measurement, along and across the road, for half a length of
+    /// `half_length_m`.
+    pub(crate) fn innovation(&self, measurement: &Measurement, half_length_m: f64) -> [Innovation; 2] {
+        let measurement = self.smoothed(measurement);
+        let across = measurement.across_for(half_length_m, &self.estimate());
+        [self.along.innovation(&measurement.along), self.across.innovation(&across)]
     }
 
     /// Returns the estimates along the road (of the face) and across it (of the centre).

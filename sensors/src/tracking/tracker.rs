@@ -6,6 +6,7 @@ use super::TrackList;
 use super::assignment::{Assignment, RESERVED};
 use super::association::assign;
 use super::axis::{AxisEstimate, AxisMeasurement};
+use super::box_use::{BoxRole, BoxUse};
 use super::classes::{FusedClass, vehicle_log_likelihood_ratio};
 use super::config::TrackerModel;
 use super::ends::{Ends, SidePoint};
@@ -250,6 +251,10 @@ pub struct Tracker {
     /// The points on the side of the track that is corrected.
     side_points: Vec<SidePoint>,
     faces: Vec<Option<Face>>,
+    /// What has become of the boxes of the latest update.
+    uses: Vec<BoxUse>,
+    /// Index in `uses` of the first box of the scan that is processed.
+    first_use: usize,
 }
 
 impl Tracker {
@@ -265,6 +270,8 @@ impl Tracker {
             owners: Vec::with_capacity(RESERVED),
             side_points: Vec::with_capacity(RESERVED),
             faces: Vec::with_capacity(RESERVED),
+            uses: Vec::with_capacity(RESERVED),
+            first_use: 0,
         }
     }
 
@@ -290,6 +297,7 @@ impl Tracker {
         list: &mut TrackList,
     ) {
         self.tracks.iter_mut().for_each(|track| track.seen = Seen::OutOfView);
+        self.uses.clear();
         let mut latest = None;
         for scan in scans {
             self.measure(&scan, list);
@@ -352,6 +360,7 @@ impl Tracker {
         self.project_faces(&scan.view, &frame);
         self.find_owners(scan.ego.d_m);
         self.release_false_fronts(scan);
+        self.begin_uses(scan);
         for track_index in 0..self.tracks.len() {
             match self.assigned[track_index] {
                 Some(detection_index) => self.correct(track_index, detection_index, scan),
@@ -360,6 +369,7 @@ impl Tracker {
             }
         }
         self.start_tracks(scan, ego_mps, list);
+        self.note_parts();
     }
 
     /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that
@@ -371,11 +381,36 @@ impl Tracker {
         }
     }
 
+    /// Returns what has become of the boxes of the latest update.
+    pub(crate) fn uses(&self) -> &[BoxUse] {
+        &self.uses
+    }
+
+    /// Lists the boxes of a scan as ignored.
+    fn begin_uses(&mut self, scan: &TrackerScan<'_>) {
+        self.first_use = self.uses.len();
+        let ignored =
+            |index| BoxUse { sensor: scan.sensor, index, role: BoxRole::Ignored, track: None, innovation: None };
+        self.uses.extend((0..scan.detections.len()).map(ignored));
+    }
+
+    /// Notes the boxes that are parts of the vehicles of tracks.
+    fn note_parts(&mut self) {
+        for (used, owner) in self.uses[self.first_use..].iter_mut().zip(&self.owners) {
+            if let (BoxRole::Ignored, Some(track_index)) = (used.role, owner) {
+                *used = BoxUse { role: BoxRole::Part, track: Some(self.tracks[*track_index].id), ..*used };
+            }
+        }
+    }
+
     /// Corrects a track with its detection.
     fn correct(&mut self, track_index: usize, detection_index: usize, scan: &TrackerScan<'_>) {
         let detection = &scan.detections[detection_index];
         let track = &mut self.tracks[track_index];
         let measurement = &self.measurements[detection_index];
+        let innovation = track.filter.innovation(measurement, 0.5 * track.size_m().0);
+        let used = &mut self.uses[self.first_use + detection_index];
+        *used = BoxUse { role: BoxRole::Corrects, track: Some(track.id), innovation: Some(innovation), ..*used };
         track.filter.correct(measurement, 0.5 * track.size_m().0, followed_sensor(detection, scan));
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
@@ -594,6 +629,8 @@ impl Tracker {
             track.extent.update(detection);
         }
         track.class.update(&detection.class, detection.points);
+        let used = &mut self.uses[self.first_use + detection_index];
+        *used = BoxUse { role: BoxRole::Starts, track: Some(track.id), ..*used };
         self.tracks.push(track);
     }
 

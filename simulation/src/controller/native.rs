@@ -199,6 +199,14 @@ pub enum NativeError {
         /// The reason for which it cannot be started.
         reason: String,
     },
+    /// A perception program cannot be started.
+    #[error("failed to start the perception program `{program}`: {reason}")]
+    StartProgram {
+        /// The program, as the scenario names it.
+        program: String,
+        /// Why it cannot be started.
+        reason: String,
+    },
 }
 
 /// Returns the path of the file of a controller.

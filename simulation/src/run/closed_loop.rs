@@ -26,6 +26,7 @@ pub fn simulate(
         match run.go_on(observer)? {
             Next::End(end) => {
                 controller.finish(run.time())?;
+                run.finish_sensors()?;
                 return Ok(run.finish(end));
             }
             Next::Control => {
@@ -36,6 +37,7 @@ pub fn simulate(
                 }?;
                 if let Some(end) = run.command(command, observer)? {
                     controller.finish(run.time())?;
+                    run.finish_sensors()?;
                     return Ok(run.finish(end));
                 }
             }

@@ -15,7 +15,7 @@ const LEAST_STEPS: u32 = 125;
 
 /// Adds up the computing time of a run.
 #[derive(Debug, Default)]
-pub(super) struct ComputingTime {
+pub(crate) struct ComputingTime {
     spent: Duration,
     steps: u32,
     has_begun: bool,
@@ -38,23 +38,26 @@ impl ComputingTime {
         Ok(command)
     }
 
-    /// Adds the time of a step. That of the first does not count: a controller starts in it.
+    /// Adds the time of a step of a controller.
     fn add(&mut self, time: Time, spent: Duration) -> Result<(), ControllerError> {
+        match self.exceeded(spent, 1e3 * CONTROL_STEP.s()) {
+            Some(message) => Err(ControllerError::Own { reason: format!("the controller {message}"), time }),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds the time of a step. That of the first does not count: a program starts in it. Returns a message if the mean exceeds
+    /// `allowed_ms`.
+    pub(crate) fn exceeded(&mut self, spent: Duration, allowed_ms: f64) -> Option<String> {
         if !std::mem::replace(&mut self.has_begun, true) {
-            return Ok(());
+            return None;
         }
         self.spent += spent;
         self.steps += 1;
         let mean_ms = 1e3 * self.spent.as_secs_f64() / f64::from(self.steps);
-        let allowed_ms = 1e3 * CONTROL_STEP.s();
-        if self.steps >= LEAST_STEPS && mean_ms > allowed_ms {
-            let reason = format!(
-                "the controller computes for {mean_ms:.0} ms in the mean of {} steps, and has {allowed_ms:.0} ms",
-                self.steps
-            );
-            return Err(ControllerError::Own { reason, time });
-        }
-        Ok(())
+        (self.steps >= LEAST_STEPS && mean_ms > allowed_ms).then(|| {
+            format!("computes for {mean_ms:.0} ms in the mean of {} steps, and has {allowed_ms:.0} ms", self.steps)
+        })
     }
 }
 

@@ -6,6 +6,7 @@ use closecall_sensors::{NoiseKey, Perception, SensorError};
 use super::delayed_truth::DelayedTruth;
 use super::suppressed::Suppressed;
 use super::{Arm, RunKey};
+use crate::perception::PerceptionProcess;
 use closecall_scenarios::Scenario;
 
 /// Returns the sensors of the arm in a run. The run needs the sensors that look back only if
@@ -24,12 +25,14 @@ pub(super) fn perception(
         return Ok(Box::new(DelayedTruth::new(sensors.latency_steps())));
     }
     let sensors = if needs_rear { sensors } else { sensors.without_rear() };
-    sensors.build(&NoiseKey {
+    let program = sensors.running_program().map(|program| Box::new(PerceptionProcess::new(program)) as _);
+    let key = NoiseKey {
         seed: key.seed,
         sample: key.sample,
         ego: scenario.ego_id().clone(),
         actors: scenario.actors.iter().map(|actor| actor.id.clone()).collect(),
-    })
+    };
+    sensors.build_with(&key, program)
 }
 
 /// Returns the controller of the arm in a run.

@@ -69,7 +69,12 @@ impl SampleError {
     /// Returns true if the wall clock caused the error: the same run may have an outcome on another
     /// machine.
     pub const fn is_late(&self) -> bool {
-        matches!(self, Self::Timeout { .. } | Self::Controller(ControllerError::Late { .. }))
+        matches!(
+            self,
+            Self::Timeout { .. }
+                | Self::Controller(ControllerError::Late { .. })
+                | Self::Sensors(SensorError::Program { is_late: true, .. })
+        )
     }
 
     /// Returns a one-word name of the kind of error, for reports.

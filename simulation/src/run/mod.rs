@@ -36,6 +36,7 @@ pub use arm::{Arm, ControllerFactory};
 pub use auditor::TrackAuditor;
 pub use closecall_scenarios::RunKey;
 pub use closed_loop::simulate;
+pub(crate) use computing_time::ComputingTime;
 pub use error::SampleError;
 pub use observer::{CurrentMargins, Lead, NoObserver, Observer, RunEvent, StepView};
 pub use stepper::Stepper;

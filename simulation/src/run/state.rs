@@ -435,6 +435,12 @@ impl<'a> Run<'a> {
         });
     }
 
+    /// Ends the sensors after the last step.
+    pub(super) fn finish_sensors(&mut self) -> Result<(), SampleError> {
+        let time = self.world.time();
+        Ok(self.perception.finish(time)?)
+    }
+
     /// Returns the outcome of the run.
     pub(super) fn finish(self, end: EndReason) -> Outcome {
         let settings = settings_of(&self.scenario);

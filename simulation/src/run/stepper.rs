@@ -73,7 +73,10 @@ impl Stepper {
     pub fn step(&mut self, command: EgoCommand, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let Some(mut run) = self.run.take() else { return Ok(()) };
         match run.command(command, observer)? {
-            Some(end) => self.outcome = Some(run.finish(end)),
+            Some(end) => {
+                run.finish_sensors()?;
+                self.outcome = Some(run.finish(end));
+            }
             None => {
                 self.run = Some(run);
                 self.go_on(observer)?;
@@ -86,7 +89,10 @@ impl Stepper {
         let Some(mut run) = self.run.take() else { return Ok(()) };
         match run.go_on(observer)? {
             Next::Control => self.run = Some(run),
-            Next::End(end) => self.outcome = Some(run.finish(end)),
+            Next::End(end) => {
+                run.finish_sensors()?;
+                self.outcome = Some(run.finish(end));
+            }
         }
         Ok(())
     }

@@ -124,6 +124,22 @@ fn the_columns_of_the_scans_are_those_documented() {
     assert_eq!(written, expected);
 }
 
+#[test]
+fn the_columns_of_tracks_and_clusters_are_those_documented() {
+    let folder = folder();
+    let paths = ["tracks", "clusters"].map(|name| folder.path().join(format!("{name}.parquet")));
+    let scenario = library("paper-figure");
+    let options = ["--set", "duration-s=1", "--set", "sensors.rear-camera.pipeline=off"];
+    let files = ["--tracks", paths[0].to_str().unwrap(), "--clusters", paths[1].to_str().unwrap()];
+    let args = [&["run", scenario.to_str().unwrap(), "--sensors", "full"], options.as_slice(), &files].concat();
+    stdout(&closecall(args), 0);
+    // The unit stands in Arrow's metadata alone.
+    let names = |columns: Vec<[String; 3]>| columns.into_iter().map(|[name, kind, _]| [name, kind]).collect::<Vec<_>>();
+    for (table, path) in ["tracks", "clusters"].into_iter().zip(&paths) {
+        assert_eq!(names(columns(path)), names(documented_columns(table)));
+    }
+}
+
 /// The records of a file with one JSON value on each line, behind a checksum if it has one.
 fn lines(path: &Path, has_checksum: bool) -> Vec<Value> {
     let text = std::fs::read_to_string(path).unwrap();

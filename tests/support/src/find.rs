@@ -71,6 +71,15 @@ pub fn python_with_rerun() -> Option<PathBuf> {
     found(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
 }
 
+/// Returns a Python interpreter that has these packages, separated by commas: that of the environment in which the Rerun viewer lies.
+///
+/// # Panics
+/// As [`skip`].
+pub fn python_with(packages: &str) -> Option<PathBuf> {
+    let reason = format!("CLOSECALL_RERUN does not lie in a Python environment with {packages}");
+    found(python_around(&viewer()?, packages), Need::Python, &reason)
+}
+
 /// Returns the interpreter of the Python environment in which a file lies, if it has these packages.
 fn python_around(file: &Path, packages: &str) -> Option<PathBuf> {
     let mut programs = file.ancestors().map(|folder| folder.join("bin/python")).filter(|path| path.is_file());

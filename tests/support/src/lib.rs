@@ -30,7 +30,7 @@ mod require;
 
 pub use dbscan::dbscan_by_definition;
 pub use find::{
-    browser, data, has_display, has_python, onnxruntime, python_with_exchange, python_with_onnxruntime,
+    browser, data, has_display, has_python, onnxruntime, python_with, python_with_exchange, python_with_onnxruntime,
     python_with_rerun, viewer,
 };
 pub use need::Need;

@@ -17,7 +17,7 @@ use crate::run::ControllerFactory;
 
 /// Time limit of the answer to the first message. The process may first have to load an interpreter and its libraries,
 /// perhaps on a busy machine.
-const START_TIMEOUT: Duration = Duration::from_secs(10);
+pub(crate) const START_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Creates controllers that run as separate processes.
 #[derive(Clone, Debug)]

@@ -90,7 +90,7 @@ impl Tail {
 }
 
 /// Returns the beginning of a line, for an error message.
-pub(super) fn excerpt(line: &[u8]) -> String {
+pub(crate) fn excerpt(line: &[u8]) -> String {
     excerpt_of(&String::from_utf8_lossy(line), MAX_EXCERPT_CHARS)
 }
 

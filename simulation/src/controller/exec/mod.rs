@@ -56,9 +56,12 @@ mod protocol;
 mod settings;
 
 pub use child::Child;
+pub(crate) use controller::START_TIMEOUT;
 pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
 pub use lines::NEW_SAMPLE;
+pub(crate) use lines::excerpt;
 pub use processes::{adopt_orphans, end_all};
 pub use protocol::Identity;
+pub(crate) use protocol::{PROTOCOL, check_hello};
 pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME};

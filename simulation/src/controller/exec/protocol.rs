@@ -9,7 +9,7 @@ use super::error::ExecError;
 use super::lines::excerpt;
 
 /// Version of the protocol.
-pub(super) const PROTOCOL: u32 = 1;
+pub(crate) const PROTOCOL: u32 = 1;
 
 const ACCELERATION_KEY: &str = "acceleration_mps2";
 const STATE_KEY: &str = "state";
@@ -153,7 +153,7 @@ pub struct Identity {
 }
 
 /// Checks the answer to the first message, and returns what the process states about itself.
-pub(super) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
+pub(crate) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
     let object = object(line)?;
     if object.get("type").and_then(Value::as_str) != Some("hello") {
         return Err(key_error(line, &object, "type", "\"hello\" in the first answer"));

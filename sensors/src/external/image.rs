@@ -1,0 +1,120 @@
+//! The images of the rear camera that a program gets.
+
+use closecall_traffic::{Stream, Time};
+
+use super::settings::ImageSettings;
+use crate::camera::{Camera, CameraFault, ExposureKey, FOCAL_PX, Frame, FrameBuffers, PixelRect, Sampling};
+use crate::faults::FaultList;
+use crate::worker_classifier::{CHANNEL, HeldImage};
+use crate::{NoiseKey, Scene};
+
+/// An image as a program gets it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutsideImage {
+    /// Time of the exposure.
+    pub time: Time,
+    /// Number of columns.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+    /// Red, green and blue of each pixel, row by row from the top left.
+    pub rgb: Vec<u8>,
+}
+
+/// The rear camera as a program is told of it, in the frame of the ego.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraMount {
+    /// Position of the lens ahead of the ego's centre (m). It is on the centre line.
+    pub x_m: f64,
+    /// Height of the lens above the road (m).
+    pub z_m: f64,
+    /// Pitch, positive if it looks down (rad).
+    pub pitch_rad: f64,
+    /// Focal length (px of the image that the program gets).
+    pub focal_px: f64,
+    /// Coefficients k1 and k2 of the radial distortion (-).
+    pub distortion: [f64; 2],
+    /// Number of columns and rows of the image.
+    pub size_px: [usize; 2],
+    /// Time from an image to the next (s).
+    pub period_s: f64,
+}
+
+impl CameraMount {
+    /// Returns the mounting of a camera on an ego of this length (m).
+    pub fn of(camera: &Camera, settings: ImageSettings, ego_length_m: f64) -> Self {
+        let sampling = Sampling::every(settings.step);
+        Self {
+            x_m: -0.5 * ego_length_m + camera.mount_from_rear_m,
+            z_m: camera.mount_height_m,
+            pitch_rad: camera.pitch_rad,
+            focal_px: FOCAL_PX / f64::from(settings.step),
+            distortion: camera.optics.distortion,
+            size_px: [sampling.columns().len(), sampling.rows().len()],
+            period_s: settings.period.s(),
+        }
+    }
+}
+
+/// The rear camera of a run whose images a program gets.
+pub(crate) struct OutsideCamera {
+    camera: Camera,
+    settings: ImageSettings,
+    sampling: Sampling,
+    exposures: Stream,
+    faults: FaultList<CameraFault>,
+    held: Option<HeldImage>,
+    next: Option<Time>,
+    lists: FrameBuffers,
+}
+
+impl OutsideCamera {
+    /// Creates the camera of one run, whose exposure noise is keyed by `key`.
+    pub(crate) fn new(camera: Camera, settings: ImageSettings, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+        Self {
+            camera,
+            settings,
+            sampling: Sampling::every(settings.step),
+            exposures: key.stream(CHANNEL),
+            faults,
+            held: None,
+            next: None,
+            lists: FrameBuffers::default(),
+        }
+    }
+
+    /// Returns the mounting on an ego of this length (m).
+    pub(crate) fn mount(&self, ego_length_m: f64) -> CameraMount {
+        CameraMount::of(&self.camera, self.settings, ego_length_m)
+    }
+
+    /// Returns the image of a scene if one is due, and the camera is not dead.
+    pub(crate) fn image(&mut self, scene: &Scene<'_>) -> Option<OutsideImage> {
+        // The key is drawn in each scan, so that both arms of a pair get the same exposures.
+        let key = ExposureKey::draw(&mut self.exposures);
+        let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
+        let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
+        self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
+        let due = *self.next.get_or_insert(scene.time);
+        if scene.time < due {
+            return None;
+        }
+        self.next = Some(due + self.settings.period);
+        if is_dead {
+            return None;
+        }
+        let held = self.held.as_ref().map(|held| (held.scene(), held.key));
+        let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
+        let lists = std::mem::take(&mut self.lists);
+        let mut frame = Frame::with_buffers(lists, &self.camera, imaged, key, &[PixelRect::IMAGE]);
+        if let Some(fault) = &fault {
+            frame.add_glare(fault, imaged);
+        }
+        let mut picture = frame.sampled(self.sampling.columns(), self.sampling.rows()).image;
+        self.lists = frame.into_buffers();
+        if let Some(fault) = &fault {
+            fault.apply_to_picture(&mut picture, &self.sampling);
+        }
+        Some(OutsideImage { time: scene.time, width: picture.width, height: picture.height, rgb: picture.rgb })
+    }
+}

@@ -1,0 +1,131 @@
+//! A process as the perception of the closed loop.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use closecall_scenarios::Scenario;
+use closecall_sensors::SensorError;
+use closecall_sensors::external::{
+    CameraMount, LidarMount, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, ProgramSettings,
+};
+use closecall_traffic::{CONTROL_STEP, Time};
+
+use super::answer::{self, AnswerError, Kind};
+use super::question::{self, Setup};
+use crate::controller::exec::{Child, ExecError, ExecSettings, Identity, START_TIMEOUT, check_hello};
+use crate::controller::native::NativeError;
+use crate::run::ComputingTime;
+
+/// Why a process did not give a valid answer.
+#[derive(Debug, thiserror::Error)]
+enum ProgramError {
+    /// The process does not keep to the protocol or to its limits.
+    #[error(transparent)]
+    Process(#[from] ExecError),
+    /// An answer is not valid.
+    #[error(transparent)]
+    Answer(#[from] AnswerError),
+    /// The process computes for longer than from a scan to the next.
+    #[error("the process {0}")]
+    Slow(String),
+}
+
+impl ProgramError {
+    fn is_late(&self) -> bool {
+        matches!(self, Self::Process(error) if error.is_late())
+    }
+}
+
+/// A process that perceives in one run. It is started at the first question and ended when this value is dropped.
+pub(crate) struct PerceptionProcess {
+    program: ProgramSettings,
+    started: Option<(Child, Kind)>,
+    computing: ComputingTime,
+}
+
+impl PerceptionProcess {
+    /// Creates the process of a run.
+    pub(crate) fn new(program: ProgramSettings) -> Self {
+        Self { program, started: None, computing: ComputingTime::default() }
+    }
+
+    /// Sends a question and returns its answer. Starts the process if there is none yet.
+    fn request(&mut self, question: &PerceptionQuestion<'_>) -> Result<PerceptionAnswer, ProgramError> {
+        let (child, kind) = match &mut self.started {
+            Some(started) => started,
+            None => {
+                let (child, _, kind) = greet(&self.program, &Setup::of(question))?;
+                self.started.insert((child, kind))
+            }
+        };
+        let limit = std::time::Duration::from_millis(self.program.timeout_ms);
+        // A program may load or compile what it needs with its first scan.
+        let limit = if child.answered() == 1 { START_TIMEOUT.max(limit) } else { limit };
+        let line = question::scans(question);
+        let begun = Instant::now();
+        let answered = child.request(line, limit)?;
+        let spent = begun.elapsed();
+        let parsed = answer::parse(&answered, (*kind, question.time), child.answered());
+        let parsed =
+            parsed.map_err(ProgramError::from).and_then(|parsed| Ok(parsed?)).inspect_err(|_| child.condemn())?;
+        let period_s = question.lidars.iter().map(|lidar| lidar.period_s).fold(f64::INFINITY, f64::min);
+        match self.computing.exceeded(spent, 1e3 * period_s.max(CONTROL_STEP.s())) {
+            Some(message) => Err(ProgramError::Slow(message)),
+            None => Ok(parsed),
+        }
+    }
+
+    fn failure(&self, error: &ProgramError, time: Time) -> SensorError {
+        SensorError::Program { program: self.program.name(), reason: error.to_string(), is_late: error.is_late(), time }
+    }
+}
+
+impl PerceptionProgram for PerceptionProcess {
+    fn perceive(&mut self, question: &PerceptionQuestion<'_>) -> Result<PerceptionAnswer, SensorError> {
+        self.request(question).map_err(|error| self.failure(&error, question.time))
+    }
+
+    fn finish(&mut self, time: Time) -> Result<(), SensorError> {
+        let finished = self.started.as_mut().map_or(Ok(()), |(child, _)| child.finish());
+        finished.map_err(|error| self.failure(&error.into(), time))
+    }
+}
+
+/// Starts a program, greets it as in a run of the scenario, and returns what it states about itself in its first answer, and the files
+/// that it has open. `None` if it cannot be greeted.
+pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Option<(Identity, Vec<PathBuf>)> {
+    let model = scenario.sensors.full_model();
+    let size = scenario.actors[scenario.ego].vehicle.dimensions;
+    let lidars: Vec<LidarMount> = model.rear_lidars().map(|lidar| LidarMount::of(&lidar, size.length_m)).collect();
+    let latency_s = model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
+    let camera = program.images.map(|images| CameraMount::of(scenario.sensors.camera(), images, size.length_m));
+    let setup = Setup { size, road: &scenario.road, lidars: &lidars, camera, latency_s };
+    let (child, identity, _) = greet(program, &setup).ok()?;
+    let open_files = child.open_files();
+    Some((identity, open_files))
+}
+
+/// Tries whether a program can be started. It is killed at once.
+///
+/// # Errors
+/// [`NativeError::StartProgram`] if not.
+pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
+    Child::try_start(&exec_settings(program), program.folder.map(Path::new))
+        .map_err(|error| NativeError::StartProgram { program: program.name(), reason: error.to_string() })
+}
+
+/// Starts a program, and greets it.
+fn greet(program: &ProgramSettings, setup: &Setup<'_>) -> Result<(Child, Identity, Kind), ProgramError> {
+    let settings = exec_settings(program);
+    let mut child = Child::start(&settings, program.folder.map(Path::new))?;
+    let limit = START_TIMEOUT.max(std::time::Duration::from_millis(settings.timeout_ms));
+    let hello = child.request(setup.hello(), limit)?;
+    let identity = check_hello(&hello)?;
+    let kind = answer::kind(&hello)?;
+    Ok((child, identity, kind))
+}
+
+fn exec_settings(program: &ProgramSettings) -> ExecSettings {
+    let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
+    ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
+}
