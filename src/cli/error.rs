@@ -200,13 +200,16 @@ fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
     match problem {
         TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => "; --mirror-d turns the position",
         TrajectoryFileProblem::LanesAgainstPosition { .. } => "; --lanes-from-right turns the lanes",
+        TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
+            "; --location NAME reads one data set of NGSIM's export"
+        }
         problem if problem.affects_one_row() => "; --drop-bad-rows skips such rows, and counts them",
         _ => "",
     }
 }
 
 /// Largest number of tracks that a message suggests.
-const MAX_SUGGESTED: usize = 10;
+pub(super) const MAX_SUGGESTED: usize = 10;
 
 /// Returns the tracks that `--track` can name, as the end of a message.
 fn track_suggestion(possible: &[u64]) -> String {

@@ -15,6 +15,7 @@ use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
+use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
 use super::output::{made_by, out, outln};
 use super::protect::{of_trajectories, protect};
@@ -103,14 +104,27 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
+/// Returns the message for a track without a lane change, or for a file without one. `track` holds whether the file has the
+/// track at all.
+pub(super) fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u64]) -> String {
+    let Some((track, is_recorded)) = track else { return format!("{file} has no lane change") };
+    let unknown = if is_recorded { "" } else { ", which it does not hold" };
+    let named: Vec<String> = others.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
+    let which = match others.len() {
+        0 => "no track changes lanes".to_owned(),
+        count if count > MAX_SUGGESTED => format!("{count} tracks change lanes, such as {}", named.join(", ")),
+        _ => format!("the tracks that change lanes are {}", named.join(", ")),
+    };
+    format!("{file} has no lane change of track {track}{unknown}; {which}")
+}
+
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
 pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result<RecordedEncounter, CliError> {
     let found = choose(&smooth(&read_noting(path, read.options())?), track, CONTROL_STEP);
     let file = path.display();
     found.map_err(|error| match error {
-        ChoiceError::NoLaneChange => {
-            let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
-            CliError::usage(format!("{file} has no lane change{of_track} to re-enact"))
+        ChoiceError::NoLaneChange { is_recorded, others } => {
+            CliError::usage(no_lane_change(&format!("{file}"), track.map(|track| (track, is_recorded)), &others))
         }
         ChoiceError::NoEncounter { source, possible } => {
             CliError::NoEncounter { file: file.to_string(), source, possible }

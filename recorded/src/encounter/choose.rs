@@ -11,7 +11,12 @@ use crate::lane_change::LaneChange;
 #[derive(Clone, Debug, PartialEq)]
 pub enum ChoiceError {
     /// There is no lane change, or none of the track.
-    NoLaneChange,
+    NoLaneChange {
+        /// Whether the file has a track at all that was asked for.
+        is_recorded: bool,
+        /// The tracks that change lanes, if a track was asked for.
+        others: Vec<u64>,
+    },
     /// None of the lane changes is an encounter.
     NoEncounter {
         /// The condition that the most critical lane change does not meet.
@@ -41,7 +46,11 @@ pub fn choose(
             Err(source) => refused = refused.or(Some(source)),
         }
     }
-    let source = refused.ok_or(ChoiceError::NoLaneChange)?;
+    let source = refused.ok_or_else(|| {
+        let mut others: Vec<u64> = track.map_or(Vec::new(), |_| all.iter().map(|change| change.track_id).collect());
+        others.dedup();
+        ChoiceError::NoLaneChange { is_recorded: track.is_none_or(|track| data.track_index(track).is_some()), others }
+    })?;
     let possible = track.map_or(Vec::new(), |_| {
         all.iter().filter(|change| encounter_of(change).is_ok()).map(|change| change.track_id).collect()
     });
