@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_recorded::encounter::{ChoiceError, RecordedEncounter, choose};
+use closecall_recorded::encounter::{ChoiceError, Lead, RecordedEncounter, Wanted, choose};
 use closecall_recorded::filters::smooth;
 use closecall_report::json::stamped;
 use closecall_report::run::film::{EncounterComparison, film_encounter};
@@ -80,7 +80,8 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
-    let found = chosen(&args.file, &args.read, args.track)?;
+    let wanted = Wanted { track: args.track, number: None, lead: Lead::Required };
+    let found = chosen(&args.file, &args.read, wanted)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
@@ -119,12 +120,17 @@ pub(super) fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u
 }
 
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
-pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result<RecordedEncounter, CliError> {
-    let found = choose(&smooth(&read_noting(path, read.options())?), track, CONTROL_STEP);
+pub(super) fn chosen(path: &Path, read: &ReadArgs, wanted: Wanted) -> Result<RecordedEncounter, CliError> {
+    let found = choose(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP);
+    let track = wanted.track;
     let file = path.display();
     found.map_err(|error| match error {
         ChoiceError::NoLaneChange { is_recorded, others } => {
             CliError::usage(no_lane_change(&format!("{file}"), track.map(|track| (track, is_recorded)), &others))
+        }
+        ChoiceError::NoSuchNumber { count } => {
+            let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
+            CliError::usage(format!("{file} has {count} lane changes{of_track}: --number can be 1 to {count}"))
         }
         ChoiceError::NoEncounter { source, possible } => {
             CliError::NoEncounter { file: file.to_string(), source, possible }

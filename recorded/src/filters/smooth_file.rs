@@ -6,7 +6,7 @@ use closecall_traffic::Time;
 
 use super::smooth::{SmoothedTrack, SmoothedTrajectoryData, smooth, smooth_track};
 use crate::trajectory_data::{
-    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, STREAM_ROWS, TrajectoryFileError,
+    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, TrajectoryFileError,
     TrajectoryFileProblem, Tracks, count_flaws, open_streaming, read_with,
 };
 
@@ -28,7 +28,7 @@ pub struct SmoothedFile {
 
 /// Smooths the tracks of the file at `path`, and holds no more of its rows than needed.
 ///
-/// A file of more than [`STREAM_ROWS`] rows is held as a whole only if it is not sorted, or if it may
+/// A file of more than [`STREAM_ROWS`](crate::trajectory_data::STREAM_ROWS) rows is held as a whole only if it is not sorted, or if it may
 /// hold several data sets whose clocks overlap.
 ///
 /// # Errors
