@@ -191,7 +191,8 @@ fn built(
     let own_start = start_of(&changer.trajectory).ok_or("the vehicle that changes lanes appears after the start")?;
     let mut actors = vec![lane_changer(encounter, changer, own_start, lane_change)?];
     let mut kept: Vec<&Participant> = vec![changer];
-    for (index, vehicle) in encounter.vehicles.iter().enumerate().filter(|(index, _)| *index != encounter.rear_index()) {
+    for (index, vehicle) in encounter.vehicles.iter().enumerate().filter(|(index, _)| *index != encounter.rear_index())
+    {
         let Some(start) = start_of(&vehicle.trajectory) else { continue };
         let is_opponent = index == EGO_INDEX || Some(index) == opp2;
         let fits = fits_the_road(encounter, vehicle, start.lane)

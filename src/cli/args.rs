@@ -196,7 +196,13 @@ impl ReadArgs {
         });
         let axes = AxisOptions { mirror_d: self.mirror_d, lanes_from_right: self.lanes_from_right };
         let bad_rows = if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject };
-        ReadOptions { layout, bad_rows, axes, lanes: self.lanes.reliability(), location: self.location.map(Location::name) }
+        ReadOptions {
+            layout,
+            bad_rows,
+            axes,
+            lanes: self.lanes.reliability(),
+            location: self.location.map(Location::name),
+        }
     }
 }
 

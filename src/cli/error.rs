@@ -98,9 +98,13 @@ pub enum CliError {
     /// A recorded lane change cannot be shown.
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
-    /// A recorded lane change is not an encounter that can be re-enacted.
-    #[error("failed to re-enact an encounter of {file}: {source}{}", track_suggestion(possible))]
+    /// A recorded lane change is not an encounter that can be re-enacted or sampled.
+    #[error("failed to {purpose} an encounter of {file}: {source}{}", track_suggestion(option, possible))]
     NoEncounter {
+        /// What the encounter is for.
+        purpose: &'static str,
+        /// The option that names a track.
+        option: &'static str,
         /// The trajectory file.
         file: String,
         /// The condition that is not met.
@@ -211,15 +215,15 @@ fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
 /// Largest number of tracks that a message suggests.
 pub(super) const MAX_SUGGESTED: usize = 10;
 
-/// Returns the tracks that `--track` can name, as the end of a message.
-fn track_suggestion(possible: &[u64]) -> String {
+/// Returns the tracks that `option` can name, as the end of a message.
+fn track_suggestion(option: &str, possible: &[u64]) -> String {
     let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
     match possible.len() {
         0 => String::new(),
         count if count > MAX_SUGGESTED => {
-            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
+            format!("; {option} can name {count} other tracks, such as {}", named.join(", "))
         }
-        _ => format!("; --track can name {}", named.join(", ")),
+        _ => format!("; {option} can name {}", named.join(", ")),
     }
 }
 

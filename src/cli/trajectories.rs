@@ -55,8 +55,8 @@ impl CriterionChoice {
     "closecall traffic lane-changes traffic.csv --criterion distance --reference known.csv",
 ]))]
 pub(super) struct LaneChangesArgs {
-    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as `closecall traffic record` writes
-    /// it. The file can be compressed by gzip
+    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, floating car data of SUMO, a vehicle record of Vissim, JSON of I-24
+    /// MOTION, an in-car log, or plain CSV as `closecall traffic record` writes it. The file can be compressed by gzip
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]

@@ -111,7 +111,9 @@ fn an_encounter_that_cannot_be_re_enacted_is_refused_with_the_reason() {
         assert_eq!(code(&output), expected, "{args:?}: {said}");
         assert!(words.iter().all(|word| said.contains(word)), "{args:?}: {said}");
     };
-    refused(&[own, "--track", "99"], 2, &["own.csv", "no lane change of track 99"]);
+    let unknown = ["own.csv", "no lane change of track 99, which it does not hold", "tracks that change lanes are 3"];
+    refused(&[own, "--track", "99"], 2, &unknown);
+    refused(&[own, "--track", "1"], 2, &["no lane change of track 1; the tracks that change lanes are 3"]);
     refused(&["/no/such.csv"], 6, &["/no/such.csv"]);
     refused(&[own, "--record", "/nowhere/at/all.rrd"], 6, &["/nowhere/at/all.rrd"]);
     refused(&[own, "-o", own], 2, &["would overwrite"]);

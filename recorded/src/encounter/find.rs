@@ -110,9 +110,15 @@ impl<'a> Roles<'a> {
         let lane = Lane(change.from_lane);
         let next_id =
             |follower: &Trajectory, time: Time| next_ahead(data, follower, lane, time).map(|track| track.track_id);
-        let in_order = |time: Time| {
-            next_id(self.rear, time) == Some(self.ego.track_id)
-                && self.lead.is_none_or(|lead| next_id(self.ego, time) == Some(lead.track_id))
+        // Without a lead vehicle, the ego vehicle only has to be ahead: it may cut in.
+        let is_ahead = |time: Time| {
+            self.rear.at(time).zip(self.ego.at(time)).is_some_and(|(rear, ego)| rear.lane == lane && ego.s_m > rear.s_m)
+        };
+        let in_order = |time: Time| match self.lead {
+            Some(lead) => {
+                next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(lead.track_id)
+            }
+            None => is_ahead(time),
         };
         let max_ticks = LEAD_IN.ns() / PERIOD.ns();
         let instants = (0..=max_ticks).map(|ticks| self.change_start - PERIOD * ticks);

@@ -121,6 +121,7 @@ fn without_a_margin_system_no_lead_vehicle_is_required() {
     assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 1, 3]);
     assert_eq!(changes.len(), 1);
     assert_eq!(choose_with(Some(2), Lead::LeftOut).unwrap_err(), ChoiceError::NoSuchNumber { count: 1 });
-    let unknown = choose(&data, Wanted { track: Some(9), number: None, lead: Lead::LeftOut }, CONTROL_STEP).unwrap_err();
+    let unknown =
+        choose(&data, Wanted { track: Some(9), number: None, lead: Lead::LeftOut }, CONTROL_STEP).unwrap_err();
     assert_eq!(unknown, ChoiceError::NoLaneChange { is_recorded: false, others: vec![3] });
 }

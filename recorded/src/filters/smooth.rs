@@ -128,7 +128,9 @@ fn presence_by_tick(tracks: &[SmoothedTrack]) -> (i64, Vec<Vec<Presence>>) {
     let ticks = usize::try_from(tick_of(last) - first_tick).map_or(0, |ticks| ticks + 1);
     let mut counts = vec![0_usize; ticks];
     for point in tracks.iter().flat_map(|track| &track.trajectory.points) {
-        if let Some(count) = usize::try_from(tick_of(point.time) - first_tick).ok().and_then(|tick| counts.get_mut(tick)) {
+        if let Some(count) =
+            usize::try_from(tick_of(point.time) - first_tick).ok().and_then(|tick| counts.get_mut(tick))
+        {
             *count += 1;
         }
     }

@@ -6,8 +6,8 @@ use closecall_traffic::Time;
 
 use super::smooth::{SmoothedTrack, SmoothedTrajectoryData, smooth, smooth_track};
 use crate::trajectory_data::{
-    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, TrajectoryFileError,
-    TrajectoryFileProblem, Tracks, count_flaws, open_streaming, read_with,
+    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, Tracks, TrajectoryFileError,
+    TrajectoryFileProblem, count_flaws, open_streaming, read_with,
 };
 
 /// Number of track points among which overlaps are searched: 25 MiB.
@@ -76,4 +76,3 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
     Ok(Some(SmoothedFile { data, flaws: inspector.count_flaws(), period: file.period(), warnings }))
 }
-

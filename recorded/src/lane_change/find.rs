@@ -21,10 +21,7 @@ pub struct FoundLaneChanges {
 ///
 /// # Errors
 /// [`TrajectoryFileError`] if the file cannot be read or used.
-pub fn find(
-    tracks: &mut Tracks<'_>,
-    criterion: Criterion,
-) -> Result<FoundLaneChanges, TrajectoryFileError> {
+pub fn find(tracks: &mut Tracks<'_>, criterion: Criterion) -> Result<FoundLaneChanges, TrajectoryFileError> {
     let lanes = tracks.lanes();
     let detector = LaneChangeDetector::new(lanes, tracks.markings());
     let basis = DetectionBasis::new(criterion, lanes, tracks.markings());

@@ -145,9 +145,7 @@ impl Reader {
     fn add(&mut self, document: Document) -> Result<(), ReadError> {
         let number = self.documents;
         let wrong = |field: &'static str, value: &str, allowed: &str| {
-            let reason = format!(
-                "trajectory {number}: `{field}` is {value}, but {allowed} is needed",
-            );
+            let reason = format!("trajectory {number}: `{field}` is {value}, but {allowed} is needed",);
             ReadError::of_file(TrajectoryFileProblem::Unreadable { format: FORMAT, reason })
         };
         let Document { timestamp, x_position, y_position, length, width, direction, coarse_vehicle_class } = document;
@@ -224,7 +222,8 @@ impl Reader {
 
     fn finish(mut self) -> Result<CollectedSource, ReadError> {
         let both = self.has == [true; 2];
-        let (shift_m, first_lane) = if both { (f64::from(MAX_LANES) * LANE_M + SEPARATION_M, MAX_LANES + 1) } else { (0.0, 0) };
+        let (shift_m, first_lane) =
+            if both { (f64::from(MAX_LANES) * LANE_M + SEPARATION_M, MAX_LANES + 1) } else { (0.0, 0) };
         for row in self.collected.rows_mut() {
             if let Position::Road { road: 1, d_m, lane, .. } = &mut row.position {
                 *d_m -= shift_m;

@@ -182,10 +182,7 @@ fn reader_for<'a>(
 }
 
 /// Selects the reader of a text file by its first line.
-fn text_source<'a, R: BufRead + 'a>(
-    input: R,
-    options: &ReadOptions,
-) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+fn text_source<'a, R: BufRead + 'a>(input: R, options: &ReadOptions) -> Result<Box<dyn RowSource + 'a>, ReadError> {
     let (lines, number, first) = read_first_line(input)?;
     if let Ok((header, separator, width)) = Header::parse(&first)
         && sumo::is_table(&header)

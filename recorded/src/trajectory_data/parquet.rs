@@ -46,7 +46,9 @@ impl ParquetText {
         for column in schema.columns() {
             let path = column.path();
             if path.parts().len() != 1 || column.max_rep_level() > 0 {
-                return Err(unreadable(format!("its column `{path}` holds lists or structures instead of single values")));
+                return Err(unreadable(format!(
+                    "its column `{path}` holds lists or structures instead of single values"
+                )));
             }
             names.push(quoted(column.name()));
         }

@@ -159,6 +159,13 @@ pub(super) fn read_table<R: BufRead>(
                 continue;
             }
         };
+        let with_points;
+        let line = if separator == Separator::Semicolon && line.contains(',') {
+            with_points = line.replace(',', ".");
+            &with_points
+        } else {
+            line
+        };
         let split = fields.split(line, separator);
         let actual = fields.len();
         if let Err(problem) = split {
@@ -199,8 +206,7 @@ impl Reader {
         let heading_rad = (90.0 - real("angle", ANGLE_DEG)?).to_radians();
         let (front_x_m, front_y_m) = (real("x", allowed::PLANE_M)?, real("y", allowed::PLANE_M)?);
         let half_m = 0.5 * length_m;
-        let point =
-            (front_x_m - half_m * maths::cos(heading_rad), front_y_m - half_m * maths::sin(heading_rad));
+        let point = (front_x_m - half_m * maths::cos(heading_rad), front_y_m - half_m * maths::sin(heading_rad));
         let speed_mps = real("speed", allowed::SPEED_MPS)?;
         let acceleration_mps2 = optional_number(field("acceleration"), "acceleration", allowed::ACCELERATION_MPS2)?;
         let vehicle = self.collected.vehicle(field("id"));
@@ -211,7 +217,17 @@ impl Reader {
             before.is_some_and(|(before_edge, before_index)| before_edge == edge && before_index != index)
         });
         let position = Position::Plane { point, heading_rad, changes_lane };
-        Ok(CollectedRow { vehicle, time, position, speed_mps, acceleration_mps2, length_m, width_m, class, line: *line })
+        Ok(CollectedRow {
+            vehicle,
+            time,
+            position,
+            speed_mps,
+            acceleration_mps2,
+            length_m,
+            width_m,
+            class,
+            line: *line,
+        })
     }
 
     /// Returns the class that a type names, and its size.
@@ -254,8 +270,8 @@ impl Reader {
 
     fn finish(mut self) -> Result<CollectedSource, ReadError> {
         let middle = self.widths_m.len() / 2;
-        let lane_width_m = (!self.widths_m.is_empty())
-            .then(|| *self.widths_m.select_nth_unstable_by(middle, f64::total_cmp).1);
+        let lane_width_m =
+            (!self.widths_m.is_empty()).then(|| *self.widths_m.select_nth_unstable_by(middle, f64::total_cmp).1);
         let sizes = "the file states no sizes of vehicles: they have the default size of the class that their type names in SUMO";
         let mut notes = vec![sizes.to_owned()];
         if lane_width_m.is_none() {

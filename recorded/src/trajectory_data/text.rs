@@ -64,13 +64,29 @@ impl<R: BufRead> TextSource<R> {
         }
         let format = drone_format(&first, meta().map_err(Err)?, infer_road)
             .map_err(|error| error.map(|problem| ReadError::new(number, problem)))?;
-        Ok(Self { lines, format, fields: Fields::default(), name: None, first: None, usual_last_field: 0, location: Location::default() })
+        Ok(Self {
+            lines,
+            format,
+            fields: Fields::default(),
+            name: None,
+            first: None,
+            usual_last_field: 0,
+            location: Location::default(),
+        })
     }
 
     fn with_recognised_layout(lines: Lines<R>, number: u64, first: String) -> Result<Self, ReadError> {
         let format = recognise(&first).map_err(|problem| ReadError::new(number, problem))?;
         let first = (!format.has_header).then_some((number, first));
-        Ok(Self { lines, format, fields: Fields::default(), name: None, first, usual_last_field: 0, location: Location::default() })
+        Ok(Self {
+            lines,
+            format,
+            fields: Fields::default(),
+            name: None,
+            first,
+            usual_last_field: 0,
+            location: Location::default(),
+        })
     }
 }
 

@@ -10,8 +10,8 @@ use super::builder::TrackBuilder;
 use super::class_names::UnknownClass;
 use super::continuity::{Continuity, FrameClock};
 use super::data::{RecordedTrack, TrajectoryData};
-use super::estimated_lanes::EstimatedLanes;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
+use super::estimated_lanes::EstimatedLanes;
 use super::file_layout::Layout;
 use super::input::Digest;
 use super::markings::LaneMarkings;
@@ -278,7 +278,15 @@ impl<'a> Tracks<'a> {
         if let Some(estimated) = self.estimated_markings() {
             data.markings = estimated;
         }
-        Ok(TrajectoryData { layout, hash, continuity, notes, lanes, unknown_classes: self.unknown_classes().to_vec(), ..data })
+        Ok(TrajectoryData {
+            layout,
+            hash,
+            continuity,
+            notes,
+            lanes,
+            unknown_classes: self.unknown_classes().to_vec(),
+            ..data
+        })
     }
 
     /// Reads rows until the next track is complete.

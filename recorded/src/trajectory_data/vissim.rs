@@ -15,8 +15,9 @@
 //! - `COORDFRONT` and `COORDREAR` (or these with `X` and `Y`): the middle of the front and of the
 //!   rear in a plane. The road is inferred from the traffic; see `inferred_road`.
 //! - `LANE\LINK\NO`, `LANE\INDEX`, `POS`: the distance of the front from the start of a link, and a
-//!   lane, counted from the right. `POSLAT` is the position across the lane, from 0 at its right
-//!   edge to 1 at its left edge. Each link is a road of its own: a track ends where its link ends.
+//!   lane, counted from the right. `POSLAT` is the position across the lane, from 0 to 1. That it
+//!   grows to the left is an assumption, which lane changes confirm or refute: a vehicle moves
+//!   steadily from lane to lane. Each link is a road of its own: a track ends where its link ends.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -90,10 +91,9 @@ impl Units {
                 &mut self.speed,
                 &[("km/h", KMH_MPS), ("mph", MPH_MPS), ("mi/h", MPH_MPS), ("m/s", 1.0), ("ft/s", FOOT_M)],
             ),
-            "ACCELERATION" => (
-                &mut self.acceleration,
-                &[("m/s2", 1.0), ("m/s²", 1.0), ("ft/s2", FOOT_M), ("ft/s²", FOOT_M)],
-            ),
+            "ACCELERATION" => {
+                (&mut self.acceleration, &[("m/s2", 1.0), ("m/s²", 1.0), ("ft/s2", FOOT_M), ("ft/s²", FOOT_M)])
+            }
             _ => return Ok(()),
         };
         let Some((_, factor)) = allowed.iter().find(|(name, _)| *name == unit) else {
@@ -164,6 +164,11 @@ struct Reader {
     unknown_classes: UnknownClasses,
     /// Number of lanes of each link.
     lanes: BTreeMap<u32, u8>,
+    /// Link, lane and position across the lane in the latest row of each vehicle.
+    latest: BTreeMap<u32, (u32, u8, f64)>,
+    /// Steps across the road at all lane changes (lanes), if the position across the lane grows to the
+    /// left, and if it grows to the right.
+    steps: [f64; 2],
 }
 
 /// Reads a vehicle record.
@@ -198,6 +203,8 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
         collected: Collected::default(),
         unknown_classes: UnknownClasses::default(),
         lanes: BTreeMap::new(),
+        latest: BTreeMap::new(),
+        steps: [0.0; 2],
     };
     let mut fields = Fields::default();
     loop {
@@ -234,14 +241,17 @@ impl Reader {
         let Columns { time, number: vehicle, speed, place, acceleration, length, width, vehicle_type } = self.columns;
         let real = |index: usize, name: &'static str, factor: f64, bounds: Bounds| {
             let value = factor * number(text(index), name, Bounds::closed(f64::MIN, f64::MAX))?;
-            if bounds.contains(value) { Ok(value) } else { number("", name, bounds).map_err(|error| named(error, text(index))) }
+            if bounds.contains(value) {
+                Ok(value)
+            } else {
+                number("", name, bounds).map_err(|error| named(error, text(index)))
+            }
         };
         integer(text(vehicle), "NO", allowed::IDS)?;
         let class = self.class(vehicle_type.map_or("", text));
         let typical = class.typical_dimensions();
         let Units { length: length_unit, speed: speed_unit, acceleration: acceleration_unit, .. } = self.units;
-        let stated_length =
-            length.map(|index| real(index, "LENGTH", length_unit, allowed::LENGTH_M)).transpose()?;
+        let stated_length = length.map(|index| real(index, "LENGTH", length_unit, allowed::LENGTH_M)).transpose()?;
         let width_m = width.map(|index| real(index, "WIDTH", length_unit, allowed::WIDTH_M)).transpose()?;
         let (position, length_m) = match place {
             Place::Link { link, index, along, across } => {
@@ -252,6 +262,7 @@ impl Reader {
                 let lanes = self.lanes.entry(link).or_default();
                 *lanes = (*lanes).max(index);
                 let length_m = stated_length.unwrap_or(typical.length_m);
+                self.compare_senses(text(vehicle), (link, index, across));
                 // The lanes of a link are known after the last row; until then they count from the
                 // right edge.
                 let d_m = DEFAULT_LANE_WIDTH_M * (f64::from(index) - 1.0 + across);
@@ -283,6 +294,21 @@ impl Reader {
         })
     }
 
+    /// Adds the step of a lane change to the two sums of steps.
+    fn compare_senses(&mut self, vehicle: &str, now: (u32, u8, f64)) {
+        let vehicle = self.collected.vehicle(vehicle);
+        let Some(before) = self.latest.insert(vehicle, now).filter(|before| before.0 == now.0 && before.1 != now.1)
+        else {
+            return;
+        };
+        let step = |sense: f64| {
+            let at = |(_, index, across): (u32, u8, f64)| f64::from(index) + sense * across;
+            (at(now) - at(before)).abs()
+        };
+        self.steps[0] += step(1.0);
+        self.steps[1] += step(-1.0);
+    }
+
     fn class(&mut self, text: &str) -> VehicleClass {
         let listed = TYPES.iter().find(|(name, _)| text.is_empty() || *name == text);
         listed.map_or_else(|| self.unknown_classes.nearest_of(&format!("type {text}")), |(_, class)| *class)
@@ -296,6 +322,9 @@ impl Reader {
         if matches!(self.columns.place, Place::Link { .. }) && self.columns.length.is_none() {
             notes.push("the file states no lengths of vehicles: each has the typical size of its class".to_owned());
         }
+        if !matches!(self.columns.place, Place::Link { .. }) {
+            notes.push(format!("the file states no lanes: lanes of {DEFAULT_LANE_WIDTH_M} m are assumed"));
+        }
         let (by_link, markings) = self.roads()?;
         if !by_link.is_empty() {
             notes.push(format!(
@@ -304,10 +333,17 @@ impl Reader {
                 by_link.len()
             ));
         }
+        let grows_to_the_right = self.steps[1] < self.steps[0];
+        if grows_to_the_right {
+            notes.push("POSLAT grows to the right, as the lane changes show".to_owned());
+        }
         for row in self.collected.rows_mut() {
             if let Position::Road { road, d_m, lane, .. } = &mut row.position
                 && let Some(&(first_lane, shift_m, lanes)) = by_link.get(road)
             {
+                if grows_to_the_right {
+                    *d_m = DEFAULT_LANE_WIDTH_M * (2.0 * f64::from(*lane) - 1.0) - *d_m;
+                }
                 *d_m += shift_m - DEFAULT_LANE_WIDTH_M * f64::from(lanes);
                 *lane = first_lane + lanes - *lane + 1;
             }
@@ -341,9 +377,9 @@ impl Reader {
             roads.insert(link, (first_lane, shift_m, lanes));
             // The unused number before a later link has that link's left edge as its right edge.
             let first = u8::from(first_lane == 0);
-            edges.extend((first..=lanes).map(|lane| {
-                (Lane(first_lane + lane), shift_m - DEFAULT_LANE_WIDTH_M * f64::from(lane))
-            }));
+            edges.extend(
+                (first..=lanes).map(|lane| (Lane(first_lane + lane), shift_m - DEFAULT_LANE_WIDTH_M * f64::from(lane))),
+            );
             first_lane += lanes + 1;
             shift_m -= DEFAULT_LANE_WIDTH_M * f64::from(lanes) + SEPARATION_M;
         }

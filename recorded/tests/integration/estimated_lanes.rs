@@ -22,12 +22,14 @@ type Lateral = Box<dyn Fn(f64) -> f64>;
 
 /// Reads made-up vehicles, whose file states lane 0 throughout, without lanes.
 fn read_without_lanes(vehicles: &[Lateral]) -> TrajectoryData {
-    let mut text = "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    let mut text =
+        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
     for (number, lateral) in vehicles.iter().enumerate() {
         for frame in 0..150 {
             let time_s = 0.1 * f64::from(frame);
             let s_m = 40.0 * number as f64 + 25.0 * time_s;
-            writeln!(text, "{},{frame},{time_s:.1},{s_m:.2},{:.3},0,25,0,4.5,1.8,car", number + 1, lateral(time_s)).unwrap();
+            writeln!(text, "{},{frame},{time_s:.1},{s_m:.2},{:.3},0,25,0,4.5,1.8,car", number + 1, lateral(time_s))
+                .unwrap();
         }
     }
     open_from(text.as_bytes(), Path::new("made-up.csv"), WITHOUT_LANES(), usize::MAX).unwrap().collect_all().unwrap()

@@ -15,4 +15,5 @@ mod ngsim_us101;
 mod other_programs;
 mod own_trajectory_files;
 mod robustness;
+mod smooth_file;
 mod support;

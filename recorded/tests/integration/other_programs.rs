@@ -149,7 +149,7 @@ fn malformed_floating_car_data_is_refused() {
     for (text, needed) in [
         (bomb, vec!["line", "floating car data", "document type declaration"]),
         (good.replace("</timestep>", ""), vec!["floating car data"]),
-        (good.chars().take(5_000).collect(), vec!["line", "cut"]),
+        (good.chars().take(5_000).collect(), vec!["line", "floating car data", "not closed"]),
         (good.replacen("x=\"0.000\"", "x=\"nan\"", 1), vec!["line 5", "`x`", "is `nan`"]),
         (good.replacen("angle=\"90.00\"", "", 1), vec!["line 5", "`angle`", "-360 to 720"]),
         (good.replacen("speed=\"32.00\"", "speed=\"3200\"", 1), vec!["line 5", "`speed`", "0 to 150"]),
@@ -214,28 +214,35 @@ fn vissim(columns: &str, row: impl Fn(&Drive, f64) -> String) -> String {
 
 /// Positions on one link, with the position across the lane.
 fn vissim_by_link() -> String {
+    vissim_across(|across| across)
+}
+
+fn vissim_across(sense: fn(f64) -> f64) -> String {
     vissim(r"LANE\LINK\NO;LANE\INDEX;POS;POSLAT;SPEED;VEHTYPE;LENGTH", |drive, time_s| {
         let (front_m, y_m, index) = drive.at(time_s, false);
-        let across = y_m / SUMO_LANE_M + 3.0 - f64::from(index);
+        let across = sense(y_m / SUMO_LANE_M + 3.0 - f64::from(index));
         let length_m = if drive.kind == "trailer" { 16.5 } else { 5.0 };
         let kind = if drive.kind == "trailer" { 200 } else { 100 };
         format!("7;{};{front_m:.3};{across:.4};{:.3};{kind};{length_m}", index + 1, 3.6 * drive.speed_mps)
     })
 }
 
+/// Lane width that is assumed for Vissim (m).
+const VISSIM_LANE_M: f64 = 3.5;
+
 fn vissim_by_coordinates() -> String {
     vissim("SPEED;VEHTYPE;COORDFRONT;COORDREAR;WIDTH", |drive, time_s| {
         let (front_m, y_m, _) = drive.at(time_s, false);
         let length_m = if drive.kind == "trailer" { 16.5 } else { 5.0 };
         let kind = if drive.kind == "trailer" { 200 } else { 100 };
-        let rear_m = front_m - length_m;
+        let (rear_m, y_m) = (front_m - length_m, y_m / SUMO_LANE_M * VISSIM_LANE_M);
         format!("{:.3};{kind};{front_m:.3} {y_m:.3} 0.0;{rear_m:.3} {y_m:.3} 0.0;1.8", 3.6 * drive.speed_mps)
     })
 }
 
 #[test]
 fn vehicle_records_of_vissim_are_read_by_links_and_by_coordinates() {
-    for text in [vissim_by_link(), vissim_by_coordinates()] {
+    for text in [vissim_by_link(), vissim_across(|across| 1.0 - across), vissim_by_coordinates()] {
         let data = read_text(text.as_bytes()).unwrap();
         assert_eq!((data.layout, data.period), (Layout::Vissim, Time::from_ms(100)));
         let lanes: Vec<(u8, u8)> =
@@ -272,7 +279,7 @@ fn malformed_vehicle_records_are_refused() {
         (good.replace("$VEHICLE:", "$VEHICLES:"), vec!["vehicle record of Vissim", "$VEHICLE:SIMSEC;NO"]),
         (good.replace(r"LANE\INDEX", r"LANE\IDX"), vec!["line 7", r"no column `LANE\INDEX`", "Vissim"]),
         (good.replace("[km/h]", "[furlong]"), vec!["line 5", "unit of SPEED is `furlong`", "km/h, mph"]),
-        (good.replace("[km/h]", "[mph]"), vec!["share of what the recorded speed makes", "0.6 to 1.6"]),
+        (good.replace("[km/h]", "[mph]"), vec!["share of what the recorded speed makes", "0.8 to 1.25"]),
         (good.clone() + "1;2;3\n", vec!["line 488", "3 columns, but 9 are needed"]),
         (good.replacen(";100;5", ";100;500", 1), vec!["line 8", "`LENGTH`", "is `500`", "0 and up to 60"]),
         (good.replacen("0.00;1;", "0.00;x;", 1), vec!["line 8", "`NO`", "is `x`"]),
@@ -281,8 +288,8 @@ fn malformed_vehicle_records_are_refused() {
         let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(400)]);
         assert_mentions(&error, &needed, &text[..text.len().min(200)]);
     }
-    let in_miles = good.replace("[km/h]", "[m/s]");
-    assert!(read_text(in_miles.as_bytes()).is_err(), "a wrong unit is found by the positions");
+    let in_metres = good.replace("[km/h]", "[m/s]");
+    assert!(read_text(in_metres.as_bytes()).is_err(), "a wrong unit is found by the positions");
 }
 
 /// Two directions with 10 vehicles each; one changes lanes.
@@ -325,7 +332,10 @@ fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
         let back = &data.trajectories[5];
         assert!(back.points[0].d_m < -1_000.0 && back.points[0].lane.0 > 8);
         let changes = detect(&smooth(&data));
-        assert_eq!(changes.iter().map(|change| (change.track_id, change.direction)).collect::<Vec<_>>(), [(5, Side::Right)]);
+        assert_eq!(
+            changes.iter().map(|change| (change.track_id, change.direction)).collect::<Vec<_>>(),
+            [(5, Side::Right)]
+        );
     }
 }
 
@@ -333,11 +343,20 @@ fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
 fn malformed_json_is_refused() {
     let good = i24(true);
     for (text, needed) in [
-        (good.replacen("\"x_position\"", "\"x_positions\"", 1), vec!["line 1", "I-24 MOTION", "missing field `x_position`"]),
-        (good.replacen("\"direction\":1", "\"direction\":2", 1), vec!["trajectory 1", "`direction` is 2", "1 (eastbound)"]),
+        (
+            good.replacen("\"x_position\"", "\"x_positions\"", 1),
+            vec!["line 1", "I-24 MOTION", "missing field `x_position`"],
+        ),
+        (
+            good.replacen("\"direction\":1", "\"direction\":2", 1),
+            vec!["trajectory 1", "`direction` is 2", "1 (eastbound)"],
+        ),
         (good.replacen("\"length\":15.0", "\"length\":1500.0", 1), vec!["trajectory 1", "`length`", "up to 60 m"]),
         (good.replacen("\"coarse_vehicle_class\":0", "\"coarse_vehicle_class\":9", 1), vec!["from 0 to 6"]),
-        (good.replacen("\"timestamp\":[1669122000.00,", "\"timestamp\":[", 1), vec!["trajectory 1", "a list of 250", "249"]),
+        (
+            good.replacen("\"timestamp\":[1669122000.00,", "\"timestamp\":[", 1),
+            vec!["trajectory 1", "a list of 250", "249"],
+        ),
         (good.replacen("1669122000.04", "1669121000.04", 1), vec!["trajectory 1", "`timestamp`", "after 1669122000"]),
         (good.replacen("1669122000.04", "NaN", 1), vec!["line 1", "I-24 MOTION"]),
         (good.chars().take(9_000).collect(), vec!["I-24 MOTION", "EOF"]),
@@ -450,8 +469,20 @@ fn malformed_parquet_is_refused() {
 /// Writes a data set with exiD's columns, of which `columns` are left out.
 fn exid(folder: &Path, without: &[&str], changes_flagged: bool) {
     let all = [
-        "recordingId", "trackId", "frame", "xCenter", "yCenter", "heading", "width", "length", "lonVelocity",
-        "lonAcceleration", "latLaneCenterOffset", "laneWidth", "laneletId", "laneChange",
+        "recordingId",
+        "trackId",
+        "frame",
+        "xCenter",
+        "yCenter",
+        "heading",
+        "width",
+        "length",
+        "lonVelocity",
+        "lonAcceleration",
+        "latLaneCenterOffset",
+        "laneWidth",
+        "laneletId",
+        "laneChange",
     ];
     let kept: Vec<usize> = (0..all.len()).filter(|index| !without.contains(&all[*index])).collect();
     let line = |values: &[String]| kept.iter().map(|index| values[*index].clone()).collect::<Vec<_>>().join(",") + "\n";
@@ -468,9 +499,19 @@ fn exid(folder: &Path, without: &[&str], changes_flagged: bool) {
             let in_lane = if share < 0.5 { lane } else { lane + 1.0 };
             let is_flagged = changes_flagged && vehicle == 2 && frame == 150;
             let values = [
-                "5".to_owned(), vehicle.to_string(), frame.to_string(), format!("{:.3}", speed_mps * time_s),
-                format!("{y_m:.3}"), "0.0".to_owned(), "1.9".to_owned(), "4.7".to_owned(), speed_mps.to_string(),
-                "0".to_owned(), format!("{:.3}", y_m - 3.7 * in_lane), "3.7".to_owned(), format!("{in_lane}"),
+                "5".to_owned(),
+                vehicle.to_string(),
+                frame.to_string(),
+                format!("{:.3}", speed_mps * time_s),
+                format!("{y_m:.3}"),
+                "0.0".to_owned(),
+                "1.9".to_owned(),
+                "4.7".to_owned(),
+                speed_mps.to_string(),
+                "0".to_owned(),
+                format!("{:.3}", y_m - 3.7 * in_lane),
+                "3.7".to_owned(),
+                format!("{in_lane}"),
                 u8::from(is_flagged).to_string(),
             ];
             rows += &line(&values);

@@ -99,7 +99,11 @@ impl SampledRun {
     /// Evaluates the recorded lane change, with the vehicles of `step`.
     pub fn recorded(encounter: &RecordedEncounter, step: &SampledEncounter) -> Self {
         let track = |index: usize| &encounter.vehicles[index].trajectory;
-        let vehicles = Vehicles { own: track(encounter.rear_index()), opp1: track(EGO_INDEX), opp2: step.recorded_opp2.map(track) };
+        let vehicles = Vehicles {
+            own: track(encounter.rear_index()),
+            opp1: track(EGO_INDEX),
+            opp2: step.recorded_opp2.map(track),
+        };
         Self::measured("recorded".to_owned(), &vehicles, [encounter.home, encounter.target], step.lane_change_s)
     }
 
@@ -343,11 +347,8 @@ impl Sampled {
         let time = "time [s]";
         // The opponents drive as recorded, in every run.
         let recorded = self.runs.first().into_iter().flat_map(|run| ["Opp1", "Opp2"].into_iter().zip(&run.opponents));
-        let opponents = recorded.enumerate().filter(|(_, (_, path))| !path.is_empty()).map(|(index, (name, path))| Line {
-            name: name.to_owned(),
-            points: path.clone(),
-            colour: self.runs.len() + index,
-            faint: true,
+        let opponents = recorded.enumerate().filter(|(_, (_, path))| !path.is_empty()).map(|(index, (name, path))| {
+            Line { name: name.to_owned(), points: path.clone(), colour: self.runs.len() + index, faint: true }
         });
         let paths = lines(|run| &run.path).into_iter().chain(opponents).collect();
         vec![
