@@ -96,8 +96,8 @@ pub(super) fn read(mut input: impl BufRead) -> Result<CollectedSource, ReadError
         let mut json = serde_json::Deserializer::from_reader(input);
         json.deserialize_seq(&mut reader).and_then(|()| json.end())
     } else {
-        let documents = serde_json::Deserializer::from_reader(input).into_iter::<Document>();
-        documents.map(|document| document.map(|document| reader.push(document))).collect()
+        let mut documents = serde_json::Deserializer::from_reader(input).into_iter::<Document>();
+        documents.try_for_each(|document| document.map(|document| reader.push(document)))
     };
     if let Some(error) = reader.error {
         return Err(error);

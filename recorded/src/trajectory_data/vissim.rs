@@ -156,6 +156,15 @@ impl Columns {
     }
 }
 
+/// The road that a link is.
+#[derive(Clone, Copy, Debug)]
+struct LinkRoad {
+    /// The number before its first lane.
+    first_lane: u8,
+    shift_m: f64,
+    lanes: u8,
+}
+
 /// What is gathered while the file is read.
 struct Reader {
     columns: Columns,
@@ -339,7 +348,7 @@ impl Reader {
         }
         for row in self.collected.rows_mut() {
             if let Position::Road { road, d_m, lane, .. } = &mut row.position
-                && let Some(&(first_lane, shift_m, lanes)) = by_link.get(road)
+                && let Some(&LinkRoad { first_lane, shift_m, lanes }) = by_link.get(road)
             {
                 if grows_to_the_right {
                     *d_m = DEFAULT_LANE_WIDTH_M * (2.0 * f64::from(*lane) - 1.0) - *d_m;
@@ -358,9 +367,8 @@ impl Reader {
         })
     }
 
-    /// Returns, for each link, the number before its first lane, its shift (m) and the number of its
-    /// lanes; and the markings of all links.
-    fn roads(&self) -> Result<(BTreeMap<u32, (u8, f64, u8)>, Option<LaneMarkings>), ReadError> {
+    /// Returns the road of each link, and the markings of all of them.
+    fn roads(&self) -> Result<(BTreeMap<u32, LinkRoad>, Option<LaneMarkings>), ReadError> {
         let needed: u32 = self.lanes.values().map(|lanes| u32::from(*lanes) + 1).sum();
         if needed > MAX_LANES {
             let reason = format!(
@@ -374,7 +382,7 @@ impl Reader {
         let mut roads = BTreeMap::new();
         let mut edges = Vec::new();
         for (&link, &lanes) in &self.lanes {
-            roads.insert(link, (first_lane, shift_m, lanes));
+            roads.insert(link, LinkRoad { first_lane, shift_m, lanes });
             // The unused number before a later link has that link's left edge as its right edge.
             let first = u8::from(first_lane == 0);
             edges.extend(
