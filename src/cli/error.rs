@@ -11,7 +11,7 @@ use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_recorded::aerial::AerialError;
-use closecall_recorded::encounter::NoEncounter;
+use closecall_recorded::encounter::{Lead, NoEncounter};
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
 use closecall_recorded::trajectory_data::{
@@ -99,12 +99,10 @@ pub enum CliError {
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
     /// A recorded lane change is not an encounter that can be re-enacted or sampled.
-    #[error("failed to {purpose} an encounter of {file}: {source}{}", track_suggestion(option, possible))]
+    #[error("failed to {} an encounter of {file}: {source}{}", purpose(*lead), track_suggestion(*lead, possible))]
     NoEncounter {
-        /// What the encounter is for.
-        purpose: &'static str,
-        /// The option that names a track.
-        option: &'static str,
+        /// Whether a lead vehicle is required: for a re-enactment, not for a sample.
+        lead: Lead,
         /// The trajectory file.
         file: String,
         /// The condition that is not met.
@@ -215,8 +213,20 @@ fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
 /// Largest number of tracks that a message suggests.
 pub(super) const MAX_SUGGESTED: usize = 10;
 
-/// Returns the tracks that `option` can name, as the end of a message.
-fn track_suggestion(option: &str, possible: &[u64]) -> String {
+/// Returns what an encounter is for.
+const fn purpose(lead: Lead) -> &'static str {
+    match lead {
+        Lead::Required => "re-enact",
+        Lead::LeftOut => "sample",
+    }
+}
+
+/// Returns the tracks that the option of a command can name, as the end of a message.
+fn track_suggestion(lead: Lead, possible: &[u64]) -> String {
+    let option = match lead {
+        Lead::Required => "--track",
+        Lead::LeftOut => "--lane-change",
+    };
     let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
     match possible.len() {
         0 => String::new(),

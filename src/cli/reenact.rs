@@ -133,11 +133,7 @@ pub(super) fn chosen(path: &Path, read: &ReadArgs, wanted: Wanted) -> Result<Rec
             CliError::usage(format!("{file} has {count} lane changes{of_track}: --number can be 1 to {count}"))
         }
         ChoiceError::NoEncounter { source, possible } => {
-            let (purpose, option) = match wanted.lead {
-                Lead::Required => ("re-enact", "--track"),
-                Lead::LeftOut => ("sample", "--lane-change"),
-            };
-            CliError::NoEncounter { purpose, option, file: file.to_string(), source, possible }
+            CliError::NoEncounter { lead: wanted.lead, file: file.to_string(), source, possible }
         }
     })
 }

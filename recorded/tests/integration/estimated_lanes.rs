@@ -8,7 +8,7 @@ use std::path::Path;
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::{LaneChange, LaneReliability, Score, detect, read_references, score};
 use closecall_recorded::trajectory_data::{ReadOptions, TrajectoryData, open_from, read_with};
-use closecall_traffic::{Lane, Side};
+use closecall_traffic::{Lane, Side, maths};
 
 use crate::support::data_folder;
 
@@ -37,7 +37,7 @@ fn read_without_lanes(vehicles: &[Lateral]) -> TrajectoryData {
 
 /// A vehicle that sways by `sway_m` about the position `right_m`.
 fn keeps(right_m: f64, sway_m: f64, phase: f64) -> Lateral {
-    Box::new(move |time_s| right_m + sway_m * (TAU * (time_s / 9.0 + phase)).sin())
+    Box::new(move |time_s| right_m + sway_m * maths::sin(TAU * (time_s / 9.0 + phase)))
 }
 
 /// A vehicle that changes from one lane to another on a quintic path.

@@ -11,7 +11,7 @@ use closecall_recorded::trajectory_data::{
     BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, TrajectoryFileProblem, open_from,
     read, read_from, read_with,
 };
-use closecall_traffic::{Side, Time, VehicleClass};
+use closecall_traffic::{Side, Time, VehicleClass, maths};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
@@ -181,7 +181,7 @@ fn traffic_without_a_road_is_refused_with_the_reason() {
         for number in 0..12 {
             let (angle, is_left) = (30.0 * f64::from(number) + 9.0 * time_s, number % 2 == 0);
             let (radius_m, turn) = if is_left { (60.0, 1.0) } else { (160.0, -1.0) };
-            let (sin, cos) = (turn * angle).to_radians().sin_cos();
+            let (sin, cos) = maths::sin_cos((turn * angle).to_radians());
             let heading = turn * angle + turn * 90.0;
             writeln!(
                 text,

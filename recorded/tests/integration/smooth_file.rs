@@ -15,9 +15,9 @@ fn write_long(path: &Path, by_time: bool) {
     let vehicles = STREAM_ROWS / ROWS + 40;
     let row = |vehicle: usize, frame: usize| {
         let time_s = 0.1 * (frame + 7 * vehicle) as f64;
-        let tau = if vehicle % 3 == 0 { ((0.1 * frame as f64 - 4.0) / 4.0).clamp(0.0, 1.0) } else { 0.0 };
+        let tau = if vehicle.is_multiple_of(3) { ((0.1 * frame as f64 - 4.0) / 4.0).clamp(0.0, 1.0) } else { 0.0 };
         let share = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
-        let right_m = 3.5 * ((vehicle % 2) as f64 + 0.5 + if vehicle % 2 == 0 { share } else { -share });
+        let right_m = 3.5 * ((vehicle % 2) as f64 + 0.5 + if vehicle.is_multiple_of(2) { share } else { -share });
         let lane = if right_m < 3.5 { 1 } else { 2 };
         let (frame_number, s_m) = (frame + 7 * vehicle, 2.5 * frame as f64);
         format!("{vehicle},{frame_number},{time_s:.1},{s_m:.2},{right_m:.3},{lane},25,0,4.5,1.8,car\n")
