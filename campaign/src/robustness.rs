@@ -18,8 +18,9 @@ pub enum RobustnessError {
     Mixed,
 }
 
-/// Studies trajectory files. Returns the result of each file, and the result of all files together;
-/// `None` if there are no files.
+/// Studies trajectory files, and calls `warn` with what a reader of the results has to know of them.
+/// Returns the result of each file, and the result of all files together; `None` if there are no
+/// files.
 ///
 /// # Errors
 /// [`RobustnessError`] if a file cannot be used, or if the files cannot be studied together.
@@ -27,8 +28,14 @@ pub fn robustness(
     files: &[PathBuf],
     options: ReadOptions,
     setup: &Setup,
+    mut warn: impl FnMut(&Path, &str),
 ) -> Result<Option<(Vec<Robustness>, Robustness)>, RobustnessError> {
-    let studies = files.iter().map(|path| study_of(path, options)).collect::<Result<Vec<_>, _>>()?;
+    let mut studies = Vec::new();
+    for path in files {
+        let (study, warnings) = study_of(path, options)?;
+        warnings.iter().for_each(|warning| warn(path, warning));
+        studies.push(study);
+    }
     let (mut each, mut all): (Vec<Robustness>, Option<Robustness>) = (Vec::new(), None);
     for study in &studies {
         let cases = Study::cases(setup);
@@ -45,12 +52,14 @@ pub fn robustness(
     Ok(all.map(|all| (each, all)))
 }
 
-fn study_of(path: &Path, options: ReadOptions) -> Result<Study, TrajectoryFileError> {
+/// Returns the study of one file, and what a reader of results has to know of the file.
+fn study_of(path: &Path, options: ReadOptions) -> Result<(Study, Vec<String>), TrajectoryFileError> {
     let mut tracks = open(path, options)?;
     let mut measured: Vec<Measured> = Vec::new();
     while let Some(track) = tracks.next_track()? {
         measured.push((track.trajectory, track.markings));
     }
     measured.sort_by_key(|(track, _)| track.track_id);
-    Ok(Study::with_lanes(options.lanes, measured, tracks.markings()))
+    let warnings = tracks.warnings();
+    Ok((Study::with_lanes(options.lanes, measured, tracks.markings()), warnings))
 }

@@ -24,7 +24,7 @@ use closecall_controllers::{
     AccConfig, AebConfig, DriverConfig, EgoStackConfig, FollowConfig, MisConfig, OvertakerConfig, PrescribedConfig,
     PrescribedLaneChangeConfig, ReactionConfig, Wiedemann99Config,
 };
-use closecall_recorded::encounter::{EGO_INDEX, LEAD_INDEX, Participant, REAR_INDEX, RecordedEncounter};
+use closecall_recorded::encounter::{EGO_INDEX, Participant, RecordedEncounter};
 use closecall_recorded::filters::PERIOD;
 use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
@@ -124,15 +124,16 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
     let [ego, _, rear_track] = encounter.ego_lead_rear();
     let mut actors = Vec::new();
     for (index, vehicle) in encounter.vehicles.iter().enumerate() {
-        let driver = match (index, rear) {
-            (EGO_INDEX, _) => Some(ego_stack(encounter)),
-            (LEAD_INDEX, _) | (REAR_INDEX, RearDriver::Recorded) => Some(prescribed_driver(encounter, vehicle)),
-            (REAR_INDEX, RearDriver::Model) => Some(overtaking_driver(encounter)),
+        let is_rear = index == encounter.rear_index();
+        let driver = match rear {
+            _ if index == EGO_INDEX => Some(ego_stack(encounter)),
+            RearDriver::Model if is_rear => Some(overtaking_driver(encounter)),
+            _ if index <= encounter.rear_index() => Some(prescribed_driver(encounter, vehicle)),
             _ => other_driver(encounter, vehicle),
         };
         let earlier_vehicles = &encounter.vehicles[..index];
         if let (Some(driver), Some(start)) = (driver, start_of(&vehicle.trajectory))
-            && (index <= REAR_INDEX
+            && (index <= encounter.rear_index()
                 || earlier_vehicles.iter().all(|earlier| is_clear(&earlier.trajectory, start, vehicle)))
         {
             actors.push(actor(&actor_name(index, &vehicle.trajectory), vehicle, start, driver)?);
@@ -291,7 +292,7 @@ fn gaps(follower: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator
 /// Returns the driver of a vehicle other than the ego, the lead and the rear vehicle, or `None` if
 /// it is not simulated.
 fn other_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<DriverConfig> {
-    let (start, rear) = (start_of(&vehicle.trajectory)?, start_of(encounter.ego_lead_rear()[REAR_INDEX])?);
+    let (start, rear) = (start_of(&vehicle.trajectory)?, start_of(&encounter.rear().trajectory)?);
     let stays = vehicle.trajectory.points.iter().all(|point| point.lane == start.lane);
     if !stays || start.lane == encounter.home {
         return None;

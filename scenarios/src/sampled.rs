@@ -149,8 +149,8 @@ impl SampledEncounter {
 /// the encounter: the next vehicle ahead in the target lane at the recorded crossing, if it is
 /// there from the start.
 pub fn opp2_of(encounter: &RecordedEncounter) -> Option<usize> {
-    let own_m = at_or_before(encounter.ego_lead_rear()[REAR_INDEX], encounter.crossing)?.s_m;
-    let others = encounter.vehicles.iter().enumerate().skip(REAR_INDEX + 1);
+    let own_m = at_or_before(&encounter.rear().trajectory, encounter.crossing)?.s_m;
+    let others = encounter.vehicles.iter().enumerate().skip(encounter.rear_index() + 1);
     let ahead = others.filter_map(|(index, other)| {
         start_of(&other.trajectory)?;
         let point = at_or_before(&other.trajectory, encounter.crossing)?;
@@ -179,7 +179,7 @@ struct LaneChangeTimes {
 fn lane_change_of(encounter: &RecordedEncounter) -> LaneChangeTimes {
     let [start_s, end_s] =
         [encounter.change.start_s, encounter.change.end_s].map(|time_s| encounter.time_of(time_s).s());
-    let rear = encounter.ego_lead_rear()[REAR_INDEX];
+    let rear = &encounter.rear().trajectory;
     let as_recorded = (start_s.max(0.0), (end_s - start_s.max(0.0)).clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S));
     let (at_s, duration_s) = lane_change_across(rear, [start_s, encounter.crossing.s()], 0.0).unwrap_or(as_recorded);
     LaneChangeTimes { at_s: to_steps(at_s), duration_s: to_steps(duration_s) }
@@ -192,11 +192,12 @@ fn built(
     lane_change: LaneChangeTimes,
 ) -> Result<ScenarioConfig, String> {
     let base = config(encounter, RearDriver::Recorded)?;
-    let changer = &encounter.vehicles[REAR_INDEX];
+    let changer = encounter.rear();
     let own_start = start_of(&changer.trajectory).ok_or("the vehicle that changes lanes appears after the start")?;
     let mut actors = vec![lane_changer(encounter, changer, own_start, lane_change)?];
     let mut kept: Vec<&Participant> = vec![changer];
-    for (index, vehicle) in encounter.vehicles.iter().enumerate().filter(|(index, _)| *index != REAR_INDEX) {
+    for (index, vehicle) in encounter.vehicles.iter().enumerate().filter(|(index, _)| *index != encounter.rear_index())
+    {
         let Some(start) = start_of(&vehicle.trajectory) else { continue };
         let is_opponent = index == EGO_INDEX || Some(index) == opp2;
         let fits = fits_the_road(encounter, vehicle, start.lane)
@@ -285,7 +286,7 @@ fn ego(encounter: &RecordedEncounter, others: &[&Participant]) -> Result<ActorCo
 /// Returns whether a vehicle is behind the lane changer at the crossing, or at the end of its track
 /// before it, in one of the two lanes of the lane change.
 fn is_behind(encounter: &RecordedEncounter, vehicle: &Participant) -> bool {
-    let changer = encounter.ego_lead_rear()[REAR_INDEX];
+    let changer = &encounter.rear().trajectory;
     let until = vehicle.trajectory.span().map_or(Time::ZERO, |(_, last)| last.min(encounter.crossing));
     let pair = at_or_before(changer, until).zip(at_or_before(&vehicle.trajectory, until));
     pair.is_none_or(|(changer, other)| {

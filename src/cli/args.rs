@@ -13,7 +13,7 @@ use closecall_sensors::SensorMode;
 use super::CliError;
 use super::arms::ArmArgs;
 use super::help::heading;
-use super::output::print_error;
+use super::output::{print_error, reading};
 use super::saved::SavedArgs;
 
 /// The format of the output.
@@ -73,6 +73,12 @@ pub(super) enum Layout {
     Csv,
     /// Log of a vehicle that measures its distances to the lane markings
     InCar,
+    /// Floating car data (FCD) of SUMO: XML, or a table
+    Sumo,
+    /// Vehicle record of Vissim (.fzp)
+    Vissim,
+    /// Trajectories of I-24 MOTION in JSON
+    I24,
 }
 
 /// Several trajectory files, taken together.
@@ -100,7 +106,7 @@ impl FilesArgs {
 /// # Errors
 /// The file cannot be read, or its content is wrong.
 pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
-    let data = read_with(path, options)?;
+    let data = reading(path, || read_with(path, options))?;
     for warning in data.warnings() {
         print_error(format_args!("warning: {}: {warning}\n", path.display()));
     }
@@ -116,6 +122,9 @@ pub(super) struct ReadArgs {
     /// Skip and count rows that cannot be used, instead of refusing the file
     #[arg(long, help_heading = heading::DATA)]
     pub(super) drop_bad_rows: bool,
+    /// Data set to read of a file that holds several: the location of NGSIM's export
+    #[arg(long, value_enum, value_name = "NAME", help_heading = heading::DATA)]
+    location: Option<Location>,
     /// The lateral position of the file points to the other side than its layout states
     #[arg(long, help_heading = heading::DATA)]
     mirror_d: bool,
@@ -127,13 +136,41 @@ pub(super) struct ReadArgs {
     pub(super) lanes: LanesChoice,
 }
 
+/// The locations of NGSIM's data sets, which its export holds together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Location {
+    /// US 101 in Los Angeles, a motorway
+    #[value(name = "us-101")]
+    Us101,
+    /// I-80 in Emeryville, a motorway
+    #[value(name = "i-80")]
+    I80,
+    /// Lankershim Boulevard in Los Angeles, an urban street
+    Lankershim,
+    /// Peachtree Street in Atlanta, an urban street
+    Peachtree,
+}
+
+impl Location {
+    /// Returns the name in the column `Location`.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Us101 => "us-101",
+            Self::I80 => "i-80",
+            Self::Lankershim => "lankershim",
+            Self::Peachtree => "peachtree",
+        }
+    }
+}
+
 /// The lanes by which lane changes are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum LanesChoice {
     /// The lanes that the file states for each vehicle
     #[default]
     Recorded,
-    /// None: a lateral shift by most of a lane is a lane change. For files whose lanes are missing or unreliable
+    /// None: they are estimated from the lateral positions of the traffic, or else a lateral shift by most of a lane is a lane
+    /// change. For files whose lanes are missing or unreliable
     None,
 }
 
@@ -154,10 +191,19 @@ impl ReadArgs {
             Layout::Commonroad => LayoutChoice::Commonroad,
             Layout::Csv => LayoutChoice::Csv,
             Layout::InCar => LayoutChoice::InCar,
+            Layout::Sumo => LayoutChoice::Sumo,
+            Layout::Vissim => LayoutChoice::Vissim,
+            Layout::I24 => LayoutChoice::I24,
         });
         let axes = AxisOptions { mirror_d: self.mirror_d, lanes_from_right: self.lanes_from_right };
         let bad_rows = if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject };
-        ReadOptions { layout, bad_rows, axes, lanes: self.lanes.reliability() }
+        ReadOptions {
+            layout,
+            bad_rows,
+            axes,
+            lanes: self.lanes.reliability(),
+            location: self.location.map(Location::name),
+        }
     }
 }
 

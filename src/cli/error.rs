@@ -11,7 +11,7 @@ use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_recorded::aerial::AerialError;
-use closecall_recorded::encounter::NoEncounter;
+use closecall_recorded::encounter::{Lead, NoEncounter};
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
 use closecall_recorded::trajectory_data::{
@@ -99,9 +99,11 @@ pub enum CliError {
     /// A recorded lane change cannot be shown.
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
-    /// A recorded lane change is not an encounter that can be re-enacted.
-    #[error("failed to re-enact an encounter of {file}: {source}{}", track_suggestion(possible))]
+    /// A recorded lane change is not an encounter that can be re-enacted or sampled.
+    #[error("failed to {} an encounter of {file}: {source}{}", purpose(*lead), track_suggestion(*lead, possible))]
     NoEncounter {
+        /// Whether a lead vehicle is required: for a re-enactment, not for a sample.
+        lead: Lead,
         /// The trajectory file.
         file: String,
         /// The condition that is not met.
@@ -204,23 +206,38 @@ fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
     match problem {
         TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => "; --mirror-d turns the position",
         TrajectoryFileProblem::LanesAgainstPosition { .. } => "; --lanes-from-right turns the lanes",
+        TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
+            "; --location NAME reads one data set of NGSIM's export"
+        }
         problem if problem.affects_one_row() => "; --drop-bad-rows skips such rows, and counts them",
         _ => "",
     }
 }
 
 /// Largest number of tracks that a message suggests.
-const MAX_SUGGESTED: usize = 10;
+pub(super) const MAX_SUGGESTED: usize = 10;
 
-/// Returns the tracks that `--track` can name, as the end of a message.
-fn track_suggestion(possible: &[u64]) -> String {
+/// Returns what an encounter is for.
+const fn purpose(lead: Lead) -> &'static str {
+    match lead {
+        Lead::Required => "re-enact",
+        Lead::LeftOut => "sample",
+    }
+}
+
+/// Returns the tracks that the option of a command can name, as the end of a message.
+fn track_suggestion(lead: Lead, possible: &[u64]) -> String {
+    let option = match lead {
+        Lead::Required => "--track",
+        Lead::LeftOut => "--lane-change",
+    };
     let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
     match possible.len() {
         0 => String::new(),
         count if count > MAX_SUGGESTED => {
-            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
+            format!("; {option} can name {count} other tracks, such as {}", named.join(", "))
         }
-        _ => format!("; --track can name {}", named.join(", ")),
+        _ => format!("; {option} can name {}", named.join(", ")),
     }
 }
 

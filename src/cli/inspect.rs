@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_recorded::trajectory_data::{BadRows, QualityInspector, ReadOptions, open};
+use closecall_recorded::trajectory_data::{BadRows, QualityInspector, ReadOptions, TrajectoryFileError, open};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::quality::QualityText;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
 use super::help::{examples, heading};
-use super::output::{out, outln, print_error};
+use super::output::{out, outln, print_error, reading};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic inspect`.
@@ -34,11 +34,14 @@ pub(super) struct InspectArgs {
 /// Prints the flaws of a trajectory file. If some rows cannot be used, the exit code is the code of
 /// a file that other commands refuse.
 pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
-    let mut tracks = open(&args.file, ReadOptions { bad_rows: BadRows::Skip, ..args.read.options() })?;
     let mut inspector = QualityInspector::default();
-    while let Some(track) = tracks.next_track()? {
-        inspector.add(&track);
-    }
+    let tracks = reading(&args.file, || {
+        let mut tracks = open(&args.file, ReadOptions { bad_rows: BadRows::Skip, ..args.read.options() })?;
+        while let Some(track) = tracks.next_track()? {
+            inspector.add(&track);
+        }
+        Ok::<_, TrajectoryFileError>(tracks)
+    })?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json::quality(&tracks, &inspector), None, None)),
         Format::Human => out!("{}", QualityText { tracks: &tracks, inspector: &inspector }),

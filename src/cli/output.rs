@@ -3,6 +3,7 @@
 use std::fmt::{self, Arguments};
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use closecall_campaign::folder::{Folder, REPORT_FILES};
 use closecall_campaign::interrupt::Signal;
@@ -11,7 +12,7 @@ use closecall_report::heartbeat::Heartbeat;
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::atomic::{WriteError, write_texts};
 use closecall_traffic::shown::shown;
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::CliError;
 use crate::exit_code::ExitCode;
@@ -94,6 +95,25 @@ pub(super) fn heartbeat(bar: &ProgressBar) -> Option<Heartbeat> {
     let progress = move || [bar.position(), bar.length().unwrap_or_default()];
     (!session::is_active() && !stderr().is_terminal())
         .then(|| Heartbeat::start(progress, |line| print_error(format_args!("{line}\n"))))
+}
+
+/// Time between two turns of the sign that a file is being read.
+const TURN: Duration = Duration::from_millis(200);
+
+/// Does `work` on a file. A terminal shows the name of the file and the time since the begin.
+pub(super) fn reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
+    let spinner = ProgressBar::new_spinner();
+    if session::is_active() {
+        spinner.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    if let Ok(style) = ProgressStyle::with_template("{spinner} reading {msg}, {elapsed}") {
+        spinner.set_style(style);
+    }
+    spinner.set_message(path.display().to_string());
+    spinner.enable_steady_tick(TURN);
+    let done = work();
+    spinner.finish_and_clear();
+    done
 }
 
 /// Returns the command line of this program, as it was called.

@@ -56,7 +56,7 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = match args.repetitions {
         0 => None,
-        _ => robustness(&args.data.files, args.data.read.options(), &setup).map_err(refused)?,
+        _ => robustness(&args.data.files, args.data.read.options(), &setup, |_, _| {}).map_err(refused)?,
     };
     let paper = Paper::new(&recorded, studied.as_ref(), args.speed_limit_mps)?;
     let paths: Vec<PathBuf> = paper.pictures.iter().map(|picture| args.output.join(&picture.name)).collect();

@@ -1,6 +1,6 @@
 //! `closecall traffic record`: writes simulated traffic as a trajectory file.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::arguments::sample_count;
@@ -43,6 +43,16 @@ pub(super) struct RecordArgs {
     output: PathBuf,
 }
 
+/// Ending of the file that the command writes.
+const ENDING: &str = "csv";
+
+/// Refuses an output whose ending promises another format.
+fn check_ending(path: &Path) -> Result<(), CliError> {
+    let is_allowed = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(ENDING));
+    let message = || format!("--out {} must end with .{ENDING}: the file is CSV", path.display());
+    is_allowed.then_some(()).ok_or_else(|| CliError::usage(message()))
+}
+
 pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
     match &args.in_car {
         None => record_traffic(args),
@@ -53,6 +63,7 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
 fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let file = args.sim.set.load(&args.scenario)?;
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &[("--out", Some(&args.output))])?;
+    check_ending(&args.output)?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let recording = recorder.finish(&file.config().name);
@@ -69,6 +80,7 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let truth = ground_truth_path(&args.output);
     let outputs = [("--out", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
+    check_ending(&args.output)?;
     let chosen = recorded_actor(file.config(), actor)
         .map_err(|message| CliError::Usage { message: format!("{message}, with --in-car=ACTOR") })?;
     let mut recorder = InCarRecorder::new(&chosen);

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_recorded::encounter::{ChoiceError, RecordedEncounter, choose};
+use closecall_recorded::encounter::{ChoiceError, Lead, RecordedEncounter, Wanted, choose};
 use closecall_recorded::filters::smooth;
 use closecall_report::json::stamped;
 use closecall_report::run::film::{EncounterComparison, film_encounter};
@@ -16,6 +16,7 @@ use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
+use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
 use super::output::{made_by, out, outln};
 use super::protect::{of_trajectories, protect};
@@ -81,7 +82,8 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
-    let found = chosen(&args.file, &args.read, args.track)?;
+    let wanted = Wanted { track: args.track, number: None, lead: Lead::Required };
+    let found = chosen(&args.file, &args.read, wanted)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
@@ -105,17 +107,35 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
+/// Returns the message for a track without a lane change, or for a file without one. `track` holds whether the file has the
+/// track at all.
+pub(super) fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u64]) -> String {
+    let Some((track, is_recorded)) = track else { return format!("{file} has no lane change") };
+    let unknown = if is_recorded { "" } else { ", which it does not hold" };
+    let named: Vec<String> = others.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
+    let which = match others.len() {
+        0 => "no track changes lanes".to_owned(),
+        count if count > MAX_SUGGESTED => format!("{count} tracks change lanes, such as {}", named.join(", ")),
+        _ => format!("the tracks that change lanes are {}", named.join(", ")),
+    };
+    format!("{file} has no lane change of track {track}{unknown}; {which}")
+}
+
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
-pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result<RecordedEncounter, CliError> {
-    let found = choose(&smooth(&read_noting(path, read.options())?), track, CONTROL_STEP);
+pub(super) fn chosen(path: &Path, read: &ReadArgs, wanted: Wanted) -> Result<RecordedEncounter, CliError> {
+    let found = choose(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP);
+    let track = wanted.track;
     let file = path.display();
     found.map_err(|error| match error {
-        ChoiceError::NoLaneChange => {
+        ChoiceError::NoLaneChange { is_recorded, others } => {
+            CliError::usage(no_lane_change(&format!("{file}"), track.map(|track| (track, is_recorded)), &others))
+        }
+        ChoiceError::NoSuchNumber { count } => {
             let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
-            CliError::usage(format!("{file} has no lane change{of_track} to re-enact"))
+            CliError::usage(format!("{file} has {count} lane changes{of_track}: --number can be 1 to {count}"))
         }
         ChoiceError::NoEncounter { source, possible } => {
-            CliError::NoEncounter { file: file.to_string(), source, possible }
+            CliError::NoEncounter { lead: wanted.lead, file: file.to_string(), source, possible }
         }
     })
 }

@@ -46,7 +46,10 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
-    let studied = study(&args.data.files, args.data.read.options(), &setup).map_err(refused)?;
+    let studied = study(&args.data.files, args.data.read.options(), &setup, |path, warning| {
+        print_error(format_args!("warning: {}: {warning}\n", path.display()));
+    });
+    let studied = studied.map_err(refused)?;
     let Some((_, study)) = studied else { return Ok(ExitCode::Pass) };
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &robustness_charts(&study)?)?;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_recorded::encounter::{Lead, Wanted};
 use closecall_report::json::stamped;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::sampling::{Sampled, SampledRun, StepError, run_step};
@@ -34,6 +35,9 @@ pub(super) struct SampleArgs {
     /// can be re-enacted]
     #[arg(long, value_name = "TRACK", help_heading = heading::DATA)]
     lane_change: Option<u64>,
+    /// Number of the lane change among those of the track, in order of time, from 1 on [default: the most critical one]
+    #[arg(long, value_name = "NUMBER", requires = "lane_change", help_heading = heading::DATA)]
+    number: Option<usize>,
     /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario
     #[arg(long, value_name = "PARAMETER", help_heading = heading::METHOD)]
     vary: String,
@@ -72,7 +76,10 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
     protect(&inputs, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
-    let found = chosen(&args.file, &args.read, args.lane_change)?;
+    // The margin increase system needs a lead vehicle; a driver that is sampled does not.
+    let lead = if args.transfer { Lead::Required } else { Lead::LeftOut };
+    let wanted = Wanted { track: args.lane_change, number: args.number, lead };
+    let found = chosen(&args.file, &args.read, wanted)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let mut all = Sampled::new(&found);
     let (mut films, mut files): (Vec<_>, Vec<(String, ScenarioFile)>) = (Vec::new(), Vec::new());

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::{positive, recording as trajectory_path};
 use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
-use closecall_recorded::filters::smooth;
+use closecall_recorded::filters::smooth_file;
 use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
 use closecall_recorded::lane_change::{Criterion, FoundLaneChanges, find, listed_for, read_references, score};
 use closecall_recorded::trajectory_data::{Layout, open};
@@ -19,10 +19,11 @@ use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_ch
 use closecall_traffic::atomic::WriteError;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, read_noting};
+use super::args::{FilesArgs, Format, LanesChoice, ReadArgs};
 use super::help::{examples, heading};
-use super::output::{command_line, out, outln, print_error, print_written, write_charts};
+use super::output::{command_line, out, outln, print_error, print_written, reading, write_charts};
 use super::protect::{of_trajectories, protect};
+use super::reenact::no_lane_change;
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.
@@ -55,8 +56,9 @@ impl CriterionChoice {
     "closecall traffic lane-changes traffic.csv --criterion distance --reference known.csv",
 ]))]
 pub(super) struct LaneChangesArgs {
-    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as
-    /// `closecall traffic record` writes it. The file can be compressed by gzip
+    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, floating car data of SUMO, a vehicle record
+    /// of Vissim, JSON of I-24 MOTION, an in-car log, or plain CSV as `closecall traffic record` writes
+    /// it. The file can be compressed by gzip
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]
@@ -141,7 +143,7 @@ pub(super) struct FitArgs {
 
 pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
     let references = args.reference.as_deref().map(read_references).transpose()?;
-    let mut tracks = open(&args.file, args.read.options())?;
+    let mut tracks = reading(&args.file, || open(&args.file, args.read.options()))?;
     if args.criterion == CriterionChoice::Gradient && tracks.layout() != Layout::InCar {
         let message = format!(
             "{}: the gradient criterion needs the measured distances to the lane markings, which only in-car logs have: use \
@@ -156,12 +158,10 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
     let name = tracks.name().to_owned();
     let references = references.map(|all| listed_for(all, &name)).transpose();
     let references = references.map_err(|message| CliError::Usage { message })?;
-    let lanes = args.read.lanes.reliability();
     let FoundLaneChanges { lane_changes: changes, spans, tracks: count, basis } =
-        find(&mut tracks, args.criterion.criterion(), lanes)?;
+        reading(&args.file, || find(&mut tracks, args.criterion.criterion()))?;
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
-    let unknown = tracks.unknown_classes().iter().map(ToString::to_string);
-    for warning in tracks.continuity().warnings().into_iter().chain(basis.warnings()).chain(unknown) {
+    for warning in tracks.warnings().into_iter().chain(basis.warnings()) {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
     }
     if basis.lacks_recorded_crossings() {
@@ -186,18 +186,23 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     for chart in charts.iter().flatten() {
         protect(&inputs, &[("--plot", Some(chart))])?;
     }
-    let data = read_noting(&args.file, args.read.options())?;
-    let smoothed = smooth(&data);
+    let file = reading(&args.file, || smooth_file(&args.file, args.read.options()))?;
+    for warning in &file.warnings {
+        print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
+    }
+    let smoothed = &file.data;
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: args.ttce_alone };
-    let changes = evaluate(&smoothed, &judgement);
+    let changes = evaluate(smoothed, &judgement);
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
         let chosen = by_severity(&changes, args.track);
         let Some(chosen) = chosen.first() else {
-            let of_track = args.track.map_or(String::new(), |track| format!(" of track {track}"));
-            return Err(CliError::usage(format!("the trajectory file has no lane change{of_track} to record")));
+            let track = args.track.map(|track| (track, smoothed.track_index(track).is_some()));
+            let mut others: Vec<u64> = changes.iter().map(|change| change.lane_change.track_id).collect();
+            others.dedup();
+            return Err(CliError::usage(no_lane_change(&args.file.display().to_string(), track, &others)));
         };
-        write_recording(path, &[film_lane_change(&smoothed, chosen)?])?;
+        write_recording(path, &[film_lane_change(smoothed, chosen)?])?;
         print_written(path);
     }
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
@@ -205,7 +210,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
-        Format::Human => out!("{}", CriticalityText { data: &data, changes: &changes, counted }),
+        Format::Human => out!("{}", CriticalityText { file: &file, changes: &changes, counted }),
     }
     Ok(ExitCode::Pass)
 }

@@ -107,3 +107,19 @@ fn a_study_of_no_lane_change_says_so() {
     assert_eq!(code(&output), 4, "{}", stderr(&output));
     assert!(message(&output).contains("there is no lane change in the trajectory files"), "{}", stderr(&output));
 }
+
+#[test]
+fn a_trajectory_file_with_the_ending_of_another_format_is_refused() {
+    let folder = folder();
+    let scenario = library("low-thw-overtake");
+    for name in ["x.xyz", "x.parquet", "x", "x.csv.gz"] {
+        for in_car in [&[][..], &["--in-car=rear"]] {
+            let path = folder.path().join(name);
+            let args = ["traffic", "record", scenario.to_str().unwrap(), "-n", "1", "-o", path.to_str().unwrap()];
+            let output = closecall(args.iter().chain(in_car));
+            assert_eq!(code(&output), 2, "{name}: {}", stderr(&output));
+            assert!(message(&output).contains("must end with .csv"), "{name}: {}", stderr(&output));
+            assert!(!path.exists());
+        }
+    }
+}

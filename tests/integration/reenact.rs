@@ -113,7 +113,9 @@ fn an_encounter_that_cannot_be_re_enacted_is_refused_with_the_reason() {
         assert_eq!(code(&output), expected, "{args:?}: {said}");
         assert!(words.iter().all(|word| said.contains(word)), "{args:?}: {said}");
     };
-    refused(&[trajectories, "--track", "99"], 2, &["own.csv", "no lane change of track 99"]);
+    let unknown = ["own.csv", "no lane change of track 99, which it does not hold", "tracks that change lanes are 3"];
+    refused(&[trajectories, "--track", "99"], 2, &unknown);
+    refused(&[trajectories, "--track", "1"], 2, &["no lane change of track 1; the tracks that change lanes are 3"]);
     refused(&["/no/such.csv"], 6, &["/no/such.csv"]);
     refused(&[trajectories, "--record", "/nowhere/at/all.rrd"], 6, &["/nowhere/at/all.rrd"]);
     refused(&[trajectories, "-o", trajectories], 2, &["would overwrite"]);

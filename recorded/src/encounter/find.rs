@@ -5,7 +5,7 @@ use closecall_traffic::{Absent, Lane, Measured, Time, Trajectory, TrajectoryPoin
 
 use super::frame::{Frame, RoadSection};
 use super::{
-    EGO_INDEX, LEAD_IN, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, RecordedEncounter,
+    EGO_INDEX, LEAD_IN, LEAD_OUT, LONGEST_THW_S, Lead, NoEncounter, Participant, REACH_M, RecordedEncounter,
     SHORTEST_APPROACH,
 };
 use crate::filters::{PERIOD, SmoothedTrajectoryData};
@@ -18,16 +18,16 @@ use crate::lane_change::LaneChange;
 /// `period`.
 ///
 /// # Errors
-/// Returns [`NoEncounter`] if there is no ego or lead vehicle, if the three vehicles are not
+/// Returns [`NoEncounter`] if there is no ego vehicle or no required lead vehicle, if these vehicles are not
 /// recorded together for long enough, if the rear vehicle is not close behind the ego vehicle at
 /// the crossing, or if they do not share a valid road.
 pub fn encounter(
     data: &SmoothedTrajectoryData,
     change: &LaneChange,
     all: &[LaneChange],
-    period: Time,
+    (period, lead): (Time, Lead),
 ) -> Result<RecordedEncounter, NoEncounter> {
-    let roles = Roles::of(data, change)?;
+    let roles = Roles::of(data, change, lead)?;
     let start = roles.start(data, change)?;
     let road = RoadSection::of(data, roles.rear, change)?;
     let last = roles.ego.span().map_or(start, |(_, last)| last);
@@ -52,6 +52,7 @@ pub fn encounter(
         lane_width_m: road.lane_width_m,
         home: road.lane(change.from_lane).unwrap_or(Lane(1)),
         target: road.lane(change.to_lane).unwrap_or(Lane(1)),
+        lead,
         vehicles,
     })
 }
@@ -79,7 +80,8 @@ pub(super) fn begin<'a>(data: &'a SmoothedTrajectoryData, change: &LaneChange) -
 /// The three vehicles of an encounter, and the time at which their roles are assigned.
 struct Roles<'a> {
     ego: &'a Trajectory,
-    lead: &'a Trajectory,
+    /// The lead vehicle, if it is required.
+    lead: Option<&'a Trajectory>,
     rear: &'a Trajectory,
     /// First instant of the common clock at which the rear vehicle is recorded while it changes
     /// lanes.
@@ -88,14 +90,17 @@ struct Roles<'a> {
 
 impl<'a> Roles<'a> {
     /// Assigns the roles at the start of the lane change `change`.
-    fn of(data: &'a SmoothedTrajectoryData, change: &LaneChange) -> Result<Self, NoEncounter> {
+    fn of(data: &'a SmoothedTrajectoryData, change: &LaneChange, lead: Lead) -> Result<Self, NoEncounter> {
         let track_id = change.track_id;
         let (rear, change_start) = begin(data, change).ok_or(NoEncounter::NoTrack { track_id })?;
         let no_ego = NoEncounter::NoEgo { track_id, lane: change.from_lane };
         let lane = Lane(change.from_lane);
         let ego = next_ahead(data, rear, lane, change_start).ok_or(no_ego)?;
         let no_lead = NoEncounter::NoLead { track_id, ego_id: ego.track_id };
-        let lead = next_ahead(data, ego, lane, change_start).ok_or(no_lead)?;
+        let lead = match lead {
+            Lead::Required => Some(next_ahead(data, ego, lane, change_start).ok_or(no_lead)?),
+            Lead::LeftOut => None,
+        };
         Ok(Self { ego, lead, rear, change_start })
     }
 
@@ -105,16 +110,24 @@ impl<'a> Roles<'a> {
         let lane = Lane(change.from_lane);
         let next_id =
             |follower: &Trajectory, time: Time| next_ahead(data, follower, lane, time).map(|track| track.track_id);
-        let in_order = |time: Time| {
-            next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(self.lead.track_id)
+        // Without a lead vehicle, the ego vehicle only has to be ahead: it may cut in.
+        let is_ahead = |time: Time| {
+            self.rear.at(time).zip(self.ego.at(time)).is_some_and(|(rear, ego)| rear.lane == lane && ego.s_m > rear.s_m)
+        };
+        let in_order = |time: Time| match self.lead {
+            Some(lead) => {
+                next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(lead.track_id)
+            }
+            None => is_ahead(time),
         };
         let max_ticks = LEAD_IN.ns() / PERIOD.ns();
         let instants = (0..=max_ticks).map(|ticks| self.change_start - PERIOD * ticks);
         let start = instants.take_while(|&time| in_order(time)).last().unwrap_or(self.change_start);
         let crossing = Time::from_s(change.crossing_s);
-        let recorded_to = [self.ego, self.lead, self.rear].iter().filter_map(|track| Some(track.span()?.1)).min();
+        let needed = [Some(self.ego), self.lead, Some(self.rear)];
+        let recorded_to = needed.into_iter().flatten().filter_map(|track| Some(track.span()?.1)).min();
         let until = recorded_to.map_or(start, |last| last.min(crossing));
-        let (track_id, ego_id, front_id) = (self.rear.track_id, self.ego.track_id, self.lead.track_id);
+        let (track_id, ego_id, front_id) = (self.rear.track_id, self.ego.track_id, self.lead.map(|lead| lead.track_id));
         // The crossing may lie between two instants of the clock, up to one period after the last
         // recorded one.
         if until + PERIOD < crossing {
@@ -157,9 +170,9 @@ pub(super) fn next_ahead<'a>(
     ahead.min_by(|a, b| a.1.s_m.total_cmp(&b.1.s_m)).map(|(track, _)| track)
 }
 
-/// Returns the ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle.
+/// Returns the vehicles with roles, then all other vehicles that come near the ego vehicle.
 ///
-/// Returns `None` if one of the three leaves the road.
+/// Returns `None` if one with a role leaves the road.
 fn participants(
     data: &SmoothedTrajectoryData,
     roles: &Roles<'_>,
@@ -177,14 +190,14 @@ fn participants(
         let trajectory = frame.view(track, period)?;
         Some(Participant { trajectory, changes: all.iter().filter(within).cloned().collect() })
     };
-    let ego_lead_rear = [roles.ego, roles.lead, roles.rear];
-    let mut vehicles: Vec<Participant> = ego_lead_rear.into_iter().map(participant).collect::<Option<_>>()?;
+    let with_roles: Vec<&Trajectory> = [Some(roles.ego), roles.lead, Some(roles.rear)].into_iter().flatten().collect();
+    let mut vehicles: Vec<Participant> = with_roles.iter().map(|track| participant(track)).collect::<Option<_>>()?;
     let ego = vehicles[EGO_INDEX].trajectory.clone();
     let is_near = |other: &Participant| {
         let distance_m = |point: &TrajectoryPoint| Some((point.s_m - ego.at(point.time)?.s_m).abs());
         other.trajectory.points.iter().filter_map(distance_m).any(|distance_m| distance_m < REACH_M)
     };
-    let is_other = |track: &&Trajectory| ego_lead_rear.iter().all(|role| role.track_id != track.track_id);
+    let is_other = |track: &&Trajectory| with_roles.iter().all(|role| role.track_id != track.track_id);
     let others = data.trajectories().filter(is_other).filter_map(participant);
     vehicles.extend(others.filter(is_near));
     Some(vehicles)

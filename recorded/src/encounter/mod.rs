@@ -11,7 +11,8 @@
 //!
 //! The *rear vehicle* is the vehicle that changes lanes. When its lane change begins, the *ego
 //! vehicle* is the next vehicle ahead of it in the lane that it leaves (its *home* lane), and the
-//! *lead vehicle* is the next vehicle ahead of the ego vehicle in that lane.
+//! *lead vehicle* is the next vehicle ahead of the ego vehicle in that lane. Where no margin system
+//! is simulated, the lead vehicle has no role ([`Lead::LeftOut`]).
 //!
 //! The encounter starts when the three vehicles are first recorded in this order without
 //! interruption, at most [`LEAD_IN`] before the lane change begins. It ends [`LEAD_OUT`] after the
@@ -37,10 +38,10 @@ mod relevance;
 mod tests;
 
 pub use approach::{Approach, ApproachValues, NoApproach, Party, approach};
-pub use choose::{ChoiceError, choose};
+pub use choose::{ChoiceError, Wanted, choose};
 pub use find::encounter;
 pub use recorded::{
-    EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, REAR_INDEX,
+    EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, Lead, NoEncounter, Participant, REACH_M, REAR_INDEX,
     RecordedEncounter, SHORTEST_APPROACH,
 };
 pub use relevance::{Relevant, Variation, most_relevant};

@@ -19,10 +19,20 @@ pub const LONGEST_THW_S: f64 = 5.0;
 
 /// Index of the ego vehicle in [`RecordedEncounter::vehicles`].
 pub const EGO_INDEX: usize = 0;
-/// Index of the lead vehicle in [`RecordedEncounter::vehicles`].
+/// Index of the lead vehicle in [`RecordedEncounter::vehicles`], if there is one.
 pub const LEAD_INDEX: usize = 1;
-/// Index of the rear vehicle in [`RecordedEncounter::vehicles`].
+/// Index of the rear vehicle in [`RecordedEncounter::vehicles`], if there is a lead vehicle.
 pub const REAR_INDEX: usize = 2;
+
+/// Whether an encounter has a lead vehicle, whose distance to the ego vehicle is the margin that can
+/// be increased.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lead {
+    /// A lane change without a lead vehicle is no encounter.
+    Required,
+    /// No vehicle has that role.
+    LeftOut,
+}
 
 /// One vehicle of an encounter.
 #[derive(Clone, Debug)]
@@ -56,15 +66,29 @@ pub struct RecordedEncounter {
     pub home: Lane,
     /// Lane that the rear vehicle changes to.
     pub target: Lane,
-    /// The ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle, in
-    /// order of their track ids.
+    /// Whether one of the vehicles is the lead vehicle.
+    pub lead: Lead,
+    /// The ego, the lead (if there is one) and the rear vehicle, then all other vehicles that come
+    /// near the ego vehicle, in order of their track ids.
     pub vehicles: Vec<Participant>,
 }
 
 impl RecordedEncounter {
-    /// Returns the trajectories of the ego, the lead and the rear vehicle, in this order.
+    /// Returns the trajectories of the ego, the lead and the rear vehicle, in this order. Without a
+    /// lead vehicle, the ego vehicle takes its place.
     pub fn ego_lead_rear(&self) -> [&Trajectory; 3] {
-        [EGO_INDEX, LEAD_INDEX, REAR_INDEX].map(|index| &self.vehicles[index].trajectory)
+        let lead = if self.lead == Lead::Required { LEAD_INDEX } else { EGO_INDEX };
+        [EGO_INDEX, lead, self.rear_index()].map(|index| &self.vehicles[index].trajectory)
+    }
+
+    /// Returns the index of the rear vehicle in [`RecordedEncounter::vehicles`].
+    pub fn rear_index(&self) -> usize {
+        if self.lead == Lead::Required { REAR_INDEX } else { REAR_INDEX - 1 }
+    }
+
+    /// Returns the rear vehicle, which changes lanes.
+    pub fn rear(&self) -> &Participant {
+        &self.vehicles[self.rear_index()]
     }
 
     /// Converts a time of the trajectory data (s) to the clock of the encounter.
@@ -106,16 +130,17 @@ pub enum NoEncounter {
     },
     /// The three vehicles are not recorded together for long enough before the crossing.
     #[error(
-        "track {track_id} behind track {ego_id} behind track {front_id} is recorded for {recorded_s:.1} s before it \
-         crosses the marking; {needed_s:.1} s are needed"
+        "track {track_id} behind track {ego_id}{} is recorded for {recorded_s:.1} s before it \
+         crosses the marking; {needed_s:.1} s are needed",
+        front_id.map_or(String::new(), |front_id| format!(" behind track {front_id}"))
     )]
     TooShort {
         /// Track id of the rear vehicle.
         track_id: u64,
         /// Track id of the ego vehicle.
         ego_id: u64,
-        /// Track id of the lead vehicle.
-        front_id: u64,
+        /// Track id of the lead vehicle, if it is required.
+        front_id: Option<u64>,
         /// Time for which they are recorded together (s).
         recorded_s: f64,
         /// Least time that is required (s).
@@ -123,16 +148,17 @@ pub enum NoEncounter {
     },
     /// The track of one of the three vehicles ends before the crossing.
     #[error(
-        "track {track_id} crosses the marking {missing_s:.1} s after the end of its own track, or of track {ego_id} or \
-         {front_id} ahead of it: all three have to be recorded until then"
+        "track {track_id} crosses the marking {missing_s:.1} s after the end of its own track, or of track {ego_id}{} ahead \
+         of it: all of them have to be recorded until then",
+        front_id.map_or(String::new(), |front_id| format!(" or {front_id}"))
     )]
     EndsBeforeCrossing {
         /// Track id of the rear vehicle.
         track_id: u64,
         /// Track id of the ego vehicle.
         ego_id: u64,
-        /// Track id of the lead vehicle.
-        front_id: u64,
+        /// Track id of the lead vehicle, if it is required.
+        front_id: Option<u64>,
         /// Time from the end of the first of the three tracks to the crossing (s).
         missing_s: f64,
     },

@@ -15,7 +15,7 @@ fn encounter_among(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncou
     let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
     let changes = detect(&data);
     let change = changes.iter().find(|change| change.track_id == 3).unwrap();
-    encounter(&data, change, &changes, CONTROL_STEP)
+    encounter(&data, change, &changes, (CONTROL_STEP, Lead::Required))
 }
 
 /// Ego and lead vehicle, 30 m apart.
@@ -101,8 +101,27 @@ fn a_crossing_at_the_start_is_not_repeated() {
     let changes = detect(&data);
     let of_rear: Vec<_> = changes.iter().filter(|change| change.track_id == 3).collect();
     let [first, second] = of_rear[..] else { panic!("{of_rear:?}") };
-    let encounter = encounter(&data, second, &changes, CONTROL_STEP).unwrap();
+    let encounter = encounter(&data, second, &changes, (CONTROL_STEP, Lead::Required)).unwrap();
     assert_eq!(encounter.start, Time::from_s(first.crossing_s), "the encounter starts with the crossing");
     let kept: Vec<_> = encounter.vehicles[REAR_INDEX].changes.iter().map(|change| change.crossing_s).collect();
     assert_eq!(kept, [second.crossing_s]);
+}
+
+#[test]
+fn without_a_margin_system_no_lead_vehicle_is_required() {
+    let ego = straight_track(1, 150.0, 20.0, -5.25, 250);
+    let data = smooth(&trajectory_data_of(vec![rear(), ego]));
+    let changes = detect(&data);
+    let choose_with = |number, lead| choose(&data, Wanted { track: Some(3), number, lead }, CONTROL_STEP);
+    let no_lead = NoEncounter::NoLead { track_id: 3, ego_id: 1 };
+    let refused = choose_with(None, Lead::Required).unwrap_err();
+    assert_eq!(refused, ChoiceError::NoEncounter { source: no_lead, possible: Vec::new() });
+    let encounter = choose_with(Some(1), Lead::LeftOut).unwrap();
+    assert_eq!((encounter.vehicles.len(), encounter.rear().trajectory.track_id), (2, 3));
+    assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 1, 3]);
+    assert_eq!(changes.len(), 1);
+    assert_eq!(choose_with(Some(2), Lead::LeftOut).unwrap_err(), ChoiceError::NoSuchNumber { count: 1 });
+    let unknown =
+        choose(&data, Wanted { track: Some(9), number: None, lead: Lead::LeftOut }, CONTROL_STEP).unwrap_err();
+    assert_eq!(unknown, ChoiceError::NoLaneChange { is_recorded: false, others: vec![3] });
 }

@@ -39,9 +39,11 @@
 mod butterworth;
 mod resample;
 mod smooth;
+mod smooth_file;
 mod stays;
 
 pub use butterworth::LowPass;
 pub(crate) use resample::resample;
 pub use smooth::{CORNER_HZ, PERIOD, Presence, SmoothedTrack, SmoothedTrajectoryData, smooth, smooth_track};
+pub use smooth_file::{SmoothedFile, smooth_file};
 pub use stays::{Stay, stays_of};

@@ -54,9 +54,7 @@ pub struct Presence {
 /// Smooths every track and resamples it to the common clock.
 pub fn smooth(data: &TrajectoryData) -> SmoothedTrajectoryData {
     let tracks: Vec<_> = data.trajectories.iter().filter_map(smooth_track).collect();
-    let (first_tick, present) = presence_by_tick(&tracks);
-    let (name, markings) = (data.name.clone(), data.markings.clone());
-    SmoothedTrajectoryData { name, markings, lanes: data.lanes, tracks, first_tick, present }
+    SmoothedTrajectoryData::new(&data.name, (data.markings.clone(), data.lanes), tracks)
 }
 
 /// Smooths one track and resamples it to the common clock.
@@ -81,6 +79,16 @@ pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
 }
 
 impl SmoothedTrajectoryData {
+    /// Creates the data of `tracks`, which are in order of their track ids.
+    pub(super) fn new(
+        name: &str,
+        (markings, lanes): (LaneMarkings, LaneReliability),
+        tracks: Vec<SmoothedTrack>,
+    ) -> Self {
+        let (first_tick, present) = presence_by_tick(&tracks);
+        Self { name: name.to_owned(), markings, lanes, tracks, first_tick, present }
+    }
+
     /// Returns all vehicles present at the clock instant nearest to `time`, in order of their track
     /// ids.
     pub fn present_at(&self, time: Time) -> &[Presence] {
@@ -118,7 +126,15 @@ fn presence_by_tick(tracks: &[SmoothedTrack]) -> (i64, Vec<Vec<Presence>>) {
     let Some((first, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return (0, Vec::new()) };
     let first_tick = tick_of(first);
     let ticks = usize::try_from(tick_of(last) - first_tick).map_or(0, |ticks| ticks + 1);
-    let mut present = vec![Vec::new(); ticks];
+    let mut counts = vec![0_usize; ticks];
+    for point in tracks.iter().flat_map(|track| &track.trajectory.points) {
+        if let Some(count) =
+            usize::try_from(tick_of(point.time) - first_tick).ok().and_then(|tick| counts.get_mut(tick))
+        {
+            *count += 1;
+        }
+    }
+    let mut present: Vec<Vec<Presence>> = counts.into_iter().map(Vec::with_capacity).collect();
     for (track_index, track) in tracks.iter().enumerate() {
         for (point_index, point) in track.trajectory.points.iter().enumerate() {
             if let Ok(tick) = usize::try_from(tick_of(point.time) - first_tick) {

@@ -92,6 +92,11 @@ impl fmt::Display for DetectionBasis {
             (Criterion::Distance, _) if self.is_measured => {
                 write!(f, "lanes: from the measured distances to the markings in {} frames", self.measured_frames)
             }
+            (Criterion::Peak, LaneReliability::Estimated) => write!(
+                f,
+                "lanes: {} estimated from the lateral positions of the traffic, {width_m:.2} m wide",
+                self.recorded_lanes.len()
+            ),
             (Criterion::Peak, LaneReliability::Unreliable) => {
                 write!(f, "lanes: none; a lateral shift by most of a lane of {width_m:.2} m is a lane change")
             }

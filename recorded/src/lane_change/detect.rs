@@ -18,6 +18,11 @@ use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 /// (samples): 1 s. Vehicles pause on a marking, and the start and end of a manoeuvre are estimates.
 const OUTSIDE_SAMPLES: f64 = 5.0;
 
+/// Least lateral shift of a lane change over an estimated marking (m): vehicles sway in their lanes
+/// with a standard deviation of 0.2 to 0.3 m, so that a shift by 1 m is no swaying. An assumption
+/// with a plausible range of 0.8 to 1.5 m.
+const MIN_ESTIMATED_SHIFT_M: f64 = 1.0;
+
 /// The criterion by which lane changes are detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -86,7 +91,7 @@ impl LaneChangeDetector {
         recorded: &Trajectory,
         distances: &[MarkingDistances],
     ) -> Vec<LaneChange> {
-        let by_lane = (criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
+        let by_lane = criterion == Criterion::Peak && self.lanes != LaneReliability::Unreliable;
         if by_lane && crossings(&stays_of(recorded)).is_empty() {
             return Vec::new();
         }
@@ -109,6 +114,9 @@ impl LaneChangeDetector {
     fn by_peak(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
         let mut changes = match self.lanes {
             LaneReliability::Reliable => by_crossings(&track.trajectory, &crossings(&track.stays), self.lane_width_m),
+            LaneReliability::Estimated => {
+                by_estimated_lanes(&track.trajectory, &crossings(&track.stays), self.lane_width_m)
+            }
             LaneReliability::Unreliable => by_shift(&track.trajectory, self.lane_width_m),
         };
         mark_doubles(&mut changes, &self.road);
@@ -121,6 +129,9 @@ impl LaneChangeDetector {
         let width_m = || gradient::lane_width_m(recorded, distances).unwrap_or(self.lane_width_m);
         let mut changes = match (criterion, self.lanes) {
             (Criterion::Peak, LaneReliability::Reliable) => by_crossings(track, &crossings(&smoothed.stays), width_m()),
+            (Criterion::Peak, LaneReliability::Estimated) => {
+                by_estimated_lanes(track, &crossings(&smoothed.stays), width_m())
+            }
             (Criterion::Peak, LaneReliability::Unreliable) => by_shift(track, width_m()),
             (Criterion::Distance, _) if distances.is_empty() => {
                 by_distance(track, |k| self.grid.at(track.points[k].d_m))
@@ -146,6 +157,14 @@ fn by_crossings(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -
         lane_change(&sampled, manoeuvre, height_share(track, lane_width_m), *crossing)
     };
     matched.map(change).collect()
+}
+
+/// Returns the lane changes over estimated markings, apart from those of a vehicle that sways about
+/// a marking.
+fn by_estimated_lanes(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -> Vec<LaneChange> {
+    let mut changes = by_crossings(track, crossings, lane_width_m);
+    changes.retain(|change| change.lateral_shift_m >= MIN_ESTIMATED_SHIFT_M);
+    changes
 }
 
 /// Returns the manoeuvre that a crossing belongs to, in the direction of the crossing.

@@ -1,6 +1,6 @@
 //! The lane changes of a whole trajectory file. Its tracks are read one by one.
 
-use super::{Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans};
+use super::{Criterion, DetectionBasis, LaneChange, LaneChangeDetector, TrackSpans};
 use crate::trajectory_data::{Tracks, TrajectoryFileError};
 
 /// The lane changes of a trajectory file.
@@ -21,11 +21,8 @@ pub struct FoundLaneChanges {
 ///
 /// # Errors
 /// [`TrajectoryFileError`] if the file cannot be read or used.
-pub fn find(
-    tracks: &mut Tracks<'_>,
-    criterion: Criterion,
-    lanes: LaneReliability,
-) -> Result<FoundLaneChanges, TrajectoryFileError> {
+pub fn find(tracks: &mut Tracks<'_>, criterion: Criterion) -> Result<FoundLaneChanges, TrajectoryFileError> {
+    let lanes = tracks.lanes();
     let detector = LaneChangeDetector::new(lanes, tracks.markings());
     let basis = DetectionBasis::new(criterion, lanes, tracks.markings());
     let mut result = FoundLaneChanges { lane_changes: Vec::new(), spans: TrackSpans::new(), tracks: 0, basis };

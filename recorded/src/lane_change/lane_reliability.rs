@@ -9,4 +9,7 @@ pub enum LaneReliability {
     /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the
     /// recorded lane.
     Unreliable,
+    /// Estimated from the lateral positions of the traffic: the peak criterion requires a change of
+    /// the estimated lane, and a lateral shift that no vehicle makes within its lane.
+    Estimated,
 }

@@ -106,7 +106,7 @@ impl Study {
             (ReferenceKind::Gradient, Criterion::Gradient, Criterion::ALL.to_vec())
         } else {
             let kind = match lanes {
-                LaneReliability::Reliable => ReferenceKind::RecordedLanes,
+                LaneReliability::Reliable | LaneReliability::Estimated => ReferenceKind::RecordedLanes,
                 LaneReliability::Unreliable => ReferenceKind::LateralShift,
             };
             (kind, Criterion::Peak, vec![Criterion::Peak, Criterion::Distance])

@@ -27,7 +27,7 @@ pub(super) fn step(before: &Row, row: &Row, clock: FrameClock) -> Result<Step, R
     let period = clock.period;
     let (later, earlier) = if row.line > before.line { (row, before) } else { (before, row) };
     let (frames, step) = (row.frame - before.frame, row.time - before.time);
-    if frames == 0 && (step == Time::ZERO || row.clock == Clock::Continuous) {
+    if frames == 0 && (step == Time::ZERO || row.clock != Clock::MayRestart) {
         let problem =
             TrajectoryFileProblem::DuplicateRow { vehicle: row.number, frame: row.frame, first_line: earlier.line };
         return Err(ReadError::new(later.line, problem));

@@ -11,6 +11,9 @@ use super::fields::{FieldError, wrong_value};
 /// something else.
 const MAX_NAMES: usize = 16;
 
+/// Stands for the names beyond [`MAX_NAMES`].
+const OTHER_NAMES: &str = "(other names)";
+
 /// Parts of names that mean a class other than a car, in lower case.
 const HINTS: [(VehicleClass, &[&str]); 2] = [
     (VehicleClass::Truck, &["truck", "lorry", "bus", "coach", "trailer", "semi", "heavy", "hgv"]),
@@ -75,6 +78,23 @@ impl UnknownClasses {
                 Err(FieldError::at(column, wrong_value(text, allowed)))
             }
         }
+    }
+
+    /// Returns the class that the words of `text` suggest, or else a car, and counts the name. Unlike
+    /// [`UnknownClasses::resolve`], it takes any text: names of types belong to the user of a
+    /// simulation. What is beyond the room for names counts as one more name.
+    pub(super) fn nearest_of(&mut self, text: &str) -> VehicleClass {
+        let read_as = nearest(text);
+        let has_room = self.0.len() < MAX_NAMES;
+        let entry = self.0.iter_mut().rev().find(|unknown| unknown.name == text || unknown.name == OTHER_NAMES);
+        match entry {
+            Some(unknown) => unknown.entries += 1,
+            None => {
+                let (name, read_as) = if has_room { (text, read_as) } else { (OTHER_NAMES, VehicleClass::Car) };
+                self.0.push(UnknownClass { name: name.to_owned(), read_as, entries: 1 });
+            }
+        }
+        read_as
     }
 
     /// Returns the unknown names.

@@ -84,7 +84,7 @@ impl<R: BufRead> CommonRoadSource<R> {
     /// # Errors
     /// Fails if the root element is not a CommonRoad scenario.
     pub(super) fn new(source: R) -> Result<Self, ReadError> {
-        let mut xml = Xml::new(source, ATTRIBUTES);
+        let mut xml = Xml::new(source, ATTRIBUTES, "CommonRoad scenario");
         let Node::Begin { name, attributes } = xml.next()? else { return xml.fail("there is no element") };
         if name != "commonRoad" {
             return xml.fail(format!("the root element is `{name}`, but `commonRoad` is needed"));

@@ -60,6 +60,8 @@ pub struct TrajectoryData {
     pub hash: String,
     /// Unknown names of vehicle classes in the file.
     pub unknown_classes: Vec<UnknownClass>,
+    /// What the reader of the file notes on its content.
+    pub notes: Vec<String>,
     /// How the rows of the file became tracks; zeros if the data does not come from a file.
     pub continuity: Continuity,
 }
@@ -94,6 +96,7 @@ impl TrajectoryData {
             trajectories,
             hash: String::new(),
             unknown_classes: Vec::new(),
+            notes: Vec::new(),
             continuity: Continuity::default(),
         }
     }
@@ -103,6 +106,7 @@ impl TrajectoryData {
     pub fn warnings(&self) -> Vec<String> {
         let ignored = self.markings.ignored().iter().map(ToString::to_string);
         let unknown = self.unknown_classes.iter().map(ToString::to_string);
-        self.continuity.warnings().into_iter().chain(ignored).chain(unknown).collect()
+        let notes = self.notes.iter().cloned();
+        notes.chain(self.continuity.warnings()).chain(ignored).chain(unknown).collect()
     }
 }

@@ -47,7 +47,7 @@ pub enum TrajectoryFileProblem {
     #[error("{0}")]
     Io(#[source] io::Error),
     /// The compressed stream is damaged or ends too early.
-    #[error("the gzip stream is damaged or cut: {0}")]
+    #[error("the compressed stream is damaged or cut: {0}")]
     Gzip(#[source] io::Error),
     /// The file is empty or has only a header.
     #[error("there are no rows; a trajectory file needs at least one")]
@@ -66,7 +66,7 @@ pub enum TrajectoryFileProblem {
     },
     /// The file is in a format of another program.
     #[error(
-        "this is {kind}, which is not read; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)"
+        "this is {kind}, which is not read here; write it as the plain layout (CSV with `track_id, frame, time_s, s_m, …`)"
     )]
     Foreign {
         /// The format.
@@ -218,9 +218,11 @@ pub enum TrajectoryFileProblem {
         /// Maximum number of rows held.
         allowed: usize,
     },
-    /// The XML is not a readable CommonRoad scenario.
-    #[error("this is no CommonRoad scenario that can be read: {reason}")]
-    Xml {
+    /// The content is not what its beginning announces.
+    #[error("this is no {format} that can be read: {reason}")]
+    Unreadable {
+        /// The format.
+        format: &'static str,
         /// Description of the problem.
         reason: String,
     },
@@ -230,6 +232,29 @@ pub enum TrajectoryFileProblem {
          NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv"
     )]
     NeedsMetadata,
+    /// The fields of a data set of several files are separated by semicolons.
+    #[error(
+        "the file is semicolon-separated, but in this layout semicolons separate the items of lists: its columns have to be \
+         separated by commas, with decimal points"
+    )]
+    SemicolonSeparated,
+    /// The vehicles follow no road.
+    #[error(
+        "in {percent:.0} % of the rows, a vehicle does not follow a road that the traffic shows, as on intersections and \
+         roundabouts: only roads with lanes are read"
+    )]
+    NoRoad {
+        /// Share of these rows (%).
+        percent: f64,
+    },
+    /// No row belongs to the data set that is asked for.
+    #[error("no row belongs to `{asked}`; the file holds {names}")]
+    NoSuchLocation {
+        /// Name that is asked for.
+        asked: &'static str,
+        /// The names in the file.
+        names: String,
+    },
     /// The road cannot be derived from the traffic, because no vehicle moves.
     #[error("no vehicle moves, so that the road cannot be told from the traffic")]
     NothingMoves,

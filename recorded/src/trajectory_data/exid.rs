@@ -10,21 +10,19 @@
 //! - `NN_recordingMeta.csv`: frame rate.
 //!
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
-//! another format. The reader therefore infers the road from the traffic, in two passes before it
-//! reads the rows. The reference line of each direction is the longest path of a vehicle that keeps
-//! its lane. The lanes beside it are as wide as the mean recorded lane width. On either side, the
-//! outermost lane is the last lane that holds at least 2 % of its direction's rows. Lateral
-//! positions are thus relative to the path of one driver and contain its slow weaving of a
-//! decimetre or two. Vehicles on ramps count as being in the outermost lane.
+//! another format. The reader therefore infers the road from the traffic before it reads the rows;
+//! see `inferred_road`. A vehicle changes its lane where `laneChange` is 1, or where its offset
+//! from the lane's centre jumps.
 //!
-//! The reader shifts the second direction 1 km to the right of the first, as it does with highD's
-//! upper carriageway.
+//! **inD, rounD.** Their columns are the first ones of exiD's. They record intersections and
+//! roundabouts, which are no roads with lanes: they are read with a warning, or refused if most
+//! vehicles follow no road.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
-use closecall_traffic::{Lane, Time, maths};
+use closecall_traffic::Time;
 
 use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::MarkingDistances;
@@ -34,10 +32,11 @@ use super::file_layout::Layout;
 use super::file_set::{Meta, RecordingMeta, VehicleMeta};
 use super::header::Header;
 use super::highd::{SPEED_MPS, check_row_counts};
+use super::inferred_road::{InferredRoad, Placed, Pose};
 use super::input::{Digest, open_file, with_path};
-use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
+use super::markings::DEFAULT_LANE_WIDTH_M;
 use super::plain::allowed;
-use super::reference_line::{Point, ReferenceLine};
+use super::reference_line::Point;
 use super::rows::{Fields, Lines, Separator};
 use super::source::{Clock, FileInfo, ReadError, Row};
 use super::text_layout::TextLayout;
@@ -45,26 +44,9 @@ use super::text_layout::TextLayout;
 const HEADING_DEG: Bounds = Bounds::closed(-360.0, 720.0);
 const LANE_WIDTH_M: Bounds = Bounds::closed(2.0, 6.0);
 
-/// Lane width if the recorded lane widths give none (m).
-const FALLBACK_LANE_WIDTH_M: f64 = DEFAULT_LANE_WIDTH_M;
-
-/// Minimum distance between two points of a path (m).
-const SPACING_M: f64 = 2.0;
-
-/// Maximum number of points of a path, which then has a length of 20 km.
-const MAX_POINTS: usize = 10_000;
-
-/// Maximum number of directions in one data set: two of the motorway and two of a crossing road.
-const MAX_DIRECTIONS: usize = 4;
-
-/// Minimum share of its direction's rows that a lane holds.
-const MIN_SHARE: f64 = 0.02;
-
-/// Maximum number of lanes considered on either side of the reference line.
-const MAX_LANES_BESIDE: i64 = 20;
-
-/// Distance by which each direction is shifted to the right of the previous one (m).
-const SEPARATION_M: f64 = 1_000.0;
+/// Step of the offset from the lane's centre that shows a change of lane, as a share of the lane
+/// width (-): the offset jumps by a whole lane width, and within a lane it is continuous.
+const OFFSET_JUMP_SHARE: f64 = 0.5;
 
 /// The column indices of exiD's quantities.
 #[derive(Clone, Debug)]
@@ -81,6 +63,9 @@ struct ColumnIndices {
     acceleration: usize,
     lane_width: Option<usize>,
     lane_change: Option<usize>,
+    lane_offset: Option<usize>,
+    /// Index of the column that names the lanelets; inD and rounD have none.
+    lanelet: Option<usize>,
 }
 
 impl ColumnIndices {
@@ -99,6 +84,8 @@ impl ColumnIndices {
             acceleration: need("lonAcceleration")?,
             lane_width: header.find("laneWidth"),
             lane_change: header.find("laneChange"),
+            lane_offset: header.find("latLaneCenterOffset"),
+            lanelet: header.find("laneletId"),
         })
     }
 
@@ -109,36 +96,6 @@ impl ColumnIndices {
         let (x_m, y_m) = (real(self.x, "xCenter", allowed::PLANE_M)?, real(self.y, "yCenter", allowed::PLANE_M)?);
         Ok((track, (x_m, y_m), real(self.heading, "heading", HEADING_DEG)?.to_radians()))
     }
-}
-
-/// One direction of the road, as inferred from the traffic.
-#[derive(Clone, Debug)]
-struct Direction {
-    heading_rad: f64,
-    line: ReferenceLine,
-    /// Number of lanes to the left of the reference line's own lane.
-    left: i64,
-    lanes: i64,
-    /// Offset of the lane numbers, so that directions share no lane.
-    first_lane: i64,
-    /// Offset of the lateral position, so that directions do not meet (m).
-    shift_m: f64,
-}
-
-/// The road of a data set, as inferred from its traffic.
-#[derive(Clone, Debug)]
-pub(super) struct InferredRoad {
-    lane_width_m: f64,
-    directions: Vec<Direction>,
-}
-
-/// The path of one vehicle.
-#[derive(Clone, Debug, Default)]
-struct DrivenPath {
-    vehicle: Option<u64>,
-    heading_rad: f64,
-    points: Vec<Point>,
-    changes_lanes: bool,
 }
 
 /// Reads the rows of `NN_tracks.csv`.
@@ -172,116 +129,30 @@ impl ExidColumns {
     }
 }
 
-impl InferredRoad {
-    /// Reads the rows of a file twice: first for the reference lines, then for the lanes beside
-    /// them. It ignores unusable rows, because the later reading of the rows reports them.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read or no vehicle moves.
-    pub(super) fn from_traffic(path: &Path) -> Result<Self, TrajectoryFileError> {
-        let mut paths: Vec<(bool, f64, DrivenPath)> = Vec::new();
-        let mut current = DrivenPath::default();
-        let (mut width_sum_m, mut widths) = (0.0, 0_u32);
+/// Infers the road of a data set from its rows. It ignores unusable rows, because the later reading
+/// of the rows reports them.
+///
+/// # Errors
+/// Fails if the file cannot be read, no vehicle moves, or the vehicles do not follow a road.
+pub(super) fn road_from_traffic(path: &Path) -> Result<InferredRoad, TrajectoryFileError> {
+    let road = InferredRoad::of(|visit| {
+        let mut latest: Option<(u64, f64)> = None;
         each_row(path, |columns, line, fields| {
-            let Ok((track, point, heading_rad)) = columns.pose(line, fields) else { return };
-            let field = |column: Option<usize>| column.map_or("", |index| fields.get(line, index));
-            if let Ok(metres) = number(first_of(field(columns.lane_width)), "laneWidth", LANE_WIDTH_M) {
-                width_sum_m += metres;
-                widths = widths.saturating_add(1);
-            }
-            if current.vehicle != Some(track) {
-                keep_best_path(&mut paths, std::mem::take(&mut current));
-                current = DrivenPath { vehicle: Some(track), heading_rad, ..DrivenPath::default() };
-            }
-            current.changes_lanes |= first_of(field(columns.lane_change)) == "1";
-            let is_far = |last: &Point| maths::hypot(point.0 - last.0, point.1 - last.1) >= SPACING_M;
-            if current.points.last().is_none_or(is_far) && current.points.len() < MAX_POINTS {
-                current.points.push(point);
-            }
-        })?;
-        keep_best_path(&mut paths, current);
-        let lane_width_m = if widths > 0 { width_sum_m / f64::from(widths) } else { FALLBACK_LANE_WIDTH_M };
-        let directions = paths.into_iter().filter_map(|(_, _, path)| {
-            let line = ReferenceLine::through(path.points.into_iter());
-            line.length_m()?;
-            let heading_rad = path.heading_rad;
-            Some(Direction { heading_rad, line, left: 0, lanes: 1, first_lane: 0, shift_m: 0.0 })
-        });
-        let mut road = Self { lane_width_m, directions: directions.collect() };
-        if road.directions.is_empty() {
-            return Err(with_path(path, ReadError::of_file(TrajectoryFileProblem::NothingMoves)));
-        }
-        road.count_lanes(path)?;
-        Ok(road)
-    }
-
-    /// Counts the rows in each lane, and from them sets the lanes of each direction.
-    fn count_lanes(&mut self, path: &Path) -> Result<(), TrajectoryFileError> {
-        let mut rows: BTreeMap<(usize, i64), u64> = BTreeMap::new();
-        each_row(path, |columns, line, fields| {
-            if let Ok((_, point, heading_rad)) = columns.pose(line, fields)
-                && let Some(direction) = self.direction(heading_rad)
-            {
-                let lane = self.lane_beside(self.directions[direction].line.project(point).d_m);
-                *rows.entry((direction, lane)).or_default() += 1;
-            }
-        })?;
-        let (mut first_lane, mut shift_m) = (0, 0.0);
-        for (index, direction) in self.directions.iter_mut().enumerate() {
-            let in_direction = || rows.iter().filter(|((other, _), _)| *other == index);
-            let least = MIN_SHARE * in_direction().map(|(_, count)| *count).sum::<u64>() as f64;
-            let used = || in_direction().filter(|(_, count)| **count as f64 >= least).map(|((_, lane), _)| *lane);
-            let (left, right) = (used().max().unwrap_or(0).max(0), used().min().unwrap_or(0).min(0));
-            (direction.left, direction.lanes) = (left, left - right + 1);
-            (direction.first_lane, direction.shift_m) = (first_lane, shift_m);
-            first_lane += direction.lanes + 1;
-            shift_m -= self.lane_width_m * direction.lanes as f64 + SEPARATION_M;
-        }
-        Ok(())
-    }
-
-    /// Returns the index of the direction that agrees best with `heading_rad`.
-    fn direction(&self, heading_rad: f64) -> Option<usize> {
-        let agrees = |direction: &Direction| maths::cos(heading_rad - direction.heading_rad);
-        let ranked = self.directions.iter().map(agrees).enumerate();
-        ranked.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
-    }
-
-    /// Returns by how many lanes `d_m` lies to the left of the reference line's lane.
-    fn lane_beside(&self, d_m: f64) -> i64 {
-        #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and what is far away is clamped")]
-        let lane = (d_m / self.lane_width_m).round() as i64;
-        lane.clamp(-MAX_LANES_BESIDE, MAX_LANES_BESIDE)
-    }
-
-    /// Returns the lane markings of all directions.
-    fn markings(&self) -> LaneMarkings {
-        let edges = self.directions.iter().flat_map(|direction| {
-            // Lane 0 of the first direction does not exist. Lane 0 of a later direction is the
-            // omitted lane, whose right edge is the direction's left edge.
-            (0..=direction.lanes).map(move |lane| {
-                let edge_m = direction.shift_m - self.lane_width_m * lane as f64;
-                (u8::try_from(direction.first_lane + lane).unwrap_or(u8::MAX), edge_m)
-            })
-        });
-        LaneMarkings::from_right_edges(edges.filter(|(lane, _)| *lane > 0).map(|(lane, edge_m)| (Lane(lane), edge_m)))
-    }
-}
-
-/// Keeps the best path of each direction. A path without a lane change is better than a path with
-/// one, and a longer path is better than a shorter path.
-fn keep_best_path(paths: &mut Vec<(bool, f64, DrivenPath)>, path: DrivenPath) {
-    let Some(length_m) = ReferenceLine::through(path.points.iter().copied()).length_m() else { return };
-    let stays = !path.changes_lanes;
-    let same = |kept: &&mut (bool, f64, DrivenPath)| maths::cos(kept.2.heading_rad - path.heading_rad) > 0.0;
-    match paths.iter_mut().find(same) {
-        Some(kept) if (stays, length_m) > (kept.0, kept.1) => *kept = (stays, length_m, path),
-        Some(_) => {}
-        None => {
-            paths.push((stays, length_m, path));
-            paths.truncate(MAX_DIRECTIONS);
-        }
-    }
+            let Ok((vehicle, point, heading_rad)) = columns.pose(line, fields) else { return };
+            let field = |column: Option<usize>| first_of(column.map_or("", |index| fields.get(line, index)));
+            let lane_width_m = number(field(columns.lane_width), "laneWidth", LANE_WIDTH_M).ok();
+            let offset_m = field(columns.lane_offset).parse::<f64>().ok().filter(|offset_m| offset_m.is_finite());
+            // The flag alone does not tell: in some files it is 0 throughout. The offset from the
+            // centre of the lane jumps where a vehicle enters the next one.
+            let before_m = latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
+            let least_m = OFFSET_JUMP_SHARE * lane_width_m.unwrap_or(DEFAULT_LANE_WIDTH_M);
+            let jumps = before_m.zip(offset_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() > least_m);
+            latest = offset_m.map(|offset_m| (vehicle, offset_m));
+            let changes_lane = jumps || field(columns.lane_change) == "1";
+            visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane });
+        })
+    })?;
+    road.map_err(|problem| with_path(path, ReadError::of_file(problem)))
 }
 
 /// Returns the first of the values in `text` that semicolons separate.
@@ -340,6 +211,15 @@ impl TextLayout for ExidColumns {
         self.unknown_classes.names()
     }
 
+    fn warnings(&self) -> Vec<String> {
+        let urban = self.columns.lanelet.is_none().then(|| {
+            "no column names lanelets, as in inD and rounD, which record intersections and roundabouts: the lanes are derived \
+             from the traffic, and the quantities of motorway traffic may mean nothing here"
+                .to_owned()
+        });
+        urban.into_iter().chain(self.road.warning()).collect()
+    }
+
     fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
         self.columns.data.map(|index| ("recordingId", fields.get(line, index)))
     }
@@ -360,10 +240,7 @@ impl TextLayout for ExidColumns {
         let latest_index = self.latest.filter(|(latest, _)| *latest == track).map(|(_, index)| index);
         let index = latest_index.or_else(|| self.road.direction(heading_rad)).unwrap_or(0);
         self.latest = Some((track, index));
-        let Some(direction) = self.road.directions.get(index) else { return Ok(None) };
-        let projection = direction.line.project(point);
-        let width_m = self.road.lane_width_m;
-        let lane = (direction.left - self.road.lane_beside(projection.d_m) + 1).clamp(1, direction.lanes);
+        let Some(Placed { s_m, d_m, lane }) = self.road.place(index, point) else { return Ok(None) };
         let frame = integer(fields.get(line, self.columns.frame), "frame", allowed::FRAMES)?;
         Ok(Some(Row {
             number: track,
@@ -372,9 +249,9 @@ impl TextLayout for ExidColumns {
             frame,
             time: Time::from_s(frame as f64 / self.data.frame_rate_hz),
             clock: Clock::Continuous,
-            s_m: projection.s_m,
-            d_m: projection.d_m - width_m * (direction.left as f64 + 0.5) + direction.shift_m,
-            lane: u8::try_from(lane + direction.first_lane).unwrap_or(u8::MAX),
+            s_m,
+            d_m,
+            lane,
             speed_mps: real(self.columns.speed, "lonVelocity", SPEED_MPS)?,
             acceleration_mps2: Some(real(self.columns.acceleration, "lonAcceleration", allowed::ACCELERATION_MPS2)?),
             length_m: real(self.columns.length, "length", allowed::LENGTH_M)?,

@@ -20,6 +20,12 @@ pub enum Layout {
     Commonroad,
     /// A log of one vehicle that sees the lane markings.
     InCar,
+    /// Floating car data (FCD) of SUMO.
+    Sumo,
+    /// A vehicle record of Vissim.
+    Vissim,
+    /// Trajectories of I-24 MOTION in JSON.
+    I24,
 }
 
 impl Layout {
@@ -33,6 +39,9 @@ impl Layout {
             Self::Exid => "exid",
             Self::Commonroad => "commonroad",
             Self::InCar => "in-car",
+            Self::Sumo => "sumo",
+            Self::Vissim => "vissim",
+            Self::I24 => "i24",
         }
     }
 }

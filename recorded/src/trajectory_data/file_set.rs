@@ -209,6 +209,9 @@ fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, FieldError>) -
         return Err(ReadError::of_file(TrajectoryFileProblem::Empty));
     };
     fields.split(first, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
+    if fields.len() == 1 && first.contains(';') {
+        return Err(ReadError::new(number, TrajectoryFileProblem::SemicolonSeparated));
+    }
     let header = Header::new((0..fields.len()).map(|index| fields.get(first, index)));
     let needed = fields.len();
     let mut numbered_rows = Vec::new();

@@ -1,11 +1,12 @@
 //! Detection of a file's layout from its first line.
 
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
-use super::exid::{ExidColumns, InferredRoad};
+use super::exid::ExidColumns;
 use super::file_set::Meta;
 use super::header::Header;
 use super::highd::HighdColumns;
 use super::in_car::InCarColumns;
+use super::inferred_road::InferredRoad;
 use super::ngsim::NgsimColumns;
 use super::plain::PlainColumns;
 use super::rows::Separator;
@@ -49,6 +50,9 @@ pub(super) fn drone_format(
     infer_road: impl FnOnce() -> Result<InferredRoad, TrajectoryFileError>,
 ) -> Result<Format, Result<TrajectoryFileProblem, TrajectoryFileError>> {
     let (header, separator, width) = Header::parse(line).map_err(Ok)?;
+    if separator == Separator::Semicolon {
+        return Err(Ok(TrajectoryFileProblem::SemicolonSeparated));
+    }
     header.check_no_duplicates().map_err(Ok)?;
     let columns: Box<dyn TextLayout> = if is_exid(&header) {
         Box::new(ExidColumns::new(&header, meta, infer_road().map_err(Err)?).map_err(Ok)?)

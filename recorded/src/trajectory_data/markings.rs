@@ -81,14 +81,13 @@ impl LaneMarkings {
 
     /// Works like [`LaneMarkings::from_trajectories`], for tracks that are not in one slice.
     pub fn from_tracks<'t>(trajectories: impl Iterator<Item = &'t Trajectory>) -> Self {
-        let mut crossings: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
-        for pair in trajectories.flat_map(|track| track.points.windows(2)) {
-            let [before, after] = pair else { continue };
-            if before.lane.0.abs_diff(after.lane.0) == 1 {
-                let left = before.lane.0.min(after.lane.0);
-                crossings.entry(left).or_default().push(0.5 * (before.d_m + after.d_m));
-            }
-        }
+        let mut observer = MarkingObserver::default();
+        trajectories.for_each(|track| observer.add(track));
+        observer.finish()
+    }
+
+    /// Derives the markings from the positions of crossings, by the lane to their left.
+    fn from_crossings(crossings: BTreeMap<u8, Vec<f64>>) -> Self {
         let edge = Observed { left_lane: 0, d_m: 0.0, crossings: 0 };
         let observed = crossings.into_iter().filter_map(|(left_lane, positions)| {
             let crossings = positions.len();
@@ -150,6 +149,31 @@ impl LaneMarkings {
             std::iter::repeat_n(width_m, usize::from(lanes)).filter(|width_m| LANE_WIDTHS_M.contains(width_m))
         });
         median(widths.collect()).unwrap_or(DEFAULT_LANE_WIDTH_M)
+    }
+}
+
+/// Gathers where recorded lanes change, one track after the other.
+#[derive(Clone, Debug, Default)]
+pub struct MarkingObserver {
+    /// Positions of the crossings (m), by the lane to their left.
+    crossings: BTreeMap<u8, Vec<f64>>,
+}
+
+impl MarkingObserver {
+    /// Adds the crossings of a track.
+    pub fn add(&mut self, track: &Trajectory) {
+        for pair in track.points.windows(2) {
+            let [before, after] = pair else { continue };
+            if before.lane.0.abs_diff(after.lane.0) == 1 {
+                let left = before.lane.0.min(after.lane.0);
+                self.crossings.entry(left).or_default().push(0.5 * (before.d_m + after.d_m));
+            }
+        }
+    }
+
+    /// Derives the markings from the crossings.
+    pub fn finish(self) -> LaneMarkings {
+        LaneMarkings::from_crossings(self.crossings)
     }
 }
 

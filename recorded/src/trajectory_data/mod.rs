@@ -5,7 +5,8 @@
 //!                           (one line or element at a time)          (in memory: incomplete ones)     (all tracks)
 //! ```
 //!
-//! The content of a file determines its layout; the file's name does not.
+//! The content of a file determines its layout; the file's name does not. A Parquet file has the
+//! layout of its columns; see `parquet`.
 //! `docs/reference/trajectory-data.md` describes all layouts for users:
 //!
 //! | layout | content | module |
@@ -14,6 +15,9 @@
 //! | NGSIM | 18 columns in feet, with or without a header; or the 25 columns of the catalogue's export (DOI 10.21949/1504477) | `ngsim` |
 //! | highD, exiD | three files per recorded data set | `highd`, `exid`, `file_set` |
 //! | CommonRoad | XML with lanelets and dynamic obstacles | `commonroad`, `lanelets` |
+//! | SUMO | floating car data, as XML or a table | `sumo`, `collected` |
+//! | Vissim | vehicle record (`.fzp`) | `vissim`, `collected` |
+//! | I-24 MOTION | JSON in feet | `i24`, `collected` |
 //! | in-car | log of one vehicle that sees the lane markings; [`write_in_car`] writes it | `in_car` |
 //!
 //! # What the readers do
@@ -46,24 +50,29 @@
 //!
 //! [`open`] yields complete tracks one by one. It holds the rows of incomplete tracks and some
 //! dozen bytes per vehicle. Therefore, files longer than [`WINDOW_ROWS`] rows must be sorted by
-//! vehicle or by time; see `order`. [`read`] holds the whole file, in any row order: criticality
-//! needs all of it, because every vehicle may be an opponent.
+//! vehicle or by time; see `order`. [`read`] holds the whole file, in any row order. Criticality needs
+//! all vehicles, because every vehicle may be an opponent, but only smoothed ones: see
+//! [`smooth_file`](crate::filters::smooth_file).
 
 mod assemble;
 mod axes;
 mod builder;
 mod class_names;
+mod collected;
 mod commonroad;
 mod continuity;
 mod data;
 mod error;
+mod estimated_lanes;
 mod exid;
 mod fields;
 mod file_layout;
 mod file_set;
 mod header;
 mod highd;
+mod i24;
 mod in_car;
+mod inferred_road;
 mod input;
 mod lanelets;
 mod layout;
@@ -71,6 +80,7 @@ mod markings;
 mod ngsim;
 mod open;
 mod order;
+mod parquet;
 mod plain;
 mod plausible;
 mod quality;
@@ -78,11 +88,13 @@ mod reference_line;
 mod rows;
 mod skipped_rows;
 mod source;
+mod sumo;
 #[cfg(test)]
 pub(crate) mod test_support;
 mod text;
 mod text_layout;
 mod tracks;
+mod vissim;
 mod write;
 mod write_in_car;
 mod xml;
@@ -94,9 +106,9 @@ pub use continuity::Continuity;
 pub use data::{MarkingDistances, RecordedTrack, TrajectoryData, refuse_duplicates};
 pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
 pub use file_layout::Layout;
-pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings};
-pub use open::{input_files, open, open_from, read, read_from, read_with};
-pub use order::WINDOW_ROWS;
+pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings, MarkingObserver};
+pub use open::{input_files, open, open_from, open_streaming, read, read_from, read_with};
+pub use order::{STREAM_ROWS, WINDOW_ROWS};
 pub use quality::{Flaw, FlawCounts, FlawLocation, Flaws, QualityInspector, count_flaws};
 pub use skipped_rows::{SkippedRows, SkippedRowsByReason};
 pub use tracks::{BadRows, LayoutChoice, ReadOptions, Tracks};

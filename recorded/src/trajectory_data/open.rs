@@ -1,19 +1,22 @@
 //! Opening of trajectory files: selects the reader that a file needs.
 
-use std::io::{BufRead, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use super::commonroad::CommonRoadSource;
 use super::data::TrajectoryData;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
-use super::exid::InferredRoad;
+use super::exid::road_from_traffic;
 use super::file_set::FileSet;
+use super::header::Header;
 use super::input::{Digest, open_file, with_path};
-use super::order::WINDOW_ROWS;
+use super::order::{STREAM_ROWS, WINDOW_ROWS};
+use super::parquet::{self, ParquetText};
 use super::rows::io_problem;
 use super::source::{ReadError, RowSource};
-use super::text::TextSource;
+use super::text::{TextSource, read_first_line};
 use super::tracks::{ReadOptions, Tracks};
+use super::{i24, sumo, vissim};
 
 /// The first bytes of unsupported archives and compressed files, with a description of each.
 const ARCHIVES: [(&[u8], &str); 5] = [
@@ -25,15 +28,25 @@ const ARCHIVES: [(&[u8], &str); 5] = [
 ];
 
 /// The first bytes of formats of other programs, with a description of each.
-const FOREIGN: [(&[u8], &str); 5] = [
-    (b"PAR1", "a Parquet file"),
-    (b"$V", "a vehicle record of Vissim (.fzp)"),
-    (b"* File", "a vehicle record of Vissim (.fzp)"),
-    (b"[", "JSON, as I-24 MOTION and others publish it"),
-    (b"{", "JSON, as OpenLABEL and others are written"),
+const FOREIGN: [(&[u8], &str); 2] = [
+    (b"[", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`)"),
+    (b"{", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`), such as OpenLABEL"),
 ];
-/// A word at the start of SUMO's floating car data.
+
+/// The first bytes of Vissim's vehicle records.
+const VISSIM: [&[u8]; 3] = [b"$V", b"* ", b"Vehicle Record"];
+
+/// A field of I-24 MOTION, which stands near the start of its files.
+const I24: &[u8] = b"\"x_position\"";
+/// Fields of I-24 MOTION, one of which stands at the start of its files.
+const I24_START: [&[u8]; 3] = [b"\"timestamp\"", b"\"coarse_vehicle_class\"", b"\"configuration_id\""];
+
+/// A word at the start of SUMO's floating car data, and one of CommonRoad's.
 const SUMO: &[u8] = b"<fcd-export";
+const COMMONROAD: &[u8] = b"<commonRoad";
+
+/// Size of the buffer for the text of a Parquet file (bytes).
+const PARQUET_BUFFER_BYTES: usize = 1 << 16;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -44,6 +57,14 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
 pub fn open(path: &Path, options: ReadOptions) -> Result<Tracks<'static>, TrajectoryFileError> {
     open_window(path, options, WINDOW_ROWS)
+}
+
+/// Works like [`open`], but holds only [`STREAM_ROWS`](super::STREAM_ROWS) rows.
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
+pub fn open_streaming(path: &Path, options: ReadOptions) -> Result<Tracks<'static>, TrajectoryFileError> {
+    open_window(path, options, STREAM_ROWS)
 }
 
 /// Reads a whole trajectory file, with its rows in any order.
@@ -59,8 +80,7 @@ pub fn read(path: &Path) -> Result<TrajectoryData, TrajectoryFileError> {
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
 pub fn read_with(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
-    let data = open_window(path, options, usize::MAX)?.collect_all()?;
-    Ok(TrajectoryData { lanes: options.lanes, ..data })
+    open_window(path, options, usize::MAX)?.collect_all()
 }
 
 /// Reads trajectory data that consists of one file from any byte source. `path` appears in errors
@@ -111,7 +131,7 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
     let digest = Digest::default();
     let in_tracks = |error| with_path(&path, error);
     let input = digest.input(open_file(&path)?).map_err(in_tracks)?;
-    let source = TextSource::with_meta(input, || set.meta(&digest), || InferredRoad::from_traffic(&path));
+    let source = TextSource::with_meta(input, || set.meta(&digest), || road_from_traffic(&path));
     let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
     check_choice(&source, &options).map_err(in_tracks)?;
     Tracks::new((&path, digest), Box::new(source), options, window)
@@ -138,18 +158,36 @@ fn reader_for<'a>(
         return Err(ReadError::of_file(TrajectoryFileProblem::Archive { kind }));
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
-    if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning)) {
+    let is_i24 = [I24].iter().chain(&I24_START).any(|word| text.windows(word.len()).any(|window| window == *word));
+    if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning) && !is_i24) {
         return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
-    if text.starts_with(b"<") && text.windows(SUMO.len()).any(|window| window == SUMO) {
-        let kind = "floating car data (FCD) of SUMO";
-        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
-    }
-    let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
+    let holds = |word: &[u8]| text.windows(word.len()).any(|window| window == word);
+    let source: Box<dyn RowSource + 'a> = if text.starts_with(parquet::MAGIC) {
+        let rows = BufReader::with_capacity(PARQUET_BUFFER_BYTES, ParquetText::new(input)?);
+        text_source(rows, options)?
+    } else if text.starts_with(b"<") && holds(SUMO) && !holds(COMMONROAD) {
+        Box::new(sumo::read_xml(input)?)
+    } else if text.starts_with(b"<") {
         Box::new(CommonRoadSource::new(input)?)
+    } else if VISSIM.iter().any(|start| text.starts_with(start)) {
+        Box::new(vissim::read(input)?)
+    } else if text.starts_with(b"[") || text.starts_with(b"{") {
+        Box::new(i24::read(input)?)
     } else {
-        Box::new(TextSource::new(input)?)
+        text_source(input, options)?
     };
     check_choice(source.as_ref(), options)?;
     Ok(source)
+}
+
+/// Selects the reader of a text file by its first line.
+fn text_source<'a, R: BufRead + 'a>(input: R, options: &ReadOptions) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+    let (lines, number, first) = read_first_line(input)?;
+    if let Ok((header, separator, width)) = Header::parse(&first)
+        && sumo::is_table(&header)
+    {
+        return Ok(Box::new(sumo::read_table(lines, (&header, separator, width))?));
+    }
+    Ok(Box::new(TextSource::new(lines, (number, first), options.location)?))
 }

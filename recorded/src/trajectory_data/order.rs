@@ -25,6 +25,10 @@ use super::source::{ReadError, Row};
 /// vehicle per second, each recorded for 30 s at 10 Hz.
 pub const WINDOW_ROWS: usize = 1 << 20;
 
+/// Like [`WINDOW_ROWS`], for readers that keep memory small: a quarter of an hour of traffic, which
+/// takes 40 MiB.
+pub const STREAM_ROWS: usize = 1 << 18;
+
 /// The order of the rows in a file that is longer than the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {

@@ -129,8 +129,9 @@ pub fn count_flaws(data: &TrajectoryData) -> FlawCounts {
 }
 
 /// Examines tracks one by one.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct QualityInspector {
+    most_stored_points: usize,
     flaws: Flaws,
     tracks: usize,
     instants: usize,
@@ -160,7 +161,30 @@ struct OccupiedSpan {
     track_id: u64,
 }
 
+impl Default for QualityInspector {
+    fn default() -> Self {
+        Self::storing(MAX_STORED_POINTS)
+    }
+}
+
 impl QualityInspector {
+    /// Creates an inspector that stores at most this many track points to find overlaps, 50 bytes
+    /// each. It does not check the points that come too late.
+    pub fn storing(most_stored_points: usize) -> Self {
+        Self {
+            most_stored_points,
+            flaws: Flaws::default(),
+            tracks: 0,
+            instants: 0,
+            vehicles: BTreeMap::new(),
+            occupied: BTreeMap::new(),
+            stored_points: 0,
+            discarded_until: None,
+            unchecked: 0,
+            span: None,
+        }
+    }
+
     /// Examines the next track.
     pub fn add(&mut self, track: &RecordedTrack) {
         self.add_trajectory(&track.trajectory, &track.lines);
@@ -282,7 +306,7 @@ impl QualityInspector {
         }
         others.push(span);
         self.stored_points += 1;
-        while self.stored_points > MAX_STORED_POINTS
+        while self.stored_points > self.most_stored_points
             && let Some((time, discarded)) = self.occupied.pop_first()
         {
             self.stored_points -= discarded.len();

@@ -2,11 +2,12 @@
 //!
 //! ```text
 //!   NGSIM, highD, exiD, plain, in-car (text, line by line) ─┐
-//!                                                           ├─▶ RowSource ─▶ rows ─▶ Tracks (the only exit)
-//!   CommonRoad (XML, event by event)                       ─┘
+//!   CommonRoad (XML, event by event)                       ─┼─▶ RowSource ─▶ rows ─▶ Tracks (the only exit)
+//!   SUMO, Vissim, I-24 MOTION (as a whole)                 ─┘
 //! ```
 //!
-//! A reader holds one line or one XML element at a time. When it is opened, it reads the other
+//! A reader holds one line or one XML element at a time, apart from those that read a file as a
+//! whole; see `collected`. When it is opened, it reads the other
 //! files of a highD or exiD data set. A CommonRoad reader also holds the lanelets, which precede
 //! the obstacles in the file.
 
@@ -26,6 +27,8 @@ pub(super) enum Clock {
     Continuous,
     /// Concatenated original NGSIM files: vehicle and frame numbers recur at later times.
     MayRestart,
+    /// A simulation: a vehicle keeps its number, and a lane change may take a single step.
+    Simulated,
 }
 
 /// One vehicle at one frame, in SI units.
@@ -72,6 +75,11 @@ pub(super) trait RowSource {
 
     /// Returns the unknown names of vehicle classes found so far.
     fn unknown_classes(&self) -> &[UnknownClass];
+
+    /// Returns what a reader of results has to know of the file.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Returns the next row in the order of the file, or `None` at its end.
     ///

@@ -1,12 +1,13 @@
 //! Readers of text layouts, which have one row per line.
 
+use std::collections::BTreeSet;
 use std::io::BufRead;
 
 use super::class_names::UnknownClass;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
-use super::exid::InferredRoad;
 use super::fields::FieldError;
 use super::file_set::Meta;
+use super::inferred_road::InferredRoad;
 use super::layout::{Format, drone_format, is_drone_header, recognise};
 use super::rows::{Fields, Lines, Separator};
 use super::source::{FileInfo, ReadError, Row, RowSource};
@@ -22,16 +23,31 @@ pub(super) struct TextSource<R> {
     /// Length of the last field of the row before (bytes): a shorter one at the end of the file may
     /// be cut.
     usual_last_field: usize,
+    location: Location,
+}
+
+/// The data set that is read of a file with several.
+#[derive(Default)]
+struct Location {
+    asked: Option<&'static str>,
+    was_found: bool,
+    /// The names of other data sets in the file.
+    others: BTreeSet<String>,
 }
 
 impl<R: BufRead> TextSource<R> {
-    /// Detects the layout from the first line.
+    /// Detects the layout from the first line, which has been read. Of a file with several data
+    /// sets, the one that is `asked` for is read.
     ///
     /// # Errors
     /// Fails if the first line fits no layout, or fits a layout that needs other files.
-    pub(super) fn new(source: R) -> Result<Self, ReadError> {
-        let (lines, number, first) = read_first_line(source)?;
-        Self::with_recognised_layout(lines, number, first)
+    pub(super) fn new(
+        lines: Lines<R>,
+        (number, first): (u64, String),
+        asked: Option<&'static str>,
+    ) -> Result<Self, ReadError> {
+        let source = Self::with_recognised_layout(lines, number, first)?;
+        Ok(Self { location: Location { asked, ..Location::default() }, ..source })
     }
 
     /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts,
@@ -48,18 +64,34 @@ impl<R: BufRead> TextSource<R> {
         }
         let format = drone_format(&first, meta().map_err(Err)?, infer_road)
             .map_err(|error| error.map(|problem| ReadError::new(number, problem)))?;
-        Ok(Self { lines, format, fields: Fields::default(), name: None, first: None, usual_last_field: 0 })
+        Ok(Self {
+            lines,
+            format,
+            fields: Fields::default(),
+            name: None,
+            first: None,
+            usual_last_field: 0,
+            location: Location::default(),
+        })
     }
 
     fn with_recognised_layout(lines: Lines<R>, number: u64, first: String) -> Result<Self, ReadError> {
         let format = recognise(&first).map_err(|problem| ReadError::new(number, problem))?;
         let first = (!format.has_header).then_some((number, first));
-        Ok(Self { lines, format, fields: Fields::default(), name: None, first, usual_last_field: 0 })
+        Ok(Self {
+            lines,
+            format,
+            fields: Fields::default(),
+            name: None,
+            first,
+            usual_last_field: 0,
+            location: Location::default(),
+        })
     }
 }
 
 /// Reads the first line, and returns it together with the remaining lines.
-fn read_first_line<R: BufRead>(source: R) -> Result<(Lines<R>, u64, String), ReadError> {
+pub(super) fn read_first_line<R: BufRead>(source: R) -> Result<(Lines<R>, u64, String), ReadError> {
     let mut lines = Lines::new(source);
     match lines.next().map_err(at_line)? {
         Some((number, first)) => {
@@ -84,8 +116,12 @@ impl<R: BufRead> RowSource for TextSource<R> {
         self.format.columns.unknown_classes()
     }
 
+    fn warnings(&self) -> Vec<String> {
+        self.format.columns.warnings()
+    }
+
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
-        let Self { lines, format, fields, name, first, usual_last_field } = self;
+        let Self { lines, format, fields, name, first, usual_last_field, location } = self;
         loop {
             let first = first.take();
             let (number, line) = match &first {
@@ -94,11 +130,11 @@ impl<R: BufRead> RowSource for TextSource<R> {
                     Some(next) => next,
                     None => {
                         format.columns.end().map_err(ReadError::of_field)?;
-                        return Ok(None);
+                        return location.end().map(|()| None);
                     }
                 },
             };
-            let row = parse(line, format, fields, name).map_err(|error| ReadError::new(number, error))?;
+            let row = parse(line, format, fields, (name, location)).map_err(|error| ReadError::new(number, error))?;
             let last_field = fields.last_len();
             if lines.is_unterminated() && last_field < *usual_last_field {
                 return Err(ReadError::new(number, TrajectoryFileProblem::CutLine));
@@ -111,11 +147,38 @@ impl<R: BufRead> RowSource for TextSource<R> {
     }
 }
 
+impl Location {
+    /// Returns `true` if a row of another data set is asked for.
+    fn leaves_out(&mut self, data: Option<(&'static str, &str)>) -> bool {
+        let (Some(asked), Some((_, actual))) = (self.asked, data) else { return false };
+        if actual.eq_ignore_ascii_case(asked) {
+            self.was_found = true;
+            return false;
+        }
+        if !self.others.contains(actual) {
+            self.others.insert(actual.to_owned());
+        }
+        true
+    }
+
+    /// Checks, at the end of the file, that it holds the data set that is asked for.
+    fn end(&self) -> Result<(), ReadError> {
+        match self.asked {
+            Some(asked) if !self.was_found => {
+                let names: Vec<&str> = self.others.iter().map(String::as_str).collect();
+                let names = if names.is_empty() { "no column with names".to_owned() } else { names.join(", ") };
+                Err(ReadError::of_file(TrajectoryFileProblem::NoSuchLocation { asked, names }))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 fn parse(
     line: &str,
     format: &mut Format,
     fields: &mut Fields,
-    name: &mut Option<String>,
+    (name, location): (&mut Option<String>, &mut Location),
 ) -> Result<Option<Row>, FieldError> {
     let with_points;
     let line = if format.separator == Separator::Semicolon && line.contains(',') {
@@ -129,6 +192,9 @@ fn parse(
     let (actual, needed) = (fields.len(), format.width);
     if actual != needed {
         return Err(TrajectoryFileProblem::ColumnCount { actual, needed }.into());
+    }
+    if location.leaves_out(format.columns.data(line, fields)) {
+        return Ok(None);
     }
     check_name(line, format, fields, name)?;
     format.columns.parse(line, fields)

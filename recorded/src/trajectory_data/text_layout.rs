@@ -25,6 +25,11 @@ pub(super) trait TextLayout {
         &[]
     }
 
+    /// Returns what a reader of results has to know of the file.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Checks, at the end of the file, that nothing is missing.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use super::class_names::UnknownClass;
 use super::continuity::{Continuity, FrameClock};
 use super::data::{RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
+use super::estimated_lanes::EstimatedLanes;
 use super::file_layout::Layout;
 use super::input::Digest;
 use super::markings::LaneMarkings;
@@ -47,6 +48,8 @@ pub struct ReadOptions {
     pub axes: AxisOptions,
     /// Whether lane changes are found by the recorded lanes.
     pub lanes: LaneReliability,
+    /// The data set to read of a file that holds several, by its name in the file.
+    pub location: Option<&'static str>,
 }
 
 /// A layout that a caller can require by name.
@@ -62,6 +65,12 @@ pub enum LayoutChoice {
     Csv,
     /// A log of one vehicle that sees the lane markings.
     InCar,
+    /// Floating car data of SUMO.
+    Sumo,
+    /// A vehicle record of Vissim.
+    Vissim,
+    /// Trajectories of I-24 MOTION.
+    I24,
 }
 
 impl LayoutChoice {
@@ -73,6 +82,9 @@ impl LayoutChoice {
             Self::Commonroad => "commonroad",
             Self::Csv => "csv",
             Self::InCar => "in-car",
+            Self::Sumo => "sumo",
+            Self::Vissim => "vissim",
+            Self::I24 => "i24",
         }
     }
 
@@ -84,6 +96,9 @@ impl LayoutChoice {
             Layout::Highd | Layout::Exid => Self::Highd,
             Layout::Commonroad => Self::Commonroad,
             Layout::InCar => Self::InCar,
+            Layout::Sumo => Self::Sumo,
+            Layout::Vissim => Self::Vissim,
+            Layout::I24 => Self::I24,
         };
         choice == self
     }
@@ -107,7 +122,12 @@ pub struct Tracks<'a> {
     bad_rows: BadRows,
     axis_options: AxisOptions,
     axes: Axes,
+    lanes: LaneReliability,
+    /// The lanes that are estimated from the traffic, or the reason why they cannot be.
+    estimated: Option<Result<EstimatedLanes, String>>,
     builder: TrackBuilder,
+    /// Rows of the window that are not yet in the builder, in their documented directions.
+    window: std::vec::IntoIter<Row>,
     period: Time,
     markings: LaneMarkings,
     dropped: SkippedRows,
@@ -131,7 +151,10 @@ impl<'a> Tracks<'a> {
             bad_rows: options.bad_rows,
             axis_options: options.axes,
             axes: Axes::default(),
+            lanes: options.lanes,
+            estimated: None,
             builder,
+            window: Vec::new().into_iter(),
             period: ngsim::PERIOD,
             markings: LaneMarkings::default(),
             dropped: SkippedRows::default(),
@@ -165,6 +188,12 @@ impl<'a> Tracks<'a> {
         &self.markings
     }
 
+    /// Returns `true` if the file states its markings, or if they are estimated: further tracks do not
+    /// change them.
+    pub fn states_markings(&self) -> bool {
+        matches!(self.estimated, Some(Ok(_))) || self.source.info().markings.is_some()
+    }
+
     /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
@@ -189,6 +218,29 @@ impl<'a> Tracks<'a> {
     /// read.
     pub fn unknown_classes(&self) -> &[UnknownClass] {
         self.source.unknown_classes()
+    }
+
+    /// Returns by which lanes lane changes are found.
+    pub fn lanes(&self) -> LaneReliability {
+        if matches!(self.estimated, Some(Ok(_))) { LaneReliability::Estimated } else { self.lanes }
+    }
+
+    /// Returns what a reader of results has to know of the file and of the rows read so far.
+    pub fn warnings(&self) -> Vec<String> {
+        let unknown = self.unknown_classes().iter().map(ToString::to_string);
+        self.notes().into_iter().chain(self.continuity().warnings()).chain(unknown).collect()
+    }
+
+    /// Returns what the reader and the estimate of the lanes note on the file.
+    fn notes(&self) -> Vec<String> {
+        let reason = self.estimated.as_ref().and_then(|estimated| estimated.as_ref().err());
+        let unknown_lanes = reason.map(|reason| {
+            format!(
+                "the traffic does not show its lanes ({reason}): a lane change is a lateral shift by most of a lane, and it is \
+                 located at half of the shift"
+            )
+        });
+        self.source.warnings().into_iter().chain(unknown_lanes).collect()
     }
 
     /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last
@@ -222,7 +274,19 @@ impl<'a> Tracks<'a> {
             data.markings = markings;
         }
         let (hash, continuity) = (self.hash(), self.continuity());
-        Ok(TrajectoryData { layout, hash, continuity, unknown_classes: self.unknown_classes().to_vec(), ..data })
+        let (notes, lanes) = (self.notes(), self.lanes());
+        if let Some(estimated) = self.estimated_markings() {
+            data.markings = estimated;
+        }
+        Ok(TrajectoryData {
+            layout,
+            hash,
+            continuity,
+            notes,
+            lanes,
+            unknown_classes: self.unknown_classes().to_vec(),
+            ..data
+        })
     }
 
     /// Reads rows until the next track is complete.
@@ -231,12 +295,19 @@ impl<'a> Tracks<'a> {
             if let Some(track) = self.builder.pop() {
                 return Ok(Some(track));
             }
+            if let Some(row) = self.window.next() {
+                self.push(row)?;
+                continue;
+            }
             if self.ended {
                 return Ok(None);
             }
+            // The rows of the window are no longer needed.
+            self.window = Vec::new().into_iter();
             match self.next_row()? {
                 Some(mut row) => {
                     self.axes.turn(&mut row);
+                    self.assign_lane(&mut row);
                     self.push(row)?;
                 }
                 None => {
@@ -261,6 +332,18 @@ impl<'a> Tracks<'a> {
                     self.drop_row(error)?;
                 }
             }
+        }
+    }
+
+    /// Returns the markings of the estimated lanes.
+    fn estimated_markings(&self) -> Option<LaneMarkings> {
+        self.estimated.as_ref().and_then(|estimated| estimated.as_ref().ok()).map(EstimatedLanes::markings)
+    }
+
+    /// Gives a row its estimated lane, if lanes are estimated.
+    fn assign_lane(&self, row: &mut Row) {
+        if let Some(Ok(estimated)) = &self.estimated {
+            row.lane = estimated.at(row.d_m);
         }
     }
 
@@ -308,6 +391,11 @@ impl<'a> Tracks<'a> {
         if matches!(self.source.info().layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25) {
             axes::check(&rows[..rows.len().min(WINDOW_ROWS)])?;
         }
+        // The log of one vehicle shows no lanes of a road.
+        if self.lanes == LaneReliability::Unreliable && self.source.info().layout != Layout::InCar {
+            self.estimated = Some(EstimatedLanes::of(&rows[..rows.len().min(WINDOW_ROWS)]));
+            rows.iter_mut().for_each(|row| self.assign_lane(row));
+        }
         if self.ended {
             separate_data_sets(&mut rows);
             rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
@@ -315,12 +403,20 @@ impl<'a> Tracks<'a> {
         } else {
             self.builder = TrackBuilder::for_stream(clock, start, order_of(&rows, clock)?);
         }
+        if !self.ended && self.states_markings() {
+            // Nothing has to be known of the tracks in the window: they are built when they are asked
+            // for.
+            self.markings = self.estimated_markings().or(self.source.info().markings).unwrap_or_default();
+            self.window = rows.into_iter();
+            return Ok(());
+        }
         rows.into_iter().try_for_each(|row| self.push(row))?;
         if self.ended {
             self.finish()?;
         }
         let derived = || LaneMarkings::from_tracks(self.builder.ready().map(|track| &track.trajectory));
-        self.markings = self.source.info().markings.unwrap_or_else(derived);
+        let stated = self.estimated_markings().or(self.source.info().markings);
+        self.markings = stated.unwrap_or_else(derived);
         Ok(())
     }
 

@@ -47,15 +47,17 @@ pub(super) struct Xml<R> {
     is_empty: bool,
     /// Names of the requested attributes.
     wanted: &'static [&'static str],
+    /// The format of the file, for messages.
+    format: &'static str,
 }
 
 impl<R: BufRead> Xml<R> {
     /// Creates a reader that reports the `wanted` attributes.
-    pub(super) fn new(source: R, wanted: &'static [&'static str]) -> Self {
+    pub(super) fn new(source: R, wanted: &'static [&'static str], format: &'static str) -> Self {
         let meter = Rc::<Meter>::default();
         let reader = Reader::from_reader(BoundedSource { source, meter: Rc::clone(&meter) });
         let (buffer, text, path) = (Vec::new(), String::new(), Vec::new());
-        Self { reader, buffer, text, path, meter, is_empty: false, wanted }
+        Self { reader, buffer, text, path, meter, is_empty: false, wanted, format }
     }
 
     /// Returns the current line, counted from 1.
@@ -82,7 +84,8 @@ impl<R: BufRead> Xml<R> {
 
     /// Returns an error at the current line.
     pub(super) fn fail<T>(&self, reason: impl Into<String>) -> Result<T, ReadError> {
-        Err(ReadError::new(self.line(), TrajectoryFileProblem::Xml { reason: reason.into() }))
+        let problem = TrajectoryFileProblem::Unreadable { format: self.format, reason: reason.into() };
+        Err(ReadError::new(self.line(), problem))
     }
 
     /// Returns the next node. After an end node, the caller must call [`Xml::leave`] and

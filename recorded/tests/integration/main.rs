@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+mod estimated_lanes;
 mod fitted;
 mod golden;
 mod in_car;
@@ -11,6 +12,8 @@ mod malformed;
 mod malformed_layouts;
 mod malformed_rows;
 mod ngsim_us101;
+mod other_programs;
 mod own_trajectory_files;
 mod robustness;
+mod smooth_file;
 mod support;

@@ -24,6 +24,7 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
         "ignored_markings": tracks.markings().ignored(),
         "unknown_classes": tracks.unknown_classes(),
         "continuity": tracks.continuity(),
+        "warnings": tracks.warnings(),
         "flaws": inspector.flaws(),
         "overlaps_unchecked_instants": inspector.unchecked_points(),
         "dropped": tracks.dropped(),

@@ -4,8 +4,8 @@
 use std::fmt;
 
 use closecall_recorded::criticality::{Counted, CriticalLaneChange, MetricResult, shares};
+use closecall_recorded::filters::SmoothedFile;
 use closecall_recorded::lane_change::{LaneChange, Score};
-use closecall_recorded::trajectory_data::{TrajectoryData, count_flaws};
 use closecall_traffic::Side;
 
 /// Lane changes as a table, with their number.
@@ -58,8 +58,8 @@ impl fmt::Display for ScoreText<'_> {
 /// The metrics of each lane change of a trajectory file, and how often each metric is critical.
 #[derive(Clone, Copy, Debug)]
 pub struct CriticalityText<'a> {
-    /// The trajectory file.
-    pub data: &'a TrajectoryData,
+    /// The file, whose tracks are smoothed.
+    pub file: &'a SmoothedFile,
     /// Its lane changes.
     pub changes: &'a [CriticalLaneChange],
     /// The lane changes to which the shares refer.
@@ -68,16 +68,16 @@ pub struct CriticalityText<'a> {
 
 impl fmt::Display for CriticalityText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { data, changes, counted } = *self;
-        let quality = count_flaws(data);
+        let Self { file, changes, counted } = *self;
+        let quality = file.flaws;
         writeln!(
             f,
             "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
-            data.name,
+            file.data.name,
             quality.tracks,
             quality.vehicles,
             quality.instants,
-            data.period,
+            file.period,
             quality.gaps,
             quality.jumps,
             quality.overlaps,

@@ -36,16 +36,13 @@ impl fmt::Display for QualityText<'_> {
                 }
             }
         }
-        for warning in tracks.continuity().warnings() {
+        for warning in tracks.warnings() {
             writeln!(f, "  warning: {warning}")?;
         }
         let markings = tracks.markings();
         writeln!(f, "  lanes {:.2} m wide", markings.typical_lane_width_m())?;
         for ignored in markings.ignored() {
             writeln!(f, "  warning: {ignored}")?;
-        }
-        for unknown in tracks.unknown_classes() {
-            writeln!(f, "  warning: {unknown}")?;
         }
         if inspector.unchecked_points() > 0 {
             writeln!(

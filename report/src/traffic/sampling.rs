@@ -13,7 +13,7 @@ use std::fmt;
 
 use closecall_campaign::runner::run_guarded;
 use closecall_recorded::criticality::{Judgement, criticality};
-use closecall_recorded::encounter::{EGO_INDEX, REAR_INDEX, RecordedEncounter};
+use closecall_recorded::encounter::{EGO_INDEX, RecordedEncounter};
 use closecall_recorded::filters::smooth;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{SampledEncounter, ScenarioError, StepValue, opp2_of};
@@ -29,6 +29,9 @@ use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
 use crate::charts::style::{Canvas, Drawn, svg};
 use crate::run::film::{Film, TrafficFilmError, film_lane_change};
 use closecall_simulation::trajectories::TrafficRecorder;
+
+/// Distance below which two runs are the same (m).
+const SAME_M: f64 = 0.01;
 
 /// Size of the figure with its three charts (px).
 const FIGURE_PX: (u32, u32) = (900, 1_260);
@@ -55,6 +58,12 @@ pub struct SampledRun {
     /// Positions of the vehicle that changes lanes: s and d (m).
     #[serde(skip)]
     path: Vec<(f64, f64)>,
+    /// The same, with the time.
+    #[serde(skip)]
+    positions: Vec<(Time, f64, f64)>,
+    /// Positions of Opp₁ and of Opp₂: s and d (m).
+    #[serde(skip)]
+    opponents: [Vec<(f64, f64)>; 2],
     /// Time (s) and time headway (s) to Opp₁ and to Opp₂.
     #[serde(skip)]
     thw_s: [Vec<(f64, f64)>; 2],
@@ -91,7 +100,11 @@ impl SampledRun {
     /// Evaluates the recorded lane change, with the vehicles of `step`.
     pub fn recorded(encounter: &RecordedEncounter, step: &SampledEncounter) -> Self {
         let track = |index: usize| &encounter.vehicles[index].trajectory;
-        let vehicles = Vehicles { own: track(REAR_INDEX), opp1: track(EGO_INDEX), opp2: step.recorded_opp2.map(track) };
+        let vehicles = Vehicles {
+            own: track(encounter.rear_index()),
+            opp1: track(EGO_INDEX),
+            opp2: step.recorded_opp2.map(track),
+        };
         Self::measured("recorded".to_owned(), &vehicles, [encounter.home, encounter.target], step.lane_change_s)
     }
 
@@ -115,9 +128,26 @@ impl SampledRun {
             min_thw_opp1_s: smallest(&opp1),
             min_thw_opp2_s: smallest(&opp2),
             collision: None,
-            path: own.points.iter().map(|point| (point.s_m, point.d_m)).collect(),
+            path: path_of(own),
+            positions: own.points.iter().map(|point| (point.time, point.s_m, point.d_m)).collect(),
+            opponents: [path_of(vehicles.opp1), vehicles.opp2.map(path_of).unwrap_or_default()],
             thw_s: [opp1, opp2],
         }
+    }
+}
+
+impl SampledRun {
+    /// Returns the largest distances along and across the road from another run at the same time (m).
+    fn furthest_from(&self, other: &Self) -> (f64, f64) {
+        let mut furthest = (0.0_f64, 0.0_f64);
+        let mut others = self.positions.iter().peekable();
+        for (time, s_m, d_m) in &other.positions {
+            while others.next_if(|(own, ..)| own < time).is_some() {}
+            if let Some((_, own_s_m, own_d_m)) = others.next_if(|(own, ..)| own == time) {
+                furthest = (furthest.0.max((own_s_m - s_m).abs()), furthest.1.max((own_d_m - d_m).abs()));
+            }
+        }
+        furthest
     }
 }
 
@@ -132,6 +162,11 @@ fn headways(own: &Trajectory, other: &Trajectory, lane: Lane, counts: impl Fn(f6
         Some((point.time.s(), thw_s))
     };
     own.points.iter().filter(|point| counts(point.time.s())).filter_map(at).collect()
+}
+
+/// Returns the positions of a vehicle: s and d (m).
+fn path_of(track: &Trajectory) -> Vec<(f64, f64)> {
+    track.points.iter().map(|point| (point.s_m, point.d_m)).collect()
 }
 
 /// The run of one step: what was measured, and a film of the lane change.
@@ -221,6 +256,9 @@ impl fmt::Display for Sampled {
                 None => writeln!(f)?,
             }
         }
+        for remark in self.remarks() {
+            writeln!(f, "{remark}")?;
+        }
         Ok(())
     }
 }
@@ -238,10 +276,37 @@ impl Sampled {
         }
     }
 
+    /// Returns what a reader has to know of the runs: how far the first one is from the recording, those that never cross
+    /// the marking, and a parameter that changes nothing.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let [recorded, first, ..] = &self.runs[..] else { return remarks };
+        let (along_m, across_m) = first.furthest_from(recorded);
+        let crossing = recorded.crossing_s.zip(first.crossing_s).map(|(recorded_s, first_s)| first_s - recorded_s);
+        let crossing = crossing.map_or("does not cross the marking".to_owned(), |later_s| match later_s < 0.0 {
+            true => format!("crosses the marking {:.2} s earlier", -later_s),
+            false => format!("crosses the marking {later_s:.2} s later"),
+        });
+        remarks.push(format!(
+            "{} departs from the recording by up to {along_m:.1} m along and {across_m:.2} m across the road, and {crossing}",
+            first.name
+        ));
+        for run in self.runs.iter().skip(1).filter(|run| run.crossing_s.is_none()) {
+            remarks.push(format!("{} never crosses the marking", run.name));
+        }
+        for pair in self.runs[1..].windows(2) {
+            let (along_m, across_m) = pair[1].furthest_from(&pair[0]);
+            if along_m < SAME_M && across_m < SAME_M {
+                remarks.push(format!("{} changes nothing in relation to {}", pair[1].name, pair[0].name));
+            }
+        }
+        remarks
+    }
+
     /// Returns the runs as JSON.
     pub fn json(&self) -> serde_json::Value {
         let Self { title, opp1, opp2, runs } = self;
-        serde_json::json!({ "title": title, "opp1_track_id": opp1, "opp2_track_id": opp2, "runs": runs })
+        serde_json::json!({ "title": title, "opp1_track_id": opp1, "opp2_track_id": opp2, "runs": runs, "remarks": self.remarks() })
     }
 
     /// Draws the paths and the two headways of all runs as one figure (SVG).
@@ -282,8 +347,14 @@ impl Sampled {
             most: None,
         };
         let time = "time [s]";
+        // The opponents drive as recorded, in every run.
+        let recorded = self.runs.first().into_iter().flat_map(|run| ["Opp1", "Opp2"].into_iter().zip(&run.opponents));
+        let opponents = recorded.enumerate().filter(|(_, (_, path))| !path.is_empty()).map(|(index, (name, path))| {
+            Line { name: name.to_owned(), points: path.clone(), colour: self.runs.len() + index, faint: true }
+        });
+        let paths = lines(|run| &run.path).into_iter().chain(opponents).collect();
         vec![
-            chart(&self.title, ["along the road [m]", "across the road [m]"], lines(|run| &run.path)),
+            chart(&self.title, ["along the road [m]", "across the road [m]"], paths),
             chart(
                 "Time headway to Opp1, which is overtaken, during the lane change until the crossing",
                 [time, "THW [s]"],

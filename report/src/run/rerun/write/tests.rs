@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use arrow::array::AsArray;
 use arrow::datatypes::{Float32Type, UInt16Type, UInt32Type};
-use closecall_recorded::encounter::encounter;
+use closecall_recorded::encounter::{Lead, encounter};
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::detect;
 use closecall_scenarios::sampling::Design;
@@ -54,7 +54,7 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
     simulate(&scenario, key, &arm(ControllerChoice::ACC), &mut traffic).unwrap();
     let recording = smooth(&traffic.finish("own"));
     let changes = detect(&recording);
-    let encounter = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
+    let encounter = encounter(&recording, &changes[0], &changes, (CONTROL_STEP, Lead::Required)).unwrap();
     let again = reenact(&encounter, RearDriver::Model, (Path::new("own"), &[])).unwrap();
     let again = again.concrete(&again.space().nominal()).unwrap();
     let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::MIS), level);

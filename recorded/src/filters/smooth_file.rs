@@ -1,0 +1,78 @@
+//! Smoothing of a file while it is read: recorded tracks are dropped as soon as they are smoothed.
+
+use std::path::Path;
+
+use closecall_traffic::Time;
+
+use super::smooth::{SmoothedTrack, SmoothedTrajectoryData, smooth, smooth_track};
+use crate::trajectory_data::{
+    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, Tracks, TrajectoryFileError,
+    TrajectoryFileProblem, count_flaws, open_streaming, read_with,
+};
+
+/// Number of track points among which overlaps are searched: 25 MiB.
+const STORED_POINTS: usize = 1 << 19;
+
+/// The smoothed tracks of a file, and what its reader has found besides.
+#[derive(Clone, Debug)]
+pub struct SmoothedFile {
+    /// The smoothed tracks.
+    pub data: SmoothedTrajectoryData,
+    /// The flaws of the recorded tracks.
+    pub flaws: FlawCounts,
+    /// Time between two recorded frames.
+    pub period: Time,
+    /// What a reader of results has to know of the file.
+    pub warnings: Vec<String>,
+}
+
+/// Smooths the tracks of the file at `path`, and holds no more of its rows than needed.
+///
+/// A file of more than [`STREAM_ROWS`](crate::trajectory_data::STREAM_ROWS) rows is held as a whole only if it is not sorted, or if it may
+/// hold several data sets whose clocks overlap.
+///
+/// # Errors
+/// [`TrajectoryFileError`] with file, line, column and allowed values.
+pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, TrajectoryFileError> {
+    let needs_all_rows = |problem: &TrajectoryFileProblem| {
+        matches!(
+            problem,
+            TrajectoryFileProblem::NotByVehicle { .. }
+                | TrajectoryFileProblem::NotByTime { .. }
+                | TrajectoryFileProblem::TooManyOpen { .. }
+                | TrajectoryFileProblem::SplitPiece { .. }
+        )
+    };
+    match open_streaming(path, options).and_then(smooth_stream) {
+        Ok(Some(file)) => return Ok(file),
+        Err(error) if !needs_all_rows(&error.problem) => return Err(error),
+        Ok(None) | Err(_) => {}
+    }
+    let data = read_with(path, options)?;
+    let (flaws, warnings) = (count_flaws(&data), data.warnings());
+    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, warnings })
+}
+
+/// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
+fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, TrajectoryFileError> {
+    // The export may hold several data sets, which are told apart after the last row.
+    if file.layout() == Layout::Ngsim25 {
+        return Ok(None);
+    }
+    let mut markings = MarkingObserver::default();
+    let mut inspector = QualityInspector::storing(STORED_POINTS);
+    let mut tracks: Vec<SmoothedTrack> = Vec::new();
+    while let Some(track) = file.next_track()? {
+        markings.add(&track.trajectory);
+        inspector.add(&track);
+        tracks.extend(smooth_track(&track.trajectory).map(|mut smoothed| {
+            smoothed.trajectory.points.shrink_to_fit();
+            smoothed
+        }));
+    }
+    tracks.sort_by_key(|track| track.trajectory.track_id);
+    let markings = if file.states_markings() { file.markings().clone() } else { markings.finish() };
+    let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
+    let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
+    Ok(Some(SmoothedFile { data, flaws: inspector.count_flaws(), period: file.period(), warnings }))
+}

@@ -1,0 +1,301 @@
+//! Files that are read as a whole before their first row is known: vehicles have names instead of
+//! numbers, frames have times instead of numbers, and positions lie in a plane.
+//!
+//! ```text
+//!   SUMO ──────────────────────┐
+//!   Vissim, with coordinates ──┴─▶ positions in a plane ─▶ inferred road ─┐
+//!   Vissim, with links ────────┬─▶ positions on roads ───────────────────┴─▶ rows
+//!   I-24 MOTION ───────────────┘
+//! ```
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+
+use closecall_traffic::{Time, VehicleClass};
+
+use super::builder::PIECE_STRIDE;
+use super::class_names::{UnknownClass, UnknownClasses};
+use super::continuity::LONGEST_BRIDGE;
+use super::data::MarkingDistances;
+use super::error::TrajectoryFileProblem;
+use super::file_layout::Layout;
+use super::inferred_road::{InferredRoad, Placed, Pose};
+use super::markings::LaneMarkings;
+use super::plain::allowed;
+use super::reference_line::Point;
+use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
+
+/// Largest number of rows of a file that is read as a whole: they take about 3 GiB.
+const MAX_ROWS: usize = 20_000_000;
+
+/// Shortest step between two frames: shorter ones are the rounding of a file.
+const SHORTEST_STEP: Time = Time::from_ms(1);
+
+/// Lateral movement within one step that makes a lane change a jump (m): half a narrow lane.
+const JUMP_M: f64 = 1.5;
+/// Lateral speed of such a jump (m/s): twice that of the fastest lane changes.
+const JUMP_MPS: f64 = 4.0;
+/// Number of lane changes by jumps that may have another cause.
+const FEW_JUMPS: u64 = 0;
+
+/// A position, as the layout states it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Position {
+    /// In a plane; the point is the centre of the vehicle's box.
+    Plane {
+        point: Point,
+        heading_rad: f64,
+        /// `true` if the vehicle leaves its lane in this row.
+        changes_lane: bool,
+    },
+    /// On a road, of which a file may hold several. `s_m` is the centre of the vehicle's box.
+    Road { road: u32, s_m: f64, d_m: f64, lane: u8 },
+}
+
+/// A row whose vehicle has an index instead of a number.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CollectedRow {
+    pub(super) vehicle: u32,
+    pub(super) time: Time,
+    pub(super) position: Position,
+    pub(super) speed_mps: f64,
+    pub(super) acceleration_mps2: Option<f64>,
+    pub(super) length_m: f64,
+    pub(super) width_m: f64,
+    pub(super) class: VehicleClass,
+    pub(super) line: u64,
+}
+
+/// What a reader knows of a file after its last row.
+#[derive(Debug)]
+pub(super) struct Facts {
+    pub(super) layout: Layout,
+    pub(super) clock: Clock,
+    /// Lane width, if the traffic or the layout gives it (m); for positions in a plane.
+    pub(super) lane_width_m: Option<f64>,
+    /// Lane markings; for positions on roads.
+    pub(super) markings: Option<LaneMarkings>,
+    pub(super) notes: Vec<String>,
+    pub(super) unknown_classes: UnknownClasses,
+}
+
+/// The rows of a file, in its order.
+#[derive(Default)]
+pub(super) struct Collected {
+    /// Index of each vehicle, by its name in the file.
+    vehicles: HashMap<String, u32>,
+    names: Vec<String>,
+    items: Vec<Result<CollectedRow, ReadError>>,
+}
+
+impl Collected {
+    /// Returns the index of the vehicle with this name.
+    pub(super) fn vehicle(&mut self, name: &str) -> u32 {
+        if let Some(index) = self.vehicles.get(name) {
+            return *index;
+        }
+        let index = u32::try_from(self.names.len()).unwrap_or(u32::MAX);
+        self.vehicles.insert(name.to_owned(), index);
+        self.names.push(name.to_owned());
+        index
+    }
+
+    /// Adds a row, or the reason why it cannot be used.
+    ///
+    /// # Errors
+    /// The problem affects the whole file, or the file is too long.
+    pub(super) fn push(&mut self, item: Result<CollectedRow, ReadError>) -> Result<(), ReadError> {
+        if self.items.len() >= MAX_ROWS {
+            return Err(ReadError::of_file(TrajectoryFileProblem::TooManyRows { allowed: MAX_ROWS }));
+        }
+        match item {
+            Err(error) if !error.affects_one_row() => Err(error),
+            item => {
+                self.items.push(item);
+                Ok(())
+            }
+        }
+    }
+
+    /// Changes the rows.
+    pub(super) fn rows_mut(&mut self) -> impl Iterator<Item = &mut CollectedRow> {
+        self.items.iter_mut().filter_map(|item| item.as_mut().ok())
+    }
+
+    /// Returns the source of the rows.
+    ///
+    /// # Errors
+    /// The traffic shows no road.
+    pub(super) fn into_source(self, facts: Facts) -> Result<CollectedSource, ReadError> {
+        let Self { names, items, .. } = self;
+        let mut notes = facts.notes;
+        let numbers = numbers(&names, &mut notes);
+        let rows: Vec<CollectedRow> = items.iter().filter_map(|item| item.as_ref().ok()).copied().collect();
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by_key(|&index| (rows[index].vehicle, rows[index].time, rows[index].line));
+        let period = period(&rows, &order);
+        let road = infer_road(&rows, &order, facts.lane_width_m)?;
+        notes.extend(road.as_ref().and_then(InferredRoad::warning));
+        let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
+        let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
+        let mut jumps = 0;
+        for of_vehicle in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
+            let Some(&first) = of_vehicle.first() else { continue };
+            let first_frame = steps(rows[first].time - start, period);
+            let mut direction = None;
+            let mut before: Option<(Row, u32)> = None;
+            let mut visits = 0;
+            for &index in of_vehicle {
+                let row = &rows[index];
+                let (place, road_index) = match row.position {
+                    Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road),
+                    Position::Plane { point, heading_rad, .. } => {
+                        let inferred = road.as_ref();
+                        direction = direction.or_else(|| inferred.and_then(|road| road.direction(heading_rad)));
+                        (inferred.zip(direction).and_then(|(road, direction)| road.place(direction, point)), 0)
+                    }
+                };
+                let Some(Placed { s_m, d_m, lane }) = place else { continue };
+                let vehicle_id = numbers[row.vehicle as usize];
+                // A vehicle that enters another road, or comes back to a recorded one, begins a track.
+                let begins = |(last, last_road): &(Row, u32)| {
+                    *last_road != road_index || row.time - last.time > period + LONGEST_BRIDGE
+                };
+                if matches!(row.position, Position::Road { .. }) && before.as_ref().is_some_and(begins) {
+                    visits += 1;
+                    before = None;
+                }
+                let row = Row {
+                    number: vehicle_id + visits * PIECE_STRIDE,
+                    origin: Time::ZERO,
+                    vehicle_id,
+                    frame: first_frame + steps(row.time - rows[first].time, period),
+                    time: row.time,
+                    clock: facts.clock,
+                    s_m,
+                    d_m,
+                    lane,
+                    speed_mps: row.speed_mps,
+                    acceleration_mps2: row.acceleration_mps2,
+                    length_m: row.length_m,
+                    width_m: row.width_m,
+                    class: row.class,
+                    marking_distances: MarkingDistances::default(),
+                    line: row.line,
+                };
+                jumps += u64::from(before.as_ref().is_some_and(|(last, _)| is_lane_jump(last, &row)));
+                before = Some((row, road_index));
+                placed[index] = Some(row);
+            }
+        }
+        if facts.clock == Clock::Simulated && jumps > FEW_JUMPS {
+            notes.push(format!(
+                "{jumps} lane changes take a single step, because the simulation does not model their movement: their times, lanes and \
+                 distances hold, their durations, lateral speeds and lateral accelerations mean nothing"
+            ));
+        }
+        let mut placed = placed.into_iter();
+        let items = items.into_iter().filter_map(|item| match item {
+            Ok(_) => placed.next().flatten().map(Ok),
+            Err(error) => Some(Err(error)),
+        });
+        let markings = facts.markings.or_else(|| road.as_ref().map(InferredRoad::markings));
+        let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
+        Ok(CollectedSource { items: items.collect(), info, notes, unknown_classes: facts.unknown_classes })
+    }
+}
+
+/// Returns the number of each vehicle: its name, if all names are numbers, else the order in which
+/// the vehicles appear.
+fn numbers(names: &[String], notes: &mut Vec<String>) -> Vec<u64> {
+    let allowed = allowed::IDS.0.unsigned_abs()..=allowed::IDS.1.unsigned_abs();
+    let stated: Option<Vec<u64>> =
+        names.iter().map(|name| name.parse().ok().filter(|number| allowed.contains(number))).collect();
+    let mut distinct = stated.clone().unwrap_or_default();
+    distinct.sort_unstable();
+    distinct.dedup();
+    if let Some(stated) = stated
+        && distinct.len() == stated.len()
+    {
+        return stated;
+    }
+    if let [first, .., last] = names {
+        notes.push(format!(
+            "the names of vehicles are not numbers: they are numbered in the order of their first rows, `{first}` is 1 and `{last}` is {}",
+            names.len()
+        ));
+    }
+    (1..=names.len() as u64).collect()
+}
+
+/// Returns the number of periods in `span`.
+fn steps(span: Time, period: Time) -> i64 {
+    (span.ns() + period.ns() / 2).div_euclid(period.ns())
+}
+
+/// Returns the most frequent time between two successive rows of a vehicle.
+fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    for pair in order.windows(2) {
+        let (before, after) = (&rows[pair[0]], &rows[pair[1]]);
+        let step = after.time - before.time;
+        if before.vehicle == after.vehicle && step >= SHORTEST_STEP {
+            // Times since 1970 are accurate to a microsecond.
+            let microseconds = (step.ns() + 500) / 1_000;
+            *counts.entry(microseconds).or_default() += 1;
+        }
+    }
+    let usual = counts.into_iter().rev().max_by_key(|(_, count)| *count);
+    usual.map_or(Time::from_ms(1_000), |(microseconds, _)| Time::from_ns(1_000 * microseconds))
+}
+
+/// Infers the road, if positions lie in a plane.
+fn infer_road(
+    rows: &[CollectedRow],
+    order: &[usize],
+    lane_width_m: Option<f64>,
+) -> Result<Option<InferredRoad>, ReadError> {
+    if !rows.iter().any(|row| matches!(row.position, Position::Plane { .. })) {
+        return Ok(None);
+    }
+    let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
+        for &index in order {
+            let row = &rows[index];
+            if let Position::Plane { point, heading_rad, changes_lane } = row.position {
+                visit(Pose { vehicle: u64::from(row.vehicle), point, heading_rad, lane_width_m, changes_lane });
+            }
+        }
+        Ok::<(), ReadError>(())
+    })?;
+    road.map(Some).map_err(ReadError::of_file)
+}
+
+fn is_lane_jump(before: &Row, row: &Row) -> bool {
+    let (across_m, step_s) = ((row.d_m - before.d_m).abs(), (row.time - before.time).s());
+    before.lane != row.lane && across_m > JUMP_M.max(JUMP_MPS * step_s).min(0.9 * 2.0 * JUMP_M)
+}
+
+/// The rows of a file that was read as a whole.
+pub(super) struct CollectedSource {
+    items: VecDeque<Result<Row, ReadError>>,
+    info: FileInfo,
+    notes: Vec<String>,
+    unknown_classes: UnknownClasses,
+}
+
+impl RowSource for CollectedSource {
+    fn info(&self) -> FileInfo {
+        self.info.clone()
+    }
+
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
+        self.items.pop_front().transpose()
+    }
+}

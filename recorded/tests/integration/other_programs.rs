@@ -1,0 +1,601 @@
+//! Files of other programs: SUMO, Vissim, I-24 MOTION, Parquet, inD; what they mean, and what is
+//! refused.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use closecall_recorded::filters::smooth;
+use closecall_recorded::lane_change::detect;
+use closecall_recorded::trajectory_data::{
+    BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, TrajectoryFileProblem, open_from,
+    read, read_from, read_with,
+};
+use closecall_traffic::{Side, Time, VehicleClass, maths};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::parser::parse_message_type;
+
+use crate::support::{PLAIN_HEADER, assert_mentions, read_text};
+
+/// Width of SUMO's lanes in the made-up network (m).
+const SUMO_LANE_M: f64 = 3.2;
+
+/// One vehicle of a made-up road along +x: lanes 0 (right) to 2 (left), y up.
+struct Drive {
+    id: &'static str,
+    kind: &'static str,
+    /// Index of the first and of the last lane.
+    lanes: [i32; 2],
+    start_m: f64,
+    speed_mps: f64,
+}
+
+const DRIVES: [Drive; 4] = [
+    Drive { id: "f.0", kind: "car", lanes: [2, 2], start_m: 0.0, speed_mps: 32.0 },
+    Drive { id: "f.1", kind: "car", lanes: [0, 1], start_m: 10.0, speed_mps: 30.0 },
+    Drive { id: "t.0", kind: "trailer", lanes: [0, 0], start_m: 40.0, speed_mps: 24.0 },
+    Drive { id: "f.2", kind: "car", lanes: [1, 1], start_m: -5.0, speed_mps: 31.0 },
+];
+
+impl Drive {
+    /// Returns the front (m), y of the middle (m) and the lane at a time.
+    fn at(&self, time_s: f64, jumps: bool) -> (f64, f64, i32) {
+        let tau = if jumps { f64::from(u8::from(time_s >= 6.0)) } else { ((time_s - 4.0) / 4.0).clamp(0.0, 1.0) };
+        let share = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+        let [from, to] = self.lanes;
+        let index = if share < 0.5 { from } else { to };
+        let y_m = SUMO_LANE_M * (f64::from(from) + share * f64::from(to - from) - 2.5);
+        (self.start_m + self.speed_mps * time_s, y_m, index)
+    }
+
+    /// Returns the row of the drive in the order `id, x, y, angle, type, speed, pos, lane`. The road
+    /// consists of two edges, which meet at x = 150 m.
+    fn row(&self, time_s: f64, jumps: bool) -> [String; 8] {
+        let (front_m, y_m, index) = self.at(time_s, jumps);
+        let edge = if front_m < 150.0 { "e0" } else { "e1" };
+        [
+            self.id.to_owned(),
+            format!("{front_m:.3}"),
+            format!("{y_m:.3}"),
+            "90.00".to_owned(),
+            self.kind.to_owned(),
+            format!("{:.2}", self.speed_mps),
+            format!("{:.2}", front_m.rem_euclid(150.0)),
+            format!("{edge}_{index}"),
+        ]
+    }
+}
+
+const NAMES: [&str; 8] = ["id", "x", "y", "angle", "type", "speed", "pos", "lane"];
+
+fn times_s() -> impl Iterator<Item = f64> {
+    (0..120).map(|step| 0.1 * f64::from(step))
+}
+
+fn sumo_xml(jumps: bool) -> String {
+    let mut text = "<?xml version=\"1.0\"?>\n<!-- by SUMO -->\n<fcd-export>\n".to_owned();
+    for time_s in times_s() {
+        writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
+        for drive in &DRIVES {
+            let values = drive.row(time_s, jumps);
+            let attributes: Vec<String> =
+                NAMES.iter().zip(&values).map(|(name, value)| format!("{name}=\"{value}\"")).collect();
+            writeln!(text, "<vehicle {}/>", attributes.join(" ")).unwrap();
+        }
+        text += "<person id=\"p\" x=\"0\" y=\"0\"/>\n</timestep>\n";
+    }
+    text + "</fcd-export>\n"
+}
+
+fn sumo_table(separator: &str, has_prefix: bool) -> String {
+    let name = |name: &&str| if has_prefix { format!("vehicle_{name}") } else { (*name).to_owned() };
+    let mut header = vec![if has_prefix { "timestep_time".to_owned() } else { "time".to_owned() }];
+    header.extend(NAMES.iter().map(name));
+    let mut text = header.join(separator) + "\n";
+    for time_s in times_s() {
+        for drive in &DRIVES {
+            writeln!(text, "{time_s:.2}{separator}{}", drive.row(time_s, false).join(separator)).unwrap();
+        }
+    }
+    text
+}
+
+/// Asserts that the made-up road was read as it is.
+fn assert_is_made_up_road(data: &TrajectoryData) {
+    assert_eq!((data.layout, data.period), (Layout::Sumo, Time::from_ms(100)));
+    let lanes: Vec<(u8, u8)> =
+        data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect();
+    assert_eq!(lanes, [(1, 1), (3, 2), (3, 3), (2, 2)], "SUMO counts its lanes from the right");
+    assert!((data.markings.typical_lane_width_m() - SUMO_LANE_M).abs() < 0.01);
+    let truck = &data.trajectories[2];
+    assert_eq!((truck.class, truck.dimensions.length_m), (VehicleClass::Truck, 16.5));
+    // The centre is half a length behind the front.
+    let apart_m = truck.points[0].s_m - data.trajectories[1].points[0].s_m;
+    assert!((apart_m - (30.0 - 0.5 * (16.5 - 5.0))).abs() < 0.01, "{apart_m}");
+    assert!(data.notes.iter().any(|note| note.contains("`f.0` is 1")), "{:?}", data.notes);
+    let changes = detect(&smooth(data));
+    let [change] = &changes[..] else { panic!("{}", changes.len()) };
+    assert_eq!((change.track_id, change.direction), (2, Side::Left));
+    assert!((change.crossing_s - 6.0).abs() < 0.15, "{}", change.crossing_s);
+}
+
+#[test]
+fn floating_car_data_of_sumo_is_read_as_xml_and_as_a_table() {
+    assert_is_made_up_road(&read_text(sumo_xml(false).as_bytes()).unwrap());
+    for (separator, has_prefix) in [(";", true), (",", true), (";", false)] {
+        assert_is_made_up_road(&read_text(sumo_table(separator, has_prefix).as_bytes()).unwrap());
+    }
+    // Without the line end of the last row, and with decimal commas.
+    let table = sumo_table(";", true).trim_end().replace('.', ",").replace("f,", "f.").replace("t,", "t.");
+    assert_is_made_up_road(&read_text(table.as_bytes()).unwrap());
+}
+
+#[test]
+fn a_lane_change_in_a_single_step_of_sumo_is_one_and_its_duration_is_named_as_meaningless() {
+    let data = read_text(sumo_xml(true).as_bytes()).unwrap();
+    assert_eq!(data.continuity.jumps, 0, "a simulation does not swap its vehicles");
+    assert!(data.notes.iter().any(|note| note.starts_with("1 lane changes take a single step")), "{:?}", data.notes);
+    let tracks = &data.trajectories;
+    assert_eq!(tracks.len(), 4);
+    assert!(tracks[1].points.windows(2).any(|pair| pair[0].lane != pair[1].lane));
+}
+
+#[test]
+fn malformed_floating_car_data_is_refused() {
+    let good = sumo_xml(false);
+    let bomb = good.replace("<fcd-export>", "<!DOCTYPE a [<!ENTITY b \"bbbb\"><!ENTITY c \"&b;&b;\">]>\n<fcd-export>");
+    for (text, needed) in [
+        (bomb, vec!["line", "floating car data", "document type declaration"]),
+        (good.replace("</timestep>", ""), vec!["floating car data"]),
+        (good.chars().take(5_000).collect(), vec!["line", "floating car data", "not closed"]),
+        (good.replacen("x=\"0.000\"", "x=\"nan\"", 1), vec!["line 5", "`x`", "is `nan`"]),
+        (good.replacen("angle=\"90.00\"", "", 1), vec!["line 5", "`angle`", "-360 to 720"]),
+        (good.replacen("speed=\"32.00\"", "speed=\"3200\"", 1), vec!["line 5", "`speed`", "0 to 150"]),
+        (good.replacen("id=\"f.0\"", "id=\"\"", 1), vec!["line 5", "`id`", "name of a vehicle"]),
+        (good.replacen("time=\"0.00\"", "time=\"x\"", 1), vec!["line 5", "`time`", "is `x`"]),
+        (good.replace("fcd-export>", "fcd-exports>"), vec!["fcd-export` is needed"]),
+        (sumo_table(";", true).replace("vehicle_angle", "vehicle_angel"), vec!["line 1", "no column `angle`", "SUMO"]),
+        (sumo_table(";", true) + "12.0;f.0;1\n", vec!["line 482", "3 columns, but 9 are needed"]),
+        ("<fcd-export>\n</fcd-export>\n".to_owned(), vec!["no rows"]),
+    ] {
+        let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(300)]);
+        assert_mentions(&error, &needed, &text[..text.len().min(200)]);
+        assert!(!error.is_io());
+    }
+    // Bad rows can be left out.
+    let text = good.replacen("x=\"0.000\"", "x=\"nan\"", 1);
+    let options = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
+    let mut tracks = open_from(text.as_bytes(), Path::new("fcd.xml"), options, usize::MAX).unwrap();
+    while tracks.next_track().unwrap().is_some() {}
+    assert_eq!(tracks.dropped().count(), 1);
+}
+
+/// Vehicles that drive in a circle about a centre, as at a roundabout, and some that turn off.
+#[test]
+fn traffic_without_a_road_is_refused_with_the_reason() {
+    let mut text = "<fcd-export>\n".to_owned();
+    for time_s in times_s() {
+        writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
+        for number in 0..12 {
+            let (angle, is_left) = (30.0 * f64::from(number) + 9.0 * time_s, number % 2 == 0);
+            let (radius_m, turn) = if is_left { (60.0, 1.0) } else { (160.0, -1.0) };
+            let (sin, cos) = maths::sin_cos((turn * angle).to_radians());
+            let heading = turn * angle + turn * 90.0;
+            writeln!(
+                text,
+                "<vehicle id=\"{number}\" x=\"{:.2}\" y=\"{:.2}\" angle=\"{:.1}\" type=\"car\" speed=\"{:.2}\" lane=\"r_0\"/>",
+                radius_m * cos,
+                radius_m * sin,
+                (90.0 - heading).rem_euclid(360.0),
+                radius_m * 9.0_f64.to_radians(),
+            )
+            .unwrap();
+        }
+        text += "</timestep>\n";
+    }
+    text += "</fcd-export>\n";
+    let error = read_text(text.as_bytes()).unwrap_err();
+    assert_mentions(&error, &["does not follow a road", "roundabouts"], "a roundabout");
+}
+
+fn vissim(columns: &str, row: impl Fn(&Drive, f64) -> String) -> String {
+    let mut text = format!(
+        "$VISSION\n* File: made-up\n*\n* POS: Position [m]\n* SPEED: Speed [km/h]\n*\n$VEHICLE:SIMSEC;NO;{columns}\n"
+    );
+    for time_s in times_s() {
+        for (number, drive) in DRIVES.iter().enumerate() {
+            writeln!(text, "{time_s:.2};{};{}", number + 1, row(drive, time_s)).unwrap();
+        }
+    }
+    text
+}
+
+/// Positions on one link, with the position across the lane.
+fn vissim_by_link() -> String {
+    vissim_across(|across| across)
+}
+
+fn vissim_across(sense: fn(f64) -> f64) -> String {
+    vissim(r"LANE\LINK\NO;LANE\INDEX;POS;POSLAT;SPEED;VEHTYPE;LENGTH", |drive, time_s| {
+        let (front_m, y_m, index) = drive.at(time_s, false);
+        let across = sense(y_m / SUMO_LANE_M + 3.0 - f64::from(index));
+        let length_m = if drive.kind == "trailer" { 16.5 } else { 5.0 };
+        let kind = if drive.kind == "trailer" { 200 } else { 100 };
+        format!("7;{};{front_m:.3};{across:.4};{:.3};{kind};{length_m}", index + 1, 3.6 * drive.speed_mps)
+    })
+}
+
+/// Lane width that is assumed for Vissim (m).
+const VISSIM_LANE_M: f64 = 3.5;
+
+fn vissim_by_coordinates() -> String {
+    vissim("SPEED;VEHTYPE;COORDFRONT;COORDREAR;WIDTH", |drive, time_s| {
+        let (front_m, y_m, _) = drive.at(time_s, false);
+        let length_m = if drive.kind == "trailer" { 16.5 } else { 5.0 };
+        let kind = if drive.kind == "trailer" { 200 } else { 100 };
+        let (rear_m, y_m) = (front_m - length_m, y_m / SUMO_LANE_M * VISSIM_LANE_M);
+        format!("{:.3};{kind};{front_m:.3} {y_m:.3} 0.0;{rear_m:.3} {y_m:.3} 0.0;1.8", 3.6 * drive.speed_mps)
+    })
+}
+
+#[test]
+fn vehicle_records_of_vissim_are_read_by_links_and_by_coordinates() {
+    for text in [vissim_by_link(), vissim_across(|across| 1.0 - across), vissim_by_coordinates()] {
+        let data = read_text(text.as_bytes()).unwrap();
+        assert_eq!((data.layout, data.period), (Layout::Vissim, Time::from_ms(100)));
+        let lanes: Vec<(u8, u8)> =
+            data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect();
+        assert_eq!(lanes, [(1, 1), (3, 2), (3, 3), (2, 2)], "Vissim counts its lanes from the right");
+        assert_eq!(data.trajectories[2].class, VehicleClass::Truck);
+        assert!((data.trajectories[0].points[5].speed_mps - 32.0).abs() < 0.01, "km/h");
+        let changes = detect(&smooth(&data));
+        let [change] = &changes[..] else { panic!("{}", changes.len()) };
+        assert_eq!((change.track_id, change.direction), (2, Side::Left));
+        assert!((change.crossing_s - 6.0).abs() < 0.2, "{}", change.crossing_s);
+    }
+}
+
+#[test]
+fn a_track_of_vissim_ends_where_its_link_ends() {
+    let text = vissim(r"LANE\LINK\NO;LANE\INDEX;POS;SPEED", |drive, time_s| {
+        let (front_m, _, index) = drive.at(time_s, false);
+        let (link, along_m) = if front_m < 150.0 { (1, front_m) } else { (2, front_m - 150.0) };
+        format!("{link};{};{along_m:.3};{:.3}", index + 1, 3.6 * drive.speed_mps)
+    });
+    let data = read_text(text.as_bytes()).unwrap();
+    assert_eq!(data.trajectories.len(), 8);
+    assert_eq!(data.continuity.jumps, 0);
+    assert!(data.notes.iter().any(|note| note.contains("each of 2 links")), "{:?}", data.notes);
+    let far_m = data.trajectories[0].points[0].d_m - data.trajectories[7].points[0].d_m;
+    assert!(far_m.abs() > 900.0, "the roads are apart: {far_m}");
+}
+
+#[test]
+fn malformed_vehicle_records_are_refused() {
+    let good = vissim_by_link();
+    for (text, needed) in [
+        (good.replace("$VEHICLE:", "$VEHICLES:"), vec!["vehicle record of Vissim", "$VEHICLE:SIMSEC;NO"]),
+        (good.replace(r"LANE\INDEX", r"LANE\IDX"), vec!["line 7", r"no column `LANE\INDEX`", "Vissim"]),
+        (good.replace("[km/h]", "[furlong]"), vec!["line 5", "unit of SPEED is `furlong`", "km/h, mph"]),
+        (good.replace("[km/h]", "[mph]"), vec!["share of what the recorded speed makes", "0.8 to 1.25"]),
+        (good.clone() + "1;2;3\n", vec!["line 488", "3 columns, but 9 are needed"]),
+        (good.replacen(";100;5", ";100;500", 1), vec!["line 8", "`LENGTH`", "is `500`", "0 and up to 60"]),
+        (good.replacen("0.00;1;", "0.00;x;", 1), vec!["line 8", "`NO`", "is `x`"]),
+        (vissim_by_coordinates().replacen(" 0.0;", ";", 1).replacen("0.000 ", "", 1), vec!["line 8", "COORDFRONT"]),
+    ] {
+        let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(400)]);
+        assert_mentions(&error, &needed, &text[..text.len().min(200)]);
+    }
+    let in_metres = good.replace("[km/h]", "[m/s]");
+    assert!(read_text(in_metres.as_bytes()).is_err(), "a wrong unit is found by the positions");
+}
+
+/// Two directions with 10 vehicles each; one changes lanes.
+fn i24(is_array: bool) -> String {
+    let mut documents = Vec::new();
+    for number in 0..20_u32 {
+        let (direction, first) = (if number % 2 == 0 { 1.0 } else { -1.0 }, 5.0 * f64::from(number));
+        let lane = f64::from(number % 3);
+        let mut lists = [const { Vec::new() }; 3];
+        for frame in 0..250_u32 {
+            let time_s = 0.04 * f64::from(frame);
+            let tau = if number == 4 { ((time_s - 3.0) / 4.0).clamp(0.0, 1.0) } else { 0.0 };
+            let share = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+            lists[0].push(format!("{:.2}", 1_669_122_000.0 + time_s));
+            lists[1].push(format!("{:.3}", 310_000.0 + direction * (10.0 * first + 100.0 * time_s)));
+            lists[2].push(format!("{:.3}", direction * (6.0 + 12.0 * (lane + share))));
+        }
+        let [timestamp, x, y] = lists.map(|list| list.join(","));
+        documents.push(format!(
+            "{{\"_id\":{{\"$oid\":\"637c{number}\"}},\"timestamp\":[{timestamp}],\"x_position\":[{x}],\"y_position\":[{y}],\
+             \"length\":15.0,\"width\":6.0,\"height\":5.0,\"direction\":{direction},\"coarse_vehicle_class\":{},\"flags\":[]}}",
+            if number == 6 { 4 } else { 0 }
+        ));
+    }
+    if is_array { format!("[{}]", documents.join(",\n")) } else { documents.join("\n") }
+}
+
+#[test]
+fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
+    for text in [i24(true), i24(false)] {
+        let data = read_text(text.as_bytes()).unwrap();
+        assert_eq!((data.layout, data.period, data.trajectories.len()), (Layout::I24, Time::from_ms(40), 20));
+        let track = &data.trajectories[4];
+        assert!((track.points[100].speed_mps - 30.48).abs() < 0.05 && (track.dimensions.length_m - 4.572).abs() < 1e-6);
+        assert_eq!(data.trajectories[6].class, VehicleClass::Truck);
+        // The rear is stated: two vehicles are as far apart as their rears, whatever the direction.
+        assert!(data.trajectories.iter().all(|track| track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m)));
+        assert_eq!((track.points[0].lane.0, track.points[249].lane.0), (2, 3));
+        assert!((track.points[0].d_m + 1.5 * 3.6576).abs() < 0.01);
+        let back = &data.trajectories[5];
+        assert!(back.points[0].d_m < -1_000.0 && back.points[0].lane.0 > 8);
+        let changes = detect(&smooth(&data));
+        assert_eq!(
+            changes.iter().map(|change| (change.track_id, change.direction)).collect::<Vec<_>>(),
+            [(5, Side::Right)]
+        );
+    }
+}
+
+#[test]
+fn malformed_json_is_refused() {
+    let good = i24(true);
+    for (text, needed) in [
+        (
+            good.replacen("\"x_position\"", "\"x_positions\"", 1),
+            vec!["line 1", "I-24 MOTION", "missing field `x_position`"],
+        ),
+        (
+            good.replacen("\"direction\":1", "\"direction\":2", 1),
+            vec!["trajectory 1", "`direction` is 2", "1 (eastbound)"],
+        ),
+        (good.replacen("\"length\":15.0", "\"length\":1500.0", 1), vec!["trajectory 1", "`length`", "up to 60 m"]),
+        (good.replacen("\"coarse_vehicle_class\":0", "\"coarse_vehicle_class\":9", 1), vec!["from 0 to 6"]),
+        (
+            good.replacen("\"timestamp\":[1669122000.00,", "\"timestamp\":[", 1),
+            vec!["trajectory 1", "a list of 250", "249"],
+        ),
+        (good.replacen("1669122000.04", "1669121000.04", 1), vec!["trajectory 1", "`timestamp`", "after 1669122000"]),
+        (good.replacen("1669122000.04", "NaN", 1), vec!["line 1", "I-24 MOTION"]),
+        (good.chars().take(9_000).collect(), vec!["I-24 MOTION", "EOF"]),
+        ("{\"openlabel\": {\"metadata\": {}}}".to_owned(), vec!["JSON without the fields of I-24 MOTION", "OpenLABEL"]),
+        ("[1, 2]".to_owned(), vec!["JSON without the fields"]),
+    ] {
+        let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(200)]);
+        assert_mentions(&error, &needed, &text[..text.len().min(120)]);
+    }
+}
+
+/// The columns of a Parquet file.
+enum Column {
+    Whole(&'static str, Vec<i64>),
+    Number(&'static str, Vec<f64>),
+    Text(&'static str, Vec<&'static str>),
+}
+
+fn parquet_of(columns: &[Column]) -> Vec<u8> {
+    let schema: String = columns
+        .iter()
+        .map(|column| match column {
+            Column::Whole(name, _) => format!("REQUIRED INT64 {name};"),
+            Column::Number(name, _) => format!("REQUIRED DOUBLE {name};"),
+            Column::Text(name, _) => format!("REQUIRED BYTE_ARRAY {name} (UTF8);"),
+        })
+        .collect();
+    let schema = Arc::new(parse_message_type(&format!("message rows {{ {schema} }}")).unwrap());
+    let mut bytes = Vec::new();
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(WriterProperties::default())).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    for column in columns {
+        let mut writer = group.next_column().unwrap().unwrap();
+        match column {
+            Column::Whole(_, values) => writer.typed::<Int64Type>().write_batch(values, None, None).unwrap(),
+            Column::Number(_, values) => writer.typed::<DoubleType>().write_batch(values, None, None).unwrap(),
+            Column::Text(_, values) => {
+                let values: Vec<ByteArray> = values.iter().map(|value| ByteArray::from(*value)).collect();
+                writer.typed::<ByteArrayType>().write_batch(&values, None, None).unwrap()
+            }
+        };
+        writer.close().unwrap();
+    }
+    group.close().unwrap();
+    writer.close().unwrap();
+    bytes
+}
+
+fn plain_columns(rows: usize, speed_mps: f64) -> Vec<Column> {
+    let number = |value: f64| vec![value; rows];
+    vec![
+        Column::Text("recording_id", vec!["a, b"; rows]),
+        Column::Whole("track_id", vec![3; rows]),
+        Column::Whole("frame", (0..rows as i64).collect()),
+        Column::Number("time_s", (0..rows).map(|row| 0.1 * row as f64).collect()),
+        Column::Number("s_m", (0..rows).map(|row| 3.0 * row as f64).collect()),
+        Column::Number("d_m", number(1.75)),
+        Column::Number("lane_id", number(1.0)),
+        Column::Number("speed_mps", number(speed_mps)),
+        Column::Number("accel_mps2", number(0.0)),
+        Column::Number("length_m", number(4.6)),
+        Column::Number("width_m", number(1.8)),
+        Column::Text("vehicle_class", vec!["car"; rows]),
+    ]
+}
+
+#[test]
+fn a_parquet_file_has_the_layout_of_its_columns() {
+    let data = read_text(&parquet_of(&plain_columns(40, 30.0))).unwrap();
+    assert_eq!((data.layout, data.name.as_str(), data.trajectories.len()), (Layout::Plain, "a, b", 1));
+    assert_eq!(data.trajectories[0].points.len(), 40);
+    assert!((data.trajectories[0].points[39].s_m - 117.0).abs() < 1e-9);
+
+    let times: Vec<f64> = times_s().flat_map(|time_s| [time_s; DRIVES.len()]).collect();
+    let rows: Vec<(f64, &Drive)> = times.iter().copied().zip(DRIVES.iter().cycle()).collect();
+    let number = |value: fn(&Drive, f64) -> f64| rows.iter().map(|(time_s, drive)| value(drive, *time_s)).collect();
+    let lanes = ["e0_0", "e0_1", "e0_2"];
+    let sumo = [
+        Column::Number("timestep_time", times.clone()),
+        Column::Text("vehicle_id", rows.iter().map(|(_, drive)| drive.id).collect()),
+        Column::Number("vehicle_x", number(|drive, time_s| drive.at(time_s, false).0)),
+        Column::Number("vehicle_y", number(|drive, time_s| drive.at(time_s, false).1)),
+        Column::Number("vehicle_angle", vec![90.0; rows.len()]),
+        Column::Text("vehicle_type", rows.iter().map(|(_, drive)| drive.kind).collect()),
+        Column::Number("vehicle_speed", number(|drive, _| drive.speed_mps)),
+        Column::Text(
+            "vehicle_lane",
+            rows.iter().map(|(time_s, drive)| lanes[drive.at(*time_s, false).2 as usize]).collect(),
+        ),
+    ];
+    assert_is_made_up_road(&read_text(&parquet_of(&sumo)).unwrap());
+}
+
+#[test]
+fn malformed_parquet_is_refused() {
+    let good = parquet_of(&plain_columns(40, 30.0));
+    let error = |bytes: &[u8]| read_text(bytes).unwrap_err();
+    assert_mentions(&error(&good[..good.len() / 2]), &["Parquet file"], "cut");
+    assert_mentions(&error(&parquet_of(&plain_columns(40, -30.0))), &["line 2", "`speed_mps`", "0 to 150"], "negative");
+    assert_mentions(&error(&parquet_of(&plain_columns(40, f64::NAN))), &["line 2", "`speed_mps`", "NaN"], "NaN");
+    assert_mentions(&error(&parquet_of(&[Column::Whole("a", vec![1])])), &["1 columns", "starts with `a`"], "other");
+    let mut damaged = good.clone();
+    let middle = good.len() / 3;
+    damaged[middle..middle + 200].fill(0xff);
+    if let Err(error) = read_text(&damaged) {
+        assert!(!error.is_io(), "{error}");
+    }
+}
+
+/// Writes a data set with exiD's columns, of which `columns` are left out.
+fn exid(folder: &Path, without: &[&str], changes_flagged: bool) {
+    let all = [
+        "recordingId",
+        "trackId",
+        "frame",
+        "xCenter",
+        "yCenter",
+        "heading",
+        "width",
+        "length",
+        "lonVelocity",
+        "lonAcceleration",
+        "latLaneCenterOffset",
+        "laneWidth",
+        "laneletId",
+        "laneChange",
+    ];
+    let kept: Vec<usize> = (0..all.len()).filter(|index| !without.contains(&all[*index])).collect();
+    let line = |values: &[String]| kept.iter().map(|index| values[*index].clone()).collect::<Vec<_>>().join(",") + "\n";
+    let mut rows = line(&all.map(str::to_owned));
+    let mut meta = "recordingId,trackId,numFrames,class\n".to_owned();
+    // The longest path is that of the vehicle that changes lanes.
+    for (vehicle, lane, speed_mps) in [(1, 0.0, 25.0), (2, 0.0, 33.0), (3, 1.0, 26.0), (4, 1.0, 24.0)] {
+        writeln!(meta, "5,{vehicle},300,car").unwrap();
+        for frame in 0..300_u32 {
+            let time_s = 0.04 * f64::from(frame);
+            let tau = if vehicle == 2 { ((time_s - 4.0) / 4.0).clamp(0.0, 1.0) } else { 0.0 };
+            let share = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+            let y_m = 3.7 * (lane + share);
+            let in_lane = if share < 0.5 { lane } else { lane + 1.0 };
+            let is_flagged = changes_flagged && vehicle == 2 && frame == 150;
+            let values = [
+                "5".to_owned(),
+                vehicle.to_string(),
+                frame.to_string(),
+                format!("{:.3}", speed_mps * time_s),
+                format!("{y_m:.3}"),
+                "0.0".to_owned(),
+                "1.9".to_owned(),
+                "4.7".to_owned(),
+                speed_mps.to_string(),
+                "0".to_owned(),
+                format!("{:.3}", y_m - 3.7 * in_lane),
+                "3.7".to_owned(),
+                format!("{in_lane}"),
+                u8::from(is_flagged).to_string(),
+            ];
+            rows += &line(&values);
+        }
+    }
+    std::fs::write(folder.join("05_recordingMeta.csv"), "recordingId,frameRate\n5,25\n").unwrap();
+    std::fs::write(folder.join("05_tracksMeta.csv"), meta).unwrap();
+    std::fs::write(folder.join("05_tracks.csv"), rows).unwrap();
+}
+
+#[test]
+fn a_lane_change_that_exid_does_not_flag_is_found_and_makes_no_others() {
+    for is_flagged in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        exid(folder.path(), &[], is_flagged);
+        let data = read(folder.path()).unwrap();
+        let changes = detect(&smooth(&data));
+        let listed: Vec<_> = changes.iter().map(|change| (change.track_id, change.direction)).collect();
+        assert_eq!(listed, [(2, Side::Left)], "flagged: {is_flagged}");
+        assert!(data.warnings().is_empty(), "{:?}", data.warnings());
+    }
+}
+
+#[test]
+fn urban_recordings_are_not_read_without_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &["latLaneCenterOffset", "laneWidth", "laneletId", "laneChange"], false);
+    let data = read(folder.path()).unwrap();
+    assert!(data.warnings()[0].contains("as in inD and rounD"), "{:?}", data.warnings());
+}
+
+#[test]
+fn semicolons_are_the_reason_why_a_data_set_of_several_files_is_refused() {
+    for file in ["05_tracks.csv", "05_tracksMeta.csv", "05_recordingMeta.csv"] {
+        let folder = tempfile::tempdir().unwrap();
+        exid(folder.path(), &[], true);
+        let path = folder.path().join(file);
+        std::fs::write(&path, std::fs::read_to_string(&path).unwrap().replace(',', ";")).unwrap();
+        let error = read(folder.path()).unwrap_err();
+        assert_mentions(&error, &[file, "semicolon-separated"], file);
+    }
+}
+
+#[test]
+fn one_location_of_an_export_can_be_chosen() {
+    let header = "Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_Length,v_Width,\
+                  v_Class,v_Vel,v_Acc,Lane_ID,Location";
+    let mut text = header.to_owned() + "\n";
+    for (location, lane) in [("us-101", 2), ("i-80", 3)] {
+        for frame in 1..20 {
+            writeln!(
+                text,
+                "7,{frame},20,{},20.0,{}.0,0,0,15.0,6.0,2,50.0,0.0,{lane},{location}",
+                1_118_846_980_000_i64 + 100 * frame,
+                100 + 5 * frame
+            )
+            .unwrap();
+        }
+    }
+    let asked = |location| ReadOptions { location: Some(location), ..ReadOptions::default() };
+    let read = |options| -> Result<TrajectoryData, TrajectoryFileError> {
+        open_from(text.as_bytes(), Path::new("ngsim.csv"), options, usize::MAX)?.collect_all()
+    };
+    let refused = read(ReadOptions::default()).unwrap_err();
+    assert!(matches!(refused.problem, TrajectoryFileProblem::SeveralRecordings { .. }), "{refused}");
+    let data = read(asked("i-80")).unwrap();
+    assert_eq!((data.name.as_str(), data.trajectories[0].points[0].lane.0), ("i-80", 3));
+    let error = read(asked("peachtree")).unwrap_err();
+    assert_mentions(&error, &["`peachtree`", "i-80, us-101"], "another location");
+}
+
+#[test]
+fn a_layout_of_another_program_can_be_demanded() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, layout) in [
+        ("a.xml", sumo_xml(false), LayoutChoice::Sumo),
+        ("a.fzp", vissim_by_link(), LayoutChoice::Vissim),
+        ("a.json", i24(true), LayoutChoice::I24),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let asked = |layout| read_with(&path, ReadOptions { layout: Some(layout), ..ReadOptions::default() });
+        assert!(asked(layout).is_ok());
+        assert_mentions(&asked(LayoutChoice::Csv).unwrap_err(), &["not in csv as asked for"], name);
+    }
+    assert!(read_from(PLAIN_HEADER.as_bytes(), Path::new("a.csv")).is_err());
+}
