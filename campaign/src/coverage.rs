@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use closecall_scenarios::coverage::CoverageName;
+use closecall_scenarios::Scenario;
+use closecall_scenarios::coverage::{CoverageName, Surroundings};
 use closecall_scenarios::sampling::Design;
 use serde::Serialize;
 
@@ -81,8 +82,9 @@ impl CoverageCounter {
         let plan = self.work.file.coverage();
         let outcome = record.arms.last().and_then(|arm| arm.result.as_ref().ok());
         let Some(outcome) = outcome.filter(|_| !plan.items.is_empty()) else { return };
-        let scenario = || self.work.file.concrete(&outcome.parameters).ok();
-        let of_items: Vec<Option<usize>> = plan.items.iter().map(|item| item.bin(outcome, &scenario)).collect();
+        let concrete = || self.work.file.concrete(&outcome.parameters).ok();
+        let surroundings = || concrete().map(|Scenario { environment, road, .. }| Surroundings { environment, road });
+        let of_items: Vec<Option<usize>> = plan.items.iter().map(|item| item.bin(outcome, &surroundings)).collect();
         let tallies = record.tallies();
         for (place, target) in plan.targets.iter().enumerate() {
             let Some(index) = target.index(&of_items, &plan.items).filter(|&index| target.counts[index]) else {

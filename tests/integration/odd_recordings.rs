@@ -160,18 +160,18 @@ fn a_whole_file_without_a_last_line_end_is_read_and_a_cut_one_is_not() {
 }
 
 #[test]
-fn formats_of_other_programs_are_refused_by_their_names() {
+fn files_of_other_programs_that_lack_something_are_refused_by_that_reason() {
     let folder = folder();
     let files = [
-        ("a.parquet", "PAR1\u{15}\u{4}", "Parquet"),
-        ("a.fzp", "$VISION\n* File: a.inpx\n$VEHICLE:SIMSEC;NO;LANE\\LINK\\NO\n", "Vissim"),
-        ("a.json", "[{\"timestamp\": [1.0], \"x_position\": [2.0]}]", "I-24 MOTION"),
-        ("a.xml", "<?xml version=\"1.0\"?>\n<!-- generated -->\n<fcd-export>\n</fcd-export>\n", "SUMO"),
+        ("a.parquet", "PAR1\u{15}\u{4}", "no Parquet file that can be read"),
+        ("a.fzp", "$VISION\n* File: a.inpx\n$VEHICLE:SIMSEC;NO;LANE\\LINK\\NO\n", "which the Vissim layout needs"),
+        ("a.json", "[{\"timestamp\": [1.0], \"x_position\": [2.0]}]", "missing field `y_position`"),
+        ("a.xml", "<?xml version=\"1.0\"?>\n<!-- generated -->\n<fcd-export>\n</fcd-export>\n", "there are no rows"),
     ];
-    for (name, text, program) in files {
+    for (name, text, reason) in files {
         let file = folder.path().join(name);
         fs::write(&file, text).unwrap();
         let message = refusal(&file, &[]);
-        assert!(message.contains(program) && message.contains(name), "{message}");
+        assert!(message.contains(reason) && message.contains(name), "{message}");
     }
 }

@@ -20,6 +20,7 @@ use closecall_traffic::input;
 use serde::{Deserialize, Serialize};
 
 use super::error::RareError;
+use super::files::{JOURNAL, MANIFEST, RESULT};
 use super::method::Method;
 use super::problem::{Point, Response};
 use crate::folder::FolderError;
@@ -28,10 +29,6 @@ use crate::lock::Lock;
 use crate::manifest::Manifest;
 use crate::record::SampleFailure;
 use crate::sampling::Sampling;
-
-pub(crate) const MANIFEST: &str = "rare-manifest.json";
-const JOURNAL: &str = "rare-journal.jsonl";
-pub(crate) const RESULT: &str = "rare.json";
 
 /// A point in the journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

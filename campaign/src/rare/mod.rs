@@ -18,6 +18,7 @@
 
 mod error;
 mod estimate;
+mod files;
 mod importance;
 mod journal;
 mod method;
@@ -31,7 +32,7 @@ mod subset;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use journal::{MANIFEST, RESULT};
+pub(crate) use files::{MANIFEST, RESULT};
 
 pub use error::RareError;
 pub use estimate::{COVERAGE, Mean};

@@ -15,9 +15,11 @@ use super::odd::OddAttribute;
 pub struct CoverageConfig {
     /// The items, by their names. Names of items and crosses differ.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ItemConfig>")]
     pub item: BTreeMap<CoverageName, ItemConfig>,
     /// Crosses of items, by their names.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, CrossConfig>")]
     pub cross: BTreeMap<CoverageName, CrossConfig>,
     /// The item or cross whose bins the sampling design `coverage` visits in turn. Its items are parameters that are not correlated
     /// with others.

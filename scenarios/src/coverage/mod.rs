@@ -14,5 +14,5 @@ mod plan;
 
 pub use config::{CoverageConfig, CrossConfig, ItemConfig};
 pub use name::CoverageName;
-pub use odd::OddAttribute;
+pub use odd::{OddAttribute, Surroundings};
 pub use plan::{Bin, CoveragePlan, Item, Target};

@@ -3,11 +3,9 @@
 //! The names and the limits of the classes are those of ISO 34503:2023, as the OpenODD taxonomy of the Autoware Foundation
 //! lists them (`Domain_Concepts_Definition_ISO_34503.yaml`). ISO 34503 has no class for what is absent: `none` and `dry` are ours.
 
-use closecall_traffic::Light;
+use closecall_traffic::{Environment, Light, Road};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::Scenario;
 
 /// An attribute of the operational design domain that a scenario determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +32,15 @@ const RAIN_MM_PER_H: [(f64, &str); 4] =
 /// Visibility below which water droplets in the air are fog (m): the definition of the World Meteorological Organization.
 const FOG_VISIBILITY_M: f64 = 1_000.0;
 
+/// The part of a concrete scenario on which the attributes depend.
+#[derive(Clone, Debug)]
+pub struct Surroundings {
+    /// Light, weather and surface.
+    pub environment: Environment,
+    /// The road.
+    pub road: Road,
+}
+
 impl OddAttribute {
     /// Returns the name in scenario files.
     pub fn name(self) -> String {
@@ -56,8 +63,7 @@ impl OddAttribute {
     }
 
     /// Returns the class of a scenario.
-    pub fn of(self, scenario: &Scenario) -> &'static str {
-        let environment = &scenario.environment;
+    pub fn of(self, Surroundings { environment, road }: &Surroundings) -> &'static str {
         let second = |holds: bool| self.labels()[usize::from(holds)];
         match self {
             Self::RainfallIntensity if environment.rain_mm_per_h <= 0.0 => "no-rain",
@@ -72,8 +78,8 @@ impl OddAttribute {
             },
             Self::Particulates => second(environment.visibility_m < FOG_VISIBILITY_M),
             Self::SurfaceCondition => second(environment.water_film_mm > 0.0),
-            Self::HorizontalPlane => second(scenario.road.curvature_per_m() != 0.0),
-            Self::DrivableAreaEdge => second(scenario.road.has_guard_rails()),
+            Self::HorizontalPlane => second(road.curvature_per_m() != 0.0),
+            Self::DrivableAreaEdge => second(road.has_guard_rails()),
         }
     }
 }

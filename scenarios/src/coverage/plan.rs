@@ -6,8 +6,7 @@ use closecall_traffic::{ConfigError, ParameterName, Parameters, Problem, Value};
 
 use super::config::{CoverageConfig, CrossConfig, ItemConfig};
 use super::name::CoverageName;
-use super::odd::OddAttribute;
-use crate::Scenario;
+use super::odd::{OddAttribute, Surroundings};
 use crate::criteria::{Measure, MeasureKind};
 use crate::outcome::Outcome;
 use crate::parameters::{ParameterSpace, Part, Strata, volume};
@@ -259,9 +258,9 @@ fn cross(name: CoverageName, config: &CrossConfig, items: &[Item]) -> Result<Tar
 }
 
 impl Item {
-    /// Returns the index of the bin of a run; `None` if its value is in no bin, or the run has none. `scenario` makes the concrete
-    /// scenario of the run.
-    pub fn bin(&self, outcome: &Outcome, scenario: &dyn Fn() -> Option<Scenario>) -> Option<usize> {
+    /// Returns the index of the bin of a run; `None` if its value is in no bin, or the run has none.
+    /// `surroundings` returns road and weather of the run.
+    pub fn bin(&self, outcome: &Outcome, surroundings: &dyn Fn() -> Option<Surroundings>) -> Option<usize> {
         match &self.source {
             Source::Parameter(name) => self.bin_of_value(&outcome.parameters, name),
             Source::Measure(measure) => {
@@ -271,7 +270,7 @@ impl Item {
                     MeasureKind::Number => self.bin_of_number(value),
                 }
             }
-            Source::Odd(attribute) => self.bin_of_label(attribute.of(&scenario()?)),
+            Source::Odd(attribute) => self.bin_of_label(attribute.of(&surroundings()?)),
         }
     }
 
