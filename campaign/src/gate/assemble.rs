@@ -22,7 +22,7 @@ pub enum AssemblyError {
     #[error("`{expression}` compares with a baseline: it needs a paired campaign")]
     NoBaseline {
         /// The criterion.
-        expression: Expression,
+        expression: Box<Expression>,
     },
     /// A gate on a probability needs independent samples.
     #[error(
@@ -58,7 +58,7 @@ impl GateSet {
     ) -> Result<(), AssemblyError> {
         for expression in command_line {
             if expression.needs_pairs() && !is_paired {
-                return Err(AssemblyError::NoBaseline { expression });
+                return Err(AssemblyError::NoBaseline { expression: Box::new(expression) });
             }
             self.push(GateSpec { expression, source: GateSource::CommandLine });
         }
