@@ -23,11 +23,11 @@ const GRAVITY_MPS2: f64 = 9.81;
 // simulation traces none of it, and adding it costs more than a control step.
 
 /// Number of frames between two pairs of kept scans, one of each side of the mirror, in all phases.
-const SPARSE_SCAN_INTERVAL: usize = 200;
+const SPARSE_SCAN_INTERVAL: usize = 400;
 /// Number of frames between two kept scans in the critical and the overtaking phase.
 const DENSE_SCAN_INTERVAL: usize = 5;
 /// Maximum number of dense scans in a film.
-const MAX_DENSE_SCANS: usize = 40;
+const MAX_DENSE_SCANS: usize = 24;
 
 /// Observes a run and records its film.
 pub struct FilmRecorder {
