@@ -123,7 +123,7 @@ impl RareManifest {
 #[derive(Debug)]
 pub struct RareFolder {
     path: PathBuf,
-    /// Whether the budget is larger than that of the journal's runs.
+    /// Whether the journal was written with a smaller budget.
     has_grown: bool,
     _lock: Lock,
 }
@@ -223,7 +223,7 @@ pub struct RareJournal {
     file: fs::File,
     kept: std::vec::IntoIter<KeptLine>,
     line: usize,
-    /// Whether a larger budget may lead to other points than those of the journal.
+    /// Whether the journal may hold other points, because the budget has grown.
     may_differ: bool,
 }
 
