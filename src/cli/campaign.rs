@@ -76,8 +76,8 @@ pub(super) struct CampaignArgs {
     #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
     judge_seed: Option<JudgeSeed>,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or
-    /// `importance` for a rare event, which --event names. -n is then the largest number of runs
-    /// [default: 200000]
+    /// `importance` for the probability of a rare event, which --event names, and `search` for its
+    /// first case. -n is then the largest number of runs [default: 200000, of a search 2000]
     #[arg(long, default_value_t = DesignChoice::Plain(Design::Random), help_heading = heading::SAMPLES)]
     design: DesignChoice,
     #[command(flatten)]
@@ -366,7 +366,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         DesignChoice::Rare(method) => return rare_campaign(args, method),
         DesignChoice::Plain(design) if args.rare.is_named() => {
             return Err(CliError::usage(format!(
-                "--event is the rare event of --design subset or importance, and not of {design}: a gate such as --gate \"upper(induced) <= 0.01\" judges the samples of a plain campaign"
+                "--event is the rare event of --design subset, importance or search, and not of {design}: a gate such as --gate \"upper(induced) <= 0.01\" judges the samples of a plain campaign"
             )));
         }
         DesignChoice::Plain(_) => {}
