@@ -25,7 +25,7 @@ impl ComputingTime {
     /// Calls `step`, and adds the time that it takes.
     ///
     /// # Errors
-    /// The error of `step`, or [`ControllerError::Own`] if the mean computing time exceeds the
+    /// The error of `step`, or [`ControllerError::Late`] if the mean computing time exceeds the
     /// control period.
     pub(super) fn of<T>(
         &mut self,
@@ -41,7 +41,7 @@ impl ComputingTime {
     /// Adds the time of a step of a controller.
     fn add(&mut self, time: Time, spent: Duration) -> Result<(), ControllerError> {
         match self.exceeded(spent, 1e3 * CONTROL_STEP.s()) {
-            Some(message) => Err(ControllerError::Own { reason: format!("the controller {message}"), time }),
+            Some(message) => Err(ControllerError::Late { reason: format!("the controller {message}"), time }),
             None => Ok(()),
         }
     }
