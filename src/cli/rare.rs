@@ -58,6 +58,12 @@ impl DesignChoice {
     }
 }
 
+impl Default for DesignChoice {
+    fn default() -> Self {
+        Self::Plain(Design::Random)
+    }
+}
+
 impl fmt::Display for DesignChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -81,7 +87,7 @@ impl FromStr for DesignChoice {
 }
 
 /// The rare event of a campaign.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub(super) struct RareArgs {
     /// With --design subset or importance: the event whose probability is estimated, a flag such as
     /// `collision` or `induced`, a number with a bound such as "min_ttc_rear_s < 0.3", or a
