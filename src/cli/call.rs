@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use clap::Args;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -15,10 +16,12 @@ use super::trajectories::{find_criticality, find_fit, find_lane_changes};
 use crate::exit_code::ExitCode;
 
 /// The arguments of a campaign, and of the networks that it runs.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Args, Deserialize)]
 struct Campaign {
+    #[command(flatten)]
     #[serde(rename = "..campaign")]
     campaign: CampaignArgs,
+    #[arg(long)]
     onnxruntime: Option<PathBuf>,
 }
 

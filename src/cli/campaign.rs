@@ -47,7 +47,7 @@ use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::keywords::{Argument, exclusive, needs};
+use super::keywords::{Argument, needs};
 use super::output::{heartbeat, out, outln, print_error, print_failure};
 use super::plan::PlanArgs;
 use super::rare::{DesignChoice, Rare, RareArgs};
@@ -75,7 +75,7 @@ pub(super) struct CampaignArgs {
     seed: Option<u64>,
     /// Seed of a campaign that judges: a number, or `secret`, which draws a seed that nobody knew
     /// before. The campaign states it in the end. `--preset pr` without a seed draws one
-    #[arg(long, value_name = "SEED|secret", help_heading = heading::SAMPLES)]
+    #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
     #[serde(default, deserialize_with = "parsed_option")]
     judge_seed: Option<JudgeSeed>,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or
@@ -101,7 +101,7 @@ pub(super) struct CampaignArgs {
     jobs: Option<Jobs>,
     /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local`
     /// (start one here). Needs the Python package: pip install "closecall[ray]"
-    #[arg(long, value_name = "ADDRESS", help_heading = heading::EXECUTION)]
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs", help_heading = heading::EXECUTION)]
     ray: Option<String>,
     /// Longest wall time of a sample with one controller; a sample that takes longer ends in an
     /// error [default: 300]
@@ -330,13 +330,9 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
         Place::Named(path) => Some(path),
         Place::Default | Place::Nowhere => None,
     };
-    let partition = ("partition", args.partition.is_some());
-    let [collisions, induced] = args.gates.counts();
-    needs(("until-certain", args.plan.until_certain), args.gates.bounds_probability())?;
-    args.plan.check(("resume", args.results.is_resumed()), &[partition, collisions, induced])?;
-    exclusive(("judge-seed", args.judge_seed.is_some()), &[("seed", args.seed.is_some())])?;
-    exclusive(("ray", args.ray.is_some()), &[("jobs", args.jobs.is_some())])?;
-    needs(partition, ("out", out.is_some()))?;
+    let has_gate = args.gates.max_probability.is_some();
+    needs(("until-certain", args.plan.until_certain), ("max-probability", has_gate))?;
+    needs(("partition", args.partition.is_some()), ("out", out.is_some()))?;
     if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place() == Place::Nowhere {
         return Err(CliError::usage(format!(
             "{}: the recordings are kept in a folder of results: name one with {}",

@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::CliError;
 use super::help::heading;
-use super::keywords::{Argument, Given, exclusive, needs};
+use super::keywords::{Argument, needs};
 use super::output::print_error;
 
 /// The gates of a campaign.
@@ -25,7 +25,8 @@ pub(super) struct GateArgs {
     #[serde(rename = "gate")]
     require: Vec<Expression>,
     /// Measure only: no gate is judged, and there is no verdict
-    #[arg(long, help_heading = heading::GATES)]
+    #[arg(long, conflicts_with_all = ["require", "max_collisions", "max_other_collisions", "max_probability", "max_induced",
+        "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk", "max_flaky"], help_heading = heading::GATES)]
     no_gate: bool,
     /// Fail if the ego collides in more than K samples of any scenario
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
@@ -85,7 +86,6 @@ impl GateArgs {
         design: Design,
         preset: Option<PresetGates>,
     ) -> Result<GateSet, CliError> {
-        self.check()?;
         let mut set = GateSet {
             is_measurement: self.no_gate,
             max_flip_rate: self.max_flip_rate.map_or(MAX_FLIP_RATE, |share| share.0),
@@ -109,36 +109,6 @@ impl GateArgs {
         Ok(self.max_flip_rate.is_some() || self.max_flaky.is_some() || !self.criteria()?.is_empty())
     }
 
-    /// Returns the gates on a number of collisions, which need a known number of samples.
-    pub(super) fn counts(&self) -> [Given; 2] {
-        [("max-collisions", self.max_collisions.is_some()), ("max-induced", self.max_induced.is_some())]
-    }
-
-    /// Returns the gate on a probability, and whether there is one.
-    pub(super) fn bounds_probability(&self) -> Given {
-        ("max-probability", self.max_probability.is_some())
-    }
-
-    /// Checks the combination of the gates.
-    fn check(&self) -> Result<(), CliError> {
-        let [collisions, induced] = self.counts();
-        let gates = [
-            ("gate", !self.require.is_empty()),
-            collisions,
-            ("max-other-collisions", self.max_other_collisions.is_some()),
-            self.bounds_probability(),
-            induced,
-            ("min-prevented", self.min_prevented.is_some()),
-            ("max-harm", self.max_harm.is_some()),
-            ("min-rear-thw", self.min_rear_thw.is_some()),
-            ("max-engagement-rate", self.max_engagement_rate.is_some()),
-            ("max-speed-deficit-mps", self.max_speed_deficit_mps.is_some()),
-            ("max-jerk", self.max_jerk.is_some()),
-            ("max-flaky", self.max_flaky.is_some()),
-        ];
-        exclusive(("no-gate", self.no_gate), &gates)
-    }
-
     /// Returns the criteria that the options stand for.
     fn criteria(&self) -> Result<Vec<Expression>, CliError> {
         let options = GateOptions {
@@ -157,7 +127,7 @@ impl GateArgs {
 
     /// Returns the gate on the probability of a collision.
     pub(super) fn probability(&self) -> Result<Option<ProbabilityGate>, CliError> {
-        needs(("confidence", self.confidence.is_some()), self.bounds_probability())?;
+        needs(("confidence", self.confidence.is_some()), ("max-probability", self.max_probability.is_some()))?;
         let confidence = self.confidence.map_or(ProbabilityGate::CONFIDENCE, |confidence| confidence.0);
         let gate = |max: Probability| ProbabilityGate::new(max.0, confidence);
         let usage = |error| CliError::usage(format!("{}: {error}", Argument("max-probability")));

@@ -2,11 +2,12 @@
 //!
 //! The arguments of a command are a struct, whose fields are the options of the command line and
 //! the keywords of a call. A field that is such a struct itself has a name that begins with `..`:
-//! its keywords stand beside the others.
+//! its keywords stand beside the others. Which arguments exclude each other is stated for clap.
 
 use std::fmt;
 use std::slice::Iter;
 
+use clap::{Arg, Args, Command};
 use closecall_campaign::session;
 use serde::de::value::StrDeserializer;
 use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, IntoDeserializer, MapAccess, Visitor};
@@ -30,14 +31,28 @@ const KINDS: [(&str, &str); 7] = [
 ];
 
 /// Returns the arguments of a command that the keywords, a JSON object, state.
-pub(super) fn arguments<T: DeserializeOwned>(keywords: &str) -> Result<T, CliError> {
+pub(super) fn arguments<T: Args + DeserializeOwned>(keywords: &str) -> Result<T, CliError> {
     let refused = |error: serde_json::Error| CliError::usage(error.to_string());
     let mut keywords: Map<String, Value> = serde_json::from_str(keywords).map_err(refused)?;
+    check_conflicts::<T>(&keywords)?;
     let arguments = T::deserialize(Group(&mut keywords)).map_err(refused)?;
     match keywords.keys().next() {
         Some(name) => Err(CliError::usage(format!("there is no keyword `{name}`"))),
         None => Ok(arguments),
     }
+}
+
+/// Refuses keywords that exclude each other.
+fn check_conflicts<T: Args>(keywords: &Map<String, Value>) -> Result<(), CliError> {
+    let command = T::augment_args(Command::new("call"));
+    let name = |arg: &Arg| arg.get_long().unwrap_or_default().replace('-', "_");
+    let is_given = |arg: &&Arg| keywords.contains_key(&name(arg));
+    for arg in command.get_arguments().filter(is_given) {
+        if let Some(other) = command.get_arg_conflicts_with(arg).into_iter().find(is_given) {
+            return Err(CliError::usage(format!("{}= cannot be used with {}=", name(arg), name(other))));
+        }
+    }
+    Ok(())
 }
 
 /// Deserialises a struct from the keywords that it has, and removes them.
@@ -108,16 +123,8 @@ impl fmt::Display for Argument {
     }
 }
 
-/// An argument, and whether it is given.
-pub(super) type Given = (&'static str, bool);
-
-/// Refuses an argument together with any of the others.
-pub(super) fn exclusive((name, is_given): Given, others: &[Given]) -> Result<(), CliError> {
-    match others.iter().find(|(_, other_is_given)| is_given && *other_is_given) {
-        Some((other, _)) => Err(CliError::usage(format!("{} cannot be used with {}", Argument(name), Argument(other)))),
-        None => Ok(()),
-    }
-}
+/// The name of an argument, and whether it is given.
+type Given = (&'static str, bool);
 
 /// Refuses an argument without the one that it needs.
 pub(super) fn needs((name, is_given): Given, (needed, needed_is_given): Given) -> Result<(), CliError> {
@@ -133,18 +140,22 @@ mod tests {
 
     use super::*;
 
-    #[derive(Debug, PartialEq, Deserialize)]
+    #[derive(Debug, PartialEq, Args, Deserialize)]
     struct Arguments {
         file: String,
+        #[command(flatten)]
         #[serde(rename = "..limits")]
         limits: Limits,
+        #[arg(long, conflicts_with = "most")]
         share: Option<f64>,
     }
 
-    #[derive(Debug, Default, PartialEq, Deserialize)]
+    #[derive(Debug, Default, PartialEq, Args, Deserialize)]
     #[serde(default)]
     struct Limits {
+        #[arg(long)]
         most: u64,
+        #[arg(long)]
         is_strict: bool,
     }
 
@@ -161,6 +172,7 @@ mod tests {
             (r#"{"file": "a", "most": "three"}"#, "most=: string \"three\", expected a whole number, 0 or more"),
             (r#"{"file": "a", "most": -1}"#, "most=: integer `-1`, expected a whole number, 0 or more"),
             (r#"{"file": "a", "is_strict": 1}"#, "is_strict=: integer `1`, expected true or false"),
+            (r#"{"file": "a", "most": 1, "share": 0.5}"#, "share= cannot be used with most="),
             (r#"{"file": "a", "mots": 1}"#, "there is no keyword `mots`"),
             (r#"{"file": "a", "..limits": 1}"#, "there is no keyword `..limits`"),
             ("{}", "missing field `file`"),
@@ -170,13 +182,10 @@ mod tests {
     }
 
     #[test]
-    fn arguments_that_exclude_or_need_each_other_are_named() {
-        let message = |result: Result<(), CliError>| result.unwrap_err().to_string();
-        assert_eq!(message(exclusive(("a", true), &[("b", false), ("c-d", true)])), "--a cannot be used with --c-d");
-        assert_eq!(message(needs(("a-b", true), ("c", false))), "--a-b needs --c");
-        assert!(exclusive(("a", false), &[("b", true)]).is_ok() && needs(("a", false), ("b", false)).is_ok());
-        session::Session::default().run("f()", || {
-            assert_eq!(message(needs(("a-b", true), ("c", false))), "a_b= needs c=");
-        });
+    fn an_argument_is_named_as_its_user_knows_it() {
+        let message = || needs(("a-b", true), ("c", false)).unwrap_err().to_string();
+        assert_eq!(message(), "--a-b needs --c");
+        session::Session::default().run("f()", || assert_eq!(message(), "a_b= needs c="));
+        assert!(needs(("a-b", false), ("c", false)).is_ok() && needs(("a-b", true), ("c", true)).is_ok());
     }
 }

@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 use super::CliError;
 use super::help::heading;
-use super::keywords::{Argument, Given, exclusive};
+use super::keywords::Argument;
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;
@@ -67,11 +67,16 @@ pub(super) struct PlanArgs {
     /// With --max-probability: stop each scenario as soon as its samples show whether its
     /// probability is low enough. The bounds (confidence sequences) are valid although they are
     /// evaluated after every sample
-    #[arg(long, help_heading = heading::SAMPLES)]
+    #[arg(long, conflicts_with_all = ["partition", "max_collisions", "max_induced"], help_heading = heading::SAMPLES)]
     pub(super) until_certain: bool,
     /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only
     /// the samples before the first unfinished one are judged
-    #[arg(long, value_name = "TIME", help_heading = heading::SAMPLES)]
+    #[arg(
+        long,
+        value_name = "TIME",
+        conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"],
+        help_heading = heading::SAMPLES
+    )]
     #[serde(deserialize_with = "parsed_option")]
     time_budget: Option<WallTime>,
     /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1.
@@ -84,20 +89,11 @@ pub(super) struct PlanArgs {
     check_at_most: Option<u64>,
     /// Check the validity of the simulator in no sample, for measurements of speed. Every report
     /// says so
-    #[arg(long, help_heading = heading::VALIDITY)]
+    #[arg(long, conflicts_with_all = ["check_share", "check_at_most"], help_heading = heading::VALIDITY)]
     no_validity_checks: bool,
 }
 
 impl PlanArgs {
-    /// Checks the combination with other arguments of a campaign. A count of collisions is judged
-    /// over a number of samples that is known before.
-    pub(super) fn check(&self, resume: Given, others: &[Given]) -> Result<(), CliError> {
-        exclusive(("until-certain", self.until_certain), others)?;
-        exclusive(("time-budget", self.time_budget.is_some()), &[&[resume], others].concat())?;
-        let checks = [("check-share", self.check_share.is_some()), ("check-at-most", self.check_at_most.is_some())];
-        exclusive(("no-validity-checks", self.no_validity_checks), &checks)
-    }
-
     /// Returns the wall time after which the samples stop.
     pub(super) fn time_budget(&self) -> Option<Duration> {
         self.time_budget.map(|time| time.0)
