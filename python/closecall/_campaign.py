@@ -206,7 +206,7 @@ def campaign(
         # The seed of a judgement takes the place of the default.
         keywords["seed"] = None if seed == 0 and options.get("judge_seed") is not None else whole("seed", seed)
         keywords |= {"paired": paired, "design": design, "sensors": sensors, "jobs": jobs}
-        keywords |= {"gate": _several(gate), "set": settings}
+        keywords |= {"gate": _several(gate), "set": settings or None}
         if kept is not None:
             # Nobody could look at the recordings.
             keywords["record"] = "0"
@@ -218,9 +218,9 @@ def campaign(
     return CampaignResult(*result, None if kept is not None else folder, kept)
 
 
-def _several(values: str | Sequence[str] | None) -> list[str] | None:
+def _several(values: str | os.PathLike[str] | Sequence[str] | None) -> list[str | os.PathLike[str]] | None:
     """Returns a list of texts, of which one may be given as it is; ``None`` if there are none."""
-    return [values] if isinstance(values, str) else list(values or ()) or None
+    return [values] if isinstance(values, (str, os.PathLike)) else list(values or ()) or None
 
 
 def _keep_results(folder: Path) -> None:

@@ -109,6 +109,14 @@ def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> Non
         (cc.fit(file, seed=2), ["traffic", "fit", "--seed", "2"]),
     ]:
         assert found == json.loads(command(*words, file, "--format", "json").stdout)
+    for call, message in [
+        (lambda: cc.lane_changes(file, criterion="jump"), "criterion=: `jump`, expected one of `peak`, `distance`, `gradient`"),  # type: ignore[arg-type]
+        (lambda: cc.lane_changes(file, criterion="gradient"), "use `peak` or `distance` as criterion="),
+        (lambda: cc.criticality(file, speed_limit_mps=-3), "speed_limit_mps=: `-3` is not a number above 0"),
+        (lambda: cc.fit(file, seed=-1), "seed: expected a whole number"),
+    ]:
+        with pytest.raises(cc.UsageError, match=message):
+            call()
     rows = file.read_text().splitlines()
     rows[3] = rows[3].replace(rows[3].split(",")[2], "x", 1)
     file.write_text("\n".join(rows) + "\n")
@@ -118,14 +126,6 @@ def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> Non
     assert "drop_bad_rows= skips such rows" in str(raised.value) and "--" not in str(raised.value)
     with pytest.raises(cc.FileError):
         cc.criticality(tmp_path / "none.csv")
-    for call, message in [
-        (lambda: cc.lane_changes(file, criterion="jump"), "criterion=: `jump`, expected one of `peak`, `distance`, `gradient`"),  # type: ignore[arg-type]
-        (lambda: cc.lane_changes(file, criterion="gradient"), "use `peak` or `distance` as criterion="),
-        (lambda: cc.criticality(file, speed_limit_mps=-3), "speed_limit_mps=: `-3` is not a number above 0"),
-        (lambda: cc.fit(file, seed=-1), "seed: expected a whole number"),
-    ]:
-        with pytest.raises(cc.UsageError, match=message):
-            call()
 
 
 def test_fitted_distributions_name_the_call(tmp_path: Path) -> None:

@@ -636,3 +636,31 @@ pub(super) fn progress_bar(samples: u64) -> ProgressBar {
     }
     bar
 }
+
+#[cfg(test)]
+mod tests {
+    use closecall_campaign::gate::MAX_FLIP_RATE;
+    use closecall_campaign::probability::ProbabilityGate;
+    use closecall_campaign::validity::CheckPlan;
+    use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS};
+
+    use super::*;
+
+    #[test]
+    fn the_help_states_the_defaults() {
+        let command = CampaignArgs::augment_args(clap::Command::new("campaign"));
+        for (name, default) in [
+            ("check-share", CheckPlan::SHARE),
+            ("check-at-most", CheckPlan::AT_MOST as f64),
+            ("confidence", ProbabilityGate::CONFIDENCE),
+            ("max-flip-rate", MAX_FLIP_RATE),
+            ("sample-timeout-s", SAMPLE_TIMEOUT_S),
+            ("controller-timeout-ms", DEFAULT_TIMEOUT_MS as f64),
+            ("controller-memory-mib", DEFAULT_MEMORY_MIB as f64),
+        ] {
+            let argument = command.get_arguments().find(|argument| argument.get_long() == Some(name)).unwrap();
+            let help = argument.get_long_help().or(argument.get_help()).unwrap().to_string();
+            assert!(help.contains(&format!("[default: {default}]")), "{name}: {help}");
+        }
+    }
+}
