@@ -46,12 +46,24 @@ fn replay_command(replay: &Replay<'_>) -> String {
 /// Returns the command that resumes a campaign: the command that started it, without the options
 /// that would end it at the same sample again.
 fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> String {
+    if let [call] = command {
+        return resume_call(call, retries_errors);
+    }
     let is_kept = |word: &&String| !matches!(word.as_str(), "--fail-fast" | "--resume");
     let words = command.iter().filter(is_kept).map(String::as_str);
     let folder = moved_to.iter().flat_map(|folder| ["--out", folder]);
     let is_retried = retries_errors && !command.iter().any(|word| word == "--retry-errors");
     let resumed = std::iter::once("--resume").chain(is_retried.then_some("--retry-errors"));
     words.chain(folder).chain(resumed).map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the call that resumes a campaign: the call of another program that started it, likewise.
+fn resume_call(call: &str, retries_errors: bool) -> String {
+    let call = [", fail_fast=True", ", resume=True", ", retry_errors=True"]
+        .iter()
+        .fold(call.to_owned(), |call, word| call.replace(word, ""));
+    let retried = if retries_errors { ", retry_errors=True" } else { "" };
+    format!("{}, resume=True{retried})", call.trim_end_matches(')'))
 }
 
 #[cfg(test)]
@@ -70,6 +82,15 @@ mod tests {
         );
         assert_eq!(resumed("c campaign --resume --out x", true, None), "c campaign --out x --resume --retry-errors");
         assert_eq!(resumed("c campaign x --resume", false, Some("a b")), "c campaign x --out 'a b' --resume");
+    }
+
+    #[test]
+    fn the_resume_call_is_the_call_with_resume() {
+        let call = ["closecall.campaign(['x'], out='y', fail_fast=True)".to_owned()];
+        let resumed =
+            |retries_errors| command_for(&Action::Resume(Resume { command: &call, retries_errors, moved_to: None }));
+        assert_eq!(resumed(false), "closecall.campaign(['x'], out='y', resume=True)");
+        assert_eq!(resumed(true), "closecall.campaign(['x'], out='y', resume=True, retry_errors=True)");
     }
 
     #[test]

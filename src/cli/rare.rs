@@ -62,6 +62,12 @@ impl DesignChoice {
     }
 }
 
+impl Default for DesignChoice {
+    fn default() -> Self {
+        Self::Plain(Design::Random)
+    }
+}
+
 impl fmt::Display for DesignChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -85,7 +91,7 @@ impl FromStr for DesignChoice {
 }
 
 /// The rare event of a campaign.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub(super) struct RareArgs {
     /// With --design subset, importance or search: the event that is estimated or sought, a flag such as
     /// `collision` or `induced`, a number with a bound such as "min_ttc_rear_s < 0.3", or a

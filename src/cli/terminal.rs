@@ -6,7 +6,6 @@
 use std::fmt::Display;
 use std::io::{IsTerminal, stdout};
 
-use closecall_campaign::session;
 use console::{Style, Term};
 use textwrap::{Options, WordSplitter, wrap};
 
@@ -18,7 +17,7 @@ const LEAST_WIDTH: usize = 20;
 /// Returns a text for standard output.
 pub(super) fn for_terminal(text: &impl Display) -> String {
     let text = text.to_string();
-    if session::is_active() || !stdout().is_terminal() {
+    if !stdout().is_terminal() {
         return text;
     }
     let width = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
@@ -29,7 +28,7 @@ pub(super) fn for_terminal(text: &impl Display) -> String {
 /// Returns a line that is cut off at the width of the terminal.
 pub(super) fn cut(line: &str) -> String {
     let columns = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    match columns.filter(|_| stdout().is_terminal() && !session::is_active()) {
+    match columns.filter(|_| stdout().is_terminal()) {
         Some(width) if line.chars().count() > width.max(LEAST_WIDTH) => {
             let kept: String = line.chars().take(width.max(LEAST_WIDTH) - 1).collect();
             format!("{kept}…")
