@@ -48,11 +48,10 @@ use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::keywords::{Argument, needs};
-use super::output::{heartbeat, out, outln, print_error, print_failure};
+use super::output::{heartbeat, out, outln, print_error, print_failure, print_text};
 use super::plan::PlanArgs;
 use super::rare::{DesignChoice, Rare, RareArgs};
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
-use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of a campaign.
@@ -474,14 +473,14 @@ impl Conclusion<'_> {
 impl Judged<'_> {
     fn print(&self) {
         let CampaignReport { manifest, works, tally, judged, .. } = self.report;
-        out!("{}", for_terminal(&CountsText(&tally.summary)));
+        print_text(CountsText(&tally.summary));
         let simulated_s = tally.summary.total().simulated_s;
         outln!("{simulated_s:.0} simulated seconds in {:.1} s on {}", self.wall_s, self.place);
         out!("{}", self.companion.text(&tally.summary));
         out!("{}", ensemble_text(&tally.summary, manifest));
-        out!("{}", for_terminal(&CoverageText(judged)));
+        print_text(CoverageText(judged));
         out!("{}", FlakyText(&tally.overview));
-        out!("{}", for_terminal(&VerdictText { judged, scenarios: works.len() }));
+        print_text(VerdictText { judged, scenarios: works.len() });
         out!("{}", after_verdict(judged));
         if self.has_drawn_seed {
             outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);

@@ -15,14 +15,23 @@ use closecall_traffic::shown::shown;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::CliError;
+use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
-/// Prints to standard output, without control characters of others (see [`shown`]). A reader that
-/// has closed the pipe (`closecall … | head`) does not change the exit code. Any other failure ends
-/// the program with [`ExitCode::Io`].
+/// Prints to standard output, without control characters of others (see [`shown`]).
 pub(super) fn print(text: Arguments<'_>) {
-    let text = text.to_string();
-    let text = shown(&text);
+    write(&shown(&text.to_string()));
+}
+
+/// Prints a text for people to standard output. Control characters of others are replaced before a
+/// terminal gets its colours.
+pub(super) fn print_text(text: impl Display) {
+    write(&for_terminal(&shown(&text.to_string())));
+}
+
+/// Writes to standard output. A reader that has closed the pipe (`closecall … | head`) does not
+/// change the exit code. Any other failure ends the program with [`ExitCode::Io`].
+fn write(text: &str) {
     let mut out = stdout().lock();
     if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush())
         && error.kind() != ErrorKind::BrokenPipe

@@ -33,8 +33,7 @@ use super::args::Format;
 use super::backend::{check_backend, check_networks};
 use super::campaign::progress_bar;
 use super::help::heading;
-use super::output::{heartbeat, out, outln, print_error, print_written};
-use super::terminal::for_terminal;
+use super::output::{heartbeat, outln, print_error, print_text, print_written};
 use crate::exit_code::ExitCode;
 
 /// Largest number of runs of each scenario, unless another one is named: of an estimate, and of a
@@ -309,7 +308,7 @@ impl Rare<'_> {
 
     fn print(&self, reports: &[RareReport], works: &[Arc<Work>], sensors: Option<SensorMode>) {
         for (report, work) in reports.iter().zip(works) {
-            out!("{}", for_terminal(report));
+            print_text(report);
             if let Some(gate) = self.gate {
                 let verdict = self.word(report);
                 let (max, confidence) = (gate.max(), percent(gate.confidence()));

@@ -3,7 +3,6 @@
 //!
 //! `NO_COLOR` and `CLICOLOR` are respected (crate `console`).
 
-use std::fmt::Display;
 use std::io::{IsTerminal, stdout};
 
 use console::{Style, Term};
@@ -14,14 +13,14 @@ const HANGING: usize = 2;
 /// Narrowest terminal to which texts are wrapped (columns).
 const LEAST_WIDTH: usize = 20;
 
-/// Returns a text for standard output.
-pub(super) fn for_terminal(text: &impl Display) -> String {
-    let text = text.to_string();
+/// Returns a text for standard output. Nothing may replace control characters afterwards: the colours
+/// are such.
+pub(super) fn for_terminal(text: &str) -> String {
     if !stdout().is_terminal() {
-        return text;
+        return text.to_owned();
     }
     let width = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    let wrapped = width.map_or(text.clone(), |width| wrapped(&text, width));
+    let wrapped = width.map_or_else(|| text.to_owned(), |width| wrapped(text, width));
     if console::colors_enabled() { coloured(&wrapped) } else { wrapped }
 }
 
