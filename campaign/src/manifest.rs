@@ -1,7 +1,6 @@
 //! The manifest of a campaign's folder: everything that determines the outcomes and that a replay
 //! needs.
 
-use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -12,6 +11,7 @@ use closecall_sensors::SensorMode;
 use closecall_sensors::external::ProgramSettings;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_traffic::input;
 use object::{Object, ReadCache};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -76,7 +76,7 @@ pub fn set_program(library: PathBuf) {
 /// Returns the identifier that the linker wrote into an executable, or `None` if there is none of
 /// at least [`BUILD_DIGITS`] digits.
 fn build_id(path: &Path) -> Option<Vec<u8>> {
-    let file = ReadCache::new(File::open(path).ok()?);
+    let file = ReadCache::new(input::open(path).ok()?);
     let executable = object::File::parse(&file).ok()?;
     let of_mach = || executable.mach_uuid().ok().flatten().map(|id| id.to_vec());
     let id = executable.build_id().ok().flatten().map(<[u8]>::to_vec).or_else(of_mach)?;
@@ -86,7 +86,7 @@ fn build_id(path: &Path) -> Option<Vec<u8>> {
 /// Returns the BLAKE3 hash of a file, without loading the file into memory.
 pub(crate) fn file_hash(path: &Path) -> io::Result<blake3::Hash> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path)?)?;
+    hasher.update_reader(input::open(path)?)?;
     Ok(hasher.finalize())
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn file_hash(path: &Path) -> io::Result<blake3::Hash> {
 fn parts_hash(path: &Path) -> io::Result<blake3::Hash> {
     let length = path.metadata()?.len().div_ceil(HASH_PARTS);
     let part_hash = |part: u64| -> io::Result<blake3::Hash> {
-        let mut file = File::open(path)?;
+        let mut file = input::open(path)?;
         file.seek(SeekFrom::Start(part * length))?;
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(file.take(length))?;

@@ -155,10 +155,13 @@ impl Judgement {
 
     /// Adds reasons for which the campaign cannot be believed, found outside its records.
     pub fn add_invalid(&mut self, reasons: Vec<String>) {
-        if !reasons.is_empty() && self.decision != Decision::SampleError {
+        if self.decision == Decision::SampleError {
+            self.reasons.extend(reasons);
+        } else if !reasons.is_empty() {
             self.decision = Decision::Invalid;
+            // The first reason is the sentence of the verdict.
+            self.reasons.splice(0..0, reasons);
         }
-        self.reasons.extend(reasons);
     }
 
     /// Returns the word for reports; a measurement has no verdict.
@@ -264,7 +267,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         if !is_judged {
             let missing = match gates.is_empty() {
                 true => "no gate was set and no requirement was checked: set a gate, or measure without a verdict",
-                false => "no gate and no requirement is decided",
+                false => "no gate was set, and not every check of the requirements is decided",
             };
             findings.add(Decision::NotJudged, missing.to_owned());
         }

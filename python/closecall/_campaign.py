@@ -32,7 +32,8 @@ class CampaignResult:
 
     #: The exit code of the command line: 0 pass, 1 fail, 4 inconclusive or not judged, 5 a sample ended in an error, 7 invalid.
     exit_code: int
-    #: The verdict, such as ``PASS`` or ``FAIL``; ``ENDED EARLY`` if ``fail_fast`` or ``max_errors`` has ended the campaign.
+    #: The verdict, such as ``PASS`` or ``FAIL``; ``ENDED EARLY`` if ``fail_fast`` or ``max_errors`` has ended the campaign, and
+    #: ``measured, not judged`` with ``no_gate``.
     verdict: str
     #: Number of samples.
     samples: int
@@ -61,11 +62,11 @@ class CampaignResult:
         """Shows the verdict with its reasons, the counts of each controller, and the outcome map."""
         heads = ("controller", "collisions", "rate", "95 % interval", "harm", "errors")
         rows = [_row(name, counts, self.samples) for name, counts in self.report.get("controllers", {}).items()]
-        table = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-        reasons = "".join(f"<li>{html.escape(str(reason))}</li>" for reason in self.report.get("reasons", []))
+        table = "".join(f"<tr>{''.join(f'<td>{_escaped(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        reasons = "".join(f"<li>{_escaped(str(reason))}</li>" for reason in self.report.get("reasons", []))
         head = "".join(f"<th>{name}</th>" for name in heads)
         return (
-            f"<p><strong>{html.escape(self.verdict)}</strong>: {self.samples} samples</p><ul>{reasons}</ul>"
+            f"<p><strong>{_escaped(self.verdict)}</strong>: {self.samples} samples</p><ul>{reasons}</ul>"
             f"<table><thead><tr>{head}</tr></thead><tbody>{table}</tbody></table>{self._outcome_map()}"
         )
 
@@ -78,6 +79,11 @@ class CampaignResult:
         _, _, rest = page.partition("Outcome map</h3>")
         drawing = re.search(r"<svg.*?</svg>", rest, re.DOTALL)
         return "" if drawing is None else f"<figure>{drawing.group()}<figcaption>Outcome map</figcaption></figure>"
+
+
+def _escaped(text: str) -> str:
+    """Returns a text for a page, without control characters of others."""
+    return html.escape(_native.shown(text))
 
 
 def _row(name: str, counts: dict[str, Any], samples: int) -> tuple[str, ...]:
@@ -199,6 +205,9 @@ def campaign(
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         if out is None and resume:
             raise UsageError("resume: name the folder of the campaign with `out`")
+        for name in ("record", "partition"):
+            if out is None and options.get(name) is not None:
+                raise UsageError(f"{name}: the files are kept in the folder of the campaign: name one with `out`")
         kept = tempfile.TemporaryDirectory(prefix="closecall-") if out is None else None
         folder = Path(kept.name, "results") if kept is not None else Path(os.fspath(out or ""))
         keywords: dict[str, object] = {"scenarios": named, "n": n, "out": folder, "resume": resume}
@@ -214,7 +223,8 @@ def campaign(
         code, keys = call("campaign", {**keywords, **more}, report)
     if kept is not None:
         _keep_results(folder)
-    result = (code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys)
+    verdict = keys.get("verdict", "ENDED EARLY") or "measured, not judged"
+    result = (code, verdict, keys["samples"], keys["errors"], keys["failures"], keys)
     return CampaignResult(*result, None if kept is not None else folder, kept)
 
 

@@ -8,7 +8,7 @@ import json
 import os
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,8 +18,29 @@ Side = Literal["front", "rear", "left", "right"]
 Phase = Literal["approach", "critical", "overtaking", "after"]
 
 
-@dataclass(frozen=True)
-class Collision:
+class _Readable:
+    """Shows its numbers with five digits. Attributes have all of them."""
+
+    def __repr__(self) -> str:
+        return _short(self)
+
+
+def _short(value: object) -> str:
+    """Returns the ``repr`` of a value, with five digits of each number."""
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_short(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_short, value))}{',' if len(value) == 1 else ''})"
+    if isinstance(value, _Readable):
+        shown = (one.name for one in fields(value) if one.repr)  # type: ignore[arg-type]
+        return f"{type(value).__name__}({', '.join(f'{name}={_short(getattr(value, name))}' for name in shown)})"
+    return repr(value)
+
+
+@dataclass(frozen=True, repr=False)
+class Collision(_Readable):
     """The first contact of two vehicles."""
 
     #: Time of the first contact (s).
@@ -38,8 +59,8 @@ class Collision:
     delta_v_mps: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Moment:
+@dataclass(frozen=True, repr=False)
+class Moment(_Readable):
     """A moment of the encounter, with its letter in the paper's figure."""
 
     moment: str
@@ -48,8 +69,8 @@ class Moment:
     time_s: float
 
 
-@dataclass(frozen=True)
-class Margins:
+@dataclass(frozen=True, repr=False)
+class Margins(_Readable):
     """The smallest margins of the ego, from the truth. An absent value is ``None``, and ``absent`` names the reason."""
 
     #: Smallest front time headway (s).
@@ -75,8 +96,8 @@ class Margins:
     absent: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class MisSummary:
+@dataclass(frozen=True, repr=False)
+class MisSummary(_Readable):
     """What the margin increase system did. An absent value is ``None``, and ``absent`` names the reason."""
 
     #: Time of the first engagement (s).
@@ -102,8 +123,8 @@ class MisSummary:
     absent: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Promise:
+@dataclass(frozen=True, repr=False)
+class Promise(_Readable):
     """What became of the method's promise, from the true states. An absent value is ``None``, and ``absent`` names the reason."""
 
     #: What became of the gain of 2 s of front time headway, in words; ``None`` if nothing was promised.
@@ -117,8 +138,8 @@ class Promise:
     absent: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Outcome:
+@dataclass(frozen=True, repr=False)
+class Outcome(_Readable):
     """The outcome of a run. In a notebook it shows itself in the viewer of Rerun if ``rerun-sdk[notebook]`` is installed, and otherwise
     the figure that ``closecall plot`` draws."""
 

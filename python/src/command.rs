@@ -105,3 +105,9 @@ pub(crate) fn read_table(path: PathBuf) -> PyResult<Table> {
     let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| fail(&error))?;
     Ok(Table::new(schema, batches))
 }
+
+/// Returns a text with its control and bidirectional characters as numbers.
+#[pyfunction]
+pub(crate) fn shown(text: &str) -> String {
+    closecall_traffic::shown::shown(text).into_owned()
+}

@@ -28,7 +28,7 @@ use pyo3::pymodule;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::command::{call, main, read_table, set_program};
+    use super::command::{call, main, read_table, set_program, shown};
     #[pymodule_export]
     use super::controller::{ControllerInput, LeadVehicle, Odometry, PythonController, Sensors, Setup, Track, refuse};
     #[pymodule_export]

@@ -134,3 +134,24 @@ def test_a_policy_with_normalized_actions_is_judged_as_it_was_trained() -> None:
         cc.run(SCENARIO, gym.PolicyController(lambda _: 0.25, normalized_actions=True), sensors="object", sample=3),
     ]
     assert outcomes[0].margins == outcomes[1].margins
+
+
+def test_a_measured_campaign_shows_itself_without_control_characters() -> None:
+    result = cc.campaign("slow-approach", n=2, sensors="object", no_gate=True)
+    assert result.verdict == "measured, not judged"
+    assert "measured, not judged" in result._repr_html_()
+    failing = cc.campaign("slow-approach", n=2, sensors="object", controller="exec:printf '\\033[31m\\342\\200\\256x\\n'")
+    shown = failing._repr_html_()
+    assert not any(character in shown for character in ("\x1b", "\u202e")), shown
+
+
+@pytest.mark.parametrize("keyword", [{"record": "failures:1"}, {"partition": "1/2"}])
+def test_what_is_kept_in_a_folder_needs_one(keyword: dict[str, str]) -> None:
+    with pytest.raises(cc.UsageError, match="name one with `out`"):
+        cc.campaign("slow-approach", n=2, **keyword)  # type: ignore[arg-type]
+
+
+def test_an_outcome_shows_numbers_that_can_be_read() -> None:
+    outcome = cc.run("low-thw-overtake", sample=3, sensors="object")
+    assert not re.search(r"\d\.\d{6,}", repr(outcome)), repr(outcome)
+    assert re.search(r"\d\.\d{6,}", str(dict(outcome.parameters))), "the attributes have all digits"

@@ -49,7 +49,7 @@ impl FittedFile {
     /// [`ScenarioError`] if the file cannot be read, or a distribution is not valid.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let read = |source| ScenarioError::Read { path: path.to_owned(), source };
-        let text = std::fs::read_to_string(path).map_err(read)?;
+        let text = closecall_traffic::input::read_text(path).map_err(read)?;
         let hash = blake3::hash(text.as_bytes()).to_hex();
         let source = format!("from {} (blake3 {})", path.display(), hash.get(..16).unwrap_or_default());
         let wrong = |message: String| ScenarioError::Syntax { path: path.to_owned(), line: 1, message };

@@ -77,9 +77,13 @@ fn overview(listed: &[LibraryEntry], members: &[&str]) {
     for scenario in &plain {
         outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));
     }
-    print_text(format_args!("{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.\n",
-            faults.len()));
+    print_text(format_args!(
+        "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.\n",
+        faults.len()
+    ));
     print_text(format_args!("Members of the driver ensemble (`closecall list {MEMBERS}`): {}\n", members.join(", ")));
-    print_text(format_args!("A command takes a name in place of a file: `closecall run {}`. `closecall new NAME --from LIBRARY_NAME` writes a copy.\n",
-            plain.first().map_or("paper-figure", |first| first.name)));
+    print_text(format_args!(
+        "A command takes a name in place of a file: `closecall run {}`. `closecall new NAME --from LIBRARY_NAME` writes a copy.\n",
+        plain.first().map_or("paper-figure", |first| first.name)
+    ));
 }

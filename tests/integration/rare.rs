@@ -139,7 +139,10 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
         ("--design search --event collision --max-probability 0.1", "--design search states no probability"),
         ("--design search --event collision --relative-width 0.3", "--design search states no probability"),
         ("--design search", "name one with --event"),
-        ("--design halton --event collision", "one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance`, `search`"),
+        (
+            "--design halton --event collision",
+            "one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance`, `search`",
+        ),
         ("--event collision", "--design subset, importance or search"),
         ("--guide min_gap_rear_m --design subset", "--event"),
     ] {
@@ -240,7 +243,8 @@ fn a_search_finds_a_collision_that_is_rare_and_writes_its_smallest_case() {
     };
     let text = stdout(&run(&found, "--jobs 1"), 1);
     assert!(text.contains("a search states no probability"), "{text}");
-    let result: serde_json::Value = serde_json::from_str(&fs::read_to_string(found.join("rare.json")).unwrap()).unwrap();
+    let result: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(found.join("rare.json")).unwrap()).unwrap();
     let report = &result["scenarios"][0];
     assert_eq!(report["search"]["has_event"], true);
     assert!(report["runs"].as_u64().unwrap() < 2_000, "{report}");
@@ -265,7 +269,8 @@ fn a_search_finds_a_collision_that_is_rare_and_writes_its_smallest_case() {
 fn a_regression_is_found_in_a_case_in_which_the_earlier_controller_does_not_fail() {
     let place = folder();
     let out = place.path().join("out");
-    let words = "campaign low-thw-overtake --arms acc,gap-1.6 --sensors object --design search --event induced --seed 7";
+    let words =
+        "campaign low-thw-overtake --arms acc,gap-1.6 --sensors object --design search --event induced --seed 7";
     let text = stdout(&closecall(words.split_whitespace().chain(["--out", out.to_str().unwrap()])), 1);
     assert!(text.contains("no vehicle collides in it with acc"), "{text}");
     let path = out.join("low-thw-overtake-found.toml");
@@ -278,5 +283,8 @@ fn a_regression_is_found_in_a_case_in_which_the_earlier_controller_does_not_fail
 fn a_search_that_finds_nothing_spends_its_budget_and_says_what_that_means() {
     let words = "campaign slow-approach --controller mis --sensors object --design search --event collision -n 300";
     let text = stdout(&closecall(words.split_whitespace()), 0);
-    assert!(text.contains("300 runs") && text.contains("not found") && text.contains("bounds no probability"), "{text}");
+    assert!(
+        text.contains("300 runs") && text.contains("not found") && text.contains("bounds no probability"),
+        "{text}"
+    );
 }

@@ -320,7 +320,8 @@ fn only_wall_times_and_threads_may_differ() {
 fn the_beginning_of_an_output_is_shown_only_with_a_mark_and_to_the_letter() {
     let printed = "a: 20 samples\none\ntwo\nPASS\nmet: all\n";
     assert!(shows("a: 20 samples\none\ntwo\nPASS\n…\n", printed));
-    for wrong in ["a: 20 samples\none\ntwo\nPASS\n", "a: 20 samples\none\nother\n…\n", "…\n", "one\ntwo\nPASS\n…\n"] {
+    for wrong in ["a: 20 samples\none\ntwo\nPASS\n", "a: 20 samples\none\nother\n…\n", "…\n", "one\ntwo\nPASS\n…\n"]
+    {
         assert!(!shows(wrong, printed), "{wrong}");
     }
     assert_eq!(cut_like("a: 19 samples\none\n…\n", printed), "a: 20 samples\none\n…");

@@ -115,10 +115,13 @@ pub struct Evaluation {
     pub interval_95: Option<[f64; 2]>,
     /// Samples that have the quantity and satisfy the condition.
     pub samples: u64,
+    /// Those of them that have the flag.
+    pub hits: u64,
     /// Whether the bound is satisfied.
     pub answer: Answer,
-    /// Number of such samples that decide the gate if further samples are like these; `None` if the
-    /// gate is decided, or if more than 10⁸ would be needed.
+    /// Number of samples of the campaign that decide the gate if further samples are like these, with
+    /// those that do not satisfy the condition; `None` if the gate is decided, or if more than 10⁸
+    /// would be needed.
     pub needed: Option<u64>,
 }
 
@@ -132,7 +135,7 @@ impl Evaluation {
             Some(_) => Answer::Missed,
         };
         let (value, samples) = covered.map_or((None, 0), |(share, samples)| (Some(share), samples));
-        Self { value, interval_95: None, samples, answer, needed: None }
+        Self { value, interval_95: None, samples, hits: 0, answer, needed: None }
     }
 }
 
@@ -142,6 +145,8 @@ pub struct Accumulator {
     expression: Expression,
     hits: u64,
     samples: u64,
+    /// Samples that were added, with those that do not count.
+    added: u64,
     sum: f64,
     smallest: Option<f64>,
     largest: Option<f64>,
@@ -152,11 +157,12 @@ pub struct Accumulator {
 impl Accumulator {
     /// Returns an accumulator without samples.
     pub fn new(expression: Expression) -> Self {
-        Self { expression, hits: 0, samples: 0, sum: 0.0, smallest: None, largest: None, values: Vec::new() }
+        Self { expression, hits: 0, samples: 0, added: 0, sum: 0.0, smallest: None, largest: None, values: Vec::new() }
     }
 
     /// Adds one sample. A sample without the value, or without the condition, does not count.
     pub fn push(&mut self, record: &Record) {
+        self.added += 1;
         if let Some(condition) = self.expression.condition
             && value(condition, record) != Some(1.0)
         {
@@ -188,7 +194,8 @@ impl Accumulator {
             .then(|| inference.interval_95(hits, samples))
             .flatten();
         let value = (samples > 0 || aggregate == Aggregate::Count).then(|| self.value(inference)).flatten();
-        let open = |reason| Evaluation { value, interval_95, samples, answer: Answer::Open(reason), needed: None };
+        let open =
+            |reason| Evaluation { value, interval_95, samples, hits, answer: Answer::Open(reason), needed: None };
         if self.expression.needs_pairs() && !is_paired {
             return open(OpenReason::NotPaired);
         }
@@ -224,7 +231,9 @@ impl Accumulator {
         };
         let is_open = answer == Answer::Open(OpenReason::TooFewSamples);
         let of_bound = || if is_bound { self.needed(inference) } else { Some(least_samples(aggregate, is_varied)) };
-        Evaluation { value, interval_95, samples, answer, needed: is_open.then(of_bound).flatten() }
+        let of_all = |needed: u64| needed.saturating_mul(self.added.max(samples)).div_ceil(samples);
+        let needed = is_open.then(of_bound).flatten().map(of_all);
+        Evaluation { value, interval_95, samples, hits, answer, needed }
     }
 
     /// Returns true if the gate fails whatever the remaining `rest` samples are, even the most

@@ -103,7 +103,8 @@ impl Nearness {
         let other = other.and_then(outcome);
         let struck = other.and_then(Outcome::ego_delta_v_mps).unwrap_or(0.0);
         let gap_m = smallest_gap_m(outcome(own)?);
-        let lead_m = other.filter(|_| self.contrasts).map_or(0.0, |other| smallest_gap_m(other).min(SAFE_GAP_M) - gap_m);
+        let lead_m =
+            other.filter(|_| self.contrasts).map_or(0.0, |other| smallest_gap_m(other).min(SAFE_GAP_M) - gap_m);
         Some(lead_m - gap_m - struck)
     }
 }

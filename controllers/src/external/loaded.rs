@@ -72,10 +72,12 @@ pub fn unload_all() {
 }
 
 /// If the controller is an FMU, unpacks it once for all processes that this process starts, and
-/// returns the folder. Returns `None` if there is nothing to unpack, or it cannot be unpacked: the
-/// process that loads it says why. No code of the file runs.
-pub fn unpack_for_children(kind: Kind, path: &Path) -> Option<PathBuf> {
-    if kind == Kind::Fmu { fmu::unpacked_for_children(path) } else { None }
+/// returns the folder. Returns `None` if there is nothing to unpack. No code of the file runs.
+///
+/// # Errors
+/// [`LoadError`] if the FMU cannot be unpacked.
+pub fn unpack_for_children(kind: Kind, path: &Path) -> Result<Option<PathBuf>, LoadError> {
+    if kind == Kind::Fmu { fmu::unpacked_for_children(path).map(Some) } else { Ok(None) }
 }
 
 /// Uses the folder into which the parent process has unpacked its FMU. The first call counts.

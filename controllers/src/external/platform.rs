@@ -3,6 +3,7 @@
 use std::env::consts::{ARCH, OS};
 use std::path::Path;
 
+use closecall_traffic::input;
 use object::{Architecture, BinaryFormat, Object, ObjectKind};
 
 use crate::external::error::LoadError;
@@ -15,6 +16,9 @@ pub(crate) fn this_platform() -> String {
     format!("{ARCH} {OS}")
 }
 
+/// Largest shared library (bytes): an assumption, ten times the size of large ones.
+const MOST_LIBRARY_BYTES: u64 = 4 << 30;
+
 /// Checks that a file is a shared library for this platform, and that it exports the functions
 /// `needed`. `prefix` is the beginning of the names that a message lists.
 ///
@@ -22,7 +26,8 @@ pub(crate) fn this_platform() -> String {
 /// [`LoadError`] that names the expected and the actual content.
 pub(crate) fn check(path: &Path, needed: &[&str], prefix: &str) -> Result<(), LoadError> {
     let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| LoadError::Read { path: shown.clone(), source })?;
+    let bytes =
+        input::read(path, MOST_LIBRARY_BYTES).map_err(|source| LoadError::Read { path: shown.clone(), source })?;
     let not = |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, expected: this_platform() };
     let file = object::File::parse(&*bytes).map_err(|error| not(format!("it cannot be parsed ({error})")))?;
     let (arch, os) = (arch(file.architecture()), os(file.format()));

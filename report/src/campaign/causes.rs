@@ -8,6 +8,7 @@ use closecall_campaign::saved::SavedCampaign;
 use closecall_studies::cost::{cost, section as cost_section};
 use closecall_studies::failures::{CAUSES, Failures, campaign_failures, section, without_section, write_rows};
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input;
 use maud::{Markup, html};
 
 /// The name of the report.
@@ -27,7 +28,7 @@ pub fn write_causes(
     write_rows(folder, &failures.rows)?;
     let mut written = vec![folder.file(CAUSES)];
     let path = folder.file(REPORT);
-    let page = std::fs::read_to_string(&path).unwrap_or_default();
+    let page = input::read_text(&path).unwrap_or_default();
     if let Some([before, old, after]) = without_section(&page) {
         let table = section(failures, saved.manifest().scenarios.len() > 1, command_for).into_string();
         // The heading keeps the name by which the list of contents refers to it.

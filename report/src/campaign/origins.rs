@@ -12,6 +12,7 @@ use closecall_campaign::ledger::PairFate;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_studies::engagement::Engagement;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input;
 use maud::{Markup, PreEscaped, html};
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +94,7 @@ pub struct Origin {
 impl Origins {
     /// Reads the origins of a campaign. Returns `None` if it has none.
     pub fn of(folder: &Folder) -> Option<Self> {
-        serde_json::from_str(&std::fs::read_to_string(folder.file(ORIGINS)).ok()?).ok()
+        serde_json::from_str(&input::read_text(&folder.file(ORIGINS)).ok()?).ok()
     }
 
     /// Writes the origins into the folder of the campaign.
@@ -274,7 +275,7 @@ fn encounters_table(findings: &Findings<'_>, origins: &Origins) -> Markup {
 
 /// Returns the recorded seconds of an encounter, and the recordings of its samples.
 fn encounter(findings: &Findings<'_>, folder: &Folder, origin: &Origin) -> Markup {
-    let picture = origin.picture.as_ref().and_then(|path| std::fs::read_to_string(folder.file(path)).ok());
+    let picture = origin.picture.as_ref().and_then(|path| input::read_text(&folder.file(path)).ok());
     let of_scenario = findings.recordings.iter().filter(|((name, _, _), _)| *name == origin.scenario);
     let samples: BTreeMap<u64, &String> = of_scenario.map(|((_, sample, _), path)| (*sample, path)).collect();
     let lead = origin.lead_track.map_or_else(
@@ -299,7 +300,7 @@ fn encounter(findings: &Findings<'_>, folder: &Folder, origin: &Origin) -> Marku
             }
             @for (sample, path) in &samples {
                 figure {
-                    @if let Ok(picture) = std::fs::read_to_string(folder.file(&svg_of(path))) {
+                    @if let Ok(picture) = input::read_text(&folder.file(&svg_of(path))) {
                         (PreEscaped(without_declaration(&picture)))
                     }
                     figcaption {

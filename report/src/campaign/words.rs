@@ -124,7 +124,7 @@ pub(crate) fn gate_line(gate: &GateResult) -> String {
 /// Returns the value of a gate and its required value, in plain words.
 pub(crate) fn gate_words(gate: &GateResult) -> String {
     let expression = &gate.expression;
-    let Evaluation { value, interval_95, samples, .. } = gate.evaluation;
+    let Evaluation { value, interval_95, samples, hits, .. } = gate.evaluation;
     let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
     let condition =
         expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
@@ -143,19 +143,18 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
         Operator::AtLeast => "at least",
         Operator::AtMost => "at most",
     };
-    let bounded = if matches!(expression.aggregate, Aggregate::Lower | Aggregate::Upper) {
-        format!("{sides} ")
-    } else {
-        String::new()
-    };
-    let is = value.map_or_else(|| "has no value".to_owned(), |value| format!("{bounded}{}", shown(value)));
+    let estimate = || format!("{hits} of {samples} ({})", percent(hits as f64 / samples as f64));
     let interval = interval_95
         .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
-    let open = gate.evaluation.undecided().map_or_else(String::new, |why| format!("; {why}"));
-    format!(
-        "{subject}{condition}: {is} ({samples} samples{interval}{open}); required: {sides} {}",
-        shown(expression.bound)
-    )
+    let is = match (expression.aggregate, value) {
+        (_, None) => format!("has no value ({samples} samples)"),
+        (Aggregate::Lower, Some(bound)) => format!("{}, one-sided lower 95 % bound {}", estimate(), shown(bound)),
+        (Aggregate::Upper, Some(bound)) => format!("{}, one-sided upper 95 % bound {}", estimate(), shown(bound)),
+        (Aggregate::Share, Some(_)) => format!("{}{interval}", estimate()),
+        (_, Some(value)) => format!("{} ({samples} samples{interval})", shown(value)),
+    };
+    let open = gate.evaluation.undecided().map_or_else(String::new, |why| format!(" ({why})"));
+    format!("{subject}{condition}: {is}{open}; required: {sides} {}", shown(expression.bound))
 }
 
 /// Returns the judged quantity in words, and whether it is a share.
@@ -224,6 +223,7 @@ mod tests {
                 value: Some(value),
                 interval_95: Some([0.2, 0.4]),
                 samples: 60,
+                hits: 18,
                 answer,
                 needed: None,
             },
@@ -253,7 +253,7 @@ mod tests {
         let judgement = judged(Decision::Fail, gates);
         assert_eq!(sentence(&judgement, 14), "FAIL: 2 of 14 scenarios miss a requirement: c (MIS-1), a (MIS-1)");
         let lines = reasons(&judgement);
-        assert!(lines[0].starts_with("NOT MET: c: MIS-1: share of the samples in which a collision is prevented, where the ego collides in the baseline: at least 5"), "{lines:?}");
+        assert!(lines[0].starts_with("NOT MET: c: MIS-1: share of the samples in which a collision is prevented, where the ego collides in the baseline: 18 of 60 (30 %), one-sided lower 95 % bound 5"), "{lines:?}");
         assert!(
             lines[0].contains("required: at least 50")
                 && lines[0].ends_with("[lower(prevented | baseline.ego_collided) >= 0.5]"),
@@ -261,7 +261,7 @@ mod tests {
         );
         assert_eq!(lines[2], "a note");
         assert!(
-            lines[3].starts_with("met: b: MIS-2: share of the samples in which a collision is induced: at most 2"),
+            lines[3].starts_with("met: b: MIS-2: share of the samples in which a collision is induced: 18 of 60 (30 %), one-sided upper 95 % bound 2 %; required: at most 3 %"),
             "{lines:?}"
         );
     }
@@ -274,7 +274,7 @@ mod tests {
         let words = gate_words(&judgement.gates[0]);
         assert_eq!(
             words,
-            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20 % to 40 %; too few \
+            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20 % to 40 %) (too few \
              samples to decide, and no number would if they are like these); required: at least 1 s"
         );
         let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);

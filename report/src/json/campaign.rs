@@ -99,7 +99,7 @@ fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
 }
 
 fn gate(gate: &GateResult) -> Value {
-    let Evaluation { value, interval_95, samples, answer, needed } = gate.evaluation;
+    let Evaluation { value, interval_95, samples, hits, answer, needed } = gate.evaluation;
     let passed = match answer {
         Answer::Met => Some(true),
         Answer::Missed => Some(false),
@@ -114,6 +114,7 @@ fn gate(gate: &GateResult) -> Value {
         "value": value,
         "interval_95": interval_95,
         "samples": samples,
+        "hits": interval_95.map(|_| hits),
         "passed": passed,
         "source": gate.source.to_string(),
     });

@@ -12,7 +12,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use closecall_traffic::ClassScores;
+use closecall_traffic::{ClassScores, input};
 use ort::environment::Environment;
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
@@ -159,7 +159,7 @@ impl Classifier {
     pub fn of(file: Option<&str>, backend: &Backend) -> Result<Self, ClassifierError> {
         let Some(path) = file else { return Self::shipped(backend) };
         let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
-        let bytes = std::fs::read(path).map_err(|error| at(error.to_string()))?;
+        let bytes = read_network(Path::new(path)).map_err(at)?;
         let classifier = Self::new(&bytes, backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
             other => other,
@@ -232,6 +232,17 @@ pub(super) fn environment(backend: &Backend) -> Result<&'static Environment, Cla
     loaded.as_ref().map_err(|reason| ClassifierError::Load { backend: backend.clone(), reason: reason.clone() })
 }
 
+/// Largest file of a network (bytes): an assumption, ten times the largest that ships.
+const MOST_NETWORK_BYTES: u64 = 2 << 30;
+
+/// Reads the file of a network.
+///
+/// # Errors
+/// The reason, in words.
+pub(super) fn read_network(path: &Path) -> Result<Vec<u8>, String> {
+    input::read(path, MOST_NETWORK_BYTES).map_err(|error| error.to_string())
+}
+
 fn load_backend(backend: &Backend) -> Result<Environment, String> {
     let builder = match backend {
         Backend::Tract => {
@@ -240,7 +251,11 @@ fn load_backend(backend: &Backend) -> Result<Environment, String> {
             }
             ort::init()
         }
-        Backend::OnnxRuntime(path) => ort::init_from(path).map_err(|error| error.to_string())?,
+        Backend::OnnxRuntime(path) => {
+            // Opened before it is loaded: the loader waits for a named pipe.
+            input::open(path).map_err(|error| error.to_string())?;
+            ort::init_from(path).map_err(|error| error.to_string())?
+        }
     };
     builder.build().map_err(|error| error.to_string())
 }

@@ -4,7 +4,7 @@
 use crate::tracking::Detection;
 use closecall_traffic::{Check, Parameters, Scene, SceneVehicle, maths};
 
-use super::classifier::{Backend, ClassifierError};
+use super::classifier::{Backend, ClassifierError, read_network};
 use super::detector::{InstanceDetector, SHIPPED_MASK_RCNN};
 use super::fault::CameraFault;
 use super::instance::Instance;
@@ -49,7 +49,7 @@ impl MaskRcnn {
             return Ok(InstanceDetector::new(SHIPPED_MASK_RCNN, labels.as_ref(), backend)?.with_input(self.input));
         };
         let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
-        let bytes = std::fs::read(path).map_err(|error| at(error.to_string()))?;
+        let bytes = read_network(std::path::Path::new(path)).map_err(at)?;
         let detector = InstanceDetector::new(&bytes, labels.as_ref(), backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
             ClassifierError::Layout { actual, wanted } => {

@@ -90,8 +90,9 @@ impl NativeSettings {
     /// program. An FMU is unpacked before the process starts: the unpacking does not count against
     /// the time of the process.
     pub fn process(&self, folder: Option<&Path>, arguments: &[&str]) -> ExecSettings {
-        let unpacked =
-            unpack_for_children(self.kind, &path_in(folder, self)).map(|folder| folder.display().to_string());
+        // A process that cannot unpack it says why.
+        let unpacked = unpack_for_children(self.kind, &path_in(folder, self)).ok().flatten();
+        let unpacked = unpacked.map(|folder| folder.display().to_string());
         let unpacked = unpacked.iter().flat_map(|folder| [UNPACKED, folder.as_str()]);
         let words = command(&unpacked.chain(arguments.iter().copied()).collect::<Vec<_>>());
         // A word with a NUL character, which cannot be quoted, names no file.
@@ -123,6 +124,12 @@ impl NativeSettings {
 
     fn try_with(&self, folder: Option<&Path>, variables: Option<&Variables>) -> Result<Identity, NativeError> {
         let text = serde_json::to_string(&variables).unwrap_or_default();
+        // Before the process has its time to load what was unpacked.
+        unpack_for_children(self.kind, &path_in(folder, self)).map_err(|error| NativeError::Refused {
+            controller: self.text(),
+            reason: error.to_string(),
+            is_io: error.is_io(),
+        })?;
         let settings = self.process(folder, &["probe", &self.text(), &text]);
         let controller = self.text();
         let crash = |error: ExecError| NativeError::Crash { controller: controller.clone(), reason: error.to_string() };
@@ -218,7 +225,7 @@ fn path_in(folder: Option<&Path>, settings: &NativeSettings) -> PathBuf {
 fn file_hash(path: &Path) -> String {
     let hash = || -> std::io::Result<blake3::Hash> {
         let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(std::fs::File::open(path)?)?;
+        hasher.update_reader(closecall_traffic::input::open(path)?)?;
         Ok(hasher.finalize())
     };
     hash().map_or_else(|error| error.to_string(), |hash| hash.to_string())

@@ -2,6 +2,7 @@
 
 use closecall_campaign::folder::Folder;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input;
 
 use super::FailureRow;
 
@@ -11,7 +12,7 @@ pub const CAUSES: &str = "causes.json";
 /// Reads the rows that previous explanations of the campaign have kept. A file that cannot be read
 /// counts as none: the rows can be made again.
 pub fn read_rows(folder: &Folder) -> Vec<FailureRow> {
-    let text = std::fs::read_to_string(folder.file(CAUSES)).unwrap_or_default();
+    let text = input::read_text(&folder.file(CAUSES)).unwrap_or_default();
     serde_json::from_str(&text).unwrap_or_default()
 }
 

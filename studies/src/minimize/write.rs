@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use closecall_campaign::action::CommandFor;
 use closecall_scenarios::{ScenarioFile, Setting, SettingError};
 use closecall_traffic::atomic::write_file;
+use closecall_traffic::input;
 use serde::Serialize;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
@@ -37,7 +38,8 @@ pub fn output_files(case: &Case, output: Option<&Path>) -> Result<[PathBuf; 2], 
     let failing = output.map_or_else(usual, Path::to_owned);
     let stem = failing.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let files = [failing.clone(), failing.with_file_name(format!("{stem}-passes.toml"))];
-    let is_foreign = |path: &&PathBuf| std::fs::read(path).is_ok_and(|bytes| !bytes.starts_with(MADE.as_bytes()));
+    let is_foreign =
+        |path: &&PathBuf| path.exists() && !input::read_text(path).is_ok_and(|text| text.starts_with(MADE));
     match files.iter().find(is_foreign) {
         Some(path) => Err(CausesError::Foreign { path: path.clone() }),
         None => Ok(files),

@@ -126,20 +126,24 @@ pub(crate) fn use_unpacked(folder: PathBuf) {
     BY_PARENT.get_or_init(|| folder);
 }
 
-/// Unpacks an FMU once for all processes that this process starts, and returns the folder. Returns
-/// `None` if it cannot be unpacked: a process that tries it again says why. No code of the FMU
-/// runs.
-pub(crate) fn unpacked_for_children(path: &Path) -> Option<PathBuf> {
-    let metadata = path.metadata().ok()?;
-    let seen = (metadata.modified().ok()?, metadata.len());
+/// Unpacks an FMU once for all processes that this process starts, and returns the folder. No code
+/// of the FMU runs.
+///
+/// # Errors
+/// [`LoadError`] if it cannot be unpacked.
+pub(crate) fn unpacked_for_children(path: &Path) -> Result<PathBuf, LoadError> {
+    let read = |source| LoadError::Read { path: path.display().to_string(), source };
+    let metadata = path.metadata().map_err(read)?;
+    let seen = (metadata.modified().map_err(read)?, metadata.len());
     let mut unpacked = UNPACKED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, folder)) = unpacked.get(path).filter(|(unpacked_as, _)| *unpacked_as == seen) {
-        return Some(folder.path.clone());
+        return Ok(folder.path.clone());
     }
-    let Unpacked { folder: Some(folder), .. } = unpack_into_new(path).ok()? else { return None };
-    let place = folder.path.clone();
-    unpacked.insert(path.to_owned(), (seen, folder));
-    Some(place)
+    let Unpacked { folder, place, .. } = unpack_into_new(path)?;
+    if let Some(folder) = folder {
+        unpacked.insert(path.to_owned(), (seen, folder));
+    }
+    Ok(place)
 }
 
 /// Removes what this process has unpacked for others.

@@ -6,6 +6,7 @@
 //! sides. The threads end with the process, whose pipes then close.
 
 use std::io::{Read, Write};
+use std::os::fd::{AsFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel};
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
-use super::error::ExecError;
+use super::error::{ExecError, is_starting};
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::processes::{self, Entry};
 use super::settings::ExecSettings;
@@ -49,6 +50,8 @@ pub struct Child {
     /// `None` once the standard input of the process is to be closed.
     requests: Option<Sender<Vec<u8>>>,
     answers: Receiver<Line>,
+    /// The pipe from which the reading thread reads, to see what it has not read yet.
+    answer_pipe: Option<OwnedFd>,
     /// The end of standard error.
     stderr: Arc<Mutex<Tail>>,
     /// Disconnected once standard error is closed.
@@ -95,6 +98,7 @@ impl Child {
             process,
             requests: Some(requests),
             answers,
+            answer_pipe: pipes.1.as_ref().and_then(|stdout| stdout.as_fd().try_clone_to_owned().ok()),
             stderr: Arc::clone(&stderr_tail),
             stderr_end,
             memory_mib: settings.memory_mib,
@@ -245,8 +249,9 @@ impl Child {
         self.send(line);
         match self.wait(limit)? {
             Some(answer) => Ok(answer),
-            // A second wait distinguishes a late process from one that hangs.
-            None => Err(match self.wait(limit)? {
+            // A second wait distinguishes a late process from one that hangs. The limit of the start
+            // is long enough for that.
+            None => Err(match if is_starting(self.answered) { None } else { self.wait(limit)? } {
                 Some(_) => ExecError::Late { limit_ms: limit.as_millis(), answered: self.answered },
                 None => {
                     let (limit_ms, answered, stderr) = (limit.as_millis(), self.answered, self.last_lines());
@@ -259,12 +264,25 @@ impl Child {
     /// Returns an error if the process has written a line since its last answer, which would be
     /// mistaken for the next one.
     fn reject_unrequested_line(&mut self) -> Result<(), ExecError> {
-        match self.answers.try_recv() {
+        let line = match self.answers.try_recv() {
+            // The process has written, and the reading thread has not come to it.
+            Err(TryRecvError::Empty) if self.has_unread() => self.answers.recv_timeout(EXIT_TIMEOUT),
+            Err(TryRecvError::Empty) => return Ok(()),
+            Err(TryRecvError::Disconnected) => return Err(self.exit_error()),
+            Ok(line) => Ok(line),
+        };
+        match line {
             Ok(Line::Whole(line)) => Err(ExecError::OutOfTurn { answered: self.answered, line: excerpt(&line) }),
             Ok(Line::TooLong) => Err(ExecError::LongLine { limit: MAX_LINE_BYTES }),
-            Err(TryRecvError::Disconnected) => Err(self.exit_error()),
-            Err(TryRecvError::Empty) => Ok(()),
+            Err(RecvTimeoutError::Disconnected) => Err(self.exit_error()),
+            // The begin of a line: its end may come as an answer.
+            Err(RecvTimeoutError::Timeout) => Ok(()),
         }
+    }
+
+    /// Returns whether the process has written what nobody has read yet.
+    fn has_unread(&self) -> bool {
+        self.answer_pipe.as_ref().is_some_and(|pipe| rustix::io::ioctl_fionread(pipe).is_ok_and(|bytes| bytes > 0))
     }
 
     /// Returns the next line, or `None` if there is none within the time limit.

@@ -49,8 +49,11 @@ pub enum ExecError {
         /// Number of answers before, including the greeting.
         answered: u64,
     },
-    /// The process did not answer within twice the time limit.
-    #[error("the process hangs: no answer in twice the {limit_ms} ms allowed, {}{}", when(*answered), last_lines(stderr))]
+    /// The process did not answer within twice the time limit, or at its start within the limit.
+    #[error(
+        "the process hangs: no answer in {}the {limit_ms} ms allowed, {}{}",
+        if is_starting(*answered) { "" } else { "twice " }, when(*answered), last_lines(stderr)
+    )]
     Hangs {
         /// The time limit (ms).
         limit_ms: u128,
@@ -132,6 +135,11 @@ impl ExecError {
     pub const fn is_late(&self) -> bool {
         matches!(self, Self::Late { .. } | Self::Hangs { .. })
     }
+}
+
+/// Returns true until the first answer after the greeting: a process has a longer limit for both.
+pub(super) const fn is_starting(answered: u64) -> bool {
+    answered < 2
 }
 
 /// Describes when an error happened by the number of answers before it. The first answer is the
