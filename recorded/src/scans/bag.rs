@@ -12,8 +12,8 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use super::cdr::{odometry, point_cloud};
 use super::error::{Origin, ScanFileError, ScanFileProblem};
+use super::options::{ScanOptions, TakenScan};
 use super::poses::Poses;
-use super::{ScanOptions, TakenScan};
 
 const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 const ODOMETRY: &str = "nav_msgs/msg/Odometry";

@@ -3,8 +3,8 @@
 use closecall_sensors::lidar::{PointTimes, RecordedPoints};
 use closecall_traffic::Time;
 
-use super::ScanOptions;
 use super::error::ScanFileProblem;
+use super::options::ScanOptions;
 
 const NS_PER_S: f64 = 1e9;
 

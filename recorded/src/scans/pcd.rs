@@ -9,8 +9,8 @@ use closecall_traffic::Time;
 
 use super::cloud::{Cloud, Field, Number};
 use super::error::{Origin, ScanFileError, ScanFileProblem};
+use super::options::{ScanOptions, TakenScan, mirror_side};
 use super::text_table::read_table;
-use super::{ScanOptions, TakenScan, mirror_side};
 
 /// The name of the index in the folder.
 pub const INDEX: &str = "scans.csv";

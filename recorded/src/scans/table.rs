@@ -11,7 +11,7 @@ use closecall_traffic::Time;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
 use super::error::{Origin, ScanFileError, ScanFileProblem};
-use super::{ScanOptions, TakenScan, mirror_side};
+use super::options::{ScanOptions, TakenScan, mirror_side};
 
 /// The table, with the scan whose rows are being collected.
 pub(super) struct TableRecording {
