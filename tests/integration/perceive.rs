@@ -17,6 +17,11 @@ use serde_json::Value;
 
 use crate::support::{ROOT, closecall, code, folder, json, message, stdout};
 
+/// The rear vehicle starts near the ego.
+const NEAR: &str = "actor.rear.start.behind.gap-m=45";
+/// The sample of a run, for the study of its scans.
+const SAMPLE: [&str; 6] = ["--seed", "3", "--sample", "2", "--set", NEAR];
+
 /// Scenarios whose tracks must come out again: what is added to the headline, and the options of both commands.
 const ROUND_TRIPS: [(&str, &str); 3] = [
     ("", "scans.parquet"),
@@ -72,13 +77,11 @@ fn rear_rows(path: &Path) -> Vec<(Vec<String>, Vec<String>)> {
 /// Runs a sample of the headline with these lines, and records its scans and its tracks. Returns the scenario, the scans and the tracks.
 fn record(folder: &Path, lines: &str, scans: &str) -> [PathBuf; 3] {
     let [scenario, scans, tracks] = ["scenario.toml", scans, "run.parquet"].map(|name| folder.join(name));
-    let text = format!(
-        "base = \"low-thw-overtake\"\nduration-s = 4\nactor.rear.start.behind.gap-m = 45\nsensors.rear-camera.pipeline = \"off\"\n{lines}"
-    );
+    let text = format!("base = \"low-thw-overtake\"\nduration-s = 4\nsensors.rear-camera.pipeline = \"off\"\n{lines}");
     std::fs::write(&scenario, text).unwrap();
     let [of_scenario, of_scans, of_tracks] = [&scenario, &scans, &tracks].map(|path| path.to_str().unwrap());
     let options = ["--sensors", "full", "--seed", "3", "--sample", "2", "--controller", "mis"];
-    let files = ["--scans", of_scans, "--tracks", of_tracks];
+    let files = ["--set", NEAR, "--scans", of_scans, "--tracks", of_tracks];
     stdout(&closecall([&["run", of_scenario], &options[..], &files].concat()), 0);
     [scenario, scans, tracks]
 }
@@ -96,7 +99,7 @@ fn the_recorded_scans_of_a_run_give_its_tracks_again_to_the_bit() {
     for (lines, name) in ROUND_TRIPS {
         let folder = folder();
         let [scenario, scans, tracks] = record(folder.path(), lines, name);
-        let (result, perceived) = perceive(&scans, &scenario, &["--seed", "3", "--sample", "2"]);
+        let (result, perceived) = perceive(&scans, &scenario, &SAMPLE);
         let (expected, perceived) = (rear_rows(&tracks), rear_rows(&perceived));
         assert!(expected.len() > 60, "{lines}: {} rows", expected.len());
         assert_eq!(perceived.len(), expected.len(), "{lines}");
@@ -118,7 +121,7 @@ fn other_settings_of_the_chain_give_other_tracks() {
     for setting in
         ["sensors.cluster-core-points=6", "sensors.tracker.latency-s=0", "sensors.rear-lidar.mount-height-m=0.9"]
     {
-        let (_, perceived) = perceive(&scans, &scenario, &["--seed", "3", "--sample", "2", "--set", setting]);
+        let (_, perceived) = perceive(&scans, &scenario, &[&SAMPLE[..], &["--set", setting]].concat());
         assert_ne!(rear_rows(&perceived), rear_rows(&tracks), "{setting}");
     }
 }
@@ -243,7 +246,7 @@ const ODOMETRY: &str = "nav_msgs/msg/Odometry";
 fn the_messages_of_ros_2_give_the_tracks_of_the_table() {
     let folder = folder();
     let [scenario, scans, _] = record(folder.path(), "", "scans.parquet");
-    let (expected, _) = perceive(&scans, &scenario, &["--seed", "3", "--sample", "2"]);
+    let (expected, _) = perceive(&scans, &scenario, &SAMPLE);
     let poses = std::fs::read_to_string(folder.path().join("scans.poses.csv")).unwrap();
     let pose = |line: &str| -> Vec<f64> { line.split(',').map(|value| value.parse().unwrap()).collect() };
     let mut messages: Vec<(&str, &str, f64, Vec<u8>)> = Vec::new();
@@ -258,7 +261,7 @@ fn the_messages_of_ros_2_give_the_tracks_of_the_table() {
     let bag = folder.path().join("drive.mcap");
     for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
         write_mcap(&bag, compression, &messages);
-        let (result, _) = perceive(&bag, &scenario, &["--seed", "3", "--sample", "2"]);
+        let (result, _) = perceive(&bag, &scenario, &SAMPLE);
         // The place on the road follows from the path, and the sensor is taken to be level.
         assert_eq!(result["road"], "path");
         for key in ["scans", "points"] {
@@ -384,18 +387,7 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
         lines.swap(last, last - 1);
         (lines.join("\n") + "\n").into_bytes()
     };
-    let nan = {
-        let mut bytes = good("scan-00.pcd");
-        let at = bytes.windows(12).position(|window| window == b"DATA binary\n").unwrap() + 12;
-        bytes[at + 4..at + 8].copy_from_slice(&f32::NAN.to_le_bytes());
-        bytes
-    };
     let cases: Vec<(&str, Vec<u8>, &str)> = vec![
-        (
-            "scan-00.pcd",
-            nan,
-            "scan-00.pcd: point 0 has y = NaN, but a finite number is needed; --drop-invalid leaves out",
-        ),
         ("scan-00.pcd", replaced("scan-00.pcd", "FIELDS x ", "FIELDS u "), "no field `x`, only u, y, z"),
         ("scan-00.pcd", replaced("scan-00.pcd", "DATA binary", "DATA zip"), "`zip` is unknown; `ascii`, `binary` and"),
         ("scan-00.pcd", good("scan-00.pcd")[..900].to_vec(), "have "),
@@ -435,11 +427,19 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
             "is not after 0 s, the previous one of `rear-lidar`",
         ),
     ];
+    let args = ["study", "perceive", recording.to_str().unwrap(), scenario.to_str().unwrap(), "--frame", "sensor"];
+    // The beams without a return have no position.
+    let output = closecall(args);
+    let text = message(&output);
+    assert!(
+        code(&output) == 3 && text.contains("scan-00.pcd: point 0 has x = NaN, but a finite number is needed"),
+        "{text}"
+    );
+    assert!(text.contains("--drop-invalid leaves out points without a position"), "{text}");
     for (name, bytes, expected) in cases {
         let before = good(name);
         std::fs::write(recording.join(name), bytes).unwrap();
-        let args = ["study", "perceive", recording.to_str().unwrap(), scenario.to_str().unwrap(), "--frame", "sensor"];
-        let output = closecall(args);
+        let output = closecall([&args[..], &["--drop-invalid"]].concat());
         let text = message(&output);
         assert_eq!(code(&output), 3, "{expected}: {text}");
         assert!(text.contains(expected), "{expected}: {text}");

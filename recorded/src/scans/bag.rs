@@ -173,7 +173,7 @@ impl BagRecording {
             };
             let origin = message.origin(&self.messages.origin);
             let points = point_cloud(&message.data)
-                .and_then(|(stamp, cloud)| cloud.into_points((stamp, options.stamp_is_start), options))
+                .and_then(|(stamp, cloud)| cloud.into_points(stamp, options))
                 .map_err(|problem| origin.error(problem))?;
             return Ok(Some(TakenScan { sensor: *sensor, origin, points }));
         }

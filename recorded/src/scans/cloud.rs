@@ -4,9 +4,7 @@ use closecall_sensors::lidar::{PointTimes, RecordedPoints};
 use closecall_traffic::Time;
 
 use super::error::ScanFileProblem;
-use super::options::ScanOptions;
-
-const NS_PER_S: f64 = 1e9;
+use super::options::{NS_PER_S, ScanOptions};
 
 /// The type of a number in a point cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,37 +112,27 @@ impl Cloud {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// Returns the points of a scan whose stamp is `stamp`. With `is_start`, the stamp is the start
-    /// of the scan, whose end is the time of its last point.
-    pub(super) fn into_points(
-        self,
-        (stamp, is_start): (Time, bool),
-        options: &ScanOptions,
-    ) -> Result<RecordedPoints, ScanFileProblem> {
+    /// Returns the points of a scan with this stamp.
+    pub(super) fn into_points(self, stamp: Time, options: &ScanOptions) -> Result<RecordedPoints, ScanFileProblem> {
         let needed = |name: &'static str| {
             self.column(name).ok_or_else(|| ScanFileProblem::MissingField { name, fields: self.names.join(", ") })
         };
-        let at_m = [single(needed("x")?), single(needed("y")?), single(needed("z")?)];
-        let intensity = self.column("intensity").map(single);
-        let beam = self.column("beam").map(beams).transpose()?;
-        let mut points = RecordedPoints { end: stamp, at_m, intensity, beam, ..RecordedPoints::default() };
-        points.times = match self.column("time").or_else(|| self.column("timestamp")) {
+        let times = match self.column("time").or_else(|| self.column("timestamp")) {
             Some(column) if column.number == Number::F64 => PointTimes::Absolute(column.values.clone()),
             Some(column) => PointTimes::Absolute(column.values.iter().map(|after_s| stamp.s() + after_s).collect()),
             None => match self.column("offset_ns").or_else(|| self.column("t")) {
-                Some(column) if is_start => {
-                    PointTimes::Absolute(column.values.iter().map(|ns| stamp.s() + ns / NS_PER_S).collect())
-                }
                 Some(column) => PointTimes::SinceStart(offsets(column)?),
                 None => PointTimes::Unknown,
             },
         };
-        let mut points = options.prepared(points);
-        if is_start {
-            let PointTimes::Absolute(times_s) = &points.times else { return Err(ScanFileProblem::NoEnd) };
-            points.end = times_s.iter().map(|time_s| Time::from_s(*time_s)).max().unwrap_or(stamp);
-        }
-        Ok(points)
+        options.prepared(RecordedPoints {
+            end: stamp,
+            at_m: [single(needed("x")?), single(needed("y")?), single(needed("z")?)],
+            intensity: self.column("intensity").map(single),
+            beam: self.column("beam").map(beams).transpose()?,
+            times,
+            ..RecordedPoints::default()
+        })
     }
 }
 

@@ -1,8 +1,11 @@
 //! How a recording is read, and a scan of it.
 
-use closecall_sensors::lidar::{MirrorSide, RecordedPoints};
+use closecall_sensors::lidar::{MirrorSide, PointTimes, RecordedPoints};
+use closecall_traffic::Time;
 
 use super::error::{Origin, ScanFileProblem};
+
+pub(super) const NS_PER_S: f64 = 1e9;
 
 /// How a recording is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,12 +54,10 @@ impl ScanOptions {
         }
     }
 
-    /// Returns the points with reflectivities, without those that have no return.
-    #[expect(clippy::float_cmp, reason = "a factor of exactly 1 changes nothing")]
-    pub(super) fn prepared(&self, mut points: RecordedPoints) -> RecordedPoints {
-        if self.intensity_scale != 1.0 {
-            points.intensity.iter_mut().flatten().for_each(|value| *value *= self.intensity_scale);
-        }
+    /// Returns the points with reflectivities, without those that have no return, and with the end of
+    /// their scan if its stamp is the start.
+    pub(super) fn prepared(&self, mut points: RecordedPoints) -> Result<RecordedPoints, ScanFileProblem> {
+        points.intensity.iter_mut().flatten().for_each(|value| *value *= self.intensity_scale);
         if self.drops_invalid {
             let is_point = |point: usize| {
                 let at_m = [0, 1, 2].map(|axis| points.at_m[axis][point]);
@@ -65,7 +66,16 @@ impl ScanOptions {
             let is_kept: Vec<bool> = (0..points.len()).map(is_point).collect();
             points.retain(&is_kept);
         }
-        points
+        if self.stamp_is_start {
+            let start_s = points.end.s();
+            if let PointTimes::SinceStart(offset_ns) = &points.times {
+                points.times =
+                    PointTimes::Absolute(offset_ns.iter().map(|ns| start_s + f64::from(*ns) / NS_PER_S).collect());
+            }
+            let PointTimes::Absolute(times_s) = &points.times else { return Err(ScanFileProblem::NoEnd) };
+            points.end = times_s.iter().map(|time_s| Time::from_s(*time_s)).max().unwrap_or(points.end);
+        }
+        Ok(points)
     }
 }
 

@@ -76,7 +76,7 @@ impl PcdRecording {
         let origin = Origin::file(&entry.path);
         let bytes = std::fs::read(&entry.path).map_err(|error| origin.error(error))?;
         let cloud = parse(&bytes).map_err(|problem| origin.error(problem))?;
-        let points = cloud.into_points((entry.time, options.stamp_is_start), options);
+        let points = cloud.into_points(entry.time, options);
         let mut points = points.map_err(|problem| origin.error(problem))?;
         (points.mirror_side, points.sensor_x_m) = (entry.mirror_side, entry.sensor_x_m);
         Ok(Some(TakenScan { sensor: entry.sensor, origin, points }))
@@ -268,7 +268,7 @@ mod tests {
 
     fn read(bytes: &[u8]) -> Result<Vec<[f32; 3]>, String> {
         let cloud = parse(bytes).map_err(|problem| problem.to_string())?;
-        let points = cloud.into_points((Time::ZERO, false), &options()).map_err(|problem| problem.to_string())?;
+        let points = cloud.into_points(Time::ZERO, &options()).map_err(|problem| problem.to_string())?;
         Ok((0..points.len()).map(|point| [0, 1, 2].map(|axis| points.at_m[axis][point])).collect())
     }
 

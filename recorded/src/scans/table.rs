@@ -24,6 +24,15 @@ pub(super) struct TableRecording {
     rows_before: usize,
 }
 
+/// The rows of one scan: its LiDAR, the number of its first row, its points, and the side of its
+/// mirror.
+struct PointRows {
+    name: Option<String>,
+    first_row: usize,
+    points: RecordedPoints,
+    side: Option<String>,
+}
+
 /// The columns of a batch of rows.
 struct Rows {
     count: usize,
@@ -50,30 +59,28 @@ impl TableRecording {
 
     pub(super) fn next_scan(&mut self, options: &ScanOptions) -> Result<Option<TakenScan>, ScanFileError> {
         loop {
-            let Some(scan) = self.next_rows()? else { return Ok(None) };
-            let (name, first_row, mut points, side) = scan;
+            let Some(PointRows { name, first_row, mut points, side }) = self.next_rows()? else { return Ok(None) };
             let origin = self.origin.at(format_args!("from row {first_row} on"));
+            let in_column =
+                |column, problem| self.origin.at(format_args!("row {first_row}, column `{column}`")).error(problem);
             let sensor = match name {
                 Some(name) => match options.sensor(&name) {
                     Ok(Some(sensor)) => sensor,
                     Ok(None) => continue,
-                    Err(problem) => {
-                        return Err(origin.at(format_args!("row {first_row}, column `sensor`")).error(problem));
-                    }
+                    Err(problem) => return Err(in_column("sensor", problem)),
                 },
                 None => options.only_sensor().map_err(|problem| origin.error(problem))?,
             };
-            let of_column = |problem| origin.at(format_args!("row {first_row}, column `mirror_side`")).error(problem);
-            points.mirror_side = mirror_side(side.as_deref()).map_err(of_column)?;
-            return Ok(Some(TakenScan { sensor, origin, points: options.prepared(points) }));
+            points.mirror_side = mirror_side(side.as_deref()).map_err(|problem| in_column("mirror_side", problem))?;
+            let points = options.prepared(points).map_err(|problem| origin.error(problem))?;
+            return Ok(Some(TakenScan { sensor, origin, points }));
         }
     }
 
     /// Returns the rows of the next scan: those that follow each other with the same sensor and
-    /// time, with the number of the first.
-    #[expect(clippy::type_complexity, reason = "the parts of one scan, which are taken apart at once")]
-    fn next_rows(&mut self) -> Result<Option<(Option<String>, usize, RecordedPoints, Option<String>)>, ScanFileError> {
-        let mut scan: Option<(Option<String>, usize, RecordedPoints, Option<String>)> = None;
+    /// time.
+    fn next_rows(&mut self) -> Result<Option<PointRows>, ScanFileError> {
+        let mut scan: Option<PointRows> = None;
         loop {
             if self.batch.as_ref().is_none_or(|rows| self.row == rows.count) && !self.next_batch()? {
                 return Ok(scan);
@@ -82,11 +89,11 @@ impl TableRecording {
             while self.row < rows.count {
                 let row = self.row;
                 let (name, end) = (rows.sensor.as_ref().map(|names| &names[row]), Time::from_s(rows.time_s[row]));
-                let (of_scan, _, points, _) = scan.get_or_insert_with(|| rows.first(row, self.rows_before + row));
-                if of_scan.as_ref() != name || points.end != end {
+                let of_scan = scan.get_or_insert_with(|| rows.first(row, self.rows_before + row));
+                if of_scan.name.as_ref() != name || of_scan.points.end != end {
                     return Ok(scan);
                 }
-                rows.append(row, points);
+                rows.append(row, &mut of_scan.points);
                 self.row += 1;
             }
         }
@@ -96,7 +103,10 @@ impl TableRecording {
     fn next_batch(&mut self) -> Result<bool, ScanFileError> {
         self.rows_before += self.batch.as_ref().map_or(0, |rows| rows.count);
         self.row = 0;
-        let Some(batch) = self.reader.next() else { return Ok(false) };
+        let Some(batch) = self.reader.next() else {
+            self.batch = None;
+            return Ok(false);
+        };
         let damaged = |error: arrow::error::ArrowError| {
             self.origin.error(ScanFileProblem::Points(format!("it is no table that can be read: {error}")))
         };
@@ -173,8 +183,8 @@ impl Rows {
     }
 
     /// Returns a scan without points that has the sensor and the time of a row, whose number in the
-    /// table is `number`.
-    fn first(&self, row: usize, number: usize) -> (Option<String>, usize, RecordedPoints, Option<String>) {
+    /// table is `first_row`.
+    fn first(&self, row: usize, first_row: usize) -> PointRows {
         let points = RecordedPoints {
             end: Time::from_s(self.time_s[row]),
             intensity: self.intensity.as_ref().map(|_| Vec::new()),
@@ -184,7 +194,7 @@ impl Rows {
             ..RecordedPoints::default()
         };
         let side = self.side.as_ref().and_then(|sides| sides[row].clone());
-        (self.sensor.as_ref().map(|names| names[row].clone()), number, points, side)
+        PointRows { name: self.sensor.as_ref().map(|names| names[row].clone()), first_row, points, side }
     }
 
     /// Appends the point of a row.
