@@ -47,7 +47,7 @@ enum Stamp {
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall study perceive scans.parquet",
-    "closecall study perceive drive.mcap my-sensors.toml --frame sensor --stamp start --intensity-scale 0.01",
+    "closecall study perceive drive.mcap my-sensors.toml --frame sensor --stamp start",
     "closecall study perceive clouds my-sensors.toml --labels boxes.csv --tracks tracks.parquet",
 ]))]
 pub(super) struct PerceiveArgs {
