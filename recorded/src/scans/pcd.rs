@@ -280,8 +280,10 @@ mod tests {
         let point_by_point: Vec<u8> = expected.iter().flatten().flat_map(|value: &f32| value.to_le_bytes()).collect();
         let binary = [format!("{HEADER}DATA binary\n").as_bytes(), &point_by_point].concat();
         assert_eq!(read(&binary), Ok(expected.clone()));
-        let by_field: Vec<u8> =
-            [0, 1, 2].iter().flat_map(|axis| expected.iter().flat_map(|point| point[*axis].to_le_bytes())).collect();
+        let by_field: Vec<u8> = [0, 1, 2]
+            .iter()
+            .flat_map(|axis| expected.iter().flat_map(move |point| point[*axis].to_le_bytes()))
+            .collect();
         // All bytes as literals: a control byte of 23 introduces 24 of them.
         let compressed = [&25_u32.to_le_bytes()[..], &24_u32.to_le_bytes(), &[23], &by_field].concat();
         let bytes = [format!("{HEADER}DATA binary_compressed\n").as_bytes(), &compressed].concat();

@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn the_place_on_a_map_is_kept_to_the_bit() {
-        let on_road = Some([1_234.567_890_123_456_7, -5.1, 0.001]);
+        let on_road = Some([1_234.567_89, -5.1, 0.001]);
         let pose = Pose { time: Time::from_ms(40), on_road, ..Pose::default() };
         let (_, ego) =
             Poses::new(Origin::file("map"), vec![pose]).unwrap().place_at(pose.time, &Road::straight(3), 0.0).unwrap();
