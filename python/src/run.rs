@@ -18,7 +18,7 @@ use closecall_scenarios::outcome::Outcome;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::trajectories::TraceRecorder;
-use closecall_simulation::{Arm, ControllerFactory, Observer, RunEvent, RunKey, SampleError, StepView};
+use closecall_simulation::{Arm, ControllerFactory, Observer, RunEvent, RunKey, SampleError, SettlingView, StepView};
 use closecall_traffic::Time;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -106,6 +106,10 @@ impl Observer for Recorders {
         self.trace.step(view);
         self.tracks.step(view);
         self.clusters.step(view);
+    }
+
+    fn settling(&mut self, view: &SettlingView<'_>) {
+        self.clusters.settling(view);
     }
 
     fn event(&mut self, time: Time, what: &RunEvent) {

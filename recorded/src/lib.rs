@@ -9,4 +9,5 @@ pub mod fit;
 pub mod following;
 pub mod lane_change;
 pub mod robustness;
+pub mod scans;
 pub mod trajectory_data;

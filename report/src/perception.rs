@@ -14,6 +14,9 @@ use closecall_studies::perception::study::Study;
 
 mod chart;
 mod page;
+mod recorded;
+
+pub use recorded::RecordedReport;
 
 /// One study, or two that are compared.
 #[derive(Clone, Debug)]

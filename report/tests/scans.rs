@@ -62,7 +62,8 @@ fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
             let is_rear = sensor.value(row) == "rear-lidar";
             let (layers, rate_hz) = if is_rear { (16, 25) } else { (64, 10) };
             assert_eq!(beam.value(row), of_column.value(row) * layers + layer.value(row));
-            assert!((0.0..=1.0).contains(&time_s.value(row)) && offset_ns.value(row) < 1_000_000_000 / rate_hz);
+            // The sensors settle in the second before the start.
+            assert!((-1.0..=1.0).contains(&time_s.value(row)) && offset_ns.value(row) < 1_000_000_000 / rate_hz);
             // The error of a range is below five standard deviations at the threshold, which the
             // files of the two kinds state. There are no droplets and no faults.
             let five_sd_m = if is_rear { 0.5 } else { 1.2 };
@@ -96,8 +97,8 @@ fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
     assert!(rows > 10_000 && of_actors > 500 && clustered > 500, "{rows} {of_actors} {clustered}");
     assert!(clustered < rows, "the road belongs to no box");
     assert_eq!(sides.len(), 2, "{sides:?}");
-    // A second has 26 control steps with its ends.
-    assert!((10..=11).contains(&frames[0]) && (25..=26).contains(&frames[1]), "{frames:?}");
+    // The run has 26 control steps with its ends, and 25 before it.
+    assert!((20..=21).contains(&frames[0]) && (50..=51).contains(&frames[1]), "{frames:?}");
 }
 
 #[test]
@@ -186,6 +187,10 @@ fn the_point_clouds_are_read_back_as_the_rows_of_the_table() {
     let mut names: Vec<String> =
         std::fs::read_dir(&clouds).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
+    let tables: Vec<String> = names.extract_if(.., |name| name.ends_with(".csv")).collect();
+    assert_eq!(tables, ["labels.csv", "poses.csv", "scans.csv"]);
+    let index = std::fs::read_to_string(clouds.join("scans.csv")).unwrap();
+    assert_eq!(index.lines().skip(1).count(), names.len());
     assert_eq!(names, expected.keys().cloned().collect::<Vec<_>>());
     assert!(names.len() > 30, "{} files", names.len());
     for (name, rows) in expected {

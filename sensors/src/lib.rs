@@ -27,6 +27,7 @@ pub mod lidar;
 mod lidar_chain;
 mod object;
 mod perception;
+mod recorded;
 mod surroundings;
 #[cfg(test)]
 mod testing;
@@ -52,4 +53,5 @@ pub use object::{
     ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
 pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth, UsedBox};
+pub use recorded::{RecordedPerception, RecordedScanError};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

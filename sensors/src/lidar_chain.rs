@@ -20,14 +20,14 @@
 //! denser clusters where fields of view overlap.
 
 use crate::tracking::{BoxUse, RearView, TrackList, Tracker, TrackerModel, TrackerScan};
-use closecall_traffic::Time;
 use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::{Road, Time, VehicleState};
 
 use crate::external::{Outside, PerceptionAnswer};
 use crate::faults::{FaultList, LidarFault};
 
 use crate::detection_classifier::DetectionClassifier;
-use crate::lidar::{Lidar, RESERVED_CLUSTERS};
+use crate::lidar::{Lidar, LidarScan, RESERVED_CLUSTERS};
 use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
 use crate::surroundings::OtherVehicle;
@@ -171,6 +171,20 @@ impl LidarChain {
         }
         self.push(&seen, scans);
         Ok(())
+    }
+
+    /// Detects boxes in a recorded scan of the sensor with this number, and appends it to the queue
+    /// of pending scans, as [`Self::detect`] does with a simulated one.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a point is not finite.
+    pub(crate) fn take_recorded(
+        &mut self,
+        sensor: usize,
+        scan: &LidarScan,
+        place: (&Road, VehicleState),
+    ) -> Result<(), SensorError> {
+        self.sensors[sensor].push_recorded(scan, place, self.step + self.latency_steps as u64)
     }
 
     /// Returns the number of the next step.

@@ -23,7 +23,7 @@ mod world;
 
 pub use closecall_traffic::CONTROL_STEP;
 pub use run::{
-    Arm, ControllerFactory, CurrentMargins, Lead, NoObserver, Observer, RunEvent, RunKey, SampleError, StepView,
-    Stepper, TrackAuditor, simulate,
+    Arm, ControllerFactory, CurrentMargins, Lead, NoObserver, Observer, RunEvent, RunKey, SampleError, SettlingView,
+    StepView, Stepper, TrackAuditor, simulate,
 };
 pub use world::Performance;

@@ -165,7 +165,7 @@ enum Command {
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
 /// know them by their name alone.
-const GROUPED: [(&str, &str); 28] = [
+const GROUPED: [(&str, &str); 29] = [
     ("anchor", "study anchor"),
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
@@ -184,6 +184,7 @@ const GROUPED: [(&str, &str); 28] = [
     ("map", "study map"),
     ("merge", "tool merge"),
     ("paper", "traffic paper"),
+    ("perceive", "study perceive"),
     ("record", "traffic record"),
     ("reenact", "traffic reenact"),
     ("render", "tool render"),

@@ -14,6 +14,7 @@ use closecall_recorded::aerial::AerialError;
 use closecall_recorded::encounter::{Lead, NoEncounter};
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
+use closecall_recorded::scans::{ScanFileError, ScanFileProblem};
 use closecall_recorded::trajectory_data::{
     TrajectoryFileError, TrajectoryFileProblem, WriteError as TrajectoryWriteError,
 };
@@ -29,12 +30,14 @@ use closecall_scenarios::openscenario::ImportFailure;
 use closecall_scenarios::source::SourceError;
 use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::datasets::DatasetError;
+use closecall_sensors::lidar::PointError;
 use closecall_simulation::SampleError;
 use closecall_simulation::controller::ArmsError;
 use closecall_simulation::controller::native::NativeError;
 use closecall_studies::CausesError;
 use closecall_studies::fidelity::FidelityError;
 use closecall_studies::perception::StudyError;
+use closecall_studies::perception::recorded::RecordedStudyError;
 use closecall_traffic::atomic::WriteError;
 
 use super::keywords::Argument;
@@ -171,6 +174,12 @@ pub enum CliError {
     /// The sensors cannot be studied.
     #[error(transparent)]
     Sensors(#[from] StudyError),
+    /// Recorded scans cannot be used.
+    #[error("{_0}{}", point_remedy(&_0.problem))]
+    Scans(ScanFileError),
+    /// A recorded scan cannot be processed.
+    #[error(transparent)]
+    Perceive(RecordedStudyError),
     /// A campaign cannot be compared with a baseline.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
@@ -183,6 +192,31 @@ impl CliError {
     /// Returns the error of arguments that clap does not refuse.
     pub(super) fn usage(message: impl Into<String>) -> Self {
         Self::Usage { message: message.into() }
+    }
+}
+
+impl From<ScanFileError> for CliError {
+    fn from(error: ScanFileError) -> Self {
+        Self::Scans(error)
+    }
+}
+
+impl From<RecordedStudyError> for CliError {
+    fn from(error: RecordedStudyError) -> Self {
+        match error {
+            RecordedStudyError::File(error) => Self::Scans(error),
+            error @ RecordedStudyError::Sensor(_) => Self::Perceive(error),
+        }
+    }
+}
+
+/// Returns the option that reads recorded points in spite of the problem, if there is one.
+fn point_remedy(problem: &ScanFileProblem) -> &'static str {
+    match problem {
+        ScanFileProblem::Point(PointError::NotFinite { quantity: "x" | "y" | "z", .. }) => {
+            "; --drop-invalid leaves out points without a position"
+        }
+        _ => "",
     }
 }
 
@@ -281,6 +315,9 @@ impl From<&CliError> for ExitCode {
             CliError::Fidelity(FidelityError::Folder(error)) => FailureKind::from(error).into(),
             CliError::Fidelity(_) => ExitCode::Usage,
             CliError::Sensors(error) => error.kind().into(),
+            CliError::Scans(error) if error.is_io() => Self::Io,
+            CliError::Scans(_) => Self::InvalidInput,
+            CliError::Perceive(_) => Self::SampleError,
             CliError::Write(_)
             | CliError::Project(ProjectError { is_io: true, .. })
             | CliError::ResultsCut(_)

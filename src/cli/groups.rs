@@ -6,8 +6,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper, record,
-    reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper, perceive,
+    record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -75,6 +75,8 @@ pub(super) enum Study {
     Fidelity(fidelity::FidelityArgs),
     /// Study the rear sensors without a controller: detection, errors, classes and consistency over distance and conditions
     Sensors(sensors::SensorsArgs),
+    /// Run the chain behind the rear LiDARs on recorded scans: tracks, and their errors if there are labels
+    Perceive(perceive::PerceiveArgs),
 }
 
 /// What other programs read: files for editors, shells and networks, and campaigns that were made
@@ -139,6 +141,7 @@ impl Study {
             Self::Exposure(args) => causes::exposure(args),
             Self::Fidelity(args) => fidelity::fidelity(args),
             Self::Sensors(args) => sensors::sensors(args),
+            Self::Perceive(args) => perceive::perceive(args),
         }
     }
 }

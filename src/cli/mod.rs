@@ -34,6 +34,7 @@ mod new;
 mod output;
 mod page_server;
 mod paper;
+mod perceive;
 mod plan;
 mod plot;
 mod protect;

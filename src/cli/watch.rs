@@ -9,7 +9,7 @@ use closecall_report::exchange::OsiRecorder;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
-use closecall_report::tables::{RunTables, TableFiles};
+use closecall_report::tables::{RunTables, TableFiles, companion_files};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, Setting};
 use closecall_simulation::{Arm, RunKey};
@@ -122,6 +122,7 @@ pub(super) fn run_watched(
     // The names of trace files are those of the standard: they are printed when they are written.
     let named = watch.outputs().into_iter().filter(|(option, _)| *option != "--osi");
     named.filter_map(|(_, path)| path).for_each(print_written);
+    watch.scans.iter().flat_map(|path| companion_files(path)).for_each(|path| print_written(&path));
     Ok(outcomes)
 }
 

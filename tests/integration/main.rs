@@ -61,6 +61,7 @@ mod own_controller;
 mod page;
 mod paper;
 mod paper_figure;
+mod perceive;
 mod perception;
 mod rare;
 mod readme;

@@ -2,7 +2,7 @@
 
 use crate::exchange::OsiRecorder;
 use crate::tables::RunTables;
-use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_simulation::{Observer, RunEvent, SettlingView, StepView};
 use closecall_traffic::Time;
 
 use super::film::FilmRecorder;
@@ -27,6 +27,12 @@ impl Observer for RunObservers<'_> {
         }
         if let Some(osi) = &mut self.osi {
             osi.step(view);
+        }
+    }
+
+    fn settling(&mut self, view: &SettlingView<'_>) {
+        if let Some(tables) = &mut self.tables {
+            tables.settling(view);
         }
     }
 

@@ -17,7 +17,7 @@ use arrow::array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArra
 use arrow::datatypes::{DataType, Field, Schema};
 use closecall_sensors::lidar::PointSource;
 use closecall_sensors::{BoxUse, Detection, Extent, MountedLidar, SeenBy, SensorError, SensorMode};
-use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_simulation::{Observer, RunEvent, SettlingView, StepView};
 use closecall_traffic::Time;
 use closecall_traffic::atomic::{WriteError, check_writable};
 
@@ -233,6 +233,16 @@ impl Observer for ClusterRecorder {
         }
     }
 
+    /// Counts the scans, as the table of scans does.
+    fn settling(&mut self, view: &SettlingView<'_>) {
+        for mounted in view.perception.lidars() {
+            let (count, latest) = self.frames.entry(mounted.name).or_insert((0, None));
+            if mounted.lidar.latest().end == view.time && *latest != Some(view.time) {
+                (*count, *latest) = (*count + 1, Some(view.time));
+            }
+        }
+    }
+
     fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
@@ -302,6 +312,10 @@ impl ClusterWriter {
 impl Observer for ClusterWriter {
     fn step(&mut self, view: &StepView<'_>) {
         self.clusters.step(view);
+    }
+
+    fn settling(&mut self, view: &SettlingView<'_>) {
+        self.clusters.settling(view);
     }
 
     fn event(&mut self, _: Time, _: &RunEvent) {}

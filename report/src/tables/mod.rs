@@ -8,6 +8,7 @@
 //! ```
 
 mod clusters;
+mod companions;
 mod pcd;
 mod run_tables;
 mod scan_columns;
@@ -17,6 +18,7 @@ mod trace;
 mod tracks;
 
 pub use clusters::{ClusterRecorder, ClusterWriter};
+pub use companions::companion_files;
 pub use run_tables::{RunTables, TableFiles};
 pub use scans::ScanWriter;
 pub use trace::{TraceWriter, trace_batch};

@@ -11,7 +11,8 @@
 //! | `beam` | U 2 | as in the table |
 //! | `time` | F 8 | time of measurement (s) |
 //!
-//! The points are already in the ego's frame, so the viewpoint of each file is the identity. The
+//! `scans.csv` lists the files with the end of each scan, and `poses.csv` and `labels.csv` have the poses of the ego and the other
+//! vehicles (`crate::tables::companions`). The points are already in the ego's frame, so the viewpoint of each file is the identity. The
 //! format has no place for some columns (direction, range, box, truth): only the table has them.
 
 use std::fs;
@@ -50,9 +51,14 @@ impl PcdFolder {
         Ok(Self { folder: builder.prefix(".scans").tempdir_in(parent_folder(path))? })
     }
 
+    /// Returns the path of the folder until it is complete.
+    pub(crate) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// Writes the latest scan of a LiDAR as its scan number `frame`.
     pub(crate) fn write(&self, mounted: &MountedLidar<'_>, frame: u32, lidar: &RearLidar) -> io::Result<()> {
-        let path = self.folder.path().join(format!("{}-{frame:05}.pcd", mounted.name));
+        let path = self.folder.path().join(file_name(mounted, frame));
         let mut file = io::BufWriter::new(fs::File::create(path)?);
         let scan = lidar.latest();
         let points = scan.len();
@@ -92,6 +98,11 @@ impl PcdFolder {
             let _ = fs::remove_dir_all(&complete);
         })
     }
+}
+
+/// Returns the name of the file of a scan.
+pub(crate) fn file_name(mounted: &MountedLidar<'_>, frame: u32) -> String {
+    format!("{}-{frame:05}.pcd", mounted.name)
 }
 
 /// Checks that `path` has nothing that the folder would replace.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use closecall_scenarios::Scenario;
-use closecall_simulation::{Arm, Observer, RunEvent, StepView};
+use closecall_simulation::{Arm, Observer, RunEvent, SettlingView, StepView};
 use closecall_traffic::Time;
 use closecall_traffic::atomic::WriteError;
 
@@ -71,6 +71,10 @@ impl RunTables {
 impl Observer for RunTables {
     fn step(&mut self, view: &StepView<'_>) {
         self.writers().for_each(|writer| writer.step(view));
+    }
+
+    fn settling(&mut self, view: &SettlingView<'_>) {
+        self.writers().for_each(|writer| writer.settling(view));
     }
 
     fn event(&mut self, _: Time, _: &RunEvent) {}

@@ -30,6 +30,7 @@ pub(crate) struct ScanColumns {
     layer: Vec<u16>,
     angles_rad: [Vec<f32>; 2],
     range_m: Vec<f32>,
+    sensor_x_m: Vec<f32>,
     at_m: [Vec<f32>; 3],
     intensity: Vec<f32>,
     offset_ns: Vec<u32>,
@@ -78,6 +79,7 @@ impl ScanColumns {
             self.angles_rad[0].push(beam.azimuth_rad as f32);
             self.angles_rad[1].push(beam.elevation_rad as f32);
             self.range_m.push(beam.range_m);
+            self.sensor_x_m.push(sign(mounted) * scan.sensor_x_m);
             self.at_m[0].push(sign(mounted) * scan.x_m[point]);
             self.at_m[1].push(sign(mounted) * scan.y_m[point]);
             self.at_m[2].push(scan.z_m[point]);
@@ -106,6 +108,7 @@ impl ScanColumns {
             single("azimuth_rad", "rad"),
             single("elevation_rad", "rad"),
             single("range_m", "m"),
+            single("sensor_x_m", "m"),
             single("x_m", "m"),
             single("y_m", "m"),
             single("z_m", "m"),
@@ -136,6 +139,7 @@ impl ScanColumns {
             azimuth_rad,
             elevation_rad,
             single(rows.range_m),
+            single(rows.sensor_x_m),
             x_m,
             y_m,
             z_m,

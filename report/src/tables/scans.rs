@@ -9,6 +9,7 @@
 //! | `beam`, `column`, `layer` | beam = column · layers + layer; column 0 is the first that is swept, layer 0 the lowest |
 //! | `azimuth_rad`, `elevation_rad` | direction of the beam's centre in the sensor's frame (rad): x along its axis, y to the left of that |
 //! | `range_m` | measured range (m) |
+//! | `sensor_x_m` | place of the sensor ahead of the ego's centre, by the measured pitch (m) |
 //! | `x_m`, `y_m`, `z_m` | the point in the ego's vehicle frame at the end of the scan (m), with the ego's motion and measured pitch compensated |
 //! | `intensity` | received power times range², scaled to the reflectivity of a target that fills the beam |
 //! | `offset_ns` | time of measurement after the start of the sweep (ns) |
@@ -16,17 +17,21 @@
 //! | `source`, `true_range_m` | the truth: the name of the actor, or `ground`, `guard-rail`, `spray`, `fog`, `false`; and the range without noise (m) |
 //!
 //! The scans are complete: they have the returns of the bare road, which a simulation leaves out because the detector discards them.
+//! They begin with the second before the start in which the sensors settle. With the poses and the labels beside them
+//! (`crate::tables::companions`), they are a recording from which the processing chain gives the same tracks again.
 
 use std::fs::File;
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 
-use closecall_sensors::{MountedLidar, SensorMode};
-use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_scenarios::Scenario;
+use closecall_sensors::{MountedLidar, Perception, SensorMode};
+use closecall_simulation::{Observer, RunEvent, SettlingView, StepView};
 use closecall_traffic::Time;
 use closecall_traffic::atomic::{WriteError, check_writable, write_file};
 use parquet::arrow::ArrowWriter;
 
+use crate::tables::companions::Companions;
 use crate::tables::pcd::PcdFolder;
 use crate::tables::scan_columns::ScanColumns;
 use crate::tables::table::properties;
@@ -40,6 +45,7 @@ pub struct ScanWriter {
     sink: Sink,
     /// Number of scans of each LiDAR, and the end of the latest.
     frames: Vec<(u32, Option<Time>)>,
+    companions: Companions,
     /// The first error, after which nothing is written.
     failed: Option<io::Error>,
 }
@@ -79,7 +85,7 @@ impl ScanWriter {
                 return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
             }
         };
-        Ok(Self { path: path.to_owned(), sink, frames: Vec::new(), failed: None })
+        Ok(Self { path: path.to_owned(), sink, frames: Vec::new(), companions: Companions::default(), failed: None })
     }
 
     /// Completes the file or the folder.
@@ -98,9 +104,13 @@ impl ScanWriter {
             Sink::Table(writer, _) => {
                 let mut file = writer.into_inner().map_err(|error| fail(io::Error::other(error)))?;
                 file.rewind().map_err(fail)?;
-                write_file(&path, |to| io::copy(&mut file, to).map(drop))
+                write_file(&path, |to| io::copy(&mut file, to).map(drop))?;
+                self.companions.write_beside(&path)
             }
-            Sink::Folder(folder) => folder.finish(&path).map_err(fail),
+            Sink::Folder(folder) => {
+                self.companions.write_in(folder.path())?;
+                folder.finish(&path).map_err(fail)
+            }
         }
     }
 
@@ -113,18 +123,28 @@ impl ScanWriter {
         }
     }
 
+    /// Appends the latest scans of all LiDARs, as far as they are new.
+    fn observe(&mut self, perception: &dyn Perception, at: (Time, &Scenario)) {
+        for (index, lidar) in perception.lidars().iter().enumerate() {
+            self.append((index, lidar), at);
+        }
+        if matches!(&self.sink, Sink::Table(_, rows) if rows.len() >= ROWS_IN_MEMORY) {
+            self.flush();
+        }
+    }
+
     /// Appends the latest scan of a LiDAR, if it is a new one.
-    fn append(&mut self, (index, mounted): (usize, &MountedLidar<'_>), view: &StepView<'_>) {
+    fn append(&mut self, (index, mounted): (usize, &MountedLidar<'_>), (time, scenario): (Time, &Scenario)) {
         let lidar = mounted.lidar;
         if self.frames.len() <= index {
             self.frames.resize(index + 1, (0, None));
         }
         let (count, latest) = &mut self.frames[index];
-        if lidar.latest().end != view.time || *latest == Some(view.time) {
+        if lidar.latest().end != time || *latest == Some(time) {
             return;
         }
         let frame = *count;
-        (*count, *latest) = (frame + 1, Some(view.time));
+        (*count, *latest) = (frame + 1, Some(time));
         let complete = match lidar.completed() {
             Ok(complete) => complete,
             Err(error) => {
@@ -132,12 +152,13 @@ impl ScanWriter {
                 return;
             }
         };
-        let actors = &view.scenario.actors;
+        let actors = &scenario.actors;
         let name = |index: usize| actors.get(index).map_or_else(|| index.to_string(), |actor| actor.id.to_string());
         match &mut self.sink {
             Sink::Table(_, rows) => rows.append((mounted, frame), &complete, &name),
             Sink::Folder(folder) if self.failed.is_none() => {
                 self.failed = folder.write(mounted, frame, &complete).err();
+                self.companions.list(mounted, frame, &complete);
             }
             Sink::Folder(_) => {}
         }
@@ -146,12 +167,13 @@ impl ScanWriter {
 
 impl Observer for ScanWriter {
     fn step(&mut self, view: &StepView<'_>) {
-        for (index, lidar) in view.perception.lidars().iter().enumerate() {
-            self.append((index, lidar), view);
-        }
-        if matches!(&self.sink, Sink::Table(_, rows) if rows.len() >= ROWS_IN_MEMORY) {
-            self.flush();
-        }
+        self.observe(view.perception, (view.time, view.scenario));
+        self.companions.step(view);
+    }
+
+    fn settling(&mut self, view: &SettlingView<'_>) {
+        self.observe(view.perception, (view.time, view.scenario));
+        self.companions.pose(view.time, view.scenario, &view.ego.state);
     }
 
     fn event(&mut self, _: Time, _: &RunEvent) {}

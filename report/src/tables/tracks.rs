@@ -12,7 +12,7 @@ use arrow::datatypes::{DataType, Field, Schema};
 use closecall_sensors::{Scene, SceneVehicle, SensorError, TrackMatch, TrackMatcher};
 use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::atomic::{WriteError, check_writable};
-use closecall_traffic::{ActorId, ClassScores, Source, Time, Track, TrackStatus, VehicleClass};
+use closecall_traffic::{ClassScores, Source, Time, Track, TrackStatus, VehicleClass};
 
 use crate::tables::table::{check_parquet, field, required, write_batch};
 
@@ -40,7 +40,7 @@ struct TrackRow {
     time: Time,
     track: Track,
     /// The vehicle that it is matched with, by name.
-    truth: Option<(ActorId, TrackMatch)>,
+    truth: Option<(String, TrackMatch)>,
 }
 
 /// Observes a run and collects its tracks.
@@ -54,6 +54,43 @@ pub struct TrackRecorder {
 }
 
 impl TrackRecorder {
+    /// Appends the tracks of one step of a recording. `truth` has the vehicles that its labels show,
+    /// if there are any, with the name of each.
+    pub fn record(&mut self, (time, tracks): (Time, &[Track]), truth: Option<(&Scene<'_>, &dyn Fn(usize) -> String)>) {
+        match truth {
+            None => self.append((time, tracks), Ok(vec![None; tracks.len()]), &|actor| actor.to_string()),
+            Some((scene, name)) => {
+                let matched = self.matcher.observe(tracks, scene);
+                self.append((time, tracks), matched, name);
+            }
+        }
+    }
+
+    /// Appends the tracks of one step with their matches. `name` names a vehicle.
+    fn append(
+        &mut self,
+        (time, tracks): (Time, &[Track]),
+        matched: Result<Vec<Option<TrackMatch>>, SensorError>,
+        name: &dyn Fn(usize) -> String,
+    ) {
+        match matched {
+            Ok(matches) => self.rows.extend(tracks.iter().zip(matches).map(|(track, matched)| TrackRow {
+                time,
+                track: track.clone(),
+                truth: matched.map(|matched| (name(matched.actor), matched)),
+            })),
+            Err(error) => self.failed = Some(error),
+        }
+    }
+
+    /// Writes the rows as the Parquet file `path`.
+    ///
+    /// # Errors
+    /// [`WriteError`] as [`TrackWriter::new`] and [`TrackWriter::finish`] return it.
+    pub fn write(self, path: &Path) -> Result<(), WriteError> {
+        write_batch(path, || self.batch())
+    }
+
     /// Returns the rows as one record batch.
     ///
     /// # Errors
@@ -114,7 +151,7 @@ impl TrackRecorder {
             let values = rows.iter().map(|row| row.truth.as_ref().map(|(_, matched)| of(matched)));
             Arc::new(values.collect::<Float64Array>())
         };
-        let actors: StringArray = rows.iter().map(|row| row.truth.as_ref().map(|(actor, _)| actor.as_str())).collect();
+        let actors: StringArray = rows.iter().map(|row| row.truth.as_ref().map(|(actor, _)| &**actor)).collect();
         all.push((field("actor", DataType::Utf8, None), Arc::new(actors)));
         all.push((field("distance_m", DataType::Float64, Some("m")), truth(&|matched| matched.distance_m)));
         for (index, (name, unit)) in ERRORS.into_iter().enumerate() {
@@ -141,14 +178,8 @@ impl Observer for TrackRecorder {
             ego: view.vehicles[ego],
             others: &self.others,
         };
-        match self.matcher.observe(view.tracks, &scene) {
-            Ok(matches) => self.rows.extend(view.tracks.iter().zip(matches).map(|(track, matched)| TrackRow {
-                time: view.time,
-                track: track.clone(),
-                truth: matched.map(|matched| (view.scenario.actors[matched.actor].id.clone(), matched)),
-            })),
-            Err(error) => self.failed = Some(error),
-        }
+        let matched = self.matcher.observe(view.tracks, &scene);
+        self.append((view.time, view.tracks), matched, &|actor| view.scenario.actors[actor].id.to_string());
     }
 
     fn event(&mut self, _: Time, _: &RunEvent) {}

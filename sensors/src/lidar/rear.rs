@@ -60,6 +60,18 @@ impl RearLidar {
         }
     }
 
+    /// Detects boxes in a recorded scan.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Detector::detect`].
+    pub(crate) fn detect_recorded(
+        &mut self,
+        scan: &LidarScan,
+        lane: &LaneGeometry,
+    ) -> Result<&[Detection], SensorError> {
+        self.detector.detect(scan, lane)
+    }
+
     /// Detects boxes in the latest scan, with the points of each vehicle as one cluster.
     ///
     /// # Errors

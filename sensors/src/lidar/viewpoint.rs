@@ -105,12 +105,18 @@ impl Viewpoint {
     /// Returns the transform from the ego's frame `before_end_s` before the end of the sweep to its
     /// frame at the end.
     pub(crate) fn deskew(&self, before_end_s: f64) -> Deskew {
-        let turned = self.yaw_rate_radps * before_end_s;
-        let distance_m = self.speed_mps * before_end_s;
-        let (sin, cos) = small_sin_cos(turned);
-        let (half_sin, half_cos) = small_sin_cos(0.5 * turned);
-        Deskew { cos, sin: -sin, x_m: -distance_m * half_cos, y_m: distance_m * half_sin }
+        deskew([self.speed_mps, self.yaw_rate_radps], before_end_s)
     }
+}
+
+/// Returns the transform of [`Viewpoint::deskew`] for an ego with this speed (m/s) and yaw rate
+/// (rad/s).
+pub(crate) fn deskew([speed_mps, yaw_rate_radps]: [f64; 2], before_end_s: f64) -> Deskew {
+    let turned = yaw_rate_radps * before_end_s;
+    let distance_m = speed_mps * before_end_s;
+    let (sin, cos) = small_sin_cos(turned);
+    let (half_sin, half_cos) = small_sin_cos(0.5 * turned);
+    Deskew { cos, sin: -sin, x_m: -distance_m * half_cos, y_m: distance_m * half_sin }
 }
 
 /// Returns the sine and cosine of the angle by which the ego turns during a sweep.

@@ -11,7 +11,7 @@ use super::Seen;
 use crate::alterations::give_true_boxes;
 use crate::external::OutsideScan;
 use crate::faults::{FaultList, LidarFault, NOTICED_AFTER_SCANS};
-use crate::lidar::{Lidar, LidarKind, RESERVED_CLUSTERS, RearLidar};
+use crate::lidar::{LaneGeometry, Lidar, LidarKind, LidarScan, RESERVED_CLUSTERS, RearLidar};
 use crate::object::{DEGRADED_SHARE, NoiseKey, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::{Detection, Health, Scene, SensorError};
@@ -163,6 +163,37 @@ impl ChainSensor {
         let mut detections = self.spare.pop().unwrap_or_else(|| Vec::with_capacity(RESERVED_CLUSTERS));
         detections.clear();
         NewScan { detections, fault, late_steps }
+    }
+
+    /// Detects boxes in a recorded scan, and appends it to the queue. The tracker may have it from
+    /// `due_step` on.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a point is not finite.
+    pub(super) fn push_recorded(
+        &mut self,
+        scan: &LidarScan,
+        (road, ego): (&Road, VehicleState),
+        due_step: u64,
+    ) -> Result<(), SensorError> {
+        while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {
+            self.spare.push(scan.detections);
+        }
+        let mut detections = self.spare.pop().unwrap_or_else(|| Vec::with_capacity(RESERVED_CLUSTERS));
+        detections.clear();
+        detections.extend_from_slice(self.lidar.detect_recorded(scan, &LaneGeometry::new(road, &ego))?);
+        self.pending.push_back(PendingScan {
+            number: self.scans,
+            time: scan.end,
+            road: *road,
+            ego,
+            detections,
+            due_step,
+            is_processed: false,
+            is_missing: false,
+        });
+        self.scans += 1;
+        Ok(())
     }
 
     /// Returns the latest scan as a program gets it.

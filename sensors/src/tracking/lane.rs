@@ -1,6 +1,6 @@
 //! The course of the road behind the ego, as the ego knows it from a camera and a map.
 
-use closecall_traffic::Scene;
+use closecall_traffic::{Road, Scene, VehicleState};
 
 /// Half the width of the region of interest about the ego's path (m): two lanes to each side.
 const HALF_WIDTH_M: f64 = 9.5;
@@ -27,17 +27,21 @@ pub struct LaneGeometry {
 impl LaneGeometry {
     /// Returns the geometry that an error-free map and camera would provide.
     pub fn from_scene(scene: &Scene<'_>) -> Self {
-        let state = &scene.ego.state;
-        let curvature = scene.road.curvature_per_m();
-        let [left_offset_m, right_offset_m] = scene.road.guard_rail_offsets_m();
-        let edges_m = [-state.d_m, scene.road.right_edge_m() - state.d_m];
+        Self::new(scene.road, &scene.ego.state)
+    }
+
+    /// Returns the geometry of a road about an ego with this state.
+    pub fn new(road: &Road, state: &VehicleState) -> Self {
+        let curvature = road.curvature_per_m();
+        let [left_offset_m, right_offset_m] = road.guard_rail_offsets_m();
+        let edges_m = [-state.d_m, road.right_edge_m() - state.d_m];
         Self {
             heading_rad: state.heading_rad,
             // The road's curvature refers to its reference line, d = 0. The ego's path is offset
             // from that line.
             curvature_per_m: curvature / (1.0 - curvature * state.d_m),
             edges_m,
-            region_m: match scene.road.has_guard_rails() {
+            region_m: match road.has_guard_rails() {
                 true => [
                     (edges_m[0] + left_offset_m - RAIL_MARGIN_M).min(HALF_WIDTH_M),
                     (edges_m[1] - right_offset_m + RAIL_MARGIN_M).max(-HALF_WIDTH_M),

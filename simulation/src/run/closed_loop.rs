@@ -19,7 +19,7 @@ pub fn simulate(
     arm: &Arm,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SampleError> {
-    let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm), observer.wants_steps())?;
+    let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm), observer)?;
     let mut controller = controller(scenario, settings_of(scenario), arm);
     let mut computing = (!arm.controller.is_built_in()).then(ComputingTime::default);
     loop {

@@ -38,5 +38,5 @@ pub use closecall_scenarios::RunKey;
 pub use closed_loop::simulate;
 pub(crate) use computing_time::ComputingTime;
 pub use error::SampleError;
-pub use observer::{CurrentMargins, Lead, NoObserver, Observer, RunEvent, StepView};
+pub use observer::{CurrentMargins, Lead, NoObserver, Observer, RunEvent, SettlingView, StepView};
 pub use stepper::Stepper;

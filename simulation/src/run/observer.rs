@@ -60,6 +60,18 @@ pub struct StepView<'a> {
     pub phase: Phase,
 }
 
+/// The sensors at one control step before the start of a run, in which they settle.
+pub struct SettlingView<'a> {
+    /// Time of the step, which is negative.
+    pub time: Time,
+    /// The scenario of the run.
+    pub scenario: &'a Scenario,
+    /// The ego.
+    pub ego: SceneVehicle,
+    /// The ego's sensors.
+    pub perception: &'a dyn Perception,
+}
+
 /// Something that happens at one instant of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RunEvent {
@@ -104,6 +116,8 @@ pub trait Observer {
     }
     /// Called at each control step (25 Hz).
     fn step(&mut self, view: &StepView<'_>);
+    /// Called at each control step of the second before the start, in which the sensors settle.
+    fn settling(&mut self, _view: &SettlingView<'_>) {}
     /// Called when something happens, with its time.
     fn event(&mut self, time: Time, event: &RunEvent);
     /// Called at each physics step (100 Hz) with the states of all vehicles, in the order of the

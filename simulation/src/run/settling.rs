@@ -5,6 +5,8 @@ use closecall_traffic::CONTROL_STEP;
 
 use closecall_scenarios::Scenario;
 
+use super::{Observer, SettlingView};
+
 /// Number of scans before the start: one second, in which tracks are confirmed and settle. Without
 /// it, the ego would start without a lead vehicle and accelerate.
 const SCANS_BEFORE_START: i64 = 25;
@@ -14,8 +16,8 @@ const SCANS_BEFORE_START: i64 = 25;
 pub(super) fn settle_sensors(
     perception: &mut dyn Perception,
     scenario: &Scenario,
-    ego: SceneVehicle,
-    others: &[SceneVehicle],
+    (ego, others): (SceneVehicle, &[SceneVehicle]),
+    observer: &mut dyn Observer,
 ) -> Result<(), SensorError> {
     let mut others_before = others.to_vec();
     for scan in (1..=SCANS_BEFORE_START).rev() {
@@ -29,7 +31,9 @@ pub(super) fn settle_sensors(
             *then = before(now);
         }
         let (road, environment) = (&scenario.road, &scenario.environment);
-        perception.step(&Scene { time, road, environment, ego: before(&ego), others: &others_before })?;
+        let ego = before(&ego);
+        perception.step(&Scene { time, road, environment, ego, others: &others_before })?;
+        observer.settling(&SettlingView { time, scenario, ego, perception: &*perception });
     }
     Ok(())
 }

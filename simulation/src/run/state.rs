@@ -93,12 +93,12 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Prepares a run. `is_observed` says whether an observer looks at its steps.
+    /// Prepares a run, whose sensors `observer` sees settle.
     pub(super) fn new(
         scenario: Cow<'a, Scenario>,
         key: RunKey,
         arm: Cow<'a, Arm>,
-        is_observed: bool,
+        observer: &mut dyn Observer,
     ) -> Result<Self, SampleError> {
         let settings = *settings_of(&scenario);
         let looks_back = arm.controller.looks_back(&settings);
@@ -135,7 +135,7 @@ impl<'a> Run<'a> {
         let humans = human_drivers(&scenario, key, &of_arm);
         let mut run = Self {
             key: own,
-            perception: perception(&scenario, &arm, key, looks_back || is_observed)?,
+            perception: perception(&scenario, &arm, key, looks_back || observer.wants_steps())?,
             looks_back,
             looks: looks(&humans, scenario.actors.len()),
             humans,
@@ -165,7 +165,7 @@ impl<'a> Run<'a> {
         };
         run.collect_vehicles();
         let ego = run.vehicles[run.scenario.ego];
-        settle_sensors(run.perception.as_mut(), &run.scenario, ego, &run.others)?;
+        settle_sensors(run.perception.as_mut(), &run.scenario, (ego, &run.others), observer)?;
         Ok(run)
     }
 

@@ -37,7 +37,7 @@ impl Stepper {
         observer: &mut dyn Observer,
     ) -> Result<Self, SampleError> {
         let arm = Arm { controller: Arc::new(External), sensors };
-        let run = Run::new(Cow::Owned(scenario), key, Cow::Owned(arm), observer.wants_steps())?;
+        let run = Run::new(Cow::Owned(scenario), key, Cow::Owned(arm), observer)?;
         let mut stepper = Self { run: Some(run), outcome: None };
         stepper.go_on(observer)?;
         Ok(stepper)

@@ -305,7 +305,7 @@ fn time_to_confirm(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> 
 }
 
 /// Returns the rear tracks that a controller may act on.
-fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
+pub(crate) fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
     tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative)
 }
 
@@ -319,13 +319,13 @@ fn distance_m([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
 }
 
 /// Returns the nearest track within the cut-off.
-fn nearest<'a>(tracks: &[&'a Track], truth_m: [f64; 2]) -> Option<&'a Track> {
+pub(crate) fn nearest<'a>(tracks: &[&'a Track], truth_m: [f64; 2]) -> Option<&'a Track> {
     let apart_m = |track: &Track| distance_m(position_m(track), truth_m);
     let nearest = tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
     (apart_m(nearest) <= CUTOFF_M).then_some(*nearest)
 }
 
-fn errors(track: &Track, truth_m: [f64; 2], vehicle: &SceneVehicle) -> Tracked {
+pub(crate) fn errors(track: &Track, truth_m: [f64; 2], vehicle: &SceneVehicle) -> Tracked {
     let at_m = position_m(track);
     let (best, confidence) = (0..track.class.0.len())
         .map(|class| (class, track.class.0[class]))

@@ -13,6 +13,7 @@
 //! * [`agreement`]: verdicts with object-level sensors against verdicts with the full chain
 //! * [`approach`]: one approach
 //! * [`study`]: all approaches of all cases
+//! * [`recorded`]: the chain on a recording
 //! * [`fit`]: the fit of the object-level sensor to the full chain
 //! * [`behaviour`]: errors, delays and misses of the tracks of a vehicle
 //! * [`validation`]: the object-level sensor against the full chain, by this behaviour
@@ -24,6 +25,7 @@ pub mod behaviour;
 pub mod cases;
 pub mod figures;
 pub mod fit;
+pub mod recorded;
 pub mod study;
 pub mod validation;
 

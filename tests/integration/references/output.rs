@@ -368,4 +368,12 @@ fn the_keys_of_studies_are_those_documented() {
     hold("frontier", [&seeded(&frontier, 0), &errors]);
     let anchor = ["study", "anchor", "-n", "80", "--ensemble", "glances", "steer-none"];
     hold("anchor", [&seeded(&anchor, 0)]);
+    let folder = folder();
+    let scans = folder.path().join("scans.parquet");
+    let scans = scans.to_str().unwrap();
+    let run = ["run", "low-thw-overtake", "--set", "duration-s=1", "--set", "actor.rear.start.behind.gap-m=45"];
+    stdout(&closecall([&run[..], &["--sensors", "full", "--controller", "mis", "--scans", scans]].concat()), 0);
+    let labelled = program(&["study", "perceive", scans], 0);
+    std::fs::remove_file(folder.path().join("scans.labels.csv")).unwrap();
+    hold("perceive", [&labelled, &program(&["study", "perceive", scans], 0)]);
 }

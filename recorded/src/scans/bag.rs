@@ -1,0 +1,200 @@
+//! An MCAP file of ROS 2 with `PointCloud2` messages, and with `Odometry` if it has the poses.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use mcap::McapError;
+use mcap::parse_record;
+use mcap::records::Record;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::cdr::{odometry, point_cloud};
+use super::error::{Origin, ScanFileError, ScanFileProblem};
+use super::options::{ScanOptions, TakenScan};
+use super::poses::Poses;
+
+const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
+const ODOMETRY: &str = "nav_msgs/msg/Odometry";
+/// The encoding of the messages of ROS 2.
+const CDR: &str = "cdr";
+
+/// Greatest size of a record, such as a chunk (bytes): a damaged length must not take all memory.
+const MAX_RECORD: usize = 1 << 30;
+
+/// A channel: its topic, and the type and the encoding of its messages.
+#[derive(Clone, Debug)]
+struct Channel {
+    topic: String,
+    message: String,
+    encoding: String,
+}
+
+/// A message of one of the two types.
+struct Message {
+    channel: Channel,
+    /// Its number in the channel, from 0.
+    number: usize,
+    data: Vec<u8>,
+}
+
+/// The messages of a file, one after the other.
+struct Messages {
+    origin: Origin,
+    file: BufReader<File>,
+    reader: LinearReader,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Channel>,
+    counts: BTreeMap<u16, usize>,
+}
+
+impl Messages {
+    fn open(path: &Path) -> Result<Self, ScanFileError> {
+        let origin = Origin::file(path);
+        let file = BufReader::new(File::open(path).map_err(|error| origin.error(error))?);
+        let (schemas, channels, counts) = Default::default();
+        let reader =
+            LinearReader::new_with_options(LinearReaderOptions::default().with_record_length_limit(MAX_RECORD));
+        Ok(Self { origin, file, reader, schemas, channels, counts })
+    }
+
+    /// Returns the next point cloud or odometry.
+    fn next(&mut self) -> Result<Option<Message>, ScanFileError> {
+        let of_mcap = |origin: &Origin, error: McapError| {
+            let text = match error {
+                McapError::UnsupportedCompression(kind) => {
+                    format!("a chunk has the compression `{kind}`, but `lz4`, `zstd` and none are read")
+                }
+                McapError::BadMagic => "it does not begin as MCAP files do".to_owned(),
+                other => other.to_string(),
+            };
+            origin.error(ScanFileProblem::Mcap(text))
+        };
+        while let Some(event) = self.reader.next_event() {
+            match event.map_err(|error| of_mcap(&self.origin, error))? {
+                LinearReadEvent::ReadRequest(wanted) => {
+                    let buffer = self.reader.insert(wanted);
+                    let read = self.file.read(buffer).map_err(|error| self.origin.error(error))?;
+                    self.reader.notify_read(read);
+                }
+                LinearReadEvent::Record { data, opcode } => {
+                    match parse_record(opcode, data).map_err(|error| of_mcap(&self.origin, error))? {
+                        Record::Schema { header, .. } => {
+                            self.schemas.insert(header.id, header.name);
+                        }
+                        Record::Channel(channel) => {
+                            let message = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                            let (topic, encoding) = (channel.topic, channel.message_encoding);
+                            self.channels.insert(channel.id, Channel { topic, message, encoding });
+                        }
+                        Record::Message { header, data } => {
+                            let Some(channel) = self.channels.get(&header.channel_id) else { continue };
+                            if ![POINT_CLOUD, ODOMETRY].contains(&&*channel.message) {
+                                continue;
+                            }
+                            let count = self.counts.entry(header.channel_id).or_default();
+                            let number = *count;
+                            *count += 1;
+                            return Ok(Some(Message { channel: channel.clone(), number, data: data.into_owned() }));
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Message {
+    /// Returns the place of the message in its file.
+    fn origin(&self, file: &Origin) -> Origin {
+        file.at(format_args!("topic {}, message {}", self.channel.topic, self.number))
+    }
+
+    fn check_encoding(&self, file: &Origin) -> Result<(), ScanFileError> {
+        let reason = || format!("its encoding is `{}`", self.channel.encoding);
+        let message = if self.channel.message == POINT_CLOUD { POINT_CLOUD } else { ODOMETRY };
+        match &*self.channel.encoding {
+            CDR => Ok(()),
+            _ => Err(self.origin(file).error(ScanFileProblem::Message { message, reason: reason() })),
+        }
+    }
+}
+
+/// The file, whose poses and topics are known.
+pub(super) struct BagRecording {
+    messages: Messages,
+    poses: Option<Poses>,
+    /// The LiDAR of each topic; `None` for one that is not needed.
+    sensors: BTreeMap<String, Option<usize>>,
+}
+
+impl BagRecording {
+    pub(super) fn open(path: &Path, options: &ScanOptions) -> Result<Self, ScanFileError> {
+        let origin = Origin::file(path);
+        let mut messages = Messages::open(path)?;
+        let (mut poses, mut of_poses, mut topics) = (Vec::new(), None::<String>, Vec::new());
+        while let Some(message) = messages.next()? {
+            message.check_encoding(&origin)?;
+            let topic = &message.channel.topic;
+            if message.channel.message == POINT_CLOUD {
+                if !topics.contains(topic) {
+                    topics.push(topic.clone());
+                }
+                continue;
+            }
+            let first = of_poses.get_or_insert_with(|| topic.clone());
+            if first != topic {
+                let text = format!("the topics {first} and {topic} both hold odometry; one is needed");
+                return Err(origin.error(ScanFileProblem::Mcap(text)));
+            }
+            poses.push(odometry(&message.data).map_err(|problem| message.origin(&origin).error(problem))?);
+        }
+        let poses = match of_poses {
+            Some(topic) => Some(Poses::new(origin.at(format_args!("topic {topic}")), poses)?),
+            None => None,
+        };
+        let sensors = sensors(&topics, options).map_err(|problem| origin.error(problem))?;
+        Ok(Self { messages: Messages::open(path)?, poses, sensors })
+    }
+
+    /// Returns the poses that the file has.
+    pub(super) fn take_poses(&mut self) -> Option<Poses> {
+        self.poses.take()
+    }
+
+    pub(super) fn next_scan(&mut self, options: &ScanOptions) -> Result<Option<TakenScan>, ScanFileError> {
+        while let Some(message) = self.messages.next()? {
+            let topic = &message.channel.topic;
+            let Some(Some(sensor)) = self.sensors.get(topic).filter(|_| message.channel.message == POINT_CLOUD) else {
+                continue;
+            };
+            let origin = message.origin(&self.messages.origin);
+            let points = point_cloud(&message.data)
+                .and_then(|(stamp, cloud)| cloud.into_points(stamp, options))
+                .map_err(|problem| origin.error(problem))?;
+            return Ok(Some(TakenScan { sensor: *sensor, origin, points }));
+        }
+        Ok(None)
+    }
+}
+
+/// Returns the LiDAR of each topic.
+fn sensors(topics: &[String], options: &ScanOptions) -> Result<BTreeMap<String, Option<usize>>, ScanFileProblem> {
+    if let ([topic], [_]) = (topics, &options.lidars[..]) {
+        return Ok(BTreeMap::from([(topic.clone(), Some(0))]));
+    }
+    let of_topic = |topic: &String| {
+        let named = topic.split('/').find_map(|part| options.sensor(&part.replace('_', "-")).ok());
+        named.map(|sensor| (topic.clone(), sensor))
+    };
+    let sensors: BTreeMap<String, Option<usize>> = topics.iter().filter_map(of_topic).collect();
+    let mut taken: Vec<usize> = sensors.values().flatten().copied().collect();
+    taken.sort_unstable();
+    if sensors.len() == topics.len() && taken.windows(2).all(|pair| pair[0] != pair[1]) {
+        return Ok(sensors);
+    }
+    Err(ScanFileProblem::Topics { topics: topics.join(", "), lidars: options.lidars.join(", ") })
+}

@@ -1,0 +1,118 @@
+//! The labels of a recording: where the other vehicles are.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use closecall_traffic::{Time, VehicleClass};
+
+use super::error::{ScanFileError, ScanFileProblem};
+use super::text_table::read_table;
+
+/// Longest time between two labels of a vehicle between which it is interpolated (s).
+const LONGEST_GAP: Time = Time::from_ms(500);
+/// The columns of a table of labels, all of which are needed.
+const COLUMNS: [&str; 9] = ["time_s", "id", "class", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m"];
+
+/// A vehicle at one time, in the ego's frame at that time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Label {
+    /// Time.
+    pub time: Time,
+    /// Class of the vehicle.
+    pub class: VehicleClass,
+    /// Centre of its box ahead of the ego's centre, and to the left (m).
+    pub at_m: [f64; 2],
+    /// Heading relative to the ego's (rad).
+    pub heading_rad: f64,
+    /// Speed over ground along its heading (m/s).
+    pub speed_mps: f64,
+    /// Length and width (m).
+    pub size_m: [f64; 2],
+}
+
+/// The labels of all vehicles.
+#[derive(Clone, Debug, Default)]
+pub struct Labels {
+    /// The names of the vehicles, in order.
+    pub names: Vec<String>,
+    /// The labels of each vehicle, in order of time.
+    of_vehicles: Vec<Vec<Label>>,
+}
+
+impl Labels {
+    /// Reads a table of labels.
+    ///
+    /// # Errors
+    /// [`ScanFileError`] with the line and the column that is wrong.
+    pub fn read(path: &Path) -> Result<Self, ScanFileError> {
+        let rows = read_table(path, &COLUMNS, (COLUMNS.len(), "the labels"))?;
+        let mut vehicles: BTreeMap<String, Vec<Label>> = BTreeMap::new();
+        for row in &rows {
+            let id = row.needed_text(1)?;
+            let class = row.needed_text(2)?;
+            let class = VehicleClass::ALL.into_iter().find(|known| known.name() == class).ok_or_else(|| {
+                let names = VehicleClass::ALL.map(|known| format!("`{}`", known.name())).join(", ");
+                row.place(2).error(ScanFileProblem::UnknownWord { text: class.to_owned(), allowed: names })
+            })?;
+            let size = |column: usize| match row.number(column)? {
+                value if value > 0.0 => Ok(value),
+                value => {
+                    let problem = ScanFileProblem::OutOfRange { value, allowed: "a size above 0" };
+                    Err(row.place(column).error(problem))
+                }
+            };
+            let label = Label {
+                time: Time::from_s(row.number(0)?),
+                class,
+                at_m: [row.number(3)?, row.number(4)?],
+                heading_rad: row.number(5)?,
+                speed_mps: row.number(6)?,
+                size_m: [size(7)?, size(8)?],
+            };
+            let of_vehicle = vehicles.entry(id.to_owned()).or_default();
+            if let Some(previous) = of_vehicle.last().filter(|previous| previous.time >= label.time) {
+                return Err(row.place(0).error(ScanFileProblem::TimeGoesBack {
+                    time_s: label.time.s(),
+                    previous_s: previous.time.s(),
+                    of: format!(" of `{id}`"),
+                }));
+            }
+            of_vehicle.push(label);
+        }
+        let (names, of_vehicles) = vehicles.into_iter().unzip();
+        Ok(Self { names, of_vehicles })
+    }
+
+    /// Returns whether the labels of some vehicle reach from before `time` to after it.
+    pub fn cover(&self, time: Time) -> bool {
+        self.of_vehicles.iter().any(|labels| {
+            labels.first().is_some_and(|first| first.time <= time)
+                && labels.last().is_some_and(|last| last.time >= time)
+        })
+    }
+
+    /// Returns the vehicles that are labelled at `time`, with their indices in `names`.
+    pub fn at(&self, time: Time) -> impl Iterator<Item = (usize, Label)> {
+        self.of_vehicles.iter().enumerate().filter_map(move |(index, labels)| Some((index, at(labels, time)?)))
+    }
+}
+
+/// Returns the label at a time, interpolated between two that are near enough.
+fn at(labels: &[Label], time: Time) -> Option<Label> {
+    let next = labels.partition_point(|label| label.time < time);
+    let after = labels.get(next)?;
+    if after.time == time {
+        return Some(*after);
+    }
+    let before = labels.get(next.checked_sub(1)?)?;
+    let gap = after.time - before.time;
+    let share = (time - before.time).s() / gap.s();
+    let mixed = |a: f64, b: f64| a + share * (b - a);
+    (gap <= LONGEST_GAP).then(|| Label {
+        time,
+        at_m: [0, 1].map(|axis| mixed(before.at_m[axis], after.at_m[axis])),
+        heading_rad: mixed(before.heading_rad, after.heading_rad),
+        speed_mps: mixed(before.speed_mps, after.speed_mps),
+        ..*before
+    })
+}

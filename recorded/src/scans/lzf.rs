@@ -1,0 +1,60 @@
+//! The compression LZF of `binary_compressed` PCD files.
+//!
+//! The format is that of liblzf by Marc Lehmann: a control byte below 32 introduces that many bytes
+//! and one, and any other a copy of earlier output. Its upper three bits are the length minus 2, or
+//! with 7 in the upper bits the next byte adds to it; the lower five bits and the following byte are
+//! the distance minus 1.
+
+/// Control bytes below this one introduce bytes as they are.
+const LITERAL: u8 = 32;
+/// Length in the upper bits of a control byte from which on another byte adds to it.
+const LONG: usize = 7;
+
+/// Returns the data, of which there are `size` bytes.
+pub(super) fn decompress(compressed: &[u8], size: usize) -> Result<Vec<u8>, &'static str> {
+    const CUT: &str = "they end too early";
+    let mut data: Vec<u8> = Vec::with_capacity(size.min(1 << 28));
+    let mut bytes = compressed;
+    while let Some((&control, rest)) = bytes.split_first() {
+        bytes = rest;
+        if control < LITERAL {
+            let (literal, rest) = bytes.split_at_checked(usize::from(control) + 1).ok_or(CUT)?;
+            data.extend_from_slice(literal);
+            bytes = rest;
+        } else {
+            let mut length = usize::from(control >> 5);
+            if length == LONG {
+                let (&more, rest) = bytes.split_first().ok_or(CUT)?;
+                length += usize::from(more);
+                bytes = rest;
+            }
+            let (&low, rest) = bytes.split_first().ok_or(CUT)?;
+            bytes = rest;
+            let distance = (usize::from(control & 31) << 8) + usize::from(low) + 1;
+            let from = data.len().checked_sub(distance).ok_or("a copy begins before the data")?;
+            // A copy may overlap what it writes.
+            (from..from + length + 2).for_each(|index| data.push(data[index]));
+        }
+        if data.len() > size {
+            return Err("they are longer than stated");
+        }
+    }
+    if data.len() == size { Ok(data) } else { Err("they are shorter than stated") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn literals_and_overlapping_copies_are_decompressed() {
+        // `abc`, then nine bytes from three before, then a long copy.
+        let compressed = [2, b'a', b'b', b'c', (7 << 5), 0, 2, (7 << 5), 3, 0];
+        let data = decompress(&compressed, 24).unwrap();
+        assert_eq!(data, [b"abcabcabcabc".as_slice(), &[b'c'; 12]].concat());
+        assert_eq!(decompress(&compressed, 25), Err("they are shorter than stated"));
+        assert_eq!(decompress(&compressed, 20), Err("they are longer than stated"));
+        assert_eq!(decompress(&[4, b'a'], 5), Err("they end too early"));
+        assert_eq!(decompress(&[0, b'a', 32, 9], 5), Err("a copy begins before the data"));
+    }
+}

@@ -1,0 +1,249 @@
+//! The poses of the ego, and its place on a road.
+//!
+//! ```text
+//!  time, x, y, yaw, speed ─▶ path of the ego ─▶ arc through its last 100 m ─▶ road, place on it
+//!  s, d, heading, if a map gives them ─────────────────────────────────────▶
+//! ```
+//!
+//! The chain looks back, so that the ego has driven the road that it needs. Without a map, the road
+//! is the arc that has the mean curvature of the last 100 m of the ego's path, and the ego drives
+//! along it in the middle of its lane.
+
+use std::path::Path;
+
+use closecall_traffic::{Road, Time, VehicleState, maths};
+
+use super::error::{Origin, ScanFileError, ScanFileProblem};
+use super::text_table::read_table;
+
+/// Length of the path whose mean curvature the road has (m; assumption): the distance at which most
+/// vehicles are first tracked.
+const CURVATURE_OVER_M: f64 = 100.0;
+/// Length of the path below which the road counts as straight (m).
+const LEAST_PATH_M: f64 = 10.0;
+/// Longest time between two poses (s): at 1 rad/s² a yaw rate errs by 0.1 rad/s within half of it.
+const LONGEST_GAP: Time = Time::from_ms(500);
+/// The columns of a table of poses: those that are needed come first.
+const COLUMNS: [&str; 9] =
+    ["time_s", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "s_m", "d_m", "heading_rad"];
+const NEEDED: usize = 5;
+
+/// The ego at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Time.
+    pub time: Time,
+    /// Position in a frame that does not move, x and y, counter-clockwise seen from above (m).
+    pub at_m: [f64; 2],
+    /// Heading, counter-clockwise from x (rad).
+    pub yaw_rad: f64,
+    /// Speed (m/s).
+    pub speed_mps: f64,
+    /// Yaw rate, positive to the left (rad/s); `None` if it follows from the headings.
+    pub yaw_rate_radps: Option<f64>,
+    /// Position s and d on the road (m), and heading relative to it (rad), if a map gives them.
+    pub on_road: Option<[f64; 3]>,
+}
+
+/// The poses of the ego, in order of time.
+#[derive(Clone, Debug)]
+pub struct Poses {
+    origin: Origin,
+    poses: Vec<Pose>,
+    /// Headings without jumps of a turn (rad).
+    yaw_rad: Vec<f64>,
+    /// Length of the path up to each pose (m).
+    driven_m: Vec<f64>,
+}
+
+impl Poses {
+    /// Reads a table of poses.
+    ///
+    /// # Errors
+    /// [`ScanFileError`] with the line and the column that is wrong.
+    pub fn read(path: &Path) -> Result<Self, ScanFileError> {
+        let rows = read_table(path, &COLUMNS, (NEEDED, "the poses of the ego"))?;
+        let mut poses: Vec<Pose> = Vec::with_capacity(rows.len());
+        for row in &rows {
+            let number = |column: usize| row.number(column);
+            let on_road = [row.number_or_none(6)?, row.number_or_none(7)?, row.number_or_none(8)?];
+            let pose = Pose {
+                time: Time::from_s(number(0)?),
+                at_m: [number(1)?, number(2)?],
+                yaw_rad: number(3)?,
+                speed_mps: number(4)?,
+                yaw_rate_radps: row.number_or_none(5)?,
+                on_road: match on_road {
+                    [Some(s_m), Some(d_m), Some(heading_rad)] => Some([s_m, d_m, heading_rad]),
+                    [None, None, None] => None,
+                    _ => {
+                        let missing = 6 + on_road.iter().position(Option::is_none).unwrap_or_default();
+                        let problem = "`s_m`, `d_m` and `heading_rad` belong together, and one of them is empty";
+                        return Err(row.place(missing).error(ScanFileProblem::Csv(problem.to_owned())));
+                    }
+                },
+            };
+            if !(pose.speed_mps >= 0.0) {
+                let problem = ScanFileProblem::OutOfRange { value: pose.speed_mps, allowed: "a speed of 0 or more" };
+                return Err(row.place(4).error(problem));
+            }
+            if let Some(previous) = poses.last().filter(|previous| previous.time >= pose.time) {
+                return Err(row.place(0).error(goes_back(pose.time, previous.time)));
+            }
+            poses.push(pose);
+        }
+        Ok(Self::from_checked(Origin::file(path), poses))
+    }
+
+    /// Returns the poses of a recording.
+    ///
+    /// # Errors
+    /// [`ScanFileError`] if there are none, or if a time is not after the previous one.
+    pub(super) fn new(origin: Origin, poses: Vec<Pose>) -> Result<Self, ScanFileError> {
+        if poses.is_empty() {
+            return Err(origin.error(ScanFileProblem::NoRows));
+        }
+        if let Some(pair) = poses.windows(2).find(|pair| pair[0].time >= pair[1].time) {
+            return Err(origin.error(goes_back(pair[1].time, pair[0].time)));
+        }
+        Ok(Self::from_checked(origin, poses))
+    }
+
+    fn from_checked(origin: Origin, poses: Vec<Pose>) -> Self {
+        let (mut yaw_rad, mut driven_m) = (Vec::with_capacity(poses.len()), Vec::with_capacity(poses.len()));
+        for (index, pose) in poses.iter().enumerate() {
+            match index.checked_sub(1) {
+                None => {
+                    yaw_rad.push(pose.yaw_rad);
+                    driven_m.push(0.0);
+                }
+                Some(before) => {
+                    let turn = std::f64::consts::TAU;
+                    let turned = pose.yaw_rad - poses[before].yaw_rad;
+                    yaw_rad.push(yaw_rad[before] + turned - turn * (turned / turn).round());
+                    let [x_m, y_m] = [0, 1].map(|axis| pose.at_m[axis] - poses[before].at_m[axis]);
+                    driven_m.push(driven_m[before] + maths::hypot(x_m, y_m));
+                }
+            }
+        }
+        Self { origin, poses, yaw_rad, driven_m }
+    }
+
+    /// Returns the time of the last pose.
+    pub fn last(&self) -> Time {
+        self.poses.last().map_or(Time::ZERO, |pose| pose.time)
+    }
+
+    /// Returns whether the place on the road is recorded, rather than derived from the path.
+    pub fn has_map(&self) -> bool {
+        self.poses.iter().all(|pose| pose.on_road.is_some())
+    }
+
+    /// Returns the road and the state of the ego at `time`. Where the recording does not state its
+    /// place on the road, the ego drives at the lateral position `d_m` of a road like `road`.
+    ///
+    /// # Errors
+    /// [`ScanFileError`] if there is no pose at this time.
+    pub fn place_at(&self, time: Time, road: &Road, d_m: f64) -> Result<(Road, VehicleState), ScanFileError> {
+        let next = self.poses.partition_point(|pose| pose.time < time);
+        let exact = self.poses.get(next).filter(|pose| pose.time == time).map(|_| (next, next, 0.0));
+        let between = || {
+            let before = next.checked_sub(1)?;
+            let gap = self.poses.get(next)?.time - self.poses[before].time;
+            (gap <= LONGEST_GAP).then(|| (before, next, (time - self.poses[before].time).s() / gap.s()))
+        };
+        let Some((before, after, share)) = exact.or_else(between) else {
+            let [first_s, last_s] = [self.poses[0].time.s(), self.last().s()];
+            return Err(self.origin.error(ScanFileProblem::NoPose { time_s: time.s(), first_s, last_s }));
+        };
+        let mixed = |of: &dyn Fn(usize) -> f64| match share {
+            0.0 => of(before),
+            _ => of(before) + share * (of(after) - of(before)),
+        };
+        let yaw_rate_radps = match self.poses[before].yaw_rate_radps {
+            Some(_) => mixed(&|index| self.poses[index].yaw_rate_radps.unwrap_or_default()),
+            None => self.yaw_rate_radps(before),
+        };
+        let state = VehicleState {
+            speed_mps: mixed(&|index| self.poses[index].speed_mps),
+            yaw_rate_radps,
+            ..VehicleState::default()
+        };
+        let of_road = |axis: usize| move |index: usize| self.poses[index].on_road.unwrap_or_default()[axis];
+        if self.poses[before].on_road.is_some() && self.poses[after].on_road.is_some() {
+            let [s_m, d_m, heading_rad] = [0, 1, 2].map(|axis| mixed(&of_road(axis)));
+            return Ok((*road, VehicleState { s_m, d_m, heading_rad, ..state }));
+        }
+        let path_per_m = self.curvature_per_m(before);
+        // The curvature of a road is that of its left edge, where d is 0.
+        let road = road.with_curvature(path_per_m / (1.0 + path_per_m * d_m));
+        // A metre of the left edge is longer or shorter than a metre of the ego's path.
+        let s_m = mixed(&|index| self.driven_m[index]) / (1.0 - road.curvature_per_m() * d_m);
+        Ok((road, VehicleState { s_m, d_m, ..state }))
+    }
+
+    /// Returns the mean curvature of the path before a pose (1/m).
+    fn curvature_per_m(&self, last: usize) -> f64 {
+        let driven_m = &self.driven_m[..=last];
+        let first = driven_m.partition_point(|at_m| driven_m[last] - at_m > CURVATURE_OVER_M);
+        let length_m = driven_m[last] - driven_m[first];
+        if length_m < LEAST_PATH_M { 0.0 } else { (self.yaw_rad[last] - self.yaw_rad[first]) / length_m }
+    }
+
+    /// Returns the yaw rate between a pose and the next one (rad/s).
+    fn yaw_rate_radps(&self, before: usize) -> f64 {
+        let before = before.min(self.poses.len().saturating_sub(2));
+        let elapsed_s = self.poses.get(before + 1).map_or(0.0, |next| (next.time - self.poses[before].time).s());
+        if elapsed_s > 0.0 { (self.yaw_rad[before + 1] - self.yaw_rad[before]) / elapsed_s } else { 0.0 }
+    }
+}
+
+fn goes_back(time: Time, previous: Time) -> ScanFileProblem {
+    ScanFileProblem::TimeGoesBack { time_s: time.s(), previous_s: previous.s(), of: String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An ego that drives 30 m/s along a bend to the left with a radius of 1 km.
+    fn bend() -> Poses {
+        let pose = |step: i64| {
+            let time = Time::from_ms(100 * step);
+            let yaw_rad = 3.0 + 0.03 * time.s();
+            let (sin, cos) = maths::sin_cos(yaw_rad);
+            Pose { time, at_m: [1_000.0 * sin, -1_000.0 * cos], yaw_rad, speed_mps: 30.0, ..Pose::default() }
+        };
+        Poses::new(Origin::file("bend"), (0..100).map(pose).collect()).unwrap()
+    }
+
+    #[test]
+    fn the_road_of_an_ego_without_a_map_is_the_arc_that_it_has_driven() {
+        let (road, ego) = bend().place_at(Time::from_ms(5_050), &Road::straight(3), -5.625).unwrap();
+        // The left edge of the road is 5.6 m nearer to the centre of the bend.
+        assert!((1.0 / road.curvature_per_m() - (1_000.0 - 5.625)).abs() < 0.1, "{}", road.curvature_per_m());
+        assert_eq!((ego.heading_rad, ego.d_m, ego.speed_mps), (0.0, -5.625, 30.0));
+        assert!((ego.yaw_rate_radps - 0.03).abs() < 1e-9);
+        let (_, later) = bend().place_at(Time::from_ms(6_050), &Road::straight(3), -5.625).unwrap();
+        let driven_m = (later.s_m - ego.s_m) * (1.0 + 5.625 * road.curvature_per_m());
+        assert!((driven_m - 30.0).abs() < 0.01, "{driven_m}");
+    }
+
+    #[test]
+    fn a_time_without_poses_and_times_that_go_back_are_refused() {
+        let error = bend().place_at(Time::from_s(20.0), &Road::straight(3), -5.6).unwrap_err().to_string();
+        assert!(error.contains("no pose at 20 s") && error.contains("from 0 to 9.9 s"), "{error}");
+        let twice = vec![Pose::default(); 2];
+        let error = Poses::new(Origin::file("odometry"), twice).unwrap_err().to_string();
+        assert!(error.contains("odometry") && error.contains("times must increase"), "{error}");
+    }
+
+    #[test]
+    fn the_place_on_a_map_is_kept_to_the_bit() {
+        let on_road = Some([1_234.567_89, -5.1, 0.001]);
+        let pose = Pose { time: Time::from_ms(40), on_road, ..Pose::default() };
+        let (_, ego) =
+            Poses::new(Origin::file("map"), vec![pose]).unwrap().place_at(pose.time, &Road::straight(3), 0.0).unwrap();
+        assert_eq!(Some([ego.s_m, ego.d_m, ego.heading_rad]), on_road);
+    }
+}

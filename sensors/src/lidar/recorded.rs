@@ -1,0 +1,400 @@
+//! The points of a recorded scan, as the processing chain takes them.
+//!
+//! ```text
+//!  points in the sensor's frame ─▶ mounting ─▶ motion of the ego ─┐
+//!  points in the ego's frame ─────────────────────────────────────┴─▶ beams, times ─▶ LidarScan
+//! ```
+//!
+//! The recording of a run states every value, so that the scan has the same bits as the simulated
+//! one. What the recording of a real sensor lacks follows from the pattern of the scenario's LiDAR:
+//! the beam from the direction of the point, and the time from the azimuth.
+
+use closecall_traffic::{Time, maths};
+use nalgebra::{Rotation3, Vector3};
+
+use super::ground::ground_reach_m;
+use super::pattern::Pattern;
+use super::power::LinkBudget;
+use super::viewpoint::{deskew, sensor_position_m, turned_axes};
+use super::{Lidar, LidarScan, MirrorSide};
+use closecall_traffic::Environment;
+
+/// Intensity of the points of a sensor that records none (assumption): neither a droplet nor a
+/// registration plate.
+const UNKNOWN_INTENSITY: f32 = 0.3;
+/// Time before the end of a scan at which a point may have been measured, at most (s): the period of
+/// the slowest sensor that the model covers.
+const LONGEST_SCAN_S: f64 = 1.0;
+/// Time by which a point may be measured after the end of its scan (s): the rounding of a stamp.
+const STAMP_ROUNDING_S: f64 = 1e-3;
+/// Number of columns on either side that are compared with the direction of a point, because the
+/// groups of layers are shifted.
+const SHIFTED_COLUMNS: usize = 4;
+const NS_PER_S: f64 = 1e9;
+
+/// The frame of recorded points, in metres. Both have x ahead, y to the left and z up (REP 103 of
+/// ROS).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PointFrame {
+    /// The ego's: the origin is on the ground below the ego's centre, at the end of the scan. The
+    /// motion of the ego within the scan is compensated.
+    #[default]
+    Ego,
+    /// The sensor's: x is its viewing axis. The origin moves with the sensor.
+    Sensor,
+}
+
+/// The times at which the points of a scan were measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum PointTimes {
+    /// The recording does not say.
+    #[default]
+    Unknown,
+    /// Times after the start of the sweep (ns).
+    SinceStart(Vec<u32>),
+    /// Times on the clock of the recording (s).
+    Absolute(Vec<f64>),
+}
+
+/// The points of a recorded scan. All lists have the same length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordedPoints {
+    /// Time at which the scan ends.
+    pub end: Time,
+    /// Side of the mirror that deflected the scan.
+    pub mirror_side: MirrorSide,
+    /// Positions x, y and z (m).
+    pub at_m: [Vec<f32>; 3],
+    /// Intensities, as reflectivities; `None` if the sensor records none.
+    pub intensity: Option<Vec<f32>>,
+    /// Times of measurement.
+    pub times: PointTimes,
+    /// Beams, as column · layers + layer; `None` if the recording does not say.
+    pub beam: Option<Vec<u16>>,
+    /// Position of the sensor ahead of the ego's centre (m) by the measured pitch of the ego; `None`
+    /// for a level ego.
+    pub sensor_x_m: Option<f32>,
+}
+
+/// A point that cannot be used. Points are counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PointError {
+    /// A value is not finite.
+    #[error("point {point} has {quantity} = {value}, but a finite number is needed")]
+    NotFinite {
+        /// The point.
+        point: usize,
+        /// The quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The LiDAR of the scenario has no such beam.
+    #[error(
+        "point {point} has the beam {beam}, but the LiDAR `{lidar}` of the scenario has the beams 0 to {last}: name the \
+         scenario whose LiDAR has recorded the scan"
+    )]
+    Beam {
+        /// The point.
+        point: usize,
+        /// Its beam.
+        beam: u16,
+        /// Name of the LiDAR.
+        lidar: &'static str,
+        /// The last beam of its pattern.
+        last: usize,
+    },
+    /// A point was measured outside of its scan.
+    #[error(
+        "point {point} was measured {before_s} s before the end of its scan, but a time from 0 to 1 s before it is needed"
+    )]
+    Time {
+        /// The point.
+        point: usize,
+        /// Time from the point to the end of the scan (s).
+        before_s: f64,
+    },
+}
+
+/// The motion of the ego at the end of a scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ScanMotion {
+    /// Speed (m/s).
+    pub speed_mps: f64,
+    /// Yaw rate, positive to the left (rad/s).
+    pub yaw_rate_radps: f64,
+}
+
+/// The place of a LiDAR on an ego.
+#[derive(Clone, Copy, Debug)]
+struct Mounting {
+    sensor_m: Vector3<f64>,
+    sensor_from_ego: Rotation3<f64>,
+}
+
+impl Mounting {
+    fn new(lidar: &Lidar, ego_length_m: f64) -> Self {
+        let back_m = 0.5 * ego_length_m - lidar.inset_m;
+        Self {
+            sensor_m: sensor_position_m([back_m, lidar.left_m, lidar.mount_height_m], 0.0),
+            sensor_from_ego: turned_axes(lidar, 0.0),
+        }
+    }
+}
+
+impl RecordedPoints {
+    /// Returns the number of points.
+    pub fn len(&self) -> usize {
+        self.at_m[0].len()
+    }
+
+    /// Returns true if the scan has no points.
+    pub fn is_empty(&self) -> bool {
+        self.at_m[0].is_empty()
+    }
+
+    /// Removes the points for which `is_kept` is false.
+    pub fn retain(&mut self, is_kept: &[bool]) {
+        fn keep<T>(values: &mut Vec<T>, is_kept: &[bool]) {
+            let mut flags = is_kept.iter();
+            values.retain(|_| flags.next().copied().unwrap_or(true));
+        }
+        self.at_m.iter_mut().for_each(|values| keep(values, is_kept));
+        if let Some(values) = &mut self.intensity {
+            keep(values, is_kept);
+        }
+        if let Some(values) = &mut self.beam {
+            keep(values, is_kept);
+        }
+        match &mut self.times {
+            PointTimes::Unknown => {}
+            PointTimes::SinceStart(values) => keep(values, is_kept),
+            PointTimes::Absolute(values) => keep(values, is_kept),
+        }
+    }
+
+    /// Returns the scan that this LiDAR has recorded on an ego of a length (m), and the number of
+    /// points that lie outside of its field of view and are left out. There are none of these if
+    /// the recording states the beams.
+    ///
+    /// # Errors
+    /// [`PointError`] for the first point that cannot be used.
+    pub(crate) fn into_scan(
+        mut self,
+        lidar: &Lidar,
+        (frame, ego_length_m): (PointFrame, f64),
+        motion: ScanMotion,
+    ) -> Result<(LidarScan, usize), PointError> {
+        self.check(lidar)?;
+        let mounting = Mounting::new(lidar, ego_length_m);
+        let pattern = Pattern::shared(lidar.kind);
+        let mut outside = 0;
+        if self.beam.is_none() {
+            let beams: Vec<Option<u16>> = (0..self.len())
+                .map(|point| {
+                    let at_m = Vector3::from(std::array::from_fn(|axis| f64::from(self.at_m[axis][point])));
+                    let seen_m = match frame {
+                        PointFrame::Sensor => at_m,
+                        PointFrame::Ego => mounting.sensor_from_ego * (at_m - mounting.sensor_m),
+                    };
+                    beam_towards(&seen_m, pattern, self.mirror_side)
+                })
+                .collect();
+            let is_seen: Vec<bool> = beams.iter().map(Option::is_some).collect();
+            outside = beams.len() - beams.iter().flatten().count();
+            self.retain(&is_seen);
+            self.beam = Some(beams.into_iter().flatten().collect());
+        }
+        let beam = self.beam.take().unwrap_or_default();
+        let (start, offset_ns) = self.timed(lidar, pattern, &beam);
+        if frame == PointFrame::Sensor {
+            self.into_ego_frame(&mounting, motion, (start, &offset_ns));
+        }
+        let mut resolution = lidar.kind.resolution;
+        resolution.mount_height_m = lidar.mount_height_m;
+        resolution.ground_reach_m = ground_reach_m(lidar);
+        resolution.threshold_per_m2 = match &self.intensity {
+            Some(_) => 1.0 / f64::from(LinkBudget::new(lidar, &Environment::CLEAR_DAY).gain_m2),
+            // No intensity tells where an edge lies within a beam.
+            None => f64::INFINITY,
+        };
+        let count = self.len();
+        #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+        let sensor_m = [mounting.sensor_m.x as f32, mounting.sensor_m.y as f32];
+        let [x_m, y_m, z_m] = self.at_m;
+        let scan = LidarScan {
+            start,
+            end: self.end,
+            mirror_side: self.mirror_side,
+            sensor_x_m: self.sensor_x_m.unwrap_or(sensor_m[0]),
+            sensor_y_m: sensor_m[1],
+            axis_azimuth_rad: lidar.azimuth_rad,
+            resolution,
+            x_m,
+            y_m,
+            z_m,
+            intensity: self.intensity.unwrap_or_else(|| vec![UNKNOWN_INTENSITY; count]),
+            offset_ns,
+            beam,
+        };
+        Ok((scan, outside))
+    }
+
+    fn check(&self, lidar: &Lidar) -> Result<(), PointError> {
+        let named = ["x", "y", "z"].into_iter().zip(&self.at_m);
+        for (quantity, values) in named.chain(self.intensity.as_ref().map(|values| ("intensity", values))) {
+            if let Some((point, value)) = values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+                return Err(PointError::NotFinite { point, quantity, value: f64::from(*value) });
+            }
+        }
+        let last = lidar.kind.beams() - 1;
+        let wrong = self.beam.iter().flatten().enumerate().find(|(_, beam)| usize::from(**beam) > last);
+        if let Some((point, &beam)) = wrong {
+            return Err(PointError::Beam { point, beam, lidar: lidar.name(), last });
+        }
+        if let PointTimes::Absolute(times_s) = &self.times {
+            for (point, time_s) in times_s.iter().enumerate() {
+                let before_s = self.end.s() - time_s;
+                if !(-STAMP_ROUNDING_S..=LONGEST_SCAN_S).contains(&before_s) {
+                    return Err(PointError::Time { point, before_s });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the start of the scan and the time of each point after it (ns). A sweep of the pattern
+    /// ends with the scan; a point before it makes the scan longer.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1 s")]
+    fn timed(&mut self, lidar: &Lidar, pattern: &Pattern, beam: &[u16]) -> (Time, Vec<u32>) {
+        let start = self.end - Time::from_ns(lidar.kind.sweep_ns as i64);
+        match std::mem::take(&mut self.times) {
+            PointTimes::SinceStart(offset_ns) => (start, offset_ns),
+            PointTimes::Unknown => {
+                let columns = beam.iter().map(|&beam| usize::from(beam) / lidar.kind.layers());
+                (start, columns.map(|column| pattern.columns[column].offset_ns).collect())
+            }
+            PointTimes::Absolute(times_s) => {
+                let since_ns = |start: Time, time_s: f64| ((time_s - start.s()) * NS_PER_S).round();
+                let earliest_ns = times_s.iter().map(|&time_s| since_ns(start, time_s)).fold(0.0, f64::min);
+                let start = start + Time::from_ns(earliest_ns as i64);
+                (start, times_s.iter().map(|&time_s| since_ns(start, time_s).max(0.0) as u32).collect())
+            }
+        }
+    }
+
+    /// Moves the points from the sensor's frame when they were measured to the ego's frame at the
+    /// end of the scan.
+    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    fn into_ego_frame(&mut self, mounting: &Mounting, motion: ScanMotion, (start, offset_ns): (Time, &[u32])) {
+        let ego_from_sensor = mounting.sensor_from_ego.inverse();
+        for (point, &offset_ns) in offset_ns.iter().enumerate() {
+            let seen_m = Vector3::from(std::array::from_fn(|axis| f64::from(self.at_m[axis][point])));
+            let then_m = ego_from_sensor * seen_m + mounting.sensor_m;
+            let before_end_s = (self.end - start).s() - f64::from(offset_ns) / NS_PER_S;
+            let to = deskew([motion.speed_mps, motion.yaw_rate_radps], before_end_s);
+            let now_m = [
+                to.cos * then_m.x - to.sin * then_m.y + to.x_m,
+                to.sin * then_m.x + to.cos * then_m.y + to.y_m,
+                then_m.z,
+            ];
+            for (axis, at_m) in now_m.into_iter().enumerate() {
+                self.at_m[axis][point] = at_m as f32;
+            }
+        }
+    }
+}
+
+/// Returns the beam whose centre is nearest to a direction in the sensor's frame; `None` if the
+/// direction is outside of the field of view.
+fn beam_towards(seen_m: &Vector3<f64>, pattern: &Pattern, mirror_side: MirrorSide) -> Option<u16> {
+    let (kind, layers) = (pattern.kind(), pattern.kind().layers());
+    let azimuth_deg = maths::atan2(seen_m.y, seen_m.x).to_degrees();
+    let elevation_rad = maths::atan2(seen_m.z, maths::hypot(seen_m.x, seen_m.y));
+    let shift_deg = kind.group_shift_deg * (kind.groups() - 1) as f64;
+    if !(azimuth_deg >= -kind.half_field_deg - kind.finest_step_deg
+        && azimuth_deg <= kind.half_field_deg + shift_deg + kind.finest_step_deg)
+    {
+        return None;
+    }
+    let columns = &kind.azimuths_deg;
+    let near = columns.partition_point(|column_deg| *column_deg < azimuth_deg).min(columns.len() - 1);
+    let beam_of = |column: usize, layer: usize| u16::try_from(column * layers + layer).ok();
+    let apart = |beam: Option<u16>, is_azimuth: bool| {
+        beam.map_or(f64::INFINITY, |beam| {
+            let (beam_azimuth_rad, beam_elevation_rad) = pattern.direction_rad(mirror_side, beam);
+            match is_azimuth {
+                true => (beam_azimuth_rad - azimuth_deg.to_radians()).abs(),
+                false => (beam_elevation_rad - elevation_rad).abs(),
+            }
+        })
+    };
+    let layer = (0..layers).min_by(|&a, &b| {
+        let [a, b] = [a, b].map(|layer| apart(beam_of(near, layer), false));
+        a.total_cmp(&b)
+    })?;
+    let columns = near.saturating_sub(SHIFTED_COLUMNS + 1)..(near + SHIFTED_COLUMNS).min(columns.len());
+    let column = columns.min_by(|&a, &b| {
+        let [a, b] = [a, b].map(|column| apart(beam_of(column, layer), true));
+        a.total_cmp(&b)
+    })?;
+    beam_of(column, layer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A scan of three points of the standard LiDAR, in its own frame: 20 m away, ahead of it, to
+    /// its left, and out of its field of view.
+    fn points() -> RecordedPoints {
+        let (sin, cos) = maths::sin_cos(0.5_f64);
+        #[expect(clippy::cast_possible_truncation, reason = "a test")]
+        let at_m = [vec![20.0, (20.0 * cos) as f32, 0.0], vec![0.0, (20.0 * sin) as f32, 20.0], vec![0.1; 3]];
+        RecordedPoints { end: Time::from_ms(120), at_m, ..RecordedPoints::default() }
+    }
+
+    #[test]
+    fn a_point_in_the_sensor_s_frame_is_behind_the_ego_and_has_the_beam_of_its_direction() {
+        let lidar = Lidar::default();
+        let (scan, outside) = points().into_scan(&lidar, (PointFrame::Sensor, 4.6), ScanMotion::default()).unwrap();
+        assert_eq!((scan.len(), outside), (2, 1));
+        assert!((scan.x_m[0] + 22.3).abs() < 1e-5 && scan.y_m[0].abs() < 1e-5 && (scan.z_m[0] - 0.7).abs() < 1e-5);
+        // The left of a sensor that looks back is the right of the ego.
+        assert!(scan.y_m[1] < -9.0);
+        let pattern = Pattern::shared(lidar.kind);
+        for (point, azimuth_rad) in [(0, 0.0), (1, 0.5)] {
+            let (of_beam_rad, _) = pattern.direction_rad(MirrorSide::Plus, scan.beam[point]);
+            assert!((of_beam_rad - azimuth_rad).abs() <= lidar.kind.finest_step_deg.to_radians(), "{of_beam_rad}");
+        }
+        assert!(scan.offset_ns[0] < scan.offset_ns[1], "the sweep goes to the ego's right");
+        assert!(scan.resolution.threshold_per_m2.is_infinite(), "no intensity tells where an edge lies");
+    }
+
+    #[test]
+    fn the_motion_of_the_ego_moves_a_point_by_its_age() {
+        let times = PointTimes::Absolute(vec![0.02, 0.12, 0.12]);
+        let moving = ScanMotion { speed_mps: 30.0, yaw_rate_radps: 0.0 };
+        let (scan, _) = RecordedPoints { times, ..points() }
+            .into_scan(&Lidar::default(), (PointFrame::Sensor, 4.6), moving)
+            .unwrap();
+        // In 0.1 s the ego has driven 3 m away from the first point.
+        assert!((scan.x_m[0] + 25.3).abs() < 1e-4, "{}", scan.x_m[0]);
+        assert_eq!((scan.start, scan.offset_ns[0]), (Time::from_ms(20), 0));
+    }
+
+    #[test]
+    fn a_value_that_is_not_finite_a_foreign_beam_and_a_time_outside_of_the_scan_are_refused() {
+        let refused = |points: RecordedPoints| {
+            let result = points.into_scan(&Lidar::default(), (PointFrame::Ego, 4.6), ScanMotion::default());
+            result.map(drop).unwrap_err().to_string()
+        };
+        let mut wrong = points();
+        wrong.at_m[1][2] = f32::NAN;
+        assert!(refused(wrong).starts_with("point 2 has y = NaN, but"));
+        let error = refused(RecordedPoints { beam: Some(vec![0, 65_000, 0]), ..points() });
+        assert!(error.starts_with("point 1 has the beam 65000, but the LiDAR `rear-lidar`"), "{error}");
+        let error = refused(RecordedPoints { times: PointTimes::Absolute(vec![0.1, 0.2, 0.1]), ..points() });
+        assert!(error.starts_with("point 1 was measured -0.08") && error.contains("0 to 1 s"), "{error}");
+    }
+}
