@@ -59,6 +59,9 @@ const EGO_TIME_GAP_S: f64 = 1.8;
 const PATH_STEPS_S: [f64; 5] = [0.5, 0.75, 1.0, 1.5, 2.0];
 /// Shortest distance between two points of a lateral path (m): an assumption, 1 to 5 are plausible.
 const PATH_STEP_M: f64 = 2.0;
+/// Time in which a vehicle steers straight ahead after the end of its record (s): an assumption, 1 to 3
+/// are plausible.
+const STRAIGHTENING_S: f64 = 2.0;
 /// Distance to the edge of the road that the path of a vehicle's centre keeps (m): numerical.
 const EDGE_M: f64 = 0.01;
 /// Largest acceleration with which a vehicle starts (m/s²): dry friction. Beyond it lies noise.
@@ -310,6 +313,15 @@ fn path_in_steps(encounter: &RecordedEncounter, vehicle: &Trajectory, step_s: f6
             path.push([point.s_m - first_m, within(point.d_m)]);
             last = Some(point);
         }
+    }
+    // The end of the record, from which the vehicle steers straight ahead.
+    if let (Some(end), Some(last)) = (vehicle.points.last(), last) {
+        if end.s_m - last.s_m >= PATH_STEP_M {
+            path.push([end.s_m - first_m, within(end.d_m)]);
+        }
+        let length_m = (STRAIGHTENING_S * end.speed_mps).max(PATH_STEP_M);
+        let slope = end.lateral_speed_mps / end.speed_mps.max(MIN_SPEED_MPS);
+        path.push([end.s_m.max(last.s_m) - first_m + length_m, within(end.d_m + 0.5 * slope * length_m)]);
     }
     // A vehicle that stands, or moves less than a step, keeps its lateral position.
     if let [only] = path[..] {

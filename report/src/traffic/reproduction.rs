@@ -51,7 +51,7 @@ pub struct Reproduction {
     pub desired_speed_mps: Option<f64>,
     /// The calibrated cc1 (s).
     pub cc1_s: Option<f64>,
-    /// The first collision of any two vehicles before the end of the lane change, if there is one.
+    /// The first collision of the vehicle that changes lanes before the end of its lane change, if there is one.
     pub collision: Option<String>,
 }
 
@@ -183,7 +183,10 @@ pub fn step_zero(
         let driver = calibrate_replaced(encounter, &ahead, calibrated);
         let step = built(&driver)?;
         let run = run_step(encounter, ("step 0".to_owned(), None), &step, seed)?;
-        let collision = run.first_collision.clone().filter(|(_, time)| *time <= until).map(|(between, _)| between);
+        // A collision of two other vehicles is one of their recorded positions. It matters if the run ends with it
+        // before the crossing.
+        let collision = run.run.collision.as_ref().filter(|(_, time_s)| *time_s <= until.s());
+        let collision = collision.map(|(other, time_s)| format!("it collides with {other} at {time_s:.2} s"));
         let reproduction = Reproduction::new([&recorded, &run.run], &ahead, (&driver, calibrated), collision);
         Ok(StepZero { driver, step, recorded: recorded.clone(), run, reproduction })
     };

@@ -178,8 +178,6 @@ pub struct StepRun {
     pub run: SampledRun,
     /// The film of the lane change; `None` if the vehicle never changes lanes.
     pub film: Option<Film>,
-    /// The first collision of any two vehicles, in words, and its time.
-    pub first_collision: Option<(String, Time)>,
 }
 
 /// Runs one step of a sampled lane change. The sensors of the ego, which is behind all other
@@ -205,12 +203,7 @@ pub fn run_step(
     let changes = criticality(&smoothed, &Judgement::default());
     let change = changes.iter().find(|change| change.lane_change.track_id == track_id);
     let film = change.map(|change| film_lane_change(&smoothed, change)).transpose()?;
-    let first = outcome.collisions.first();
-    let first_collision = first.map(|collision| {
-        let [one, other] = &collision.between;
-        (format!("{one} collides with {other} at {:.2} s", collision.time.s()), collision.time)
-    });
-    Ok(StepRun { run, first_collision, film: film.map(|film| film.with_arm(name.replace(" = ", "-"))) })
+    Ok(StepRun { run, film: film.map(|film| film.with_arm(name.replace(" = ", "-"))) })
 }
 
 /// The reason why a step has no run.
