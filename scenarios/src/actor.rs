@@ -1,7 +1,7 @@
 //! The vehicles of a concrete scenario.
 
 use closecall_controllers::{CheckedDriver, LaneKeeping, SpeedKeeping};
-use closecall_traffic::{ActorId, ConfigError, Problem, Vehicle, VehicleState};
+use closecall_traffic::{ActorId, ConfigError, LateralPath, Problem, Vehicle, VehicleState};
 
 use super::events::Event;
 use super::fleet::FleetOf;
@@ -17,6 +17,8 @@ pub struct Actor {
     pub start: VehicleState,
     /// Its driver: a human driver, or the ego stack.
     pub driver: CheckedDriver,
+    /// Its lateral path, or `None` if it keeps the centre of its lane.
+    pub path: Option<LateralPath>,
     /// How its driver weaves in the lane, or `None` if the driver keeps the lane exactly.
     pub lane_keeping: Option<LaneKeeping>,
     /// How the desired speed of its driver varies, or `None` if it is constant.

@@ -4,8 +4,8 @@ use closecall_controllers::external::VariableTable;
 use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
 use closecall_sensors::Sensors;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Environment, PHYSICS_STEP, Parameters, Problem, Range, Road, Time, Vehicle,
-    VehicleState,
+    ActorId, Check, ConfigError, Environment, LateralPath, Num, PHYSICS_STEP, Parameters, Problem, Range, Road, Time,
+    Vehicle, VehicleState,
 };
 
 use crate::coverage::CoveragePlan;
@@ -219,15 +219,17 @@ impl ScenarioConfig {
             fleets.push(FleetOf::check(&actor.vehicle).map_err(in_vehicle)?);
             drivers.push(actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?);
         }
+        let paths = self.check_paths(road, parameters)?;
         let states = placement::initial_states(
-            placement::Actors { actors: &self.actors, vehicles: &vehicles, drivers: &drivers },
+            placement::Actors { actors: &self.actors, vehicles: &vehicles, drivers: &drivers, paths: &paths },
             road,
             parameters,
         )?;
         let ids: Vec<&ActorId> = self.actors.iter().map(|actor| &actor.id).collect();
         let start = events::Start { ids: &ids, vehicles: &vehicles, states: &states };
         let mut checked = Vec::with_capacity(self.actors.len());
-        for ((index, actor), driver) in self.actors.iter().enumerate().zip(drivers) {
+        for (((index, actor), driver), path) in self.actors.iter().enumerate().zip(drivers).zip(paths) {
+            check_path_grip(path.as_ref(), states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
             let Keeping { lane_keeping, speed_keeping } =
                 actor.check_keeping(parameters).map_err(|error| at(index, error))?;
@@ -248,6 +250,7 @@ impl ScenarioConfig {
                 vehicle: vehicles[index],
                 start: states[index],
                 driver,
+                path,
                 lane_keeping,
                 speed_keeping,
                 events,
@@ -256,6 +259,50 @@ impl ScenarioConfig {
         }
         Ok(checked)
     }
+}
+
+impl ScenarioConfig {
+    /// Checks the lateral paths of the actors.
+    fn check_paths(&self, road: &Road, parameters: &Parameters) -> Result<Vec<Option<LateralPath>>, ConfigError> {
+        let check = |(index, actor): (usize, &ActorConfig)| {
+            let path = actor.path.as_ref().map(|path| actor.check_path(path, road, parameters)).transpose();
+            path.map_err(|error| error.within("path").within_index(index).within("actor"))
+        };
+        self.actors.iter().enumerate().map(check).collect()
+    }
+}
+
+impl ActorConfig {
+    fn check_path(&self, path: &[[Num; 2]], road: &Road, parameters: &Parameters) -> Result<LateralPath, ConfigError> {
+        if matches!(self.driver, DriverConfig::EgoStack(_)) {
+            let rule = "the ego stack keeps the centre of its lane".to_owned();
+            return Err(ConfigError::new("driver", Problem::Contradiction { other: "path", rule }));
+        }
+        let (travelled_m, across_m) = (Range::closed(0.0, 100_000.0), Range::closed(road.right_edge_m(), 0.0));
+        let point = |(index, [x, d]): (usize, &[Num; 2])| -> Result<[f64; 2], ConfigError> {
+            let x_m = parameters.number(x, "distance-m", travelled_m).map_err(|error| error.within_index(index))?;
+            let d_m = parameters.number(d, "position-m", across_m).map_err(|error| error.within_index(index))?;
+            Ok([x_m, d_m])
+        };
+        let points: Vec<[f64; 2]> = path.iter().enumerate().map(point).collect::<Result<_, _>>()?;
+        let needed = "two pairs or more of a distance and a lateral position, with distances that increase from 0";
+        LateralPath::new(&points).ok_or_else(|| ConfigError::new("distance-m", Problem::Missing { needed }))
+    }
+}
+
+/// Rejects a lateral path that needs more lateral acceleration at the initial speed than drivers use
+/// on this road.
+fn check_path_grip(path: Option<&LateralPath>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
+    let bend_per_m = path.map_or(0.0, LateralPath::largest_second_derivative_per_m);
+    let (largest_mps2, grip_mps2) = (speed_mps * speed_mps * bend_per_m, lateral_grip_mps2(friction));
+    if largest_mps2 <= grip_mps2 {
+        return Ok(());
+    }
+    let rule = format!(
+        "at {speed_mps:.1} m/s such a path needs up to {largest_mps2:.2} m/s² sideways, and drivers steer up to \
+         {grip_mps2:.2} m/s² on this road"
+    );
+    Err(ConfigError::new("path", Problem::Contradiction { other: "environment.friction", rule }))
 }
 
 /// How a driver keeps lane and speed.

@@ -169,6 +169,12 @@ pub struct ActorConfig {
     pub start: StartConfig,
     /// The driver: a human driver model, or the ego stack.
     pub driver: DriverConfig,
+    /// The lateral path of a human driver, in place of the centre of the lane: pairs of the distance
+    /// along the road since the start (m) and the lateral position of the vehicle's centre, positive
+    /// to the left of the road's left edge (m). The distances increase from 0, and the first position
+    /// is in the lane of the start. At its end the vehicle drives straight on. A lane change by the
+    /// driver or by an event ends it. Default: the vehicle keeps the centre of its lane.
+    pub path: Option<Vec<[Num; 2]>>,
     /// How a human driver weaves in the lane. Default: it does not.
     pub lane_keeping: Option<LaneKeepingConfig>,
     /// How the desired speed of a human driver varies. Default: it is constant.
@@ -200,6 +206,8 @@ pub struct AbsoluteStartConfig {
     pub s_m: Num,
     /// Speed (m/s).
     pub speed_mps: Num,
+    /// Acceleration (m/s²). Default: 0.
+    pub acceleration_mps2: Option<Num>,
 }
 
 /// A position and a speed relative to another actor. Give exactly one of `gap-m`, `thw-s` and

@@ -243,6 +243,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
                     lane: approach.home,
                     s_m: Num::Fixed(EGO_S_M),
                     speed_mps: parameter("cruise-mps")?,
+                    acceleration_mps2: None,
                 }),
                 ..actor("ego", vehicle(ego), ego_stack()?)?
             },
@@ -252,6 +253,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
                     speed_mps: Some(parameter("cruise-mps")?),
                     ..relative("ego")?
                 }),
+                path: None,
                 lane_keeping: Some(LaneKeepingConfig { sdlp_m: Num::Fixed(0.2) }),
                 events: vec![lead_brakes()?],
                 ..actor(
@@ -269,6 +271,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
                     closing_mps: Some(parameter("closing-mps")?),
                     ..relative("ego")?
                 }),
+                path: None,
                 lane_keeping: Some(LaneKeepingConfig { sdlp_m: Num::Fixed(0.2) }),
                 speed_keeping: Some(SpeedKeepingConfig { acceleration_noise_mps2: Num::Fixed(0.1) }),
                 ..actor("rear", vehicle(rear), overtaker(approach)?)?
@@ -311,6 +314,7 @@ fn actor(name: &str, vehicle: VehicleConfig, driver: DriverConfig) -> Result<Act
         vehicle,
         start: StartConfig::Ahead(relative("ego")?),
         driver,
+        path: None,
         lane_keeping: None,
         speed_keeping: None,
         events: Vec::new(),

@@ -2,7 +2,9 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_traffic::metrics::touching_distance_m;
-use closecall_traffic::{ActorId, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState};
+use closecall_traffic::{
+    ActorId, ConfigError, Lane, LateralPath, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState, maths,
+};
 
 use super::actor::find_actor;
 use super::config::{ActorConfig, RelativeStartConfig, StartConfig};
@@ -11,6 +13,7 @@ const SPEED_RANGE_MPS: Range = Range::closed(0.0, 80.0);
 const POSITION_RANGE_M: Range = Range::closed(-10_000.0, 100_000.0);
 const GAP_RANGE_M: Range = Range::closed(-50.0, 1_000.0);
 const THW_RANGE_S: Range = Range::closed(0.0, 60.0);
+const ACCELERATION_RANGE_MPS2: Range = Range::closed(-12.0, 12.0);
 const CLOSING_RANGE_MPS: Range = Range::closed(-60.0, 60.0);
 
 /// The actors of a scenario, with their checked vehicles and drivers in the same order.
@@ -19,6 +22,7 @@ pub(super) struct Actors<'a> {
     pub(super) actors: &'a [ActorConfig],
     pub(super) vehicles: &'a [Vehicle],
     pub(super) drivers: &'a [CheckedDriver],
+    pub(super) paths: &'a [Option<LateralPath>],
 }
 
 /// Returns the state of every actor at time zero, in the order of the actors.
@@ -27,7 +31,7 @@ pub(super) struct Actors<'a> {
 /// [`ConfigError`] if a value is out of range, if positions depend on each other in a cycle, or if
 /// vehicles overlap.
 pub(super) fn initial_states(
-    Actors { actors, vehicles, drivers }: Actors<'_>,
+    Actors { actors, vehicles, drivers, paths }: Actors<'_>,
     road: &Road,
     parameters: &Parameters,
 ) -> Result<Vec<VehicleState>, ConfigError> {
@@ -39,7 +43,10 @@ pub(super) fn initial_states(
         for (index, actor) in actors.iter().enumerate() {
             if placed[index].is_none() {
                 let placement = Placement { actors, vehicles, drivers, road, parameters, placed: &placed };
-                placed[index] = placement.state(index, actor).map_err(|error| at(index, error))?;
+                let state = placement.state(index, actor).map_err(|error| at(index, error))?;
+                let on_path = |state| on_path(state, paths[index].as_ref(), road);
+                let state = state.map(on_path).transpose();
+                placed[index] = state.map_err(|error| error.within_index(index).within("actor"))?;
             }
         }
         if placed.iter().flatten().count() == before {
@@ -49,6 +56,18 @@ pub(super) fn initial_states(
     let states: Vec<VehicleState> = placed.into_iter().flatten().collect();
     reject_overlaps(actors, vehicles, road, &states)?;
     Ok(states)
+}
+
+/// Returns the state in which an actor starts on its lateral path.
+fn on_path(state: VehicleState, path: Option<&LateralPath>, road: &Road) -> Result<VehicleState, ConfigError> {
+    let Some(path) = path else { return Ok(state) };
+    let [d_m, slope, _] = path.at(0.0);
+    let [on_path, at_start] = [d_m, state.d_m].map(|d_m| road.lane_at(d_m));
+    if on_path == at_start {
+        return Ok(VehicleState { d_m, heading_rad: maths::atan(slope), ..state });
+    }
+    let rule = format!("the path starts in lane {}, and the actor in lane {}", on_path.0, at_start.0);
+    Err(ConfigError::new("path", Problem::Contradiction { other: "start", rule }))
 }
 
 fn at(index: usize, error: ConfigError) -> ConfigError {
@@ -112,7 +131,10 @@ impl Placement<'_> {
                 let d_m = self.lane_centre_m(start.lane).map_err(|error| error.within("absolute"))?;
                 let s_m = number(&start.s_m, "s-m", POSITION_RANGE_M)?;
                 let speed_mps = number(&start.speed_mps, "speed-mps", SPEED_RANGE_MPS)?;
-                Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
+                let acceleration = start.acceleration_mps2.as_ref();
+                let acceleration_mps2 =
+                    acceleration.map_or(Ok(0.0), |num| number(num, "acceleration-mps2", ACCELERATION_RANGE_MPS2))?;
+                Ok(Some(VehicleState { s_m, d_m, speed_mps, acceleration_mps2, ..VehicleState::default() }))
             }
             StartConfig::Ahead(start) => self.relative(index, start, 1.0).map_err(|error| error.within("ahead")),
             StartConfig::Behind(start) => self.relative(index, start, -1.0).map_err(|error| error.within("behind")),

@@ -24,7 +24,7 @@ use closecall_controllers::{
     AccConfig, AebConfig, DriverConfig, EgoStackConfig, FollowConfig, MisConfig, OvertakerConfig, PrescribedConfig,
     PrescribedLaneChangeConfig, ReactionConfig, Wiedemann99Config,
 };
-use closecall_recorded::encounter::{EGO_INDEX, Participant, RecordedEncounter};
+use closecall_recorded::encounter::{EGO_INDEX, LONGEST_THW_S, Participant, RecordedEncounter};
 use closecall_recorded::filters::PERIOD;
 use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
@@ -67,7 +67,7 @@ const MAX_TIME_GAP_S: f64 = 5.0;
 pub(super) const MIN_LANE_CHANGE_S: f64 = 1.5;
 pub(super) const MAX_LANE_CHANGE_S: f64 = 20.0;
 /// Smallest gap between two vehicles that start in the same lane (m).
-const MIN_START_GAP_M: f64 = 0.5;
+pub(super) const MIN_START_GAP_M: f64 = 0.5;
 
 /// Returns the name of a vehicle as an actor: `ego`, `front`, `rear`, or its track. `index` is its
 /// index in the encounter's list of vehicles.
@@ -121,7 +121,6 @@ fn scenario_text(config: &ScenarioConfig) -> Result<String, String> {
 
 /// Returns the contents of the scenario file.
 pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioConfig, String> {
-    let [ego, _, rear_track] = encounter.ego_lead_rear();
     let mut actors = Vec::new();
     for (index, vehicle) in encounter.vehicles.iter().enumerate() {
         let is_rear = index == encounter.rear_index();
@@ -139,9 +138,8 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
             actors.push(actor(&actor_name(index, &vehicle.trajectory), vehicle, start, driver)?);
         }
     }
-    Ok(ScenarioConfig {
-        function: Function::Mis,
-        schema_version: SCHEMA_VERSION,
+    let [ego, _, rear_track] = encounter.ego_lead_rear();
+    let title = Title {
         name: format!("reenacted-track-{}", rear_track.track_id),
         description: format!(
             "The encounter of track {} (R) with track {} (E) in {}, from {:.1} s on",
@@ -150,7 +148,29 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
             encounter.data_name,
             encounter.start.s()
         ),
-        tags: vec!["reenacted".to_owned()],
+        tag: "reenacted",
+    };
+    Ok(with_actors(encounter, title, actors))
+}
+
+/// The words that name a scenario.
+pub(super) struct Title {
+    /// Its name.
+    pub(super) name: String,
+    /// What happens.
+    pub(super) description: String,
+    /// Its only tag.
+    pub(super) tag: &'static str,
+}
+
+/// Returns the contents of a scenario file with the road and the duration of an encounter.
+pub(super) fn with_actors(encounter: &RecordedEncounter, title: Title, actors: Vec<ActorConfig>) -> ScenarioConfig {
+    ScenarioConfig {
+        function: Function::Mis,
+        schema_version: SCHEMA_VERSION,
+        name: title.name,
+        description: title.description,
+        tags: vec![title.tag.to_owned()],
         requirements: Vec::new(),
         checks: BTreeMap::new(),
         gate: GateConfig::default(),
@@ -177,7 +197,7 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
         controller: Default::default(),
         ideal: Default::default(),
         fault: Default::default(),
-    })
+    }
 }
 
 /// Returns an actor with the recorded size and start of a vehicle.
@@ -200,8 +220,10 @@ pub(super) fn actor(
             lane: start.lane,
             s_m: rounded(start.s_m),
             speed_mps: rounded(start.speed_mps.max(0.0)),
+            acceleration_mps2: None,
         }),
         driver,
+        path: None,
         lane_keeping: None,
         speed_keeping: None,
         events: Vec::new(),
@@ -216,7 +238,7 @@ pub(super) fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
 
 /// Returns whether a vehicle that starts at `start` keeps a gap to `other`, if both start in the
 /// same lane.
-pub(super) fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
+fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
     let touching_m = touching_distance_m(other.dimensions.length_m, vehicle.trajectory.dimensions.length_m);
     start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > touching_m + MIN_START_GAP_M)
 }
@@ -247,7 +269,7 @@ fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
 /// recorded, and as fast.
 fn overtaking_driver(encounter: &RecordedEncounter) -> DriverConfig {
     let [ego, _, rear] = encounter.ego_lead_rear();
-    let cut_out_thw_s = encounter.crossing_thw_s;
+    let cut_out_thw_s = encounter.crossing_thw_s.unwrap_or(LONGEST_THW_S);
     let start_mps = start_of(rear).map_or(MIN_SPEED_MPS, |start| start.speed_mps.max(MIN_SPEED_MPS));
     let cc0_m = STANDSTILL_GAP_M.min(0.5 * cut_out_thw_s * start_mps);
     let closest_s = gaps(rear, ego, encounter.crossing)
@@ -349,11 +371,7 @@ pub(super) fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Partici
 /// its start, and crosses the marking after half of that length. A recorded one is hardly ever
 /// symmetric. Of all starts from `free_from_s` on for which the duration is possible, the start
 /// nearest to the recorded `start_s` is chosen. Returns `None` if there is none.
-pub(super) fn lane_change_across(
-    vehicle: &Trajectory,
-    [start_s, crossing_s]: [f64; 2],
-    free_from_s: f64,
-) -> Option<(f64, f64)> {
+fn lane_change_across(vehicle: &Trajectory, [start_s, crossing_s]: [f64; 2], free_from_s: f64) -> Option<(f64, f64)> {
     let crossing_m = vehicle.at(Time::from_s(crossing_s))?.s_m;
     let candidate = |point: &TrajectoryPoint| {
         let duration_s = 2.0 * (crossing_m - point.s_m) / point.speed_mps.max(MIN_SPEED_MPS);

@@ -49,20 +49,7 @@ impl Variation {
     /// # Errors
     /// Says what is wrong, and what is allowed.
     pub fn new(parameter: &str, [from, to]: [f64; 2], steps: usize) -> Result<Self, String> {
-        let named = PARAMETERS
-            .iter()
-            .find(|key| **key == parameter || key.strip_prefix(parameter).is_some_and(|unit| unit.starts_with('-')));
-        let key = match named {
-            Some(key) => format!("actor.{LANE_CHANGER}.driver.wiedemann99.{key}"),
-            None if parameter.contains('.') => parameter.to_owned(),
-            None => {
-                return Err(format!(
-                    "`{parameter}` is no parameter of the lane changer's driver: allowed are {}, or a path of keys such as \
-                     `actor.{LANE_CHANGER}.driver.wiedemann99.cc1-s`",
-                    PARAMETERS.join(", "),
-                ));
-            }
-        };
+        let key = Self::key_of(parameter)?;
         if !(2..=MAX_STEPS).contains(&steps) {
             return Err(format!("{steps} steps are not possible: 2 to {MAX_STEPS} are allowed"));
         }
@@ -72,6 +59,25 @@ impl Variation {
         let value = |step: usize| from + (to - from) * step as f64 / (steps - 1) as f64;
         let values = (0..steps).map(|step| (value(step) * STEPS_PER_UNIT).round() / STEPS_PER_UNIT).collect();
         Ok(Self { key, values })
+    }
+
+    /// Returns the key of a parameter in the scenario file: see [`Self::new`].
+    ///
+    /// # Errors
+    /// Says what is wrong, and what is allowed.
+    pub fn key_of(parameter: &str) -> Result<String, String> {
+        let named = PARAMETERS
+            .iter()
+            .find(|key| **key == parameter || key.strip_prefix(parameter).is_some_and(|unit| unit.starts_with('-')));
+        match named {
+            Some(key) => Ok(format!("actor.{LANE_CHANGER}.driver.wiedemann99.{key}")),
+            None if parameter.contains('.') => Ok(parameter.to_owned()),
+            None => Err(format!(
+                "`{parameter}` is no parameter of the lane changer's driver: allowed are {}, or a path of keys such as \
+                 `actor.{LANE_CHANGER}.driver.wiedemann99.cc1-s`",
+                PARAMETERS.join(", "),
+            )),
+        }
     }
 
     /// Returns the steps, each with its value.

@@ -125,6 +125,7 @@ pub(super) fn add(
             vehicle: drawn.vehicle,
             start: VehicleState { s_m, ..start },
             driver: block.driver.clone(),
+            path: None,
             lane_keeping: None,
             speed_keeping: None,
             events: Vec::new(),

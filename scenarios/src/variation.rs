@@ -36,6 +36,7 @@ impl Scenario {
         let road = self.road.mirrored()?;
         let mirrored = |actor: &Actor| Actor {
             start: mirrored(&actor.start, &self.road),
+            path: actor.path.as_ref().map(|path| path.mirrored(self.road.right_edge_m())),
             driver: actor.driver.mirrored(),
             events: actor.events.iter().map(|event| Event { then: event.then.mirrored(), ..event.clone() }).collect(),
             ..actor.clone()

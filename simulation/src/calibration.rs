@@ -21,7 +21,9 @@ mod calibrate;
 mod follower;
 mod optimise;
 mod predictive;
+mod replaced;
 
 pub use calibrate::{Calibration, Errors, PairResult, calibrate};
 pub use follower::{FollowingModel, ParameterSpec};
 pub use predictive::Predictive;
+pub use replaced::{Calibrated, ahead_of, calibrate_replaced, value_of};

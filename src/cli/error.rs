@@ -22,6 +22,7 @@ use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;
 use closecall_report::run::rerun::RecordingError;
+use closecall_report::traffic::reproduction::StepZeroError;
 use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::ScenarioError;
 use closecall_scenarios::library::UnknownScenario;
@@ -114,6 +115,14 @@ pub enum CliError {
         source: NoEncounter,
         /// The tracks of the file that can be re-enacted.
         possible: Vec<u64>,
+    },
+    /// No driver reproduces a recorded lane change.
+    #[error("failed to sample an encounter of {file}: {source}")]
+    NotReproduced {
+        /// The trajectory file.
+        file: String,
+        /// How far the closest driver is from the recording.
+        source: StepZeroError,
     },
     /// A set of rendered images cannot be written.
     #[error(transparent)]
@@ -298,8 +307,10 @@ impl From<&CliError> for ExitCode {
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
+            | CliError::NotReproduced { .. }
             | CliError::Project(ProjectError { is_io: false, .. })
             | CliError::View(ViewError::Nothing { .. } | ViewError::Foreign { .. })
+            | CliError::Aerial(AerialError::Traffic { .. } | AerialError::Network(_) | AerialError::Output { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Controller(error) => FailureKind::from(error).into(),
             CliError::Folder(error) | CliError::Results(error) => FailureKind::from(error).into(),
@@ -329,7 +340,13 @@ impl From<&CliError> for ExitCode {
             | CliError::Figure(_)
             | CliError::WriteRecording(_)
             | CliError::Dataset(_)
-            | CliError::Aerial(_) => Self::Io,
+            | CliError::Aerial(
+                AerialError::Folder { .. }
+                | AerialError::Write(_)
+                | AerialError::Encode { .. }
+                | AerialError::Pose(_)
+                | AerialError::Stream(_),
+            ) => Self::Io,
             CliError::Member(MemberError::Read { .. }) | CliError::Following(FollowingError::Read { .. }) => Self::Io,
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
@@ -338,6 +355,7 @@ impl From<&CliError> for ExitCode {
                 PlanError::Controller { .. } | PlanError::WithoutMis { .. } | PlanError::WithoutHuman { .. },
             ) => Self::InvalidInput,
             CliError::Usage { .. }
+            | CliError::Aerial(AerialError::Option { .. })
             | CliError::Gates(_)
             | CliError::Arms(_)
             | CliError::Plan(_)

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_recorded::encounter::{ChoiceError, Lead, RecordedEncounter, Wanted, choose};
+use closecall_recorded::encounter::{ChoiceError, Lead, RecordedEncounter, Wanted, choose_first};
 use closecall_recorded::filters::smooth;
 use closecall_report::json::stamped;
 use closecall_report::run::film::{EncounterComparison, film_encounter};
@@ -123,7 +123,18 @@ pub(super) fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u
 
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
 pub(super) fn chosen(path: &Path, read: &ReadArgs, wanted: Wanted) -> Result<RecordedEncounter, CliError> {
-    let found = choose(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP);
+    chosen_by(path, read, wanted, Ok)?
+}
+
+/// Returns what `accept` makes of the encounter of the named track of a trajectory file, or of the
+/// most critical one that it accepts.
+pub(super) fn chosen_by<T>(
+    path: &Path,
+    read: &ReadArgs,
+    wanted: Wanted,
+    accept: impl Fn(RecordedEncounter) -> Result<T, CliError>,
+) -> Result<Result<T, CliError>, CliError> {
+    let found = choose_first(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP, accept);
     let track = wanted.track;
     let file = path.display();
     found.map_err(|error| match error {

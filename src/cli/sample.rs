@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_recorded::encounter::{Lead, Wanted};
+use closecall_recorded::encounter::{Lead, RecordedEncounter, Wanted};
 use closecall_report::json::stamped;
 use closecall_report::run::rerun::write_recording;
-use closecall_report::traffic::sampling::{Sampled, SampledRun, StepError, run_step};
+use closecall_report::traffic::reproduction::{StepZeroError, step_zero};
+use closecall_report::traffic::sampling::{Sampled, StepError, run_step};
 use closecall_scenarios::{ScenarioFile, Variation, sampled};
+use closecall_simulation::calibration::value_of;
 use closecall_traffic::atomic::write_file;
 
 use super::CliError;
@@ -15,13 +17,13 @@ use super::args::{Format, ReadArgs, SetArgs};
 use super::help::{examples, heading};
 use super::output::{made_by, out, outln, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
-use super::reenact::chosen;
+use super::reenact::chosen_by;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic sample`.
 #[derive(Debug, Args)]
 #[command(after_help = examples([
-    "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3",
+    "closecall traffic sample traffic.csv --vary cc1 --to 0.3",
     "closecall traffic sample traffic.csv --lane-change 3 --vary cc1 --from 1.5 --to 0.3 -o sampled",
     "closecall traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3 --transfer -o sampled",
 ]))]
@@ -41,9 +43,9 @@ pub(super) struct SampleArgs {
     /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario
     #[arg(long, value_name = "PARAMETER", help_heading = heading::METHOD)]
     vary: String,
-    /// Its first value
+    /// Its first value [default: the calibrated one of step 0]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, help_heading = heading::METHOD)]
-    from: f64,
+    from: Option<f64>,
     /// Its last value
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, help_heading = heading::METHOD)]
     to: f64,
@@ -56,10 +58,10 @@ pub(super) struct SampleArgs {
     #[command(flatten)]
     set: SetArgs,
     /// Folder for `sample.svg`, `sample.rrd` (a Rerun file) and the scenario of each step,
-    /// `step-1.toml` and so on
+    /// `step-0.toml` and so on
     #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
-    /// Also write each step as an encounter with the margin increase system, `transferred-1.toml`
+    /// Also write each step as an encounter with the margin increase system, `transferred-0.toml`
     /// and so on: the vehicle that changes lanes becomes the rear vehicle, the vehicle that it
     /// overtakes the ego, and the next one the lead vehicle
     #[arg(long, requires = "output", help_heading = heading::OUTPUT)]
@@ -70,36 +72,56 @@ pub(super) struct SampleArgs {
 }
 
 pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
-    let variation = Variation::new(&args.vary, [args.from, args.to], args.steps);
-    let variation = variation.map_err(|message| CliError::Usage { message })?;
+    let usage = |message| CliError::Usage { message };
+    let key = Variation::key_of(&args.vary).map_err(usage)?;
+    let variation = |from| Variation::new(&args.vary, [from, args.to], args.steps).map_err(usage);
+    // A wrong value is refused before the file is read.
+    args.from.map(variation).transpose()?;
     let path = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
-    let inputs = of_trajectories(std::slice::from_ref(&args.file));
-    protect(&inputs, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
+    let files = of_trajectories(std::slice::from_ref(&args.file));
+    protect(&files, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
     // The margin increase system needs a lead vehicle; a driver that is sampled does not.
     let lead = if args.transfer { Lead::Required } else { Lead::LeftOut };
     let wanted = Wanted { track: args.lane_change, number: args.number, lead };
-    let found = chosen(&args.file, &args.read, wanted)?;
-    let source = format!("{} (track {})", args.file.display(), found.change.track_id);
-    let mut all = Sampled::new(&found);
-    let (mut films, mut files): (Vec<_>, Vec<(String, ScenarioFile)>) = (Vec::new(), Vec::new());
-    for (number, value) in variation.steps().enumerate() {
-        let step = sampled(&found, value, (Path::new(&source), &args.set.settings))?;
-        if number == 0 {
-            all.runs.push(SampledRun::recorded(&found, &step));
-        }
-        let done = run_step(&found, value, &step, args.seed).map_err(|error| match error {
-            StepError::Scenario(source) => CliError::Scenario(source),
-            StepError::Film(source) => CliError::TrafficFilm(source),
-            StepError::Run(source) => CliError::Sample { sample: number as u64, source },
+    let zero_of = |found: RecordedEncounter| {
+        let source = format!("{} (track {})", args.file.display(), found.change.track_id);
+        let zero = step_zero(&found, (Path::new(&source), &args.set.settings), args.seed);
+        let zero = zero.map_err(|error| match error {
+            StepZeroError::Step(error) => of_step(error, 0),
+            not_reproduced @ StepZeroError::NotReproduced(_) => {
+                CliError::NotReproduced { file: args.file.display().to_string(), source: not_reproduced }
+            }
         })?;
+        Ok((found, source, zero))
+    };
+    let (found, source, zero) = chosen_by(&args.file, &args.read, wanted, zero_of)??;
+    let inputs = (Path::new(&source), &args.set.settings[..]);
+    let last_key = key.rsplit('.').next().unwrap_or_default();
+    // Only a parameter of the vehicle that changes lanes is calibrated.
+    let is_calibrated = Variation::key_of(last_key).is_ok_and(|own| own == key);
+    let from = args.from.or_else(|| value_of(&zero.driver, last_key).filter(|_| is_calibrated));
+    let variation = variation(from.ok_or_else(|| {
+        usage(format!("--from is missing: `{}` has no calibrated value from which the steps start", args.vary))
+    })?)?;
+    let mut all = Sampled::new(&found, (zero.recorded, zero.run.run), (zero.reproduction, zero.step.lane_change_s[1]));
+    let mut films: Vec<_> = zero.run.film.into_iter().collect();
+    let mut files: Vec<(String, ScenarioFile)> = Vec::new();
+    let mut steps = vec![zero.step];
+    for (number, value) in (1..).zip(variation.steps()) {
+        let step = sampled(&found, (&zero.driver, Some(value)), inputs)?;
+        let done = run_step(&found, (value.label(), Some(value.value)), &step, args.seed);
+        let done = done.map_err(|error| of_step(error, number))?;
         films.extend(done.film);
-        if let Some(cut_out_thw_s) = done.run.thw_opp1_at_crossing_s.filter(|_| args.transfer) {
-            let transferred = step.transferred(&found, cut_out_thw_s, Path::new(&source))?;
-            files.push((format!("transferred-{}.toml", number + 1), transferred));
-        }
-        files.push((format!("step-{}.toml", number + 1), step.file));
         all.runs.push(done.run);
+        steps.push(step);
+    }
+    for (number, (step, run)) in steps.into_iter().zip(&all.runs[1..]).enumerate() {
+        if let Some(cut_out_thw_s) = run.thw_opp1_at_crossing_s.filter(|_| args.transfer) {
+            let transferred = step.transferred(&found, cut_out_thw_s, Path::new(&source))?;
+            files.push((format!("transferred-{number}.toml"), transferred));
+        }
+        files.push((format!("step-{number}.toml"), step.file));
     }
     if let (Some(folder), Some(svg), Some(rrd)) = (&args.output, svg, rrd) {
         write_charts(folder, &[svg], &[all.figure()?])?;
@@ -114,4 +136,13 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         Format::Human => out!("{all}"),
     }
     Ok(ExitCode::Pass)
+}
+
+/// Returns the error of a step.
+fn of_step(error: StepError, number: u64) -> CliError {
+    match error {
+        StepError::Scenario(source) => CliError::Scenario(source),
+        StepError::Film(source) => CliError::TrafficFilm(source),
+        StepError::Run(source) => CliError::Sample { sample: number, source },
+    }
 }

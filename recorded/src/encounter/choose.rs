@@ -48,11 +48,23 @@ pub struct Wanted {
 ///
 /// # Errors
 /// [`ChoiceError`] if there is none.
-pub fn choose(
+pub fn choose(data: &SmoothedTrajectoryData, wanted: Wanted, period: Time) -> Result<RecordedEncounter, ChoiceError> {
+    let Ok(chosen) = choose_first(data, wanted, period, Ok::<_, std::convert::Infallible>)?;
+    Ok(chosen)
+}
+
+/// Returns what `accept` makes of the most critical lane change of `data` that is wanted, is an
+/// encounter and is accepted, with a trajectory point at every `period`. If none is accepted, returns
+/// the first reason of `accept`.
+///
+/// # Errors
+/// [`ChoiceError`] if there is no encounter.
+pub fn choose_first<T, E>(
     data: &SmoothedTrajectoryData,
     Wanted { track, number, lead }: Wanted,
     period: Time,
-) -> Result<RecordedEncounter, ChoiceError> {
+    accept: impl Fn(RecordedEncounter) -> Result<T, E>,
+) -> Result<Result<T, E>, ChoiceError> {
     let changes = criticality(data, &Judgement::default());
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
     let encounter_of = |change: &LaneChange| encounter(data, change, &all, (period, lead));
@@ -66,12 +78,16 @@ pub fn choose(
             return Err(ChoiceError::NoSuchNumber { count });
         }
     }
-    let mut refused = None;
+    let (mut refused, mut not_accepted) = (None, None);
     for change in candidates {
-        match encounter_of(&change.lane_change) {
-            Ok(encounter) => return Ok(encounter),
+        match encounter_of(&change.lane_change).map(&accept) {
+            Ok(Ok(accepted)) => return Ok(Ok(accepted)),
+            Ok(Err(reason)) => not_accepted = not_accepted.or(Some(reason)),
             Err(source) => refused = refused.or(Some(source)),
         }
+    }
+    if let Some(reason) = not_accepted {
+        return Ok(Err(reason));
     }
     let source = refused.ok_or_else(|| {
         let mut others: Vec<u64> = track.map_or(Vec::new(), |_| all.iter().map(|change| change.track_id).collect());

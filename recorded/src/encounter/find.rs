@@ -18,9 +18,10 @@ use crate::lane_change::LaneChange;
 /// `period`.
 ///
 /// # Errors
-/// Returns [`NoEncounter`] if there is no ego vehicle or no required lead vehicle, if these vehicles are not
-/// recorded together for long enough, if the rear vehicle is not close behind the ego vehicle at
-/// the crossing, or if they do not share a valid road.
+/// Returns [`NoEncounter`] if the rear vehicle and the vehicles ahead of it are not recorded for long
+/// enough before the crossing, or if they do not share a valid road. If a lead vehicle is required,
+/// also if there is no ego or no lead vehicle, and if the rear vehicle is not close behind the ego
+/// vehicle at the crossing.
 pub fn encounter(
     data: &SmoothedTrajectoryData,
     change: &LaneChange,
@@ -30,29 +31,35 @@ pub fn encounter(
     let roles = Roles::of(data, change, lead)?;
     let start = roles.start(data, change)?;
     let road = RoadSection::of(data, roles.rear, change)?;
-    let last = roles.ego.span().map_or(start, |(_, last)| last);
+    let reference = roles.reference();
+    let last = reference.span().map_or(start, |(_, last)| last);
     let end = last.min(on_clock(Time::from_s(change.end_s) + LEAD_OUT));
-    let origin_m = roles.ego.at(start).map_or(0.0, |point| point.s_m);
+    let origin_m = reference.at(start).map_or(0.0, |point| point.s_m);
     let frame = Frame { start, end, origin_m, road };
-    let (track_id, ego_id) = (roles.rear.track_id, roles.ego.track_id);
+    let track_id = roles.rear.track_id;
     let vehicles = participants(data, &roles, &frame, all, period);
     let vehicles = vehicles.ok_or(NoEncounter::LeavesTheRoad { track_id })?;
     let thw_s = roles.headway_s(Time::from_s(change.crossing_s));
     let is_behind = |thw_s: &f64| *thw_s > 0.0 && *thw_s <= LONGEST_THW_S;
-    let not_behind = NoEncounter::NotBehind { track_id, ego_id, thw_s, longest_s: LONGEST_THW_S };
-    let crossing_thw_s = thw_s.ok().filter(is_behind).ok_or(not_behind)?;
+    if let (Lead::Required, Some(ego)) = (lead, roles.ego)
+        && !thw_s.is_ok_and(|thw_s| is_behind(&thw_s))
+    {
+        let ego_id = ego.track_id;
+        return Err(NoEncounter::NotBehind { track_id, ego_id, thw_s, longest_s: LONGEST_THW_S });
+    }
     Ok(RecordedEncounter {
         data_name: data.name.clone(),
         change: change.clone(),
         start,
         crossing: Time::from_s(change.crossing_s) - start,
         end: end - start,
-        crossing_thw_s,
+        crossing_thw_s: thw_s,
         lanes: road.lanes,
         lane_width_m: road.lane_width_m,
         home: road.lane(change.from_lane).unwrap_or(Lane(1)),
         target: road.lane(change.to_lane).unwrap_or(Lane(1)),
         lead,
+        has_ego: roles.ego.is_some(),
         vehicles,
     })
 }
@@ -77,9 +84,10 @@ pub(super) fn begin<'a>(data: &'a SmoothedTrajectoryData, change: &LaneChange) -
     Some((rear, on_clock(begins.unwrap_or(crossing) + PERIOD - Time::from_ns(1))))
 }
 
-/// The three vehicles of an encounter, and the time at which their roles are assigned.
+/// The vehicles of an encounter, and the time at which their roles are assigned.
 struct Roles<'a> {
-    ego: &'a Trajectory,
+    /// The ego vehicle: there is one if a lead vehicle is required.
+    ego: Option<&'a Trajectory>,
     /// The lead vehicle, if it is required.
     lead: Option<&'a Trajectory>,
     rear: &'a Trajectory,
@@ -95,39 +103,77 @@ impl<'a> Roles<'a> {
         let (rear, change_start) = begin(data, change).ok_or(NoEncounter::NoTrack { track_id })?;
         let no_ego = NoEncounter::NoEgo { track_id, lane: change.from_lane };
         let lane = Lane(change.from_lane);
-        let ego = next_ahead(data, rear, lane, change_start).ok_or(no_ego)?;
-        let no_lead = NoEncounter::NoLead { track_id, ego_id: ego.track_id };
-        let lead = match lead {
-            Lead::Required => Some(next_ahead(data, ego, lane, change_start).ok_or(no_lead)?),
-            Lead::LeftOut => None,
-        };
-        Ok(Self { ego, lead, rear, change_start })
+        let ahead = next_ahead(data, rear, lane, change_start);
+        match lead {
+            Lead::Required => {
+                let ego = ahead.ok_or(no_ego)?;
+                let no_lead = NoEncounter::NoLead { track_id, ego_id: ego.track_id };
+                let lead = next_ahead(data, ego, lane, change_start).ok_or(no_lead)?;
+                Ok(Self { ego: Some(ego), lead: Some(lead), rear, change_start })
+            }
+            Lead::LeftOut => Ok(Self { ego: ahead, lead: None, rear, change_start }),
+        }
+    }
+
+    /// Returns the vehicle at which s is 0 when the encounter starts, and near which the other
+    /// vehicles are: the ego vehicle if a lead vehicle is required, otherwise the rear vehicle.
+    fn reference(&self) -> &'a Trajectory {
+        self.ego.filter(|_| self.lead.is_some()).unwrap_or(self.rear)
+    }
+
+    /// Returns the start of the encounter.
+    fn start(&self, data: &SmoothedTrajectoryData, change: &LaneChange) -> Result<Time, NoEncounter> {
+        match (self.ego, self.lead) {
+            (Some(ego), Some(lead)) => self.start_in_order(data, change, [ego, lead]),
+            _ => self.start_of_record(data, change),
+        }
+    }
+
+    /// Returns the first instant at which the rear vehicle is recorded, together with the vehicle
+    /// that it overtakes and, if enough time is left, with the vehicle that is ahead of it in its new
+    /// lane.
+    fn start_of_record(&self, data: &SmoothedTrajectoryData, change: &LaneChange) -> Result<Time, NoEncounter> {
+        let crossing = Time::from_s(change.crossing_s);
+        let since = |track: &Trajectory| track.span().map_or(self.change_start, |(first, _)| first);
+        let earliest = since(self.rear).max(self.change_start - LEAD_IN);
+        let start = self.ego.map_or(earliest, |ego| since(ego).max(earliest));
+        if crossing < start + SHORTEST_APPROACH {
+            return Err(NoEncounter::TooShort {
+                track_id: self.rear.track_id,
+                ego_id: self.ego.filter(|ego| since(ego) > earliest).map(|ego| ego.track_id),
+                front_id: None,
+                recorded_s: (crossing - start).s(),
+                needed_s: SHORTEST_APPROACH.s(),
+            });
+        }
+        // The first instant of the clock at which the rear vehicle is in its new lane.
+        let in_new_lane =
+            self.rear.points.iter().find(|point| point.time >= crossing && point.lane.0 == change.to_lane);
+        let new_leader = in_new_lane.and_then(|point| next_ahead(data, self.rear, point.lane, point.time));
+        let with_new_leader = new_leader.map_or(start, |leader| since(leader).max(start));
+        Ok(if crossing < with_new_leader + SHORTEST_APPROACH { start } else { with_new_leader })
     }
 
     /// Returns the earliest instant from which the three vehicles keep their order in the lane
     /// without interruption.
-    fn start(&self, data: &SmoothedTrajectoryData, change: &LaneChange) -> Result<Time, NoEncounter> {
+    fn start_in_order(
+        &self,
+        data: &SmoothedTrajectoryData,
+        change: &LaneChange,
+        [ego, lead]: [&Trajectory; 2],
+    ) -> Result<Time, NoEncounter> {
         let lane = Lane(change.from_lane);
         let next_id =
             |follower: &Trajectory, time: Time| next_ahead(data, follower, lane, time).map(|track| track.track_id);
-        // Without a lead vehicle, the ego vehicle only has to be ahead: it may cut in.
-        let is_ahead = |time: Time| {
-            self.rear.at(time).zip(self.ego.at(time)).is_some_and(|(rear, ego)| rear.lane == lane && ego.s_m > rear.s_m)
-        };
-        let in_order = |time: Time| match self.lead {
-            Some(lead) => {
-                next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(lead.track_id)
-            }
-            None => is_ahead(time),
-        };
+        let in_order =
+            |time: Time| next_id(self.rear, time) == Some(ego.track_id) && next_id(ego, time) == Some(lead.track_id);
         let max_ticks = LEAD_IN.ns() / PERIOD.ns();
         let instants = (0..=max_ticks).map(|ticks| self.change_start - PERIOD * ticks);
         let start = instants.take_while(|&time| in_order(time)).last().unwrap_or(self.change_start);
         let crossing = Time::from_s(change.crossing_s);
-        let needed = [Some(self.ego), self.lead, Some(self.rear)];
-        let recorded_to = needed.into_iter().flatten().filter_map(|track| Some(track.span()?.1)).min();
+        let recorded_to = [ego, lead, self.rear].into_iter().filter_map(|track| Some(track.span()?.1)).min();
         let until = recorded_to.map_or(start, |last| last.min(crossing));
-        let (track_id, ego_id, front_id) = (self.rear.track_id, self.ego.track_id, self.lead.map(|lead| lead.track_id));
+        let (track_id, ego_id, front_id) = (self.rear.track_id, ego.track_id, Some(lead.track_id));
         // The crossing may lie between two instants of the clock, up to one period after the last
         // recorded one.
         if until + PERIOD < crossing {
@@ -137,7 +183,7 @@ impl<'a> Roles<'a> {
         if until < start + SHORTEST_APPROACH {
             return Err(NoEncounter::TooShort {
                 track_id,
-                ego_id,
+                ego_id: Some(ego_id),
                 front_id,
                 recorded_s: (until - start).s(),
                 needed_s: SHORTEST_APPROACH.s(),
@@ -148,10 +194,11 @@ impl<'a> Roles<'a> {
 
     /// Returns the time headway of the rear vehicle to the ego vehicle (s).
     fn headway_s(&self, time: Time) -> Measured {
-        let (rear, ego) = (self.rear.at(time), self.ego.at(time));
-        let (rear, ego) = rear.zip(ego).ok_or(Absent::NotRecorded)?;
-        let gap_m = bumper_gap_m(ego.s_m - rear.s_m, self.rear.dimensions.length_m, self.ego.dimensions.length_m);
-        time_headway_s(gap_m, rear.speed_mps)
+        let ego = self.ego.ok_or(Absent::NoLead)?;
+        let (rear_point, ego_point) = self.rear.at(time).zip(ego.at(time)).ok_or(Absent::NotRecorded)?;
+        let apart_m = ego_point.s_m - rear_point.s_m;
+        let gap_m = bumper_gap_m(apart_m, self.rear.dimensions.length_m, ego.dimensions.length_m);
+        time_headway_s(gap_m, rear_point.speed_mps)
     }
 }
 
@@ -170,7 +217,8 @@ pub(super) fn next_ahead<'a>(
     ahead.min_by(|a, b| a.1.s_m.total_cmp(&b.1.s_m)).map(|(track, _)| track)
 }
 
-/// Returns the vehicles with roles, then all other vehicles that come near the ego vehicle.
+/// Returns the vehicles with roles, then all other vehicles that come near the ego vehicle, or the
+/// rear vehicle if no lead vehicle is required.
 ///
 /// Returns `None` if one with a role leaves the road.
 fn participants(
@@ -190,11 +238,16 @@ fn participants(
         let trajectory = frame.view(track, period)?;
         Some(Participant { trajectory, changes: all.iter().filter(within).cloned().collect() })
     };
-    let with_roles: Vec<&Trajectory> = [Some(roles.ego), roles.lead, Some(roles.rear)].into_iter().flatten().collect();
+    let in_order = match roles.lead {
+        Some(lead) => [roles.ego, Some(lead), Some(roles.rear)],
+        None => [Some(roles.rear), roles.ego, None],
+    };
+    let with_roles: Vec<&Trajectory> = in_order.into_iter().flatten().collect();
     let mut vehicles: Vec<Participant> = with_roles.iter().map(|track| participant(track)).collect::<Option<_>>()?;
-    let ego = vehicles[EGO_INDEX].trajectory.clone();
+    // The reference comes first in either order.
+    let reference = vehicles[EGO_INDEX].trajectory.clone();
     let is_near = |other: &Participant| {
-        let distance_m = |point: &TrajectoryPoint| Some((point.s_m - ego.at(point.time)?.s_m).abs());
+        let distance_m = |point: &TrajectoryPoint| Some((point.s_m - reference.at(point.time)?.s_m).abs());
         other.trajectory.points.iter().filter_map(distance_m).any(|distance_m| distance_m < REACH_M)
     };
     let is_other = |track: &&Trajectory| with_roles.iter().all(|role| role.track_id != track.track_id);

@@ -38,7 +38,7 @@ mod relevance;
 mod tests;
 
 pub use approach::{Approach, ApproachValues, NoApproach, Party, approach};
-pub use choose::{ChoiceError, Wanted, choose};
+pub use choose::{ChoiceError, Wanted, choose, choose_first};
 pub use find::encounter;
 pub use recorded::{
     EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, Lead, NoEncounter, Participant, REACH_M, REAR_INDEX,

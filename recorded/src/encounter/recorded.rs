@@ -23,6 +23,9 @@ pub const EGO_INDEX: usize = 0;
 pub const LEAD_INDEX: usize = 1;
 /// Index of the rear vehicle in [`RecordedEncounter::vehicles`], if there is a lead vehicle.
 pub const REAR_INDEX: usize = 2;
+/// Indices of the rear vehicle and of the vehicle that it overtakes, if no lead vehicle is required.
+const REAR_ALONE_INDEX: usize = 0;
+const OVERTAKEN_INDEX: usize = 1;
 
 /// Whether an encounter has a lead vehicle, whose distance to the ego vehicle is the margin that can
 /// be increased.
@@ -30,7 +33,7 @@ pub const REAR_INDEX: usize = 2;
 pub enum Lead {
     /// A lane change without a lead vehicle is no encounter.
     Required,
-    /// No vehicle has that role.
+    /// No vehicle has that role. A lane change without an ego vehicle is an encounter, too.
     LeftOut,
 }
 
@@ -56,8 +59,9 @@ pub struct RecordedEncounter {
     pub crossing: Time,
     /// Time of the encounter at its end.
     pub end: Time,
-    /// Time headway of the rear vehicle to the ego vehicle at the crossing (s).
-    pub crossing_thw_s: f64,
+    /// Time headway of the rear vehicle to the ego vehicle at the crossing (s). Without a lead
+    /// vehicle it is not required, and then absent.
+    pub crossing_thw_s: Measured,
     /// Number of lanes of the road.
     pub lanes: u8,
     /// Width of each lane (m).
@@ -68,22 +72,45 @@ pub struct RecordedEncounter {
     pub target: Lane,
     /// Whether one of the vehicles is the lead vehicle.
     pub lead: Lead,
-    /// The ego, the lead (if there is one) and the rear vehicle, then all other vehicles that come
-    /// near the ego vehicle, in order of their track ids.
+    /// Whether one of the vehicles is the ego vehicle: always with a lead vehicle.
+    pub has_ego: bool,
+    /// The vehicles with roles, then all other vehicles that come near, in order of their track ids.
+    /// The roles are the ego, the lead and the rear vehicle; without a lead vehicle, the rear vehicle
+    /// and, if there is one, the ego vehicle.
     pub vehicles: Vec<Participant>,
 }
 
 impl RecordedEncounter {
-    /// Returns the trajectories of the ego, the lead and the rear vehicle, in this order. Without a
-    /// lead vehicle, the ego vehicle takes its place.
+    /// Returns the trajectories of the ego, the lead and the rear vehicle of an encounter with a lead
+    /// vehicle, in this order.
     pub fn ego_lead_rear(&self) -> [&Trajectory; 3] {
-        let lead = if self.lead == Lead::Required { LEAD_INDEX } else { EGO_INDEX };
-        [EGO_INDEX, lead, self.rear_index()].map(|index| &self.vehicles[index].trajectory)
+        [EGO_INDEX, LEAD_INDEX, REAR_INDEX].map(|index| &self.vehicles[index].trajectory)
     }
 
     /// Returns the index of the rear vehicle in [`RecordedEncounter::vehicles`].
     pub fn rear_index(&self) -> usize {
-        if self.lead == Lead::Required { REAR_INDEX } else { REAR_INDEX - 1 }
+        match self.lead {
+            Lead::Required => REAR_INDEX,
+            Lead::LeftOut => REAR_ALONE_INDEX,
+        }
+    }
+
+    /// Returns the index of the vehicle that the rear vehicle overtakes, the ego vehicle, in
+    /// [`RecordedEncounter::vehicles`]. Returns `None` if no vehicle is ahead.
+    pub fn overtaken_index(&self) -> Option<usize> {
+        match self.lead {
+            Lead::Required => Some(EGO_INDEX),
+            Lead::LeftOut => self.has_ego.then_some(OVERTAKEN_INDEX),
+        }
+    }
+
+    /// Returns the number of vehicles with roles, which come first in
+    /// [`RecordedEncounter::vehicles`].
+    pub fn roles(&self) -> usize {
+        match self.lead {
+            Lead::Required => REAR_INDEX + 1,
+            Lead::LeftOut => 1 + usize::from(self.has_ego),
+        }
     }
 
     /// Returns the rear vehicle, which changes lanes.
@@ -128,17 +155,17 @@ pub enum NoEncounter {
         /// Track id of the ego vehicle.
         ego_id: u64,
     },
-    /// The three vehicles are not recorded together for long enough before the crossing.
+    /// The vehicles with roles are not recorded together for long enough before the crossing.
     #[error(
-        "track {track_id} behind track {ego_id}{} is recorded for {recorded_s:.1} s before it \
-         crosses the marking; {needed_s:.1} s are needed",
+        "track {track_id}{}{} is recorded for {recorded_s:.1} s before it crosses the marking; {needed_s:.1} s are needed",
+        ego_id.map_or(String::new(), |ego_id| format!(" behind track {ego_id}")),
         front_id.map_or(String::new(), |front_id| format!(" behind track {front_id}"))
     )]
     TooShort {
         /// Track id of the rear vehicle.
         track_id: u64,
-        /// Track id of the ego vehicle.
-        ego_id: u64,
+        /// Track id of the ego vehicle, if there is one.
+        ego_id: Option<u64>,
         /// Track id of the lead vehicle, if it is required.
         front_id: Option<u64>,
         /// Time for which they are recorded together (s).

@@ -34,7 +34,7 @@ fn roles_clock_and_road_are_assigned() {
     // The gap at the crossing is the initial 150 m less 10 m/s times the elapsed time and a
     // vehicle's length.
     assert!((encounter.crossing.s() - 12.5).abs() < 0.2, "{}", encounter.crossing);
-    assert!((encounter.crossing_thw_s - (150.0 - 10.0 * encounter.crossing.s() - 4.5) / 30.0).abs() < 0.1);
+    assert!((encounter.crossing_thw_s.unwrap() - (150.0 - 10.0 * encounter.crossing.s() - 4.5) / 30.0).abs() < 0.1);
     let crossing = rear.points.iter().find(|point| point.time >= encounter.crossing).unwrap();
     assert!((crossing.d_m + encounter.lane_width_m).abs() < 0.2, "{}", crossing.d_m);
     assert!(encounter.end <= Time::from_s(21.2) && encounter.end > Time::from_s(20.0), "{}", encounter.end);
@@ -118,10 +118,73 @@ fn without_a_margin_system_no_lead_vehicle_is_required() {
     assert_eq!(refused, ChoiceError::NoEncounter { source: no_lead, possible: Vec::new() });
     let encounter = choose_with(Some(1), Lead::LeftOut).unwrap();
     assert_eq!((encounter.vehicles.len(), encounter.rear().trajectory.track_id), (2, 3));
-    assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 1, 3]);
+    assert_eq!(encounter.overtaken_index().map(|index| encounter.vehicles[index].trajectory.track_id), Some(1));
     assert_eq!(changes.len(), 1);
     assert_eq!(choose_with(Some(2), Lead::LeftOut).unwrap_err(), ChoiceError::NoSuchNumber { count: 1 });
     let unknown =
         choose(&data, Wanted { track: Some(9), number: None, lead: Lead::LeftOut }, CONTROL_STEP).unwrap_err();
     assert_eq!(unknown, ChoiceError::NoLaneChange { is_recorded: false, others: vec![3] });
+}
+
+/// Returns the encounter of track 3 without a lead vehicle.
+fn sampled_among(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
+    let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
+    let changes = detect(&data);
+    let change = changes.iter().find(|change| change.track_id == 3).unwrap();
+    encounter(&data, change, &changes, (CONTROL_STEP, Lead::LeftOut))
+}
+
+#[test]
+fn without_a_vehicle_ahead_there_is_an_encounter_without_an_ego_vehicle() {
+    let encounter = sampled_among(Vec::new()).unwrap();
+    assert_eq!((encounter.overtaken_index(), encounter.roles(), encounter.vehicles.len()), (None, 1, 1));
+    assert_eq!((encounter.start, encounter.rear().trajectory.points[0].s_m.abs() < 1e-6), (Time::ZERO, true));
+    assert_eq!(encounter.crossing_thw_s, Err(closecall_traffic::Absent::NoLead));
+}
+
+#[test]
+fn a_vehicle_ahead_may_be_far_or_leave_the_record_before_the_crossing() {
+    let far = straight_track(1, 600.0, 20.0, -5.25, 250);
+    assert!(sampled_among(vec![far]).is_ok());
+    let mut leaves = straight_track(1, 150.0, 20.0, -5.25, 250);
+    leaves.points.retain(|point| point.time < Time::from_s(11.5));
+    let encounter = sampled_among(vec![leaves]).unwrap();
+    assert!(encounter.crossing > Time::from_s(12.0) && encounter.overtaken_index() == Some(1));
+}
+
+#[test]
+fn the_encounter_starts_with_the_record_of_the_vehicle_ahead_and_needs_two_seconds() {
+    let since = |since_s: f64| {
+        let mut ahead = straight_track(1, 150.0, 20.0, -5.25, 250);
+        ahead.points.retain(|point| point.time >= Time::from_s(since_s));
+        sampled_among(vec![ahead])
+    };
+    assert_eq!(since(6.0).unwrap().start, Time::from_s(6.0));
+    // A vehicle that appears after the start of the lane change is not ahead at its start.
+    assert!(since(11.0).is_ok_and(|encounter| !encounter.has_ego && encounter.start == Time::ZERO));
+    let mut late = rear();
+    late.points.retain(|point| point.time >= Time::from_s(11.5));
+    let data = smooth(&trajectory_data_of(vec![late]));
+    let changes = detect(&data);
+    let refused = encounter(&data, &changes[0], &changes, (CONTROL_STEP, Lead::LeftOut)).unwrap_err().to_string();
+    assert!(refused.starts_with("track 3 is recorded for") && refused.contains("2.0 s are needed"), "{refused}");
+}
+
+#[test]
+fn the_second_of_two_quick_lane_changes_starts_before_the_first_one() {
+    let mut twice = rear();
+    let second = changing_track(3, (0.0, 30.0), (-1.75, 1.75), (14.5, 4.0), 200);
+    for (point, second) in twice.points.iter_mut().zip(&second.points) {
+        point.d_m -= 3.5;
+        if point.time > Time::from_s(14.6) {
+            point.d_m = second.d_m - 3.5;
+            point.lateral_speed_mps = second.lateral_speed_mps;
+        }
+        point.lane = Lane((-point.d_m / 3.5).floor() as u8 + 1);
+    }
+    let data = smooth(&trajectory_data_of(vec![twice]));
+    let changes = detect(&data);
+    let [_, second] = &changes[..] else { panic!("{changes:?}") };
+    let encounter = encounter(&data, second, &changes, (CONTROL_STEP, Lead::LeftOut)).unwrap();
+    assert!(encounter.start < Time::from_s(1.0) && encounter.rear().changes.len() == 2, "{}", encounter.start);
 }

@@ -7,6 +7,7 @@ pub mod paper;
 pub mod paper_charts;
 pub mod quality;
 pub mod reenactment;
+pub mod reproduction;
 pub mod robustness;
 pub mod sampling;
 pub mod statistics;

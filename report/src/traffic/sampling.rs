@@ -13,10 +13,10 @@ use std::fmt;
 
 use closecall_campaign::runner::run_guarded;
 use closecall_recorded::criticality::{Judgement, criticality};
-use closecall_recorded::encounter::{EGO_INDEX, RecordedEncounter};
+use closecall_recorded::encounter::RecordedEncounter;
 use closecall_recorded::filters::smooth;
 use closecall_scenarios::outcome::Outcome;
-use closecall_scenarios::{SampledEncounter, ScenarioError, StepValue, opp2_of};
+use closecall_scenarios::{SampledEncounter, ScenarioError, opp2_of};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::{Arm, RunKey, SampleError};
@@ -25,6 +25,7 @@ use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 use plotters::prelude::*;
 use serde::Serialize;
 
+use super::reproduction::Reproduction;
 use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
 use crate::charts::style::{Canvas, Drawn, svg};
 use crate::run::film::{Film, TrafficFilmError, film_lane_change};
@@ -39,9 +40,9 @@ const FIGURE_PX: (u32, u32) = (900, 1_260);
 /// One run of a sampled lane change, or the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampledRun {
-    /// The varied parameter with its value; `recorded` for the recorded lane change.
+    /// The varied parameter with its value; `recorded` for the recorded lane change, `step 0` for the calibrated driver.
     pub name: String,
-    /// Value of the varied parameter; `None` for the recorded lane change.
+    /// Value of the varied parameter; `None` for the recorded lane change and for step 0.
     pub value: Option<f64>,
     /// Time at which the centre crosses the marking (s); `None` if it never does.
     pub crossing_s: Option<f64>,
@@ -60,7 +61,7 @@ pub struct SampledRun {
     path: Vec<(f64, f64)>,
     /// The same, with the time.
     #[serde(skip)]
-    positions: Vec<(Time, f64, f64)>,
+    pub(super) positions: Vec<(Time, f64, f64)>,
     /// Positions of Opp₁ and of Opp₂: s and d (m).
     #[serde(skip)]
     opponents: [Vec<(f64, f64)>; 2],
@@ -72,20 +73,20 @@ pub struct SampledRun {
 /// The vehicles of one run whose headways are measured.
 struct Vehicles<'a> {
     own: &'a Trajectory,
-    opp1: &'a Trajectory,
+    opp1: Option<&'a Trajectory>,
     opp2: Option<&'a Trajectory>,
 }
 
 impl SampledRun {
     /// Evaluates the run of one step. `tracks` are the trajectories of its actors, in their order.
     pub fn simulated(
-        (name, value): (String, f64),
+        (name, value): (String, Option<f64>),
         encounter: &RecordedEncounter,
         step: &SampledEncounter,
         (tracks, outcome): (&[Trajectory], &Outcome),
     ) -> Self {
-        let opp2 = step.opp2.map(|index| &tracks[index]);
-        let vehicles = Vehicles { own: &tracks[step.lane_changer], opp1: &tracks[step.opp1], opp2 };
+        let [opp1, opp2] = [step.opp1, step.opp2].map(|index| index.map(|index| &tracks[index]));
+        let vehicles = Vehicles { own: &tracks[step.lane_changer], opp1, opp2 };
         let actors = &step.file.config().actors;
         let own_id = &actors[step.lane_changer].id;
         let collision = outcome.collisions.iter().find(|collision| collision.involves(own_id));
@@ -94,7 +95,7 @@ impl SampledRun {
             Some((other.to_string(), collision.time.s()))
         });
         let run = Self::measured(name, &vehicles, [encounter.home, encounter.target], step.lane_change_s);
-        Self { value: Some(value), collision, ..run }
+        Self { value, collision, ..run }
     }
 
     /// Evaluates the recorded lane change, with the vehicles of `step`.
@@ -102,7 +103,7 @@ impl SampledRun {
         let track = |index: usize| &encounter.vehicles[index].trajectory;
         let vehicles = Vehicles {
             own: track(encounter.rear_index()),
-            opp1: track(EGO_INDEX),
+            opp1: encounter.overtaken_index().map(track),
             opp2: step.recorded_opp2.map(track),
         };
         Self::measured("recorded".to_owned(), &vehicles, [encounter.home, encounter.target], step.lane_change_s)
@@ -112,7 +113,8 @@ impl SampledRun {
         let own = vehicles.own;
         let crossing = own.points.iter().find(|point| point.lane == target).map(|point| point.time);
         let is_before = |time_s: f64| crossing.is_none_or(|crossing| time_s < crossing.s());
-        let opp1 = headways(own, vehicles.opp1, home, |time_s| time_s >= start_s && is_before(time_s));
+        let to_opp1 = |opp1| headways(own, opp1, home, |time_s| time_s >= start_s && is_before(time_s));
+        let opp1 = vehicles.opp1.map(to_opp1).unwrap_or_default();
         let opp2 = vehicles.opp2.map(|opp2| headways(own, opp2, target, |time_s| time_s <= end_s)).unwrap_or_default();
         let last_before = |series: &[(f64, f64)]| {
             let last = series.iter().rfind(|(time_s, _)| is_before(*time_s));
@@ -130,7 +132,7 @@ impl SampledRun {
             collision: None,
             path: path_of(own),
             positions: own.points.iter().map(|point| (point.time, point.s_m, point.d_m)).collect(),
-            opponents: [path_of(vehicles.opp1), vehicles.opp2.map(path_of).unwrap_or_default()],
+            opponents: [vehicles.opp1, vehicles.opp2].map(|track| track.map(path_of).unwrap_or_default()),
             thw_s: [opp1, opp2],
         }
     }
@@ -138,7 +140,7 @@ impl SampledRun {
 
 impl SampledRun {
     /// Returns the largest distances along and across the road from another run at the same time (m).
-    fn furthest_from(&self, other: &Self) -> (f64, f64) {
+    pub(super) fn furthest_from(&self, other: &Self) -> (f64, f64) {
         let mut furthest = (0.0_f64, 0.0_f64);
         let mut others = self.positions.iter().peekable();
         for (time, s_m, d_m) in &other.positions {
@@ -185,7 +187,7 @@ pub struct StepRun {
 /// [`StepError`] if the scenario cannot be run, or if no road can be drawn from its lanes.
 pub fn run_step(
     encounter: &RecordedEncounter,
-    value: StepValue<'_>,
+    (name, value): (String, Option<f64>),
     step: &SampledEncounter,
     seed: u64,
 ) -> Result<StepRun, StepError> {
@@ -194,14 +196,14 @@ pub fn run_step(
     let mut recorder = TrafficRecorder::default();
     recorder.begin(&scenario);
     let outcome = run_guarded(&scenario, RunKey { seed, sample: 0 }, &arm, &mut recorder)?;
-    let data = recorder.finish(&format!("{}, {}", encounter.data_name, value.label()));
-    let run = SampledRun::simulated((value.label(), value.value), encounter, step, (&data.trajectories, &outcome));
+    let data = recorder.finish(&format!("{}, {name}", encounter.data_name));
+    let run = SampledRun::simulated((name.clone(), value), encounter, step, (&data.trajectories, &outcome));
     let smoothed = smooth(&data);
     let track_id = data.trajectories[step.lane_changer].track_id;
     let changes = criticality(&smoothed, &Judgement::default());
     let change = changes.iter().find(|change| change.lane_change.track_id == track_id);
     let film = change.map(|change| film_lane_change(&smoothed, change)).transpose()?;
-    Ok(StepRun { run, film: film.map(|film| film.with_arm(value.label().replace(" = ", "-"))) })
+    Ok(StepRun { run, film: film.map(|film| film.with_arm(name.replace(" = ", "-"))) })
 }
 
 /// The reason why a step has no run.
@@ -218,25 +220,30 @@ pub enum StepError {
     Film(#[from] TrafficFilmError),
 }
 
-/// A sampled lane change: the recorded one, then one run for each value.
+/// A sampled lane change: the recorded one, then step 0, then one run for each value.
 #[derive(Clone, Debug)]
 pub struct Sampled {
     /// Name of the trajectory data, and the track that changes lanes.
     pub title: String,
-    /// Track of Opp₁.
-    pub opp1: u64,
+    /// Track of Opp₁, if there is one.
+    pub opp1: Option<u64>,
     /// Track of Opp₂, if there is one.
     pub opp2: Option<u64>,
     /// The recorded lane change, then the runs.
     pub runs: Vec<SampledRun>,
+    /// How well step 0 reproduces the recording.
+    pub reproduction: Reproduction,
+    /// Opponents whose record ends before the lane change: the track, and the time (s).
+    pub ends: Vec<(u64, f64)>,
 }
 
 impl fmt::Display for Sampled {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { title, opp1, .. } = self;
-        let opp2 =
-            self.opp2.map_or("no vehicle is ahead in the other lane".to_owned(), |track| format!("track {track}"));
-        writeln!(f, "{title}; Opp1: track {opp1}; Opp2: {opp2}")?;
+        let Self { title, opp1, opp2, .. } = self;
+        let named = |track: Option<u64>, lane: &str| {
+            track.map_or_else(|| format!("no vehicle is ahead in the {lane} lane"), |track| format!("track {track}"))
+        };
+        writeln!(f, "{title}; Opp1: {}; Opp2: {}", named(*opp1, "old"), named(*opp2, "other"))?;
         writeln!(f, "                        crosses   smallest THW [s] to   THW [s] then to")?;
         writeln!(f, "                         at [s]      Opp1      Opp2     Opp1      Opp2")?;
         for run in &self.runs {
@@ -264,37 +271,41 @@ impl fmt::Display for Sampled {
 }
 
 impl Sampled {
-    /// Creates the sampled lane change of an encounter, without runs.
-    pub fn new(encounter: &RecordedEncounter) -> Self {
-        let [opp1, _, lane_changer] = encounter.ego_lead_rear().map(|track| track.track_id);
-        let title = format!("{}: lane change of track {lane_changer}", encounter.data_name);
+    /// Creates the sampled lane change of an encounter with the recorded lane change and step 0.
+    /// `until_s` is the end of the lane change (s).
+    pub fn new(
+        encounter: &RecordedEncounter,
+        (recorded, step_0): (SampledRun, SampledRun),
+        (reproduction, until_s): (Reproduction, f64),
+    ) -> Self {
+        let track = |index: usize| &encounter.vehicles[index].trajectory;
+        let title = format!("{}: lane change of track {}", encounter.data_name, encounter.rear().trajectory.track_id);
+        let [opp1, opp2] = [encounter.overtaken_index(), opp2_of(encounter)].map(|index| index.map(track));
+        let ends = [opp1, opp2].into_iter().flatten();
+        let ends = ends.filter_map(|track| Some((track.track_id, track.span()?.1.s())));
         Self {
             title,
-            opp1,
-            opp2: opp2_of(encounter).map(|index| encounter.vehicles[index].trajectory.track_id),
-            runs: Vec::new(),
+            opp1: opp1.map(|track| track.track_id),
+            opp2: opp2.map(|track| track.track_id),
+            runs: vec![recorded, step_0],
+            reproduction,
+            ends: ends.filter(|(_, end_s)| *end_s < until_s).collect(),
         }
     }
 
-    /// Returns what a reader has to know of the runs: how far the first one is from the recording, those that never cross
-    /// the marking, and a parameter that changes nothing.
+    /// Returns what a reader has to know of the runs: how well step 0 reproduces the recording, opponents whose record
+    /// ends, runs that never cross the marking, and a parameter that changes nothing.
     pub fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
-        let [recorded, first, ..] = &self.runs[..] else { return remarks };
-        let (along_m, across_m) = first.furthest_from(recorded);
-        let crossing = recorded.crossing_s.zip(first.crossing_s).map(|(recorded_s, first_s)| first_s - recorded_s);
-        let crossing = crossing.map_or("does not cross the marking".to_owned(), |later_s| match later_s < 0.0 {
-            true => format!("crosses the marking {:.2} s earlier", -later_s),
-            false => format!("crosses the marking {later_s:.2} s later"),
-        });
-        remarks.push(format!(
-            "{} departs from the recording by up to {along_m:.1} m along and {across_m:.2} m across the road, and {crossing}",
-            first.name
-        ));
+        let mut remarks = vec![self.reproduction.to_string()];
+        for (track_id, end_s) in &self.ends {
+            remarks.push(format!(
+                "track {track_id} is recorded until {end_s:.1} s, and keeps its last speed from then on"
+            ));
+        }
         for run in self.runs.iter().skip(1).filter(|run| run.crossing_s.is_none()) {
             remarks.push(format!("{} never crosses the marking", run.name));
         }
-        for pair in self.runs[1..].windows(2) {
+        for pair in self.runs.get(2..).unwrap_or_default().windows(2) {
             let (along_m, across_m) = pair[1].furthest_from(&pair[0]);
             if along_m < SAME_M && across_m < SAME_M {
                 remarks.push(format!("{} changes nothing in relation to {}", pair[1].name, pair[0].name));
@@ -305,8 +316,15 @@ impl Sampled {
 
     /// Returns the runs as JSON.
     pub fn json(&self) -> serde_json::Value {
-        let Self { title, opp1, opp2, runs } = self;
-        serde_json::json!({ "title": title, "opp1_track_id": opp1, "opp2_track_id": opp2, "runs": runs, "remarks": self.remarks() })
+        let Self { title, opp1, opp2, runs, reproduction, .. } = self;
+        serde_json::json!({
+            "title": title,
+            "opp1_track_id": opp1,
+            "opp2_track_id": opp2,
+            "reproduction": reproduction,
+            "runs": runs,
+            "remarks": self.remarks(),
+        })
     }
 
     /// Draws the paths and the two headways of all runs as one figure (SVG).

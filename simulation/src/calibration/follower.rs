@@ -91,40 +91,48 @@ impl FollowingModel {
 
     /// Returns the model with these values, or `None` if the check of a scenario would refuse one.
     fn follower(self, values: &[f64]) -> Option<Follower> {
-        let value = |key: &str| {
-            let index = self.parameters().iter().position(|spec| spec.key == key)?;
-            values.get(index).map(|value| Num::Fixed(*value))
-        };
         let none = Parameters::default();
         match self {
             Self::Idm => {
                 let config = IdmConfig {
-                    time_gap_s: value("time-gap-s"),
-                    standstill_gap_m: value("standstill-gap-m"),
-                    acceleration_mps2: value("acceleration-mps2"),
-                    comfortable_braking_mps2: value("comfortable-braking-mps2"),
+                    time_gap_s: self.value(values, "time-gap-s"),
+                    standstill_gap_m: self.value(values, "standstill-gap-m"),
+                    acceleration_mps2: self.value(values, "acceleration-mps2"),
+                    comfortable_braking_mps2: self.value(values, "comfortable-braking-mps2"),
                     ..IdmConfig::default()
                 };
                 config.check(&none).ok().map(Follower::Idm)
             }
             Self::Wiedemann99 => {
-                let config = Wiedemann99Config {
-                    cc0_m: value("cc0-m"),
-                    cc1_s: value("cc1-s"),
-                    cc2_m: value("cc2-m"),
-                    cc3_s: value("cc3-s"),
-                    cc4_mps: value("cc4-mps"),
-                    cc5_mps: value("cc5-mps"),
-                    cc6: value("cc6"),
-                    cc7_mps2: value("cc7-mps2"),
-                    cc8_mps2: value("cc8-mps2"),
-                    cc9_mps2: value("cc9-mps2"),
-                    ..Wiedemann99Config::default()
-                };
-                let checked: Option<Wiedemann99> = config.check(&none).ok();
+                let checked: Option<Wiedemann99> = wiedemann99_config(values).check(&none).ok();
                 checked.map(|settings| Follower::Wiedemann99(Box::new(Wiedemann99Model::new(&settings))))
             }
         }
+    }
+
+    /// Returns the value of a parameter, or `None` if the model does not have it.
+    fn value(self, values: &[f64], key: &str) -> Option<Num> {
+        let index = self.parameters().iter().position(|spec| spec.key == key)?;
+        values.get(index).map(|value| Num::Fixed(*value))
+    }
+}
+
+/// Returns the Wiedemann 99 driver with these values of its parameters.
+pub(super) fn wiedemann99_config(values: &[f64]) -> Wiedemann99Config {
+    let value = |key: &str| FollowingModel::Wiedemann99.value(values, key);
+    Wiedemann99Config {
+        cc0_m: value("cc0-m"),
+        cc1_s: value("cc1-s"),
+        cc2_m: value("cc2-m"),
+        cc3_s: value("cc3-s"),
+        cc4_mps: value("cc4-mps"),
+        cc5_mps: value("cc5-mps"),
+        cc6: value("cc6"),
+        cc7_mps2: value("cc7-mps2"),
+        cc8_mps2: value("cc8-mps2"),
+        cc9_mps2: value("cc9-mps2"),
+        desired_speed_mps: value("desired-speed-mps"),
+        ..Wiedemann99Config::default()
     }
 }
 

@@ -119,6 +119,7 @@ impl<'a> Run<'a> {
                 id: actor.id.clone(),
                 vehicle: scenario.vehicle(index, own),
                 state: if index == scenario.ego { ego } else { actor.start },
+                path: actor.path.clone(),
                 weave: weave(actor, &scenario.road, key),
                 has_ideal_actuators: index == scenario.ego && scenario.interventions.has_ideal_actuation,
             });

@@ -6,6 +6,9 @@
 //!  weaving of the driver  ─▶ deviation over that distance ────┘
 //! ```
 //!
+//! A vehicle may have a lateral path from the start, such as the recorded one. It follows this path
+//! over the distance, as it follows the path of a lane change, until the first lane change.
+//!
 //! Lags and jerk limits are assumptions of the order of published brake-system responses: a
 //! passenger car or a motorcycle builds up full braking in 0.1 to 0.3 s, a lorry in 0.2 to 0.4 s,
 //! and an articulated lorry in 0.4 to 1.0 s (accident analysts' tables: nilgens.com,
@@ -17,7 +20,7 @@
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
 use closecall_scenarios::lateral_grip_mps2;
-use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState, maths};
+use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, LateralPath, Road, Vehicle, VehicleClass, VehicleState, maths};
 
 use super::path::{LanePath, LateralState};
 
@@ -103,6 +106,8 @@ pub(crate) struct Plant {
     state: VehicleState,
     /// The lane change in progress.
     lane_change: Option<LaneChangePath>,
+    /// The lateral path that the vehicle follows until its first lane change.
+    path: Option<LateralPath>,
     /// The lateral state that the driver intends: on the lane's centre line, or on the path of the
     /// lane change.
     intended: LateralState,
@@ -136,12 +141,20 @@ impl Plant {
             step_s,
             state,
             lane_change: None,
+            path: None,
             intended: LateralState { d_m: state.d_m, ..LateralState::default() },
             weave,
             distance_m: 0.0,
             deviation: Deviation::default(),
             course_rad: 0.0,
         }
+    }
+
+    /// Returns the same vehicle on a lateral path.
+    pub(crate) fn with_path(self, path: Option<LateralPath>) -> Self {
+        let Some(path) = path else { return self };
+        let intended = on_path(&path, 0.0);
+        Self { path: Some(path), intended, course_rad: maths::atan(intended.slope), ..self }
     }
 
     /// Returns the same vehicle with actuators that follow the command at once.
@@ -181,6 +194,7 @@ impl Plant {
     /// Starts a lane change, or replaces the one in progress. The path becomes longer than
     /// requested if the tyres could not provide the lateral acceleration otherwise.
     pub(crate) fn change_lane(&mut self, change: LaneChange, road: &Road) {
+        self.path = None;
         let target_m = road.lane_centre_m(change.target);
         let requested_m = change.duration_s * self.state.speed_mps;
         let mut path = LanePath::new(self.intended, target_m, requested_m.max(SHORTEST_LANE_CHANGE_M));
@@ -233,6 +247,8 @@ impl Plant {
             if change.travelled_m >= change.path.length_m() {
                 self.lane_change = None;
             }
+        } else if let Some(path) = &self.path {
+            self.intended = on_path(path, self.distance_m);
         }
         let LateralState { d_m, slope, second_derivative_per_m } = self.lateral();
         let (course_rad, curvature_per_m) = if slope == 0.0 {
@@ -260,6 +276,12 @@ impl Plant {
             second_derivative_per_m: self.intended.second_derivative_per_m + self.deviation.second_derivative_per_m,
         }
     }
+}
+
+/// Returns the lateral state after a distance along a lateral path (m).
+fn on_path(path: &LateralPath, travelled_m: f64) -> LateralState {
+    let [d_m, slope, second_derivative_per_m] = path.at(travelled_m);
+    LateralState { d_m, slope, second_derivative_per_m }
 }
 
 /// Speed after one step, and the distance travelled in it.
@@ -354,6 +376,30 @@ mod tests {
         assert!((crossing_s - 2.5).abs() < 0.05, "{crossing_s}");
         assert!((car.state().d_m + 1.875).abs() < 1e-9);
         assert!(car.state().heading_rad.abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_vehicle_follows_its_path_at_any_speed_until_it_changes_lanes() {
+        let road = Road::straight(3);
+        let points: Vec<[f64; 2]> =
+            (0..10).map(|index| f64::from(index) * 20.0).map(|x| [x, -6.0 + 0.005 * x]).collect();
+        let path = LateralPath::new(&points).unwrap();
+        for commanded_mps2 in [0.0, -4.0] {
+            let mut car = car(30.0).with_path(Some(path.clone()));
+            for _ in 0..300 {
+                car.step(commanded_mps2, Indicator::Off, &road);
+                let expected_m = path.at(car.state().s_m)[0];
+                assert!((car.state().d_m - expected_m).abs() < 1e-9, "{:?} {expected_m}", car.state());
+            }
+            car.change_lane(LaneChange { target: Lane(1), duration_s: 3.0 }, &road);
+            let before_m = car.state().d_m;
+            car.step(0.0, Indicator::Left, &road);
+            assert!((car.state().d_m - before_m).abs() < 0.01, "the lane change starts where the vehicle is");
+            for _ in 0..1_200 {
+                car.step(0.5, Indicator::Off, &road);
+            }
+            assert!((car.state().d_m + 1.875).abs() < 1e-9, "{:?}", car.state());
+        }
     }
 
     #[test]

@@ -242,7 +242,14 @@ mod tests {
         let initial = |(index, &(class, s_m, d_m, heading_rad)): (usize, &(VehicleClass, f64, f64, f64))| {
             let state = VehicleState { s_m, d_m, heading_rad, speed_mps: 30.0, ..VehicleState::default() };
             let id = ActorId::new(&format!("v{index}")).unwrap();
-            InitialVehicle { id, vehicle: Vehicle::typical(class), state, weave: None, has_ideal_actuators: false }
+            InitialVehicle {
+                id,
+                vehicle: Vehicle::typical(class),
+                state,
+                path: None,
+                weave: None,
+                has_ideal_actuators: false,
+            }
         };
         World::new(road, 0.9, PHYSICS_STEP, vehicles.iter().enumerate().map(initial).collect())
     }

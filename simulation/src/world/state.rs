@@ -3,7 +3,7 @@
 use closecall_controllers::{LaneChange, Looks, Neighbours, Weave};
 use closecall_traffic::geometry::{BoxSide, OrientedBox};
 use closecall_traffic::metrics::bumper_gap_m;
-use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{ActorId, Indicator, Lane, LateralPath, Road, Time, Vehicle, VehicleClass, VehicleState};
 use nalgebra::Vector2;
 
 use super::contact::{self, ContactSearch, StepBoxes, StruckVehicle, Touch};
@@ -37,6 +37,8 @@ pub(crate) struct InitialVehicle {
     pub(crate) vehicle: Vehicle,
     /// Its state at time zero.
     pub(crate) state: VehicleState,
+    /// Its lateral path, or `None` if it keeps the centre of its lane.
+    pub(crate) path: Option<LateralPath>,
     /// The lateral deviation of its driver, or `None` if the driver does not weave.
     pub(crate) weave: Option<Weave>,
     /// Whether its actuators follow the command at once.
@@ -97,8 +99,8 @@ impl World {
     pub(crate) fn new(road: Road, friction: f64, step: Time, vehicles: Vec<InitialVehicle>) -> Self {
         let actors: Vec<Actor> = vehicles
             .into_iter()
-            .map(|InitialVehicle { id, vehicle, state, weave, has_ideal_actuators }| {
-                let plant = Plant::new(&vehicle, state, weave, friction, step.s());
+            .map(|InitialVehicle { id, vehicle, state, path, weave, has_ideal_actuators }| {
+                let plant = Plant::new(&vehicle, state, weave, friction, step.s()).with_path(path);
                 let body =
                     Body::Driven(Box::new(if has_ideal_actuators { plant.with_ideal_actuators() } else { plant }));
                 Actor { id, vehicle, body }
@@ -449,6 +451,7 @@ mod tests {
             id: ActorId::new(&format!("v{index}")).unwrap(),
             vehicle: Vehicle::typical(class),
             state: VehicleState { s_m, d_m: -1.875, speed_mps, ..VehicleState::default() },
+            path: None,
             weave: None,
             has_ideal_actuators: true,
         };
