@@ -5,7 +5,7 @@
 //! bumper. A track counts as being in a lane if the tracker gives that lane a probability of at
 //! least one half.
 
-use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, touching_distance_m};
+use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
 use serde::Serialize;
 
@@ -307,9 +307,10 @@ pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> 
     Some(rear_vehicle_from(best, input))
 }
 
-/// Time headway below which a vehicle follows the rear vehicle closely (s): an assumption; 0.9 s is
-/// the headway below which the method calls following critical, and 0.5 to 2 are plausible.
-const FOLLOWED_HEADWAY_S: f64 = CRITICAL_THW_S;
+/// Time headway below which a vehicle follows the rear vehicle closely (s): the mean reaction to a
+/// surprising event (Green, Transportation Human Factors 2 (2000)). The driver of such a vehicle
+/// has no time to react to a slow ego when the rear vehicle pulls out.
+const FOLLOWED_HEADWAY_S: f64 = 1.5;
 
 /// Returns true if an established track follows `rear` closely in the lane of the ego. Its driver
 /// sees the ego only when `rear` has pulled out.

@@ -45,6 +45,7 @@ pub(crate) fn written(section: Section, size: Size) -> Result<String, Box<dyn Er
         Section::Arms => rows::arms(size),
         Section::Promise => rows::promise(size),
         Section::Twins => rows::twins(size),
+        Section::EventFree => rows::event_free(size),
         Section::Distributions => rows::distributions(size),
         Section::Slowing => rows::slowing(size),
         Section::Faults => rows::faults(size),

@@ -31,6 +31,8 @@ pub(crate) enum Section {
     Promise,
     /// Scenarios in which nothing happens ahead
     Twins,
+    /// Every scenario without its event, with object-level sensors
+    EventFree,
     /// The headline with one distribution changed
     Distributions,
     /// The headline with a lead vehicle that slows down and drives on
@@ -51,12 +53,13 @@ const DIGESTS: &str = "docs/evidence/determinism.json";
 const DIGITS: usize = 12;
 
 impl Section {
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Scenarios,
         Self::Ensemble,
         Self::Arms,
         Self::Promise,
         Self::Twins,
+        Self::EventFree,
         Self::Distributions,
         Self::Slowing,
         Self::Faults,
@@ -83,6 +86,7 @@ impl Section {
             Self::Scenarios | Self::Ensemble => !scenario.contains('/') || scenario.starts_with("traffic/"),
             Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
             Self::Twins => super::rows::TWINS.contains(&scenario),
+            Self::EventFree => super::rows::rests_without_event_on(scenario),
             Self::Faults => is_headline || scenario.starts_with("faults/"),
             Self::Anchor => scenario.starts_with("anchor/"),
             Self::Frontier => is_headline || scenario == "lead-brakes-at-any-time",

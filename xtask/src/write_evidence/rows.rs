@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fmt::Write;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use closecall_campaign::ledger::{ArmCounts, Pairs};
@@ -10,7 +11,7 @@ use closecall_scenarios::{ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 
 use super::page::{self, Size};
-use super::scenarios::{files_of, run, share};
+use super::scenarios::{campaign, files_of, run, share};
 
 /// A row of a table of pairs: the words in its first cell, and the changes of the scenario.
 struct Row {
@@ -50,6 +51,23 @@ pub(super) const TWINS: [&str; 10] = [
     "traffic/dense-traffic",
     "traffic/trucks-alongside",
 ];
+
+/// Scenarios in which the lead vehicle brakes, with the parameter of its speed and the arms that run
+/// them. Without the braking they have no twin in the library: their drivers differ from those of
+/// [`TWINS`].
+const BRAKING: [(&str, &str, [&str; 2]); 3] = [
+    (HEADLINE, "cruise-mps", ["acc", "mis"]),
+    ("as-recorded/low-thw-overtake-as-recorded", "following-mps", ["acc", "mis"]),
+    ("anchor/anchor-lead-brakes", "following-mps", ["human-aeb", "human+aeb"]),
+];
+
+/// A scenario in which nobody can overtake, and nothing happens ahead.
+const BLOCKED: &str = "left-lane-blocked";
+
+/// Returns true if a scenario is run without its event.
+pub(super) fn rests_without_event_on(scenario: &str) -> bool {
+    scenario == BLOCKED || TWINS.contains(&scenario) || BRAKING.iter().any(|(name, ..)| *name == scenario)
+}
 
 /// The controllers that ship, the baseline first.
 const ARMS: [&str; 9] = ["acc", "mis", "mis-ttce", "mis-extended", "gap-1.2", "gap-1.6", "gap-2.0", "blind", "crawl"];
@@ -161,6 +179,41 @@ pub(super) fn twins(size: Size) -> Result<String, Box<dyn Error>> {
         let samples = if name.starts_with("traffic/") { size.member_samples } else { size.samples };
         let summary = pair(load(name, &[])?, Size { samples, ..size }, Some(SensorMode::Full))?;
         writeln!(text, "| `{name}` | {} |", cells_of(&summary)?)?;
+    }
+    Ok(text)
+}
+
+/// Every scenario without its event, with object-level sensors: the collisions that its drivers have
+/// without the system, and those that the system induces.
+pub(super) fn event_free(size: Size) -> Result<String, Box<dyn Error>> {
+    let mut text = "`object` sensors. The arms are `acc` and `mis`; in `anchor-lead-brakes` a human drives the ego, without and \
+                    with emergency braking. In the rows that say so, the lead vehicle keeps its speed instead of braking.\n\n\
+                    | scenario | samples | the ego collides without the system | others collide with each other without it | \
+                    induced | share of all (95 %) |\n|---|---|---|---|---|---|\n"
+        .to_owned();
+    let mut row = |words: &str, file: ScenarioFile, arms: &[&str], samples| -> Result<(), Box<dyn Error>> {
+        let campaign = campaign(vec![file], Size { samples, ..size }, Some(SensorMode::Object), arms)?;
+        let mut summary = campaign.summary();
+        let mut others = 0_u64;
+        campaign.run(None, |next| {
+            summary.push(next.record);
+            others += u64::from(next.record.tallies().first().is_some_and(|without| without.others_collided));
+            ControlFlow::Continue(())
+        })?;
+        let (_, counts) = summary.scenarios.first().ok_or("a campaign without a scenario")?;
+        let Pairs { induced, .. } = counts.pairs;
+        let (samples, collisions) = (counts.pairs.samples(), counts.arms[0].collisions);
+        let share = share(&summary, induced, samples);
+        writeln!(text, "| {words} | {samples} | {collisions} | {others} | {induced} | {share} |")?;
+        Ok(())
+    };
+    for name in TWINS.into_iter().chain([BLOCKED]) {
+        let samples = if name.starts_with("traffic/") { size.member_samples } else { size.samples };
+        row(&format!("`{name}`"), load(name, &[])?, &["acc", "mis"], samples)?;
+    }
+    for (name, speed, arms) in BRAKING {
+        let keeps_speed = format!("actor.front.event.front-brakes.then.brake.to-speed-mps=${speed}");
+        row(&format!("`{name}`, no braking"), load(name, &[&keeps_speed])?, &arms, size.samples)?;
     }
     Ok(text)
 }

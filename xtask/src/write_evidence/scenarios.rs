@@ -6,6 +6,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use closecall_campaign::ensemble::{MemberValue, Quantity, verdicts_of_arm};
+use closecall_campaign::execution::Campaign;
 use closecall_campaign::ledger::{ArmCounts, Pairs};
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
@@ -140,15 +141,25 @@ pub(super) fn run(
     mode: Option<SensorMode>,
     arms: &[&str],
 ) -> Result<Summary, Box<dyn Error>> {
-    let sampling = Sampling { seed: size.seed, design: Design::Random, samples: size.samples };
-    let arms = arms.iter().map(|name| name.parse()).collect::<Result<Vec<ControllerChoice>, _>>()?;
-    let mut plan = Plan::new(files, sampling, arms)?;
-    plan.sensors = mode;
-    let summary = plan.campaign().count()?;
+    let summary = campaign(files, size, mode, arms)?.count()?;
     match summary.scenarios.iter().find(|(_, counts)| counts.errors() > 0) {
         Some((name, counts)) => Err(format!("{name}: {} runs ended in an error", counts.errors()).into()),
         None => Ok(summary),
     }
+}
+
+/// Returns a campaign of all these scenarios.
+pub(super) fn campaign(
+    files: Vec<ScenarioFile>,
+    size: Size,
+    mode: Option<SensorMode>,
+    arms: &[&str],
+) -> Result<Campaign, Box<dyn Error>> {
+    let sampling = Sampling { seed: size.seed, design: Design::Random, samples: size.samples };
+    let arms = arms.iter().map(|name| name.parse()).collect::<Result<Vec<ControllerChoice>, _>>()?;
+    let mut plan = Plan::new(files, sampling, arms)?;
+    plan.sensors = mode;
+    Ok(plan.campaign())
 }
 
 /// Returns the rows of the members of one scenario: one for each arm but the baseline.

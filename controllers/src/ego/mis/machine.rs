@@ -366,6 +366,13 @@ impl Mis {
             goal_in_reach: solution.is_some()
                 && predicted_thw.is_some_and(|thw_s| thw_s >= target.goal_thw_s - GOAL_TOLERANCE_S),
         };
-        (plan, braking)
+        let is_early = self.settings.is_early && braking > 0.0 && falls_short(&prediction, target);
+        (plan, if is_early { bound } else { braking })
     }
+}
+
+/// Returns true if the headway misses the goal by more than the tolerance when the rear vehicle
+/// arrives, with an ego that brakes no more.
+fn falls_short(prediction: &ArrivalPrediction, target: &Target) -> bool {
+    prediction.headway_at_arrival_s(0.0).is_some_and(|thw_s| thw_s < target.goal_thw_s - GOAL_TOLERANCE_S)
 }

@@ -31,7 +31,7 @@
 //! | it is a vehicle | car, truck or motorcycle: together at least as probable as not, and one of them more probable than background | `RearUnclassified` |
 //! | it is near | d_R ≤ `engage-gap-m` | `RearFar` |
 //! | it approaches | Δv − 1.645·σ ≥ `engage-closing-mps`: with confidence, judged by the covariance of its track | `RearNotApproaching` |
-//! | it is not followed closely (the extended system only) | no vehicle is less than 0.9 s behind it in the lane of the ego | `RearFollowed` |
+//! | it is not followed closely (the extended system only) | no vehicle is less than 1.5 s behind it in the lane of the ego | `RearFollowed` |
 //! | it has a passing lane | the road has a lane on the overtaking side of the ego | `NoPassingLane` |
 //! | the state of that lane is known | no unconfirmed track is in the way there | `PassingLaneUnknown` |
 //! | that lane is free | no vehicle there is within 15 m of the rear vehicle while that uses it: from 40 m behind the ego until 10 m ahead of it, all at constant speed | `PassingLaneOccupied` |
@@ -108,6 +108,9 @@
 //! [`BrakingResponse`] models how the ego's braking builds up instead, and [`ArrivalPrediction`]
 //! solves the same problem with it by a bracketed search. All assume that the lead vehicle and the
 //! rear vehicle keep their speeds; the plan is computed afresh at every step.
+//!
+//! The extended system brakes by the bound until no more braking is needed for the goal, since the
+//! lead vehicle may brake before the rear vehicle arrives.
 //!
 //! With [`Horizon::Ttce`] a* is instead the braking that gains the headway within the time to
 //! closest encounter at present speeds, as in the paper's text. The ego's own braking makes the

@@ -105,9 +105,9 @@ fn a_fast_vehicle_ahead_in_the_passing_lane_does_not_matter() {
 
 #[test]
 fn a_close_follower_of_the_rear_vehicle_in_its_lane_matters_to_the_extended_system_alone() {
-    // The rear vehicle drives at 38 m/s, its centre 94.6 m behind: 30 m are a headway of 0.67 s,
-    // and 50 m one of 1.2 s.
-    for (behind_m, engages) in [(30.0, false), (50.0, true)] {
+    // The rear vehicle drives at 38 m/s, its centre 94.6 m behind: 50 m are a headway of 1.2 s,
+    // in which no driver reacts to a surprise, and 70 m one of 1.7 s.
+    for (behind_m, engages) in [(30.0, false), (50.0, false), (70.0, true)] {
         for (mis, expected) in [(MisSettings::PAPER, true), (MisSettings::PAPER.extended(), engages)] {
             let mut bench = Bench::with_mis(mis);
             bench.tracks.push(track(3, -94.6 - behind_m, 38.0, 1));
@@ -151,4 +151,25 @@ fn the_nearer_of_two_rear_vehicles_is_the_target() {
     let mut bench = Bench::new();
     bench.tracks.push(track(3, -50.0, 34.0, 1));
     assert_eq!(bench.step().plan.unwrap().track, TrackId(3));
+}
+
+#[test]
+fn the_extended_system_gains_the_margin_at_once_and_the_paper_s_just_in_time() {
+    // The rear vehicle is 3 m/s faster: its arrival takes long, and gentle braking reaches the goal.
+    let braking_mps2 = |mis: MisSettings| {
+        let mut bench = Bench::with_mis(mis);
+        bench.rear().state[2] = 33.0;
+        -bench.step_for(1.5).acceleration_mps2
+    };
+    let [paper, extended] = [MisSettings::PAPER, MisSettings::PAPER.extended()].map(braking_mps2);
+    assert!(paper > 0.0 && paper < 0.5, "{paper}");
+    assert_eq!(extended, MisSettings::EXTENDED_MAX_DECELERATION_MPS2);
+    // A margin that is long enough takes no more speed.
+    let mut bench = Bench::with_mis(MisSettings::PAPER.extended());
+    bench.rear().state[2] = 33.0;
+    assert_eq!(bench.step().state, EgoState::Increasing);
+    bench.lead().state[0] = 130.0;
+    bench.step_for(0.2);
+    let braking_mps2 = -bench.step_for(1.5).acceleration_mps2;
+    assert!(braking_mps2 <= 0.0, "{braking_mps2}");
 }
