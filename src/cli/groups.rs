@@ -7,8 +7,7 @@ use super::command::command;
 use super::help::examples;
 use super::{
     CliError, aerial, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper,
-    perceive,
-    record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
+    perceive, record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
