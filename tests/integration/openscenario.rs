@@ -92,6 +92,39 @@ fn a_logical_scenario_of_closecall_comes_back_as_it_left() {
         (outcome["parameters"].clone(), outcome["collisions"].clone(), outcome["margins"].clone())
     };
     assert_eq!(run(output.to_str().unwrap()), run("low-thw-overtake"));
+    let edited = |path: &Path, right: &str, wrong: &str| {
+        let text = fs::read_to_string(case.join("logical.xosc")).unwrap();
+        assert!(text.contains(right), "{right}");
+        fs::write(path, text.replacen(right, wrong, 1)).unwrap();
+    };
+    // What the file or the command line changes is applied, or refused.
+    let fixed = folder.path().join("fixed.toml");
+    stdout(&imported(&case.join("logical.xosc"), &fixed, &["--parameter", "closing_mps=9.5", "--ego", "ego"]), 0);
+    assert_eq!(run(fixed.to_str().unwrap()).0["closing-mps"], 9.5);
+    fs::remove_file(&output).unwrap();
+    let path = case.join("edited.xosc");
+    for (right, wrong) in [
+        ("<ParameterDeclaration name=\"closing_mps\" parameterType=\"double\" value=\"", "&1"),
+        ("<Storyboard>", "<Storyboard><!-- --><Foo/>"),
+        ("name=\"closecall-content\"", "name=\"content\""),
+    ] {
+        edited(&path, right, &wrong.replace("&1", &format!("{right}1")));
+        let refused = imported(&path, &output, &[]);
+        assert_eq!(code(&refused), 3, "{wrong}: {}", message(&refused));
+        assert!(message(&refused).contains("`FileHeader`: it carries a scenario file"), "{}", message(&refused));
+    }
+    for (more, word) in [
+        (["--parameter", "nosuch=9.5"], "there is no parameter `nosuch`, only brake_mps2"),
+        (["--ego", "rear"], "the ego of its scenario is `ego`"),
+    ] {
+        let refused = imported(&case.join("logical.xosc"), &output, &more);
+        assert_eq!(code(&refused), 3, "{word}: {}", message(&refused));
+        assert!(message(&refused).contains(word), "{}", message(&refused));
+    }
+    assert!(!output.exists());
+    // White space between the elements is no edit.
+    edited(&path, "<Storyboard>", "\n<Storyboard>\n\n");
+    stdout(&imported(&path, &output, &[]), 0);
 }
 
 #[test]

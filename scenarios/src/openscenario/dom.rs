@@ -57,6 +57,30 @@ impl Node {
         path.iter().try_fold(self, |node, name| node.child(name))
     }
 
+    /// Returns the hash of all elements but the header, so that an edited file is noticed. White space
+    /// between elements does not count.
+    pub(super) fn content_hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        self.children.iter().filter(|child| child.name != "FileHeader").for_each(|child| child.add_to(&mut hasher));
+        hasher.finalize().to_string()
+    }
+
+    fn add_to(&self, hasher: &mut blake3::Hasher) {
+        let mut add = |text: &str| {
+            hasher.update(&text.len().to_le_bytes());
+            hasher.update(text.as_bytes());
+        };
+        add(&self.name);
+        add(self.text.trim());
+        add(&self.attributes.len().to_string());
+        for (name, value) in &self.attributes {
+            add(name);
+            add(value);
+        }
+        add(&self.children.len().to_string());
+        self.children.iter().for_each(|child| child.add_to(hasher));
+    }
+
     /// Returns an error at this element.
     pub(super) fn error(&self, path: &Path, message: impl Into<String>) -> ImportError {
         ImportError { path: path.to_owned(), line: self.line, element: self.name.clone(), message: message.into() }

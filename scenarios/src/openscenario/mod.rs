@@ -33,7 +33,7 @@ use self::reader::Reader;
 use self::road::ImportedRoad;
 use self::storyboard::Storyboard;
 use self::world::Vehicle;
-use crate::{ScenarioError, ScenarioFile};
+use crate::{ScenarioError, ScenarioFile, Setting};
 
 /// Time gap of the ego's cruise control (s): an assumption, as the file has its own controller; 1
 /// to 2 are plausible.
@@ -113,10 +113,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     let mut reader = Reader { path: path.to_owned(), values: Values::new() };
     check_kind(&reader, &root)?;
     if let Some(text) = text_of_closecall(&root) {
-        let parsed = ScenarioFile::parse(path, text, &[]).and_then(|file| file.check());
-        parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
-        let notes = vec!["Closecall wrote this file: the scenario in it is used".to_owned()];
-        return Ok(Imported { text: text.to_owned(), notes, events: Vec::new() });
+        return of_closecall(&reader, &root, (text, options));
     }
     for declaration in root.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
     {
@@ -170,6 +167,62 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
         Some(catalog) => Err(reader.error(catalog, "a catalogue is no scenario")),
         None => Ok(()),
     }
+}
+
+/// Name of the property in the header of a logical scenario that has the hash of all other elements.
+pub const CONTENT_PROPERTY: &str = "closecall-content";
+
+/// Returns the hash of the elements of a document without its header; `None` if it is no XML.
+pub fn content_hash(text: &str) -> Option<String> {
+    Some(parse(Path::new(""), text).ok()?.content_hash())
+}
+
+/// Returns the scenario that Closecall wrote into the header of a logical scenario, with the values of
+/// the options in place of its parameters.
+///
+/// # Errors
+/// [`ImportFailure`] if the other elements are not those that were written with it, or an option
+/// does not fit.
+fn of_closecall(
+    reader: &Reader,
+    root: &Node,
+    (text, options): (&str, &ImportOptions),
+) -> Result<Imported, ImportFailure> {
+    let path = &reader.path;
+    let header = reader.child(root, &["FileHeader"])?;
+    let properties = reader.child(header, &["Properties"])?;
+    let written = properties.all("Property").find(|property| property.raw("name") == Some(CONTENT_PROPERTY));
+    if written.and_then(|property| property.raw("value")) != Some(root.content_hash().as_str()) {
+        let message = "it carries a scenario file of Closecall, and the elements beside it are not those that were \
+                       written with it: edit the scenario file instead, or remove `CustomContent` to import the \
+                       elements alone";
+        return Err(reader.error(header, message).into());
+    }
+    let invalid = |source| ImportFailure::Scenario { path: path.clone(), source: Box::new(source) };
+    let file = ScenarioFile::parse(path, text, &[]).map_err(invalid)?;
+    let ego = file.ego_id().map(ToString::to_string).unwrap_or_default();
+    if let Some(asked) = options.ego.as_ref().filter(|asked| **asked != ego) {
+        let message = format!("the ego of its scenario is `{ego}`, and cannot be `{asked}`");
+        return Err(reader.error(header, message).into());
+    }
+    let mut notes = vec![
+        "Closecall wrote this file: the scenario in it is used, and neither the road nor the catalogue is read".to_owned(),
+    ];
+    let mut settings = Vec::new();
+    for (written, value) in &options.parameters {
+        let name = written.replace('_', "-");
+        if !file.space().iter().any(|(parameter, _)| parameter.as_str() == name) {
+            let names: Vec<_> = file.space().iter().map(|(parameter, _)| parameter.as_str().replace('-', "_")).collect();
+            let message = format!("there is no parameter `{written}`, only {}", names.join(", "));
+            return Err(reader.error(root, message).into());
+        }
+        let setting = format!("{name}={value}").parse::<Setting>();
+        settings.push(setting.map_err(|source| invalid(ScenarioError::Set { path: path.clone(), source }))?);
+        notes.push(format!("`{name}` is {value} in every sample"));
+    }
+    let file = ScenarioFile::parse(path, text, &settings).map_err(invalid)?;
+    file.check().map_err(invalid)?;
+    Ok(Imported { text: file.text().to_owned(), notes, events: Vec::new() })
 }
 
 /// Returns the text of the scenario that Closecall wrote into the header of a logical scenario.
