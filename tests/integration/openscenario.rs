@@ -176,6 +176,14 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ),
         ("conditionEdge=\"none\"", "conditionEdge=\"sharp\"", &["Condition", "sharp"]),
         ("rule=\"lessThan\"", "rule=\"nearly\"", &["TimeHeadwayCondition", "nearly"]),
+        ("<Storyboard>", "<Storyboard><Foo/>", &["`Foo`", "no element of `Storyboard`", "Init, Story, StopTrigger"]),
+        ("<Story ", "<Sotry/><Story ", &["`Sotry`", "no element of `Storyboard`"]),
+        ("${$EgoSpeed / 3.6}", "-50", &["AbsoluteTargetSpeed", "-50 m/s; 0 to 100 m/s"]),
+        ("name=\"Slow_Truck\"", "name=\"Ego\"", &["ScenarioObject", "an entity `Ego` already"]),
+        ("length=\"12\"", "length=\"-12\"", &["Dimensions", "`length` must be above 0 m"]),
+        ("length=\"12\"", "length=\"500\"", &["ScenarioObject", "`Slow_Truck`", "length-m"]),
+        ("a cut-in, for tests", "a cut-in\0", &["U+0000 is not allowed"]),
+        ("a cut-in, for tests", "a cut-in&#1;", &["FileHeader"]),
     ]
 }
 
@@ -204,7 +212,7 @@ fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written
 fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
-    let faults: [(&str, &str, &str); 20] = [
+    let faults: [(&str, &str, &str); 25] = [
         ("<OpenDRIVE>", "<OpenStreet>", "it is no XML"),
         ("</OpenDRIVE>", "", "ends before its root element"),
         ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
@@ -224,7 +232,12 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("a=\"3.5\"", "", "needs `a`"),
         ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
         ("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", "", "no `width`"),
-        ("a=\"3.5\"", "a=\"35\"", "lane-width-m"),
+        ("a=\"3.5\"", "a=\"35\"", "`a` is 35; a lane"),
+        ("a=\"3.5\"", "a=\"-3\"", "`width`: `a` is -3; a lane"),
+        ("curvature=\"0.001\"", "curvature=\"1e9\"", "`arc`: `curvature` is beyond 0.2 1/m"),
+        ("<road ", "<road id=\"1\"/><road ", "`road`: a road before it has the number `1` already"),
+        ("length=\"", "length=\"-", "`length` is -"),
+        ("id=\"-2\"", "id=\"-1\"", "a lane before it has the number -1 already"),
     ];
     for (right, wrong, word) in faults {
         assert!(ROAD.contains(right), "{right}");
@@ -235,7 +248,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
             | "no `laneSection`"
             | "no lanes on the right"
             | "no driving lane"
-            | "lane-width-m" => ROAD.replace(right, wrong),
+            | "`a` is 35; a lane" => ROAD.replace(right, wrong),
             _ => ROAD.replacen(right, wrong, 1),
         };
         let refused = imported(&written(folder.path(), SCENARIO, &road), &output, &[]);

@@ -17,13 +17,14 @@ mod formula;
 mod reader;
 mod road;
 mod storyboard;
+mod structure;
 mod world;
 
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::input;
+use closecall_traffic::{Segment, input};
 
 pub use dom::ImportError;
 
@@ -115,6 +116,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     if let Some(text) = text_of_closecall(&root) {
         return of_closecall(&reader, &root, (text, options));
     }
+    structure::check(&reader, &root)?;
     for declaration in root.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
     {
         let name = reader.text(declaration, "name")?;
@@ -143,8 +145,31 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     let environment = environment(&reader, &globals, &mut played.notes)?;
     let text = scenario_text(path, &mut played, (&starts, &environment))?;
     let parsed = ScenarioFile::parse(path, &text, &[]).and_then(|file| file.check());
-    parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
+    parsed.map_err(|source| at_element(&reader, (&root, &starts), source))?;
     Ok(Imported { text, notes: played.notes, events: played.events })
+}
+
+/// Returns the error of the scenario that a file describes at the element that describes its part: the
+/// lines of the scenario file are none of the reader's.
+fn at_element(reader: &Reader, (root, vehicles): (&Node, &[Vehicle]), error: ScenarioError) -> ImportFailure {
+    let ScenarioError::Value { source, .. } = &error else {
+        return ImportFailure::Scenario { path: reader.path.clone(), source: Box::new(error) };
+    };
+    let message = format!("the scenario that it describes is not valid: {source}");
+    let vehicle = match &source.path.0[..] {
+        [Segment::Key(key), Segment::Index(index), ..] if key == "actor" => vehicles.get(*index),
+        _ => None,
+    };
+    let error = match vehicle {
+        Some(vehicle) => ImportError {
+            path: reader.path.clone(),
+            line: vehicle.line,
+            element: "ScenarioObject".to_owned(),
+            message: format!("`{}`: {message}", vehicle.name),
+        },
+        None => reader.error(root, message),
+    };
+    error.into()
 }
 
 fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
