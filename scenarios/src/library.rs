@@ -235,6 +235,33 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     plain_names().chain(FAULTS.into_iter().map(|(name, _)| name))
 }
 
+/// Returns the scenarios in a folder of `scenarios/library`.
+fn in_folder(folder: &str) -> &'static [(&'static str, &'static str)] {
+    match folder {
+        "traffic" => &TRAFFIC,
+        "as-recorded" => &AS_RECORDED,
+        "aeb" => &AEB,
+        "acc" => &ACC,
+        "anchor" => &ANCHOR,
+        "faults" => &FAULTS,
+        _ => &[],
+    }
+}
+
+/// Returns the name of the scenario that a word names: by its name, or by its folder and its name, as
+/// `traffic/busy-overtake`.
+pub fn named(word: &str) -> Option<&'static str> {
+    match word.split_once('/') {
+        Some((folder, name)) => in_folder(folder).iter().map(|(scenario, _)| *scenario).find(|other| *other == name),
+        None => names().find(|name| *name == word),
+    }
+}
+
+/// Returns true if a word begins with a folder of the library, as `traffic/busy-overtake`.
+pub(crate) fn has_folder(word: &str) -> bool {
+    word.split_once('/').is_some_and(|(folder, _)| !in_folder(folder).is_empty())
+}
+
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
     // Without the scenarios with faults, which are put together from their bases, if possible.

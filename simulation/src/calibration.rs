@@ -22,6 +22,6 @@ mod follower;
 mod optimise;
 mod predictive;
 
-pub use calibrate::{Calibration, Errors, PairResult, calibrate};
+pub use calibrate::{Calibration, Errors, PairResult, calibrate, calibrate_watched};
 pub use follower::{FollowingModel, ParameterSpec};
 pub use predictive::Predictive;

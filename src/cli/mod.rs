@@ -34,6 +34,7 @@ mod page_server;
 mod paper;
 mod plan;
 mod plot;
+mod progress;
 mod protect;
 mod rare;
 mod record;
