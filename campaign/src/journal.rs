@@ -192,7 +192,7 @@ pub(crate) fn copies<K: Ord + Copy>(path: &Path, order: impl Fn(&Record) -> Opti
         if read_line(&mut reader, &mut line)? == 0 {
             break;
         }
-        if let (Some(sum), Ok(record)) = (line.first_chunk::<CHECKSUM_DIGITS>().copied(), parse(&line))
+        if let (Some(sum), Ok(record)) = (line.first_chunk::<CHECKSUM_DIGITS>().copied(), parse::<Record>(&line))
             && let Some(place) = order(&record)
         {
             lines.push((number, sum, place));
@@ -292,8 +292,7 @@ mod tests {
         let copies_of = |samples: &[u64]| {
             let lines: Vec<u8> = samples.iter().flat_map(|&sample| line(&record(sample)).unwrap()).collect();
             std::fs::write(&path, lines).unwrap();
-            let mut numbers: Vec<usize> =
-                copies(&path, |record| Some(record.sample)).unwrap().into_iter().collect();
+            let mut numbers: Vec<usize> = copies(&path, |record| Some(record.sample)).unwrap().into_iter().collect();
             numbers.sort_unstable();
             numbers
         };

@@ -257,7 +257,10 @@ mod tests {
         let data = FollowingData::default();
         let shown = text(&calibration, &data);
         assert!(shown.contains("  at the lower limit 0.1: pooled; the best value may lie beyond\n"), "{shown}");
-        assert!(shown.contains("  at the upper limit 6: pooled, 2 of 3 pairs; the best value may lie beyond\n"), "{shown}");
+        assert!(
+            shown.contains("  at the upper limit 6: pooled, 2 of 3 pairs; the best value may lie beyond\n"),
+            "{shown}"
+        );
         let member = member(&calibration, &data, "closecall");
         assert!(member.contains("the value is the upper limit of the search, 6,"), "{member}");
         assert!(member.contains("# at the lower limit 0.1: pooled\n"), "{member}");

@@ -96,7 +96,10 @@ mod tests {
 
     #[test]
     fn a_line_states_the_progress() {
-        assert_eq!(line([50, 200], "samples", Duration::from_secs(10)), "50 of 200 samples after 10 s, 5.0 samples/s, 30 s left");
+        assert_eq!(
+            line([50, 200], "samples", Duration::from_secs(10)),
+            "50 of 200 samples after 10 s, 5.0 samples/s, 30 s left"
+        );
         assert_eq!(line([0, 200], "samples", Duration::from_secs(30)), "0 of 200 samples after 30 s");
         assert_eq!(line([3, 6], "fits", Duration::from_secs(3)), "3 of 6 fits after 3 s, 1.0 fits/s, 3 s left");
     }

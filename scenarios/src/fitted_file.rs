@@ -140,19 +140,21 @@ impl FittedFile {
         }
         for (name, config) in replaced {
             let Some(distribution) = file.space().get(name).map(|entry| &entry.distribution) else { continue };
-            let (Some(bounds), Some(Value::Number(median))) = (distribution.bounds(), nominal.get(name)) else { continue };
+            let (Some(bounds), Some(Value::Number(median))) = (distribution.bounds(), nominal.get(name)) else {
+                continue;
+            };
             let is_usable = |value: f64| {
                 let mut parameters = nominal.clone();
                 parameters.insert(name.clone(), Value::Number(value));
                 file.concrete(&parameters).is_ok()
             };
-            let limits = bounds.map(|bound| usable_end(*median, bound, is_usable));
+            let limits = bounds.map(|bound| usable_end(*median, bound, &is_usable));
             if limits == bounds {
                 continue;
             }
             let [below, within] = limits.map(|limit| distribution.cdf(limit).unwrap_or_default());
             let share = below + 1.0 - within;
-            let [low, high] = limits;
+            let [low, high] = limits.map(|limit| (limit * CUT_STEPS).round() / CUT_STEPS);
             let can_use = format!("{:.1} % of the fitted values lie beyond the {low} to {high}", 100.0 * share);
             let scenario = &scenario.config().name;
             if !(share <= MOST_CUT) {

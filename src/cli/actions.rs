@@ -60,7 +60,7 @@ fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> S
 fn with_folder<'a>(words: &[&'a str], folder: &'a str) -> (Vec<&'a str>, bool) {
     const OPTIONS: [&str; 3] = ["--out", "--output", "-o"];
     let (mut replaced, mut is_value, mut is_named) = (Vec::new(), false, false);
-    for word in words {
+    for &word in words {
         let is_joined = word.split_once('=').is_some_and(|(option, _)| OPTIONS.contains(&option))
             || (word.starts_with("-o") && word.len() > 2);
         match (is_value, is_joined) {
@@ -69,7 +69,7 @@ fn with_folder<'a>(words: &[&'a str], folder: &'a str) -> (Vec<&'a str>, bool) {
             (false, false) => replaced.push(word),
         }
         is_named |= is_value || is_joined;
-        is_value = !is_value && OPTIONS.contains(word);
+        is_value = !is_value && OPTIONS.contains(&word);
     }
     (replaced, is_named)
 }

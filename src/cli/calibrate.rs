@@ -52,7 +52,8 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
         Model::Idm => FollowingModel::Idm,
         Model::Wiedemann99 => FollowingModel::Wiedemann99,
     };
-    let result = watched("fits", |on_progress| calibrate_watched(model, &data, on_progress)).ok_or_else(|| CliError::Usage { message: calibration::no_pair(&data) })?;
+    let result = watched("fits", |on_progress| calibrate_watched(model, &data, on_progress))
+        .ok_or_else(|| CliError::Usage { message: calibration::no_pair(&data) })?;
     if let Some(path) = &args.output {
         let command = format!("closecall traffic calibrate --model {}", model.name());
         let member = calibration::member(&result, &data, &command);

@@ -93,11 +93,14 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     let skipped = source::skipped(paths);
     if !skipped.is_empty() {
         let keys = KEYS_OF_SCENARIO.map(|key| format!("`{key}`")).join(", ");
-        let named = skipped.iter().take(MOST_NAMED).map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        let named =
+            skipped.iter().take(MOST_NAMED).map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         let more = skipped.len().saturating_sub(MOST_NAMED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         let files = skipped.len();
-        print_error(format_args!("note: skipped as no scenarios, with none of the keys {keys}: {files} files: {named}{more}\n"));
+        print_error(format_args!(
+            "note: skipped as no scenarios, with none of the keys {keys}: {files} files: {named}{more}\n"
+        ));
     }
     Ok(source::expand(paths)?)
 }

@@ -20,8 +20,7 @@ pub(super) fn watched<T>(unit: &'static str, work: impl FnOnce(&(dyn Fn([u64; 2]
     let of_bar = bar.clone();
     let progress = move || [of_bar.position(), of_bar.length().unwrap_or_default()];
     let is_silent = session::is_active() || stderr().is_terminal();
-    let _heartbeat = (!is_silent)
-        .then(|| Heartbeat::of(unit, progress, |line| print_error(format_args!("{line}\n"))));
+    let _heartbeat = (!is_silent).then(|| Heartbeat::of(unit, progress, |line| print_error(format_args!("{line}\n"))));
     let done = work(&|[done, all]| {
         bar.set_length(all);
         bar.set_position(done);

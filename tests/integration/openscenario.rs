@@ -177,7 +177,7 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ("conditionEdge=\"none\"", "conditionEdge=\"sharp\"", &["Condition", "sharp"]),
         ("rule=\"lessThan\"", "rule=\"nearly\"", &["TimeHeadwayCondition", "nearly"]),
         ("<Storyboard>", "<Storyboard><Foo/>", &["`Foo`", "no element of `Storyboard`", "Init, Story, StopTrigger"]),
-        ("<Story ", "<Sotry/><Story ", &["`Sotry`", "no element of `Storyboard`"]),
+        ("<Story ", "<Tale/><Story ", &["`Tale`", "no element of `Storyboard`"]),
         ("${$EgoSpeed / 3.6}", "-50", &["AbsoluteTargetSpeed", "-50 m/s; 0 to 100 m/s"]),
         ("name=\"Slow_Truck\"", "name=\"Ego\"", &["ScenarioObject", "an entity `Ego` already"]),
         ("length=\"12\"", "length=\"-12\"", &["Dimensions", "`length` must be above 0 m"]),

@@ -24,7 +24,8 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<St
         }
         let name = reader.text(entity, "name")?;
         if let Some(line) = names.insert(name.clone(), entity.line) {
-            return Err(reader.error(entity, format!("line {line} has an entity `{name}` already: each needs a name of its own")));
+            return Err(reader
+                .error(entity, format!("line {line} has an entity `{name}` already: each needs a name of its own")));
         }
         let mut vehicle = None;
         for child in &entity.children {

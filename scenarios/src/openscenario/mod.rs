@@ -231,13 +231,15 @@ fn of_closecall(
         return Err(reader.error(header, message).into());
     }
     let mut notes = vec![
-        "Closecall wrote this file: the scenario in it is used, and neither the road nor the catalogue is read".to_owned(),
+        "Closecall wrote this file: the scenario in it is used, and neither the road nor the catalogue is read"
+            .to_owned(),
     ];
     let mut settings = Vec::new();
     for (written, value) in &options.parameters {
         let name = written.replace('_', "-");
         if !file.space().iter().any(|(parameter, _)| parameter.as_str() == name) {
-            let names: Vec<_> = file.space().iter().map(|(parameter, _)| parameter.as_str().replace('-', "_")).collect();
+            let names: Vec<_> =
+                file.space().iter().map(|(parameter, _)| parameter.as_str().replace('-', "_")).collect();
             let message = format!("there is no parameter `{written}`, only {}", names.join(", "));
             return Err(reader.error(root, message).into());
         }

@@ -84,7 +84,9 @@ impl ComputingTime {
         }
         (late > MOST_LATE).then(|| {
             let [late, most] = [late, MOST_LATE].map(|share| 100.0 * share);
-            format!("computes for more than its {allowed_ms:.0} ms in {late:.0} % of {steps} steps, and may in {most:.0} %")
+            format!(
+                "computes for more than its {allowed_ms:.0} ms in {late:.0} % of {steps} steps, and may in {most:.0} %"
+            )
         })
     }
 }
