@@ -264,6 +264,7 @@ pub(crate) fn has_folder(word: &str) -> bool {
 
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
+    let name = named(name)?;
     // Without the scenarios with faults, which are put together from their bases, if possible.
     plain_text(name).or_else(|| all().find(|(scenario, _)| *scenario == name).map(|(_, text)| text))
 }
@@ -287,7 +288,8 @@ pub fn entries() -> Result<Vec<LibraryEntry>, ScenarioError> {
 /// # Errors
 /// [`UnknownScenario`] if the library has no scenario `from`.
 pub fn copy_of(from: &str, name: &str) -> Result<String, UnknownScenario> {
-    let text = text(from)
+    let (from, text) = named(from)
+        .and_then(|named| Some((named, text(named)?)))
         .ok_or_else(|| UnknownScenario { name: from.to_owned(), names: names().collect::<Vec<_>>().join(", ") })?;
     Ok(text.replace(&format!("name = \"{from}\""), &format!("name = \"{name}\"")))
 }
