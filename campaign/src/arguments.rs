@@ -2,8 +2,116 @@
 //! allowed.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Duration;
 
 use closecall_traffic::ActorId;
+use serde::de::{Deserialize, Deserializer, Error};
+use serde_json::Value;
+
+use crate::stop::duration;
+
+/// Defines numbers that are parsed from the command line and deserialised from a request, both
+/// within their limits.
+macro_rules! checked_numbers {
+    ($($(#[$doc:meta])* $name:ident($type:ty) by $parse:expr;)*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name(pub $type);
+
+        impl FromStr for $name {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, String> {
+                $parse(text).map(Self)
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                // A text keeps its quotes, and is no number.
+                Value::deserialize(deserializer)?.to_string().parse().map_err(D::Error::custom)
+            }
+        }
+    )*};
+}
+
+checked_numbers! {
+    /// A number of samples, 1 or more.
+    Count(u64) by count;
+    /// A finite number above 0.
+    Positive(f64) by positive;
+    /// A probability, above 0 and below 1.
+    Probability(f64) by probability;
+    /// A confidence, above 0.5 and below 1.
+    Confidence(f64) by confidence;
+    /// A share, 0 to 1.
+    Share(f64) by share;
+    /// A number of worker threads.
+    Jobs(u16) by whole::<u16, 1, 1_024>;
+    /// A number of further tries of a sample.
+    Retries(u32) by whole::<u32, 0, 100>;
+    /// The longest time of a controller's answer (ms).
+    TimeoutMs(u64) by whole::<u64, 1, 600_000>;
+    /// The memory of a controller's process (MiB).
+    MemoryMib(u64) by whole::<u64, 1, 1_048_576>;
+}
+
+/// Parses a whole number within limits.
+fn whole<T: TryFrom<u64>, const LEAST: u64, const MOST: u64>(text: &str) -> Result<T, String> {
+    let number = text.parse().ok().filter(|number| (LEAST..=MOST).contains(number));
+    let number = number.and_then(|number| T::try_from(number).ok());
+    number.ok_or_else(|| format!("`{text}` is not a whole number from {LEAST} to {MOST}"))
+}
+
+/// Deserialises a word, or a number, that is parsed like the same text of the command line.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err: std::fmt::Display>>(deserializer: D) -> Result<T, D::Error> {
+    word(Value::deserialize(deserializer)?).parse().map_err(D::Error::custom)
+}
+
+/// Deserialises an option like [`parsed`].
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn parsed_option<'de, D: Deserializer<'de>, T: FromStr<Err: std::fmt::Display>>(
+    deserializer: D,
+) -> Result<Option<T>, D::Error> {
+    parsed(deserializer).map(Some)
+}
+
+/// Deserialises each item of a list like [`parsed`].
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn parsed_list<'de, D: Deserializer<'de>, T: FromStr<Err: std::fmt::Display>>(
+    deserializer: D,
+) -> Result<Vec<T>, D::Error> {
+    let values = Vec::<Value>::deserialize(deserializer)?.into_iter();
+    values.map(|value| word(value).parse().map_err(D::Error::custom)).collect()
+}
+
+/// Returns the text of a value.
+fn word(value: Value) -> String {
+    match value {
+        Value::String(text) => text,
+        value => value.to_string(),
+    }
+}
+
+/// The wall time of a campaign, above 0, such as `90s`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WallTime(pub Duration);
+
+impl FromStr for WallTime {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        duration(text).map(Self)
+    }
+}
 
 /// Parses a finite number above 0.
 ///
@@ -150,5 +258,18 @@ mod tests {
             assert!(count(text).unwrap_err().contains(reason), "{text}");
         }
         assert!(count("99999999999999999999999").unwrap_err().contains("too large"));
+    }
+
+    #[test]
+    fn a_request_has_the_limits_of_the_command_line() {
+        let jobs = serde_json::from_str::<Jobs>;
+        assert_eq!(jobs("1024").unwrap(), Jobs(1024));
+        for wrong in ["0", "1025", "-1", "1.5", "true", "\"3\"", "null", "70000"] {
+            let error = jobs(wrong).unwrap_err().to_string();
+            assert_eq!(error, format!("`{wrong}` is not a whole number from 1 to 1024"));
+            assert!(wrong.parse::<Jobs>().is_err());
+        }
+        assert_eq!(serde_json::from_str::<Share>("0.1").unwrap(), Share(0.1));
+        assert!(serde_json::from_str::<Share>("1.01").is_err() && "1.01".parse::<Share>().is_err());
     }
 }

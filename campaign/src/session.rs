@@ -1,14 +1,12 @@
 //! A command that another program calls in its own process, such as a Python program. It prints
-//! nothing: its output and its messages are kept for the caller. It receives no signal: its caller
-//! stops it.
+//! nothing: its warnings are kept for the caller. It receives no signal: its caller stops it.
 //!
 //! A command runs in one thread, and looks up its session there.
 
 use std::cell::RefCell;
 use std::ffi::OsString;
-use std::fmt::{Arguments, Write};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::interrupt::{self, Signal};
 use crate::stop::StopFlag;
@@ -20,15 +18,7 @@ pub struct Session {
     pub stop: StopFlag,
     /// Number of the samples of a campaign that are done, and of all.
     pub samples: Arc<[AtomicU64; 2]>,
-}
-
-/// The output of a command.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Printed {
-    /// The text of standard output.
-    pub output: String,
-    /// The messages of standard error.
-    pub messages: Vec<String>,
+    warnings: Arc<Mutex<Vec<String>>>,
 }
 
 /// The command that this thread runs.
@@ -36,7 +26,6 @@ pub struct Printed {
 struct Running {
     arguments: Vec<String>,
     session: Option<Session>,
-    printed: Printed,
 }
 
 thread_local! {
@@ -44,26 +33,30 @@ thread_local! {
 }
 
 impl Session {
-    /// Runs a command in this thread, and returns its result and its output. The first of the
-    /// arguments is the program's name.
-    pub fn run<T>(&self, arguments: &[OsString], command: impl FnOnce() -> T) -> (T, Printed) {
-        RUNNING.set(Running { arguments: texts(arguments), session: Some(self.clone()), printed: Printed::default() });
+    /// Runs a command in this thread. `call` is the call as its program spells it, such as
+    /// `closecall.campaign('low-thw-overtake')`.
+    pub fn run<T>(&self, call: &str, command: impl FnOnce() -> T) -> T {
+        RUNNING.set(Running { arguments: vec![call.to_owned()], session: Some(self.clone()) });
         let result = command();
-        (result, RUNNING.take().printed)
+        RUNNING.take();
+        result
+    }
+
+    /// Returns the warnings of the command.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// Sets the arguments of the program, whose commands nothing calls but itself.
+/// Sets the arguments of the program, whose commands nothing calls but itself. What is not UTF-8 is
+/// replaced, as they are texts of manifests and messages.
 pub fn set_arguments(arguments: &[OsString]) {
-    RUNNING.set(Running { arguments: texts(arguments), ..Running::default() });
+    let arguments = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
+    RUNNING.set(Running { arguments, session: None });
 }
 
-/// Returns the arguments as texts for manifests and messages. What is not UTF-8 is replaced.
-fn texts(arguments: &[OsString]) -> Vec<String> {
-    arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect()
-}
-
-/// Returns the arguments of the command. The first is the program's name.
+/// Returns the words of the command line, of which the first is the program's name; a call of
+/// another program is one word.
 pub fn arguments() -> Vec<String> {
     RUNNING.with_borrow(|running| running.arguments.clone())
 }
@@ -73,18 +66,12 @@ pub fn is_active() -> bool {
     RUNNING.with_borrow(|running| running.session.is_some())
 }
 
-/// Keeps a text for the caller. Returns false if there is none.
-pub fn keep_output(text: Arguments<'_>) -> bool {
-    RUNNING.with_borrow_mut(|running| running.session.is_some() && running.printed.output.write_fmt(text).is_ok())
-}
-
-/// Keeps a message for the caller. Returns false if there is none.
-pub fn keep_message(text: Arguments<'_>) -> bool {
-    RUNNING.with_borrow_mut(|running| {
-        if running.session.is_some() {
-            running.printed.messages.push(text.to_string().trim().to_owned());
-        }
-        running.session.is_some()
+/// Keeps a warning for the caller. Returns false if there is none.
+pub fn keep_warning(text: &str) -> bool {
+    RUNNING.with_borrow(|running| {
+        let Some(session) = &running.session else { return false };
+        session.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+        true
     })
 }
 
@@ -119,20 +106,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_called_command_prints_to_its_caller() {
+    fn a_called_command_reports_to_its_caller() {
         let session = Session::default();
-        let ((), printed) = session.run(&["closecall".into(), "list".into()], || {
-            assert!(is_active());
-            assert_eq!(arguments(), ["closecall", "list"]);
-            assert!(keep_output(format_args!("one ")) && keep_output(format_args!("line")));
-            assert!(keep_message(format_args!("warning: two\n")));
+        session.run("closecall.campaign('x')", || {
+            assert!(is_active() && keep_warning("two"));
+            assert_eq!(arguments(), ["closecall.campaign('x')"]);
             report(3, 8);
             assert_eq!(received(), None);
             session.stop.set();
             assert_eq!(received(), Some(Signal::Interrupt));
         });
-        assert_eq!(printed, Printed { output: "one line".to_owned(), messages: vec!["warning: two".to_owned()] });
+        assert_eq!(session.warnings(), ["two"]);
         assert_eq!(session.samples.each_ref().map(|count| count.load(Ordering::Relaxed)), [3, 8]);
-        assert!(!is_active() && !keep_output(format_args!("for the terminal")));
+        assert!(!is_active() && !keep_warning("for the terminal"));
     }
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import json
 import os
 import re
 import shutil
@@ -18,8 +17,8 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 from . import _host, _native
-from ._command import call, option
-from ._controller import SAMPLE_TIMEOUT_S, ControllerLike, registered
+from ._command import call
+from ._controller import ControllerLike, registered
 from ._errors import UsageError
 from ._run import SensorsLike
 from ._scenario import Scenario, whole
@@ -91,7 +90,7 @@ def _row(name: str, counts: dict[str, Any], samples: int) -> tuple[str, ...]:
 
 
 class CampaignOptions(TypedDict, total=False):
-    """The further keywords of :func:`campaign`, each an option of ``closecall campaign``: its help explains them."""
+    """The further keywords of :func:`campaign`. The help of ``closecall campaign`` explains them: they are its options."""
 
     preset: str | None
     until_certain: bool
@@ -153,8 +152,7 @@ def campaign(
     The folder, the verdict and the exit code are those of the command line. ``n`` is the number of samples of each scenario.
     ``controller`` is as in :func:`run`; ``paired`` compares it with ``acc`` on the same samples. ``arms`` names
     several controllers, the baseline first. ``gate`` lists criteria such as ``"upper(induced) <= 0.01"``. ``options`` are
-    further options of the command line, with underscores: ``max_collisions=3``, ``sample_timeout_s=10``, ``no_gate=True``; see
-    :class:`CampaignOptions`.
+    further keywords such as ``max_collisions=3``, ``sample_timeout_s=10``, ``no_gate=True``; see :class:`CampaignOptions`.
 
     Without ``out`` the outcomes and the report live as long as the result does, and the call can be repeated.
 
@@ -171,16 +169,16 @@ def campaign(
         similar = get_close_matches(name, CampaignOptions.__annotations__, n=1)
         raise UsageError(f"campaign() has no keyword `{name}`" + (f"; did you mean `{similar[0]}`?" if similar else ""))
     several = [scenarios] if isinstance(scenarios, (Scenario, str, os.PathLike)) else scenarios
-    words: list[str] = []
+    named: list[str] = []
     changes: list[list[str]] = []
     for scenario in several:
         if isinstance(scenario, Scenario):
-            words.append(scenario._native.source)
+            named.append(scenario._native.source)
             changes.append(scenario._native.settings)
         else:
-            words.append(os.fspath(scenario))
+            named.append(os.fspath(scenario))
             changes.append([])
-    if not words:
+    if not named:
         raise UsageError("scenarios: none is named")
     settings = changes[0]
     if any(other != settings for other in changes):
@@ -196,27 +194,33 @@ def campaign(
     if limits is None and set(LIMITS) & set(options) and not any(isinstance(one, str) and ":" in one for one in chosen):
         raise UsageError("`controller_timeout_ms` and `controller_memory_mib` limit processes: add `isolate=True`, or name one")
     timeout_s = options.get("sample_timeout_s")
-    # What is no number, the command line refuses.
-    limit_s = timeout_s if isinstance(timeout_s, (int, float)) else SAMPLE_TIMEOUT_S
+    # What is no number is refused below.
+    limit_s = timeout_s if isinstance(timeout_s, (int, float)) else _native.SAMPLE_TIMEOUT_S
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
-        which = option("arms" if arms is not None else "controller", names)
-        named: dict[str, object] = {"samples": n, "paired": paired, "seed": whole("seed", seed), "design": design, "sensors": sensors, "jobs": jobs}
-        named |= {"resume": resume, "gate": [gate] if isinstance(gate, str) else list(gate), "set": settings}
         if out is None and resume:
             raise UsageError("resume: name the folder of the campaign with `out`")
         kept = tempfile.TemporaryDirectory(prefix="closecall-") if out is None else None
         folder = Path(kept.name, "results") if kept is not None else Path(os.fspath(out or ""))
-        named["out"] = os.fspath(folder)
-        if kept is not None and "record" not in options:
+        keywords: dict[str, object] = {"scenarios": named, "n": n, "out": folder, "resume": resume}
+        keywords |= {"arms": names} if arms is not None else {"controller": names[0] if names else None}
+        # The seed of a judgement takes the place of the default.
+        keywords["seed"] = None if seed == 0 and options.get("judge_seed") is not None else whole("seed", seed)
+        keywords |= {"paired": paired, "design": design, "sensors": sensors, "jobs": jobs}
+        keywords |= {"gate": _several(gate), "set": settings or None}
+        if kept is not None:
             # Nobody could look at the recordings.
-            named["record"] = "0"
-        further = [word for name, value in {**named, **options}.items() for word in option(name, value)]
-        code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
-    keys = json.loads(output)
+            keywords["record"] = "0"
+        more = {**options, "ensemble": _several(options.get("ensemble"))}
+        code, keys = call("campaign", {**keywords, **more}, report)
     if kept is not None:
         _keep_results(folder)
     result = (code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys["failures"], keys)
     return CampaignResult(*result, None if kept is not None else folder, kept)
+
+
+def _several(values: str | os.PathLike[str] | Sequence[str] | None) -> list[str | os.PathLike[str]] | None:
+    """Returns a list of texts, of which one may be given as it is; ``None`` if there are none."""
+    return [values] if isinstance(values, (str, os.PathLike)) else list(values or ()) or None
 
 
 def _keep_results(folder: Path) -> None:

@@ -1,16 +1,18 @@
-"""The command ``closecall``, and calls of its commands."""
+"""The command ``closecall``, and calls of its functions."""
 
 from __future__ import annotations
 
-import re
+import json
+import numbers
+import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from . import _native
-from ._errors import ClosecallError
+from ._errors import UsageError
 
 PROGRAM = "closecall"
 
@@ -40,40 +42,29 @@ def main() -> int:
     return _native.main([PROGRAM, *sys.argv[1:]])
 
 
-def call(arguments: Iterable[str], progress: Callable[[int, int], Any] | None = None) -> tuple[int, str]:
-    """Runs a command, and returns its exit code and its output. Its warnings become Python's. Messages name keywords."""
-    try:
-        code, output, messages = _native.call([PROGRAM, *arguments], progress)
-    except ClosecallError as error:
-        error.args = (keywords(str(error)), *error.args[1:])
-        raise
-    for message in messages:
-        if message.startswith("warning: "):
-            warnings.warn(keywords(message.removeprefix("warning: ")), stacklevel=3)
-    return code, output
+def call(function: str, keywords: Mapping[str, object], progress: Callable[[int, int], Any] | None = None) -> tuple[int, Any]:
+    """Calls a function of the program, and returns its exit code and its result. Its warnings become Python's.
 
-
-#: An option of the command line in a text, and its value.
-OPTION = re.compile(r"(?<![\w/-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)(?: <[^>]*>| [A-Z]+\b)?")
-#: The keywords whose options have other names.
-RENAMED = {"samples": "n", "record": "record"}
-
-
-def keywords(text: str) -> str:
-    """Returns a text of the command line that names keywords instead of options: ``--max-collisions`` is ``max_collisions=``."""
-    return OPTION.sub(lambda option: RENAMED.get(option[1], option[1].replace("-", "_")) + "=", text)
-
-
-def option(name: str, value: object) -> list[str]:
-    """Returns the words of an option: ``max_collisions=3`` is ``--max-collisions 3``.
-
-    ``None`` and ``False`` leave it out, ``True`` is an option without a value, a list repeats it.
+    Keywords that are ``None`` or ``False`` have their defaults.
     """
-    word = "--" + name.rstrip("_").replace("_", "-")
-    if value is None or value is False:
-        return []
-    if value is True:
-        return [word]
-    if isinstance(value, (list, tuple)):
-        return [part for item in value for part in option(name, item)]
-    return [f"{word}={value}"]
+    given = {name: _plain(name, value) for name, value in keywords.items() if value is not None and value is not False}
+    spelled = ", ".join(f"{name}={value!r}" for name, value in given.items())
+    code, result, messages = _native.call(function, json.dumps(given), f"{PROGRAM}.{function}({spelled})", progress)
+    for message in messages:
+        warnings.warn(message, stacklevel=3)
+    return code, json.loads(result)
+
+
+def _plain(name: str, value: object) -> Any:
+    """Returns a value as JSON has it: a number of NumPy as one of Python, a path as text, a tuple as a list."""
+    try:
+        return json.loads(json.dumps(value, default=_simple, allow_nan=False, ensure_ascii=False).encode())
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{name}: expected a text, a finite number, a path, or a list of them, not {value!r}") from error
+
+
+def _simple(value: Any) -> int | float | str:
+    """Returns a number or a path that JSON does not know."""
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    return float(value) if isinstance(value, numbers.Real) else os.fspath(value)

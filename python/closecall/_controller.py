@@ -28,8 +28,6 @@ from ._errors import UsageError
 END_TIMEOUT_S = 5.0
 #: Interval at which steps that hang are looked for (s), and the time after which the campaign has certainly given up their sample (s).
 WATCH_INTERVAL_S, GIVEN_UP_S = 0.25, 1.0
-#: Default time limit of a sample: that of ``closecall campaign`` (s).
-SAMPLE_TIMEOUT_S = 300.0
 
 #: What the ego stack does, for the summary of the margin increase system.
 State = Literal["following", "increasing", "holding", "releasing", "emergency-braking"]
@@ -242,7 +240,7 @@ def _watched(controllers: list[_native.PythonController], sample_timeout_s: floa
 
 @contextmanager
 def registered(
-    controllers: list[ControllerLike], limits: _host.Limits | None = None, is_remote: bool = False, timeout_s: float = SAMPLE_TIMEOUT_S
+    controllers: list[ControllerLike], limits: _host.Limits | None = None, is_remote: bool = False, timeout_s: float = _native.SAMPLE_TIMEOUT_S
 ) -> Iterator[list[str]]:
     """Gives every controller a name that the commands of the program know, for as long as the context lasts.
 

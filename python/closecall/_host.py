@@ -23,9 +23,6 @@ from typing import Any, NamedTuple
 from . import _native
 from ._errors import InputError, UsageError
 
-#: Default time limit of an answer (ms), and memory limit of a process (MiB): those of all controllers in processes.
-TIMEOUT_MS, MEMORY_MIB = 1_000, 1_024
-
 #: Starts a worker process, whose first argument is the file of the controllers. The working folder holds no modules for it.
 START = "import sys; sys.path[:] = filter(None, sys.path); from closecall._host import main; raise SystemExit(main())"
 
@@ -36,8 +33,8 @@ HAS_C_STACK = (3, 14)
 class Limits(NamedTuple):
     """The limits of a worker process: the time of an answer (ms), and the memory (MiB)."""
 
-    timeout_ms: int = TIMEOUT_MS
-    memory_mib: int = MEMORY_MIB
+    timeout_ms: int = _native.CONTROLLER_TIMEOUT_MS
+    memory_mib: int = _native.CONTROLLER_MEMORY_MIB
 
 
 class Parcel(NamedTuple):

@@ -6,6 +6,9 @@ from typing import Any, Literal, final
 
 VERSION: str
 PYTHON_PREFIX: str
+SAMPLE_TIMEOUT_S: float
+CONTROLLER_TIMEOUT_MS: int
+CONTROLLER_MEMORY_MIB: int
 ODOMETRY_KEYS: list[str]
 TRACK_KEYS: list[str]
 
@@ -25,7 +28,9 @@ class BlockRunner:
         """Runs samples of the scenario with index ``work`` in one thread, and returns their records."""
 
 def set_program(path: str, words: list[str]) -> None: ...
-def call(arguments: list[str], progress: Callable[[int, int], Any] | None = None) -> tuple[int, str, list[str]]: ...
+def call(
+    function: str, keywords: str, spelled: str, progress: Callable[[int, int], Any] | None = None
+) -> tuple[int, str, list[str]]: ...
 def refuse(name: str, reason: str) -> None: ...
 def read_table(path: str | os.PathLike[str]) -> Table: ...
 def rows_table(rows: str) -> Table: ...

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from . import _native
-from ._command import call, option
+from ._command import call
+from ._scenario import whole
 
 PathLike = str | os.PathLike[str]
 #: The layout of a trajectory file. By default it is recognised by the content.
@@ -48,8 +49,8 @@ def lane_changes(
 
     Raises :class:`InputError` with file, line and column (``key``) if the file cannot be used.
     """
-    named: dict[str, object] = {"criterion": criterion, "lanes": lanes, "reference": _path(reference)}
-    result = _json("lane-changes", [file], {**named, **_reading(layout, drop_bad_rows)})
+    named = {"file": file, "criterion": criterion, "lanes": lanes, "reference": reference}
+    _, result = call("lane_changes", {**named, "layout": layout, "drop_bad_rows": drop_bad_rows})
     return Rows(result) if isinstance(result, list) else dict(result)
 
 
@@ -67,8 +68,9 @@ def criticality(
     with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``. The result can be read as
     a table (:class:`Rows`).
     """
-    named: dict[str, object] = {"speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone}
-    return Rows(_json("criticality", [file], {**named, **_reading(layout, drop_bad_rows)}))
+    named = {"file": file, "speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone}
+    _, result = call("criticality", {**named, "layout": layout, "drop_bad_rows": drop_bad_rows})
+    return Rows(result)
 
 
 def fit(
@@ -86,21 +88,7 @@ def fit(
     ``output`` is the scenario part to write (TOML). The result has ``fitted``: for each parameter ``name``, ``median``,
     ``interval_95``, ``quantiles``, ``n`` and ``goodness_of_fit``.
     """
-    several = [files] if isinstance(files, (str, os.PathLike)) else files
-    named: dict[str, object] = {"out": _path(output), "provenance": provenance, "correlations": correlations, "seed": seed}
-    return dict(_json("fit", several, {**named, **_reading(layout, drop_bad_rows)}))
-
-
-def _reading(layout: Layout | None, drop_bad_rows: bool) -> dict[str, object]:
-    return {"layout": layout, "drop_bad_rows": drop_bad_rows}
-
-
-def _path(path: PathLike | None) -> str | None:
-    return None if path is None else os.fspath(path)
-
-
-def _json(command: str, files: Sequence[PathLike], options: dict[str, object]) -> Any:
-    """Runs a command of the group ``traffic`` on trajectory files, and returns its output."""
-    words = [word for name, value in options.items() for word in option(name, value)]
-    _, output = call(["traffic", command, "--format=json", *words, "--", *(os.fspath(file) for file in files)])
-    return json.loads(output)
+    several = [files] if isinstance(files, (str, os.PathLike)) else list(files)
+    named = {"files": several, "output": output, "provenance": provenance, "correlations": correlations, "seed": whole("seed", seed)}
+    _, result = call("fit", {**named, "layout": layout, "drop_bad_rows": drop_bad_rows})
+    return dict(result)

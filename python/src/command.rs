@@ -14,7 +14,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 
-use crate::error::exception;
+use crate::error::{Failure, raise};
 use crate::table::Table;
 
 /// Interval at which Python's signals and the progress of a command are looked at.
@@ -35,25 +35,28 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| cli::main(&arguments) as u8)
 }
 
-/// Runs a command in a thread of its own, and returns its exit code, its output and its messages. The first of the arguments
-/// is the program's name. `progress` is called with the number of samples that are done and of all.
+/// Calls a function of the program in a thread of its own, with keywords (JSON). Returns its exit code, its result (JSON) and its
+/// warnings. `spelled` is the call as Python spells it. `progress` is called with the number of samples that are done and of all.
 ///
-/// Ctrl-C stops a campaign after the samples that are running, and a second one returns at once. Any other command goes on
+/// Ctrl-C stops a campaign after the samples that are running, and a second one returns at once. Any other function goes on
 /// unseen.
 #[pyfunction]
-#[pyo3(signature = (arguments, progress=None))]
+#[pyo3(signature = (function, keywords, spelled, progress=None))]
 pub(crate) fn call(
     py: Python<'_>,
-    arguments: Vec<OsString>,
+    function: String,
+    keywords: String,
+    spelled: String,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(u8, String, Vec<String>)> {
     let session = Session::default();
-    let is_campaign = arguments.get(1).is_some_and(|command| command == "campaign");
+    let is_campaign = function == "campaign";
     let (sender, mut receiver) = channel();
     let called = session.clone();
     let body = move || {
+        let run = || cli::call(&function, &keywords).map_err(|error| Failure::of(&error));
         // The receiver is gone if Ctrl-C has ended the call.
-        sender.send(cli::call(&called, &arguments)).ok();
+        sender.send(called.run(&spelled, run)).ok();
     };
     thread::Builder::new().name("command".to_owned()).spawn(body)?;
     let mut reported = [0; 2];
@@ -79,8 +82,8 @@ pub(crate) fn call(
         }
         match (received, interrupt) {
             (Ok(_), Some(interrupt)) => return Err(interrupt),
-            (Ok((Ok(code), printed)), None) => return Ok((code as u8, printed.output, printed.messages)),
-            (Ok((Err(error), _)), None) => return Err(exception(py, &error)),
+            (Ok(Ok((code, result))), None) => return Ok((code as u8, result.to_string(), session.warnings())),
+            (Ok(Err(failure)), None) => return Err(raise(py, &failure)),
             (Err(RecvTimeoutError::Disconnected), _) => {
                 return Err(PyRuntimeError::new_err("the command has panicked: the message is on standard error"));
             }

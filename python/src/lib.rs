@@ -48,5 +48,11 @@ mod _native {
     #[pymodule_export]
     const PYTHON_PREFIX: &str = closecall_simulation::controller::hosted::PREFIX;
     #[pymodule_export]
+    const SAMPLE_TIMEOUT_S: f64 = closecall::cli::SAMPLE_TIMEOUT_S;
+    #[pymodule_export]
+    const CONTROLLER_TIMEOUT_MS: u64 = closecall_simulation::controller::exec::DEFAULT_TIMEOUT_MS;
+    #[pymodule_export]
+    const CONTROLLER_MEMORY_MIB: u64 = closecall_simulation::controller::exec::DEFAULT_MEMORY_MIB;
+    #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

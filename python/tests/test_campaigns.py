@@ -310,7 +310,9 @@ def test_a_campaign_that_ends_early_has_a_result(tmp_path: Path) -> None:
         out = tmp_path / next(iter(options))
         result = cc.campaign(SCENARIO, n=20, sensors="object", controller=Fails, out=out, **options)
         assert (result.verdict, result.exit_code, result.errors, result.samples) == ("ENDED EARLY", 5, 1, 1)
-        assert result.report["of"] == 20 and "--resume" in result.report["resume"]
+        resume = result.report["resume"]
+        assert result.report["of"] == 20 and resume.startswith("closecall.campaign(") and resume.count("resume=True") == 1
+        assert "fail_fast=True" not in resume
 
 
 def test_the_settings_of_one_scenario_are_not_those_of_another() -> None:

@@ -16,7 +16,7 @@ import pytest
 from support import SCENARIO, command
 
 import closecall as cc
-from closecall import _campaign, _command, _traffic
+from closecall import _campaign, _traffic
 
 TYPED = Path(__file__).with_name("typed")
 
@@ -78,8 +78,6 @@ def test_messages_name_keywords() -> None:
     with pytest.raises(cc.UsageError) as raised:
         small(partition="3/2")
     assert "--" not in str(raised.value)
-    words = "with --out DIR, or --no-gate; see a--b and --max-flip-rate <SHARE>"
-    assert _command.keywords(words) == "with out=, or no_gate=; see a--b and max_flip_rate="
 
 
 def test_the_keywords_of_a_campaign_are_the_options_of_the_command() -> None:

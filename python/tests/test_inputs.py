@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pyarrow
 import pytest
 from support import SCENARIO, command
 
@@ -29,13 +31,47 @@ import closecall.gym as ccgym
         ({"progress": 3}, "progress: expected a function of two numbers"),
         ({"gate": "upper(inducd) <= 0.01"}, "`inducd` is not a measure"),
         ({"controller": 3}, "controller: expected a name, an object with a method `step`"),
-        ({"sample_timeout_s": float("nan")}, "`nan` is not a number above 0"),
+        ({"sample_timeout_s": float("nan")}, "sample_timeout_s: expected a text, a finite number.*not nan"),
+        ({"sample_timeout_s": "10"}, "sample_timeout_s=: `\"10\"` is not a number above 0"),
+        ({"sample_timeout_s": 0}, "sample_timeout_s=: `0` is not a number above 0"),
+        ({"sensors": "lidar"}, "sensors=: `lidar`, expected one of `full`, `object`, `ground-truth`"),
+        ({"design": "subset"}, "design=: `subset` is not a sampling design"),
+        ({"jobs": 0}, "jobs=: `0` is not a whole number from 1 to 1024"),
+        ({"preset": "weekly"}, "preset=: `weekly`, expected `pr` or `nightly`"),
+        ({"time_budget": "soon"}, "time_budget=: `soon` is not a time above 0"),
+        ({"record": "best:3"}, "record=: `best:3` is not"),
+        ({"check_share": 1.5}, "check_share=: `1.5` is not a number from 0 to 1"),
+        ({"retry_crashed": 101}, "retry_crashed=: `101` is not a whole number from 0 to 100"),
+        ({"paired": "yes"}, "paired=: string \"yes\", expected true or false"),
+        ({"max_induced": -1}, "max_induced=: integer `-1`, expected a whole number, 0 or more"),
+        ({"max_induced": {1}}, "max_induced: expected a text"),
+        ({"until_certain": True}, "until_certain= needs max_probability="),
+        ({"confidence": 0.9}, "confidence= needs max_probability="),
+        ({"retry_errors": True}, "retry_errors= needs resume="),
+        ({"no_gate": True, "max_harm": 1}, "no_gate= cannot be used with max_harm="),
+        ({"judge_seed": 3, "seed": 4}, "judge_seed= cannot be used with seed="),
+        ({"no_validity_checks": True, "check_at_most": 3}, "no_validity_checks= cannot be used with check_at_most="),
+        ({"ray": "local", "jobs": 2}, "ray= cannot be used with jobs="),
+        ({"partition": "1/2", "time_budget": "9s"}, "time_budget= cannot be used with partition="),
     ],
 )
 def test_a_wrong_argument_of_a_campaign_is_named(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(cc.UsageError, match=message) as raised:
         cc.campaign(SCENARIO, **{"n": 2, "sensors": "object", **arguments})
     assert raised.value.exit_code == 2 and "--help" not in str(raised.value)
+
+
+def test_numbers_of_numpy_and_paths_are_keywords(tmp_path: Path) -> None:
+    result = cc.campaign(SCENARIO, np.int64(2), sensors="object", check_share=np.float32(0.5), judge_seed=7, out=tmp_path / "out")  # type: ignore[arg-type]
+    assert result.samples == 2 and result.report["seed"] == 7
+    again = cc.campaign(SCENARIO, 2, sensors="object", check_share=0.5, seed=7, out=tmp_path / "again")
+    assert pyarrow.table(result.outcomes()).equals(pyarrow.table(again.outcomes()))
+
+
+def test_a_report_names_the_call(tmp_path: Path) -> None:
+    cc.campaign(SCENARIO, 2, sensors="object", no_gate=True, out=tmp_path / "out")
+    call = f"closecall.campaign(scenarios=['{SCENARIO}'], n=2, out='{tmp_path}/out', seed=0, design='random', sensors='object', no_gate=True)"
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["command"] == [call]
 
 
 def test_a_campaign_needs_a_scenario() -> None:

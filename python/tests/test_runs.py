@@ -109,11 +109,27 @@ def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> Non
         (cc.fit(file, seed=2), ["traffic", "fit", "--seed", "2"]),
     ]:
         assert found == json.loads(command(*words, file, "--format", "json").stdout)
+    for call, message in [
+        (lambda: cc.lane_changes(file, criterion="jump"), "criterion=: `jump`, expected one of `peak`, `distance`, `gradient`"),  # type: ignore[arg-type]
+        (lambda: cc.lane_changes(file, criterion="gradient"), "use `peak` or `distance` as criterion="),
+        (lambda: cc.criticality(file, speed_limit_mps=-3), "speed_limit_mps=: `-3` is not a number above 0"),
+        (lambda: cc.fit(file, seed=-1), "seed: expected a whole number"),
+    ]:
+        with pytest.raises(cc.UsageError, match=message):
+            call()
     rows = file.read_text().splitlines()
     rows[3] = rows[3].replace(rows[3].split(",")[2], "x", 1)
     file.write_text("\n".join(rows) + "\n")
     with pytest.raises(cc.InputError) as raised:
         cc.lane_changes(file)
     assert raised.value.file == str(file) and raised.value.line == 4 and raised.value.key
+    assert "drop_bad_rows= skips such rows" in str(raised.value) and "--" not in str(raised.value)
     with pytest.raises(cc.FileError):
         cc.criticality(tmp_path / "none.csv")
+
+
+def test_fitted_distributions_name_the_call(tmp_path: Path) -> None:
+    file, fitted = tmp_path / "traffic.csv", tmp_path / "fitted.toml"
+    assert command("traffic", "record", SCENARIO, "-n", "3", "--seed", "1", "--sensors", "object", "-o", file).returncode == 0
+    cc.fit([file], output=fitted)
+    assert f"closecall.fit(files=['{file}'], output='{fitted}'" in fitted.read_text()

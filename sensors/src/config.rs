@@ -2,7 +2,7 @@
 //! model.
 
 use crate::tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
-use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range, Time};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -478,7 +478,7 @@ impl Sensors {
                 program: program.name(),
                 reason: "only a run starts a program".to_owned(),
                 is_late: false,
-                time: Time::ZERO,
+                time: None,
             }),
         }
     }

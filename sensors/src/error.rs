@@ -25,7 +25,7 @@ pub enum SensorError {
         time: Time,
     },
     /// A perception program did not give a valid answer. It has been ended.
-    #[error("failed to perceive at {time}: `{program}`: {reason}")]
+    #[error("failed to perceive{}: `{program}`: {reason}", time.map_or_else(String::new, |time| format!(" at {time}")))]
     Program {
         /// The program, as the scenario names it.
         program: String,
@@ -33,8 +33,8 @@ pub enum SensorError {
         reason: String,
         /// Whether the wall clock caused the error.
         is_late: bool,
-        /// The time of the question.
-        time: Time,
+        /// The time of the question; `None` if the program was asked none.
+        time: Option<Time>,
     },
     /// The classifier could not be loaded or run.
     #[error("failed to classify: {reason}")]

@@ -22,6 +22,7 @@ mod ground_truth;
 mod half_turn;
 mod image_detector;
 mod image_evidence;
+mod kept;
 pub mod lidar;
 mod lidar_chain;
 mod object;

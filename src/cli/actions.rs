@@ -47,6 +47,9 @@ fn replay_command(replay: &Replay<'_>) -> String {
 /// Returns the command that resumes a campaign: the command that started it, without the options
 /// that would end it at the same sample again, and with the folder in which its results are.
 fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> String {
+    if let [call] = command {
+        return resume_call(call, retries_errors, moved_to);
+    }
     let is_kept = |word: &&str| !matches!(*word, "--fail-fast" | "--resume");
     let words: Vec<&str> = command.iter().map(String::as_str).filter(is_kept).collect();
     let (words, is_named) = moved_to.map_or((words.clone(), false), |folder| with_folder(&words, folder));
@@ -74,6 +77,25 @@ fn with_folder<'a>(words: &[&'a str], folder: &'a str) -> (Vec<&'a str>, bool) {
     (replaced, is_named)
 }
 
+/// Returns the call that resumes a campaign: the call of another program that started it, likewise.
+fn resume_call(call: &str, retries_errors: bool, moved_to: Option<&str>) -> String {
+    let call = [", fail_fast=True", ", resume=True", ", retry_errors=True"]
+        .iter()
+        .fold(call.to_owned(), |call, word| call.replace(word, ""));
+    let call = moved_to.map_or_else(
+        || call.clone(),
+        |folder| {
+            let named = call.split_once("out='").and_then(|(before, rest)| Some((before, rest.split_once('\'')?.1)));
+            match named {
+                Some((before, after)) => format!("{before}out='{folder}'{after}"),
+                None => format!("{}, out='{folder}')", call.trim_end_matches(')')),
+            }
+        },
+    );
+    let retried = if retries_errors { ", retry_errors=True" } else { "" };
+    format!("{}, resume=True{retried})", call.trim_end_matches(')'))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,6 +117,17 @@ mod tests {
             let command = resumed(&format!("c campaign x {named} -n 4"), false, Some("r/new"));
             assert!(command.contains(" r/new -n 4 --resume") && !command.contains("r/old"), "{command}");
         }
+    }
+
+    #[test]
+    fn the_resume_call_is_the_call_with_resume() {
+        let call = ["closecall.campaign(['x'], out='y', fail_fast=True)".to_owned()];
+        let resumed =
+            |retries_errors| command_for(&Action::Resume(Resume { command: &call, retries_errors, moved_to: None }));
+        assert_eq!(resumed(false), "closecall.campaign(['x'], out='y', resume=True)");
+        assert_eq!(resumed(true), "closecall.campaign(['x'], out='y', resume=True, retry_errors=True)");
+        let moved = Resume { command: &call, retries_errors: false, moved_to: Some("z") };
+        assert_eq!(command_for(&Action::Resume(moved)), "closecall.campaign(['x'], out='z', resume=True)");
     }
 
     #[test]

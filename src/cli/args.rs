@@ -3,17 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::parsed_list;
 use closecall_recorded::lane_change::LaneReliability;
 use closecall_recorded::trajectory_data::{
     AxisOptions, BadRows, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, read_with, refuse_duplicates,
 };
 use closecall_scenarios::{FittedFile, ScenarioError, ScenarioFile, Setting, source};
 use closecall_sensors::SensorMode;
+use serde::Deserialize;
 
 use super::CliError;
 use super::arms::ArmArgs;
 use super::help::heading;
-use super::output::{print_error, reading};
+use super::output::{print_error, reading, warn};
 use super::saved::SavedArgs;
 
 /// The format of the output.
@@ -27,7 +29,8 @@ pub(super) enum Format {
 }
 
 /// The depth of the sensor simulation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum SensorsChoice {
     /// Point clouds, images, clustering, classification and tracking
     Full,
@@ -61,7 +64,8 @@ pub(super) struct SimulationArgs {
 }
 
 /// The layout of a trajectory file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Layout {
     /// NGSIM: the columns of the data set, in feet
     Ngsim,
@@ -82,12 +86,13 @@ pub(super) enum Layout {
 }
 
 /// Several trajectory files, taken together.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Args, Deserialize)]
 pub(super) struct FilesArgs {
     /// Trajectory files, whose vehicles are taken together
     #[arg(required = true, value_name = "TRAJECTORY_FILE")]
     pub(super) files: Vec<PathBuf>,
     #[command(flatten)]
+    #[serde(rename = "..read")]
     pub(super) read: ReadArgs,
 }
 
@@ -108,13 +113,14 @@ impl FilesArgs {
 pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
     let data = reading(path, || read_with(path, options))?;
     for warning in data.warnings() {
-        print_error(format_args!("warning: {}: {warning}\n", path.display()));
+        warn(format_args!("{}: {warning}", path.display()));
     }
     Ok(data)
 }
 
 /// How a trajectory file is read.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Copy, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct ReadArgs {
     /// Layout of the trajectory file [default: recognised by its content]
     #[arg(long, value_enum, help_heading = heading::DATA)]
@@ -137,13 +143,16 @@ pub(super) struct ReadArgs {
 }
 
 /// The locations of NGSIM's data sets, which its export holds together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Location {
     /// US 101 in Los Angeles, a motorway
     #[value(name = "us-101")]
+    #[serde(rename = "us-101")]
     Us101,
     /// I-80 in Emeryville, a motorway
     #[value(name = "i-80")]
+    #[serde(rename = "i-80")]
     I80,
     /// Lankershim Boulevard in Los Angeles, an urban street
     Lankershim,
@@ -164,7 +173,8 @@ impl Location {
 }
 
 /// The lanes by which lane changes are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum LanesChoice {
     /// The lanes that the file states for each vehicle
     #[default]
@@ -208,12 +218,14 @@ impl ReadArgs {
 }
 
 /// Changes of single values of a scenario.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct SetArgs {
     /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`)
     /// or by a parameter (`brake-mps2=6`); can be given more than once. In a campaign
     /// `ARM:KEY=VALUE` sets a value of the ego stack in one arm (`acc+aeb:aeb.trigger-mps2=5`)
     #[arg(long = "set", value_name = "KEY=VALUE", help_heading = heading::SCENARIO)]
+    #[serde(rename = "set", deserialize_with = "parsed_list")]
     pub(super) settings: Vec<Setting>,
 }
 
@@ -245,7 +257,8 @@ impl SetArgs {
 }
 
 /// Fitted distributions that replace the distributions of a scenario.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct FittedArgs {
     /// File with fitted distributions, as `traffic fit` writes it. They replace the distributions
     /// of parameters with the same name, or of parameters that were fitted to the same quantity.

@@ -4,19 +4,23 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::arguments::{parsed_list, parsed_option};
 use closecall_campaign::plan::{check_functions, check_mis};
 use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::{ArmList, ControllerChoice};
+use serde::Deserialize;
 
 use super::CliError;
 use super::args::SensorsChoice;
 use super::help::heading;
+use super::keywords::Argument;
 use super::protect::of_controller;
 use super::saved::LimitArgs;
 
 /// The controller under test.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct ControllerArgs {
     /// Controller of the ego vehicle [default: the function that the scenario judges, `mis` in most]: `acc`, `mis`, `mis-ttce`, `mis-extended`,
     /// `acc-aeb`, `acc+aeb` and `cruise+aeb` (stacks whose functions are switched), `human-aeb` and `human+aeb` (the human driver
@@ -27,8 +31,10 @@ pub(super) struct ControllerArgs {
     /// program of your own, which reads a line per control step and answers with a line. A built-in one takes settings of its own:
     /// `acc+aeb:aeb.trigger-mps2=5`
     #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", help_heading = heading::CONTROLLER)]
+    #[serde(deserialize_with = "parsed_option")]
     controller: Option<ControllerChoice>,
     #[command(flatten)]
+    #[serde(rename = "..limits")]
     pub(super) limits: LimitArgs,
 }
 
@@ -48,13 +54,15 @@ impl ControllerArgs {
     /// Returns the controllers. The processes among them have the limits of the command line. Each
     /// is tried.
     fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
-        let (timeout_ms, memory_mib) = (self.limits.controller_timeout_ms, self.limits.controller_memory_mib);
+        let (timeout_ms, memory_mib) = self.limits.stated();
         if let (Some(last), true) = (controllers.last(), timeout_ms.is_some() || memory_mib.is_some())
             && !controllers.iter().any(ControllerChoice::has_limits)
         {
             return Err(CliError::usage(format!(
-                "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{last}` is built in: \
-                     name a process with --controller exec:COMMAND, lib:PATH or fmu:PATH"
+                "{} and {} apply to a process, and `{last}` is built in: name a process, `exec:COMMAND`, `lib:PATH` or `fmu:PATH`, with {}",
+                Argument("controller-timeout-ms"),
+                Argument("controller-memory-mib"),
+                Argument("controller")
             )));
         }
         let limited: Vec<_> = controllers.iter().map(|choice| choice.limited(timeout_ms, memory_mib)).collect();
@@ -86,7 +94,8 @@ impl ArmArgs {
 }
 
 /// The controllers with which the controller under test is compared.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct ComparisonArgs {
     /// Also run every sample with the baseline controller, on the same random numbers: short for
     /// `--arms acc,CONTROLLER` if a scenario judges the margin increase system
@@ -96,6 +105,7 @@ pub(super) struct ComparisonArgs {
     /// last is the controller under test, and references lie between them. An `exec:COMMAND` takes
     /// the rest of its list: let it stand last, or give --arms several times
     #[arg(long, value_name = "CONTROLLER,CONTROLLER…", conflicts_with_all = ["paired", "controller"], help_heading = heading::CONTROLLER)]
+    #[serde(deserialize_with = "parsed_list")]
     pub(super) arms: Vec<ArmList>,
 }
 
@@ -113,7 +123,9 @@ impl ComparisonArgs {
             let tested = tested.choice(function)?;
             if tested == baseline && self.paired {
                 return Err(CliError::usage(format!(
-                    "--paired compares a controller with `{baseline}`: name another with --controller"
+                    "{} compares a controller with `{baseline}`: name another with {}",
+                    Argument("paired"),
+                    Argument("controller")
                 )));
             }
             let is_paired = self.paired || (by_default && tested != baseline);
@@ -159,9 +171,10 @@ pub(super) fn tuned(
     for (arm, setting) in settings {
         let Some(index) = names.iter().position(|name| name == arm) else {
             let arms = names.join("`, `");
-            return Err(CliError::usage(format!("--set {arm}:{setting}: no arm is `{arm}`, only `{arms}`")));
+            let set = Argument("set");
+            return Err(CliError::usage(format!("{set} {arm}:{setting}: no arm is `{arm}`, only `{arms}`")));
         };
-        let fail = |error| CliError::usage(format!("--set {arm}:{setting}: {error}"));
+        let fail = |error| CliError::usage(format!("{} {arm}:{setting}: {error}", Argument("set")));
         controllers[index] = controllers[index].with_setting(setting).map_err(fail)?;
     }
     Ok(controllers)

@@ -7,9 +7,9 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use closecall_campaign::arguments::positive;
+use closecall_campaign::arguments::{Jobs, Positive, Retries, parsed, parsed_option};
 use closecall_campaign::controller_watch::ControllerWatch;
-use closecall_campaign::end_rule::EndMonitor;
+use closecall_campaign::end_rule::{EndMonitor, EndedEarly};
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
 use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
@@ -30,10 +30,10 @@ use closecall_report::campaign::{
 };
 use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
-use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::controller::ControllerChoice;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 use super::CliError;
@@ -47,15 +47,15 @@ use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{heartbeat, out, outln, print_error, print_failure};
+use super::keywords::{Argument, needs};
+use super::output::{heartbeat, out, outln, print_error, print_failure, print_text};
 use super::plan::PlanArgs;
 use super::rare::{DesignChoice, Rare, RareArgs};
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
-use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
-/// Arguments of `closecall campaign`.
-#[derive(Debug, Args)]
+/// Arguments of a campaign.
+#[derive(Debug, Args, Deserialize)]
 #[command(after_help = examples([
     "closecall campaign low-thw-overtake",
     "closecall campaign scenarios --preset pr --out results",
@@ -67,6 +67,7 @@ pub(super) struct CampaignArgs {
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
+    #[serde(rename = "..plan")]
     plan: PlanArgs,
     /// Seed of the random numbers [default: 0]
     #[arg(long, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]
@@ -74,63 +75,85 @@ pub(super) struct CampaignArgs {
     /// Seed of a campaign that judges: a number, or `secret`, which draws a seed that nobody knew
     /// before. The campaign states it in the end. `--preset pr` without a seed draws one
     #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
+    #[serde(default, deserialize_with = "parsed_option")]
     judge_seed: Option<JudgeSeed>,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or
-    /// `importance` for a rare event, which --event names. -n is then the largest number of runs
-    /// [default: 200000]
-    #[arg(long, default_value_t = DesignChoice::Plain(Design::Random), help_heading = heading::SAMPLES)]
+    /// `importance` for the probability of a rare event, which --event names, and `search` for its
+    /// first case. -n is then the largest number of runs [default: 200000, of a search 2000]
+    #[arg(long, default_value_t, help_heading = heading::SAMPLES)]
+    #[serde(default, deserialize_with = "plain_design")]
     design: DesignChoice,
     #[command(flatten)]
+    #[serde(skip)]
     rare: RareArgs,
     #[command(flatten)]
+    #[serde(rename = "..controller")]
     controller: ControllerArgs,
     /// Depth of the sensor simulation [default: as in the scenario]
     #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     #[command(flatten)]
+    #[serde(rename = "..comparison")]
     comparison: ComparisonArgs,
     /// Number of worker threads [default: one per processor]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
-    jobs: Option<u16>,
+    #[arg(long, help_heading = heading::EXECUTION)]
+    jobs: Option<Jobs>,
     /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local`
     /// (start one here). Needs the Python package: pip install "closecall[ray]"
     #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs", help_heading = heading::EXECUTION)]
     ray: Option<String>,
     /// Longest wall time of a sample with one controller; a sample that takes longer ends in an
-    /// error
-    #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive, help_heading = heading::EXECUTION)]
-    sample_timeout_s: f64,
+    /// error [default: 300]
+    #[arg(long, value_name = "S", help_heading = heading::EXECUTION)]
+    sample_timeout_s: Option<Positive>,
     /// Run a sample up to N times more in a new process if the process of its library, FMU or
     /// Python controller crashes or hangs. A sample that succeeds only in this way is FLAKY: it is
-    /// counted and listed, see --max-flaky
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100), help_heading = heading::EXECUTION)]
-    retry_crashed: u32,
+    /// counted and listed, see --max-flaky [default: 0]
+    #[arg(long, value_name = "N", help_heading = heading::EXECUTION)]
+    retry_crashed: Option<Retries>,
     #[command(flatten)]
+    #[serde(rename = "..results")]
     results: ResultsArgs,
     #[command(flatten)]
+    #[serde(rename = "..artifacts")]
     artifacts: ArtifactArgs,
     /// With --out: run only part I of N of the samples; `closecall tool merge` merges the parts
-    #[arg(long, value_name = "I/N", requires = "out", help_heading = heading::EXECUTION)]
+    #[arg(long, value_name = "I/N", help_heading = heading::EXECUTION)]
     partition: Option<Partition>,
     /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows
     /// them. KIND is `worst`, `failures` or `random`; `each-kind` is the worst prevented, the worst
     /// induced and the worst shared collision of all scenarios [default: each-kind]
     #[arg(long, alias = "recordings", value_name = "KIND:N,…", help_heading = heading::OUTPUT)]
+    #[serde(default, deserialize_with = "parsed_option")]
     record: Option<Selection>,
     #[command(flatten)]
+    #[serde(rename = "..gates")]
     gates: GateArgs,
     #[command(flatten)]
+    #[serde(rename = "..end")]
     end: EndArgs,
     #[command(flatten)]
+    #[serde(rename = "..ensemble")]
     ensemble: EnsembleArgs,
     #[command(flatten)]
+    #[serde(rename = "..set")]
     set: SetArgs,
     #[command(flatten)]
+    #[serde(rename = "..fitted")]
     fitted: FittedArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
+    #[serde(skip)]
     format: Format,
 }
+
+/// Deserialises a sampling design. The estimates of a rare event have no caller but the command line.
+fn plain_design<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DesignChoice, D::Error> {
+    parsed(deserializer).map(DesignChoice::Plain)
+}
+
+/// Longest wall time of a sample with one controller, unless another is named (s).
+pub const SAMPLE_TIMEOUT_S: f64 = 300.0;
 
 /// The seed of a campaign that judges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,7 +195,10 @@ impl CampaignArgs {
             return Ok(judging.unwrap_or(0));
         }
         if self.partition.is_some() {
-            return Err(CliError::usage("--judge-seed secret: the parts of a campaign need the same seed, so name it"));
+            return Err(CliError::usage(format!(
+                "{} secret: the parts of a campaign need the same seed, so name it",
+                Argument("judge-seed")
+            )));
         }
         let drawn = || RandomState::new().build_hasher().finish();
         Ok(self.results.resumed_seed().unwrap_or_else(drawn))
@@ -183,10 +209,11 @@ impl CampaignArgs {
     }
 
     fn workers(&self) -> Result<Workers, CliError> {
-        let sample_timeout = Duration::try_from_secs_f64(self.sample_timeout_s).map_err(|_| CliError::Usage {
-            message: format!("--sample-timeout-s {}: the time is too long", self.sample_timeout_s),
+        let timeout_s = self.sample_timeout_s.map_or(SAMPLE_TIMEOUT_S, |time| time.0);
+        let sample_timeout = Duration::try_from_secs_f64(timeout_s).map_err(|_| {
+            CliError::usage(format!("{} {timeout_s}: the time is too long", Argument("sample-timeout-s")))
         })?;
-        Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs) })
+        Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs.map(|jobs| jobs.0)) })
     }
 
     /// Reads every scenario, and returns them with the controllers of their arms. Scenarios of a
@@ -211,8 +238,9 @@ impl CampaignArgs {
             let (name, judged) = (&other.config().name, other.config().function.name());
             if is_default && *is_named {
                 return Err(CliError::usage(format!(
-                    "{name} judges `{judged}`, and other scenarios judge `{}`: run them apart, or name the arms with --arms",
-                    function.name()
+                    "{name} judges `{judged}`, and other scenarios judge `{}`: run them apart, or name the arms with {}",
+                    function.name(),
+                    Argument("arms")
                 )));
             }
             if !is_named {
@@ -233,7 +261,7 @@ impl CampaignArgs {
         plan.checks = self.plan.checks()?;
         plan.inference = self.plan.inference(self.design.plain())?;
         plan.workers = self.workers()?;
-        plan.retry_crashed = self.retry_crashed;
+        plan.retry_crashed = self.retry_crashed.map_or(0, |retries| retries.0);
         Ok(plan)
     }
 }
@@ -246,7 +274,6 @@ pub(super) struct Planned<'a> {
     pub(super) artifacts: ArtifactArgs,
     pub(super) end: EndArgs,
     pub(super) record: Option<Selection>,
-    pub(super) format: Format,
     /// The cluster that runs the samples, if this machine does not.
     pub(super) ray: Option<&'a str>,
     /// Whether the samples stop as soon as they are certain.
@@ -298,18 +325,23 @@ impl Companion for Alone {
 
 /// Checks everything that would fail only after the samples have run.
 fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
-    if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place()? == Place::Nowhere {
-        return Err(CliError::usage(
-            "--record: the recordings are kept in a folder of results: name one with --out DIR",
-        ));
-    }
-    // The manifest names them, and it is text.
-    let folder = std::env::current_dir().ok();
-    let place = match args.results.place()? {
+    let out = match args.results.place() {
         Place::Named(path) => Some(path),
         Place::Default | Place::Nowhere => None,
     };
-    let named = args.scenarios.iter().map(PathBuf::as_path).chain(place).chain(folder.as_deref());
+    let has_gate = args.gates.max_probability.is_some();
+    needs(("until-certain", args.plan.until_certain), ("max-probability", has_gate))?;
+    needs(("partition", args.partition.is_some()), ("out", out.is_some()))?;
+    if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place() == Place::Nowhere {
+        return Err(CliError::usage(format!(
+            "{}: the recordings are kept in a folder of results: name one with {}",
+            Argument("record"),
+            Argument("out")
+        )));
+    }
+    // The manifest names them, and it is text.
+    let folder = std::env::current_dir().ok();
+    let named = args.scenarios.iter().map(PathBuf::as_path).chain(out).chain(folder.as_deref());
     match named.into_iter().find(|path| path.to_str().is_none()) {
         Some(path) => Err(CliError::usage(format!(
             "{}: the name is not text (UTF-8), so that the campaign cannot be resumed or replayed: use another name",
@@ -324,12 +356,12 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
     let is_named = [
         (args.plan.names_preset(), "--preset"),
         (args.plan.until_certain, "--until-certain"),
-        (args.plan.time_budget.is_some(), "--time-budget"),
+        (args.plan.time_budget().is_some(), "--time-budget"),
         (args.plan.names_checks(), "--check-share, --check-at-most and --no-validity-checks"),
         (args.partition.is_some(), "--partition"),
         (args.ray.is_some(), "--ray"),
         (args.record.is_some(), "--record"),
-        (args.retry_crashed > 0, "--retry-crashed"),
+        (args.retry_crashed.is_some(), "--retry-crashed"),
         (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
         (args.gates.names_criterion()?, "a gate other than --max-probability"),
         (args.artifacts.is_named(), "--strict-artifacts"),
@@ -339,7 +371,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
             "the runs of --design {method} are no independent samples of the scenario: it cannot be combined with {option}"
         )));
     }
-    let folder = match args.results.place()? {
+    let folder = match args.results.place() {
         Place::Named(path) => Some(path),
         Place::Default | Place::Nowhere if args.results.is_resumed() => {
             return Err(CliError::usage("--resume: name the folder of the campaign with --out"));
@@ -361,12 +393,17 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
+    run_campaign(args, &mut |conclusion| conclusion.print(args.format))
+}
+
+/// Runs a campaign. `tell` is told what it comes to.
+pub(super) fn run_campaign(args: &CampaignArgs, tell: &mut dyn FnMut(&Conclusion<'_>)) -> Result<ExitCode, CliError> {
     check_arguments(args)?;
     match args.design {
         DesignChoice::Rare(method) => return rare_campaign(args, method),
         DesignChoice::Plain(design) if args.rare.is_named() => {
             return Err(CliError::usage(format!(
-                "--event is the rare event of --design subset or importance, and not of {design}: a gate such as --gate \"upper(induced) <= 0.01\" judges the samples of a plain campaign"
+                "--event is the rare event of --design subset, importance or search, and not of {design}: a gate such as --gate \"upper(induced) <= 0.01\" judges the samples of a plain campaign"
             )));
         }
         DesignChoice::Plain(_) => {}
@@ -382,21 +419,86 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         artifacts: args.artifacts,
         end: args.end,
         record: args.record,
-        format: args.format,
         ray: args.ray.as_deref(),
         until_certain: args.plan.until_certain,
-        time_budget: args.plan.time_budget,
+        time_budget: args.plan.time_budget(),
         has_drawn_seed: args.draws_seed(),
     };
-    carry_out(&planned, &mut Alone)
+    carry_out(&planned, &mut Alone, tell)
 }
 
-/// Runs a campaign, prints its verdict, and writes its results.
-pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) -> Result<ExitCode, CliError> {
+/// What a campaign comes to.
+pub(super) enum Conclusion<'a> {
+    /// It has ended early, without a verdict.
+    Early(EndedEarly<'a>),
+    /// It is judged.
+    Judged(Judged<'a>),
+}
+
+/// A campaign that is judged.
+pub(super) struct Judged<'a> {
+    report: &'a CampaignReport<'a>,
+    companion: &'a dyn Companion,
+    wall_s: f64,
+    /// Where it ran, and the share of the checks in the time.
+    place: String,
+    has_drawn_seed: bool,
+}
+
+impl Conclusion<'_> {
+    /// Returns it for programs.
+    pub(super) fn json(&self) -> Value {
+        match self {
+            Self::Early(ended) => ended.json(),
+            Self::Judged(judged) => {
+                let mut value = json::campaign_report(judged.report, Some(judged.wall_s));
+                if let (Some((key, more)), Some(object)) = (judged.companion.json(), value.as_object_mut()) {
+                    object.insert(key.to_owned(), more);
+                }
+                value
+            }
+        }
+    }
+
+    /// Prints it.
+    pub(super) fn print(&self, format: Format) {
+        match (format, self) {
+            (Format::Json, conclusion) => outln!("{:#}", conclusion.json()),
+            (Format::Human, Self::Early(ended)) => out!("{}{ended}", CountsText(ended.summary)),
+            (Format::Human, Self::Judged(judged)) => judged.print(),
+        }
+    }
+}
+
+impl Judged<'_> {
+    fn print(&self) {
+        let CampaignReport { manifest, works, tally, judged, .. } = self.report;
+        print_text(CountsText(&tally.summary));
+        let simulated_s = tally.summary.total().simulated_s;
+        outln!("{simulated_s:.0} simulated seconds in {:.1} s on {}", self.wall_s, self.place);
+        out!("{}", self.companion.text(&tally.summary));
+        out!("{}", ensemble_text(&tally.summary, manifest));
+        print_text(CoverageText(judged));
+        out!("{}", FlakyText(&tally.overview));
+        print_text(VerdictText { judged, scenarios: works.len() });
+        out!("{}", after_verdict(judged));
+        if self.has_drawn_seed {
+            outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
+        }
+    }
+}
+
+/// Runs a campaign, tells what it comes to, and writes its results.
+pub(super) fn carry_out(
+    planned: &Planned<'_>,
+    companion: &mut dyn Companion,
+    tell: &mut dyn FnMut(&Conclusion<'_>),
+) -> Result<ExitCode, CliError> {
     let Planned { plan, gates, .. } = planned;
+    planned.end.check(planned.results.is_resumed())?;
     check_backend(plan.uses_classifier())?;
     check_networks(plan.crop_networks(), plan.mask_rcnn_cameras())?;
-    let replaceable = planned.results.place()? == Place::Default;
+    let replaceable = planned.results.place() == Place::Default;
     let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
     campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;
     let mut results = Results::start(planned.results, &mut campaign, &manifest)?;
@@ -426,7 +528,8 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
         session::received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule))
     {
         let kept = results.locked.as_ref().map(|locked| locked.folder.path());
-        let code = ending.print(planned.format, &campaign, &progress.tally.summary, kept);
+        tell(&Conclusion::Early(ending.ended(&campaign, &progress.tally.summary, kept)));
+        let code = ending.exit_code();
         return Ok(results.into_lost().map_or(code, |error| {
             print_failure(error);
             ExitCode::first_of([code, ExitCode::Io])
@@ -439,30 +542,13 @@ pub(super) fn carry_out(planned: &Planned<'_>, companion: &mut dyn Companion) ->
     let mut judged = tally.judgement();
     judged.add_invalid(watch.finish());
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
-    match planned.format {
-        Format::Json => {
-            let mut value = json::campaign_report(&report, Some(wall_s));
-            if let (Some((key, more)), Some(object)) = (companion.json(), value.as_object_mut()) {
-                object.insert(key.to_owned(), more);
-            }
-            outln!("{value:#}");
-        }
-        Format::Human => {
-            out!("{}", for_terminal(&CountsText(&tally.summary)));
-            let (simulated_s, place) = (tally.summary.total().simulated_s, campaign.place());
-            let checks = progress.spent.check_share();
-            outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
-            out!("{}", companion.text(&tally.summary));
-            out!("{}", ensemble_text(&tally.summary, &manifest));
-            out!("{}", for_terminal(&CoverageText(&judged)));
-            out!("{}", FlakyText(&tally.overview));
-            out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: campaign.works.len() }));
-            out!("{}", after_verdict(&judged));
-            if planned.has_drawn_seed {
-                outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
-            }
-        }
-    }
+    tell(&Conclusion::Judged(Judged {
+        report: &report,
+        companion,
+        wall_s,
+        place: format!("{}{}", campaign.place(), progress.spent.check_share()),
+        has_drawn_seed: planned.has_drawn_seed,
+    }));
     // A report that cannot be written does not cost the verdict.
     let written = match results.complete() {
         Some(folder) => report.write(folder, selection(planned.record)),
@@ -548,4 +634,32 @@ pub(super) fn progress_bar(samples: u64) -> ProgressBar {
         bar.set_style(style.with_key("rate", rate).with_key("time", time));
     }
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_campaign::gate::MAX_FLIP_RATE;
+    use closecall_campaign::probability::ProbabilityGate;
+    use closecall_campaign::validity::CheckPlan;
+    use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS};
+
+    use super::*;
+
+    #[test]
+    fn the_help_states_the_defaults() {
+        let command = CampaignArgs::augment_args(clap::Command::new("campaign"));
+        for (name, default) in [
+            ("check-share", CheckPlan::SHARE),
+            ("check-at-most", CheckPlan::AT_MOST as f64),
+            ("confidence", ProbabilityGate::CONFIDENCE),
+            ("max-flip-rate", MAX_FLIP_RATE),
+            ("sample-timeout-s", SAMPLE_TIMEOUT_S),
+            ("controller-timeout-ms", DEFAULT_TIMEOUT_MS as f64),
+            ("controller-memory-mib", DEFAULT_MEMORY_MIB as f64),
+        ] {
+            let argument = command.get_arguments().find(|argument| argument.get_long() == Some(name)).unwrap();
+            let help = argument.get_long_help().or(argument.get_help()).unwrap().to_string();
+            assert!(help.contains(&format!("[default: {default}]")), "{name}: {help}");
+        }
+    }
 }

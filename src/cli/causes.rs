@@ -27,10 +27,9 @@ use super::actions::command_for;
 use super::advice::to_provide;
 use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
-use super::output::{outln, print_error, print_written};
+use super::output::{outln, print_error, print_text, print_written};
 use super::protect::{of_campaign, protect};
 use super::saved::SavedArgs;
-use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall explain`.
@@ -80,7 +79,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
             for explanation in &explanations {
-                outln!("{}", for_terminal(&ExplanationText { explanation, folder: &args.dir, command_for }));
+                print_text(format_args!("{}\n", ExplanationText { explanation, folder: &args.dir, command_for }));
             }
         }
     }

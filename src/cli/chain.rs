@@ -166,13 +166,12 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
         artifacts: args.artifacts,
         end: args.end,
         record: Some(args.record.unwrap_or(recorded)),
-        format: args.format,
         ray: None,
         until_certain: false,
         time_budget: None,
         has_drawn_seed: false,
     };
-    carry_out(&planned, &mut chain)
+    carry_out(&planned, &mut chain, &mut |conclusion| conclusion.print(args.format))
 }
 
 impl Recording {

@@ -9,7 +9,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
-use closecall_campaign::session::{Printed, Session, set_arguments};
+use closecall_campaign::session::set_arguments;
 use closecall_controllers::external::remove_unpacked;
 use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 use closecall_traffic::shown::shown;
@@ -61,6 +61,8 @@ const WITH_NETWORK: [&[&str]; 21] = [
 
 /// The option for the shared library of ONNX Runtime.
 const ONNXRUNTIME: &str = "onnxruntime";
+/// The variable of the environment for the same.
+pub(super) const ONNXRUNTIME_VARIABLE: &str = "ORT_DYLIB_PATH";
 
 /// Adds the option for the shared library of ONNX Runtime to a command.
 fn with_network(command: clap::Command, path: &[&'static str]) -> clap::Command {
@@ -70,7 +72,7 @@ fn with_network(command: clap::Command, path: &[&'static str]) -> clap::Command 
                 .long(ONNXRUNTIME)
                 .value_name("PATH")
                 .value_parser(clap::value_parser!(PathBuf))
-                .env("ORT_DYLIB_PATH")
+                .env(ONNXRUNTIME_VARIABLE)
                 .help_heading(heading::EXECUTION)
                 .help(
                     "Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the \
@@ -318,16 +320,6 @@ fn wrong_stack() -> Option<String> {
     let (least, most) = (STACK_BYTES.start(), STACK_BYTES.end());
     (!STACK_BYTES.contains(&bytes))
         .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
-}
-
-/// Runs a command that another program calls, and returns the exit code of the command line and its
-/// output. The first of the arguments is the program's name.
-pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<ExitCode, CliError>, Printed) {
-    session.run(arguments, || {
-        let (command, onnxruntime) = parse(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
-        choose_backend(onnxruntime.as_deref());
-        dispatch(command)
-    })
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {

@@ -10,16 +10,17 @@ use closecall_campaign::execution::Campaign;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::session;
 use closecall_campaign::summary::Summary;
-use closecall_report::campaign::CountsText;
+use serde::Deserialize;
 
+use super::CliError;
 use super::actions::command_for;
-use super::args::Format;
 use super::help::heading;
-use super::output::{out, outln};
+use super::keywords::needs;
 use crate::exit_code::ExitCode;
 
 /// When a campaign ends before its last sample.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Copy, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct EndArgs {
     /// End at the first failing sample: the ego collides under the controller under test, or a
     /// controller ends in an error; or as soon as a gate can only fail. There is then no verdict
@@ -29,7 +30,7 @@ pub(super) struct EndArgs {
     #[arg(long, value_name = "N", help_heading = heading::EXECUTION)]
     max_errors: Option<u64>,
     /// With --resume: run the samples that ended in an error again
-    #[arg(long, requires = "resume", help_heading = heading::EXECUTION)]
+    #[arg(long, help_heading = heading::EXECUTION)]
     pub(super) retry_errors: bool,
 }
 
@@ -48,6 +49,11 @@ impl EndArgs {
         self.fail_fast || self.max_errors.is_some() || self.retry_errors
     }
 
+    /// Refuses samples to run again if no campaign goes on.
+    pub(super) fn check(&self, is_resumed: bool) -> Result<(), CliError> {
+        needs(("retry-errors", self.retry_errors), ("resume", is_resumed))
+    }
+
     /// Returns the rule that ends the campaign early.
     pub(super) const fn rule(&self) -> EndRule {
         EndRule { fail_fast: self.fail_fast, max_errors: self.max_errors }
@@ -55,7 +61,7 @@ impl EndArgs {
 }
 
 impl Ending {
-    fn exit_code(&self) -> ExitCode {
+    pub(super) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Signal(signal) => (*signal).into(),
             Self::Rule(EarlyEnd::Failure { is_error: false, .. } | EarlyEnd::Gate { .. }) => ExitCode::Fail,
@@ -70,9 +76,14 @@ impl Ending {
         }
     }
 
-    /// Prints the counts so far, and how to go on. `out` is the campaign's folder.
-    pub(super) fn print(&self, format: Format, campaign: &Campaign, summary: &Summary, out: Option<&Path>) -> ExitCode {
-        let ended = EndedEarly {
+    /// Returns the counts so far, and how to go on. `out` is the campaign's folder.
+    pub(super) fn ended<'a>(
+        &'a self,
+        campaign: &Campaign,
+        summary: &'a Summary,
+        out: Option<&'a Path>,
+    ) -> EndedEarly<'a> {
+        EndedEarly {
             message: self.message(),
             ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
             done: summary.total().samples,
@@ -81,11 +92,6 @@ impl Ending {
             summary,
             kept: out.map(|folder| Kept { folder, command: session::arguments() }),
             command_for,
-        };
-        match format {
-            Format::Json => outln!("{:#}", ended.json()),
-            Format::Human => out!("{}{ended}", CountsText(summary)),
         }
-        self.exit_code()
     }
 }

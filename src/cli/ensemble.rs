@@ -5,13 +5,16 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::member::{Ensemble, ensemble_of, members};
+use serde::Deserialize;
 
 use super::CliError;
 use super::help::heading;
+use super::keywords::Argument;
 use super::output::print_error;
 
 /// The driver ensemble of a campaign.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct EnsembleArgs {
     /// Run each scenario with each member of a driver ensemble, as an entry SCENARIO@MEMBER of its
     /// own on the same samples, and state the verdict over the members: median and worst. Members
@@ -33,7 +36,10 @@ impl EnsembleArgs {
             print_error(format_args!("{scenario}: the member `{member}` has no effect, and is not run\n"));
         }
         if ensemble.entries.is_empty() {
-            return Err(CliError::usage("--ensemble: no member has any effect on these scenarios: nothing can be run"));
+            return Err(CliError::usage(format!(
+                "{}: no member has any effect on these scenarios: nothing can be run",
+                Argument("ensemble")
+            )));
         }
         Ok(ensemble)
     }

@@ -37,6 +37,7 @@ use closecall_studies::fidelity::FidelityError;
 use closecall_studies::perception::StudyError;
 use closecall_traffic::atomic::WriteError;
 
+use super::keywords::Argument;
 use super::view_error::ViewError;
 use crate::exit_code::ExitCode;
 
@@ -183,12 +184,6 @@ impl CliError {
     pub(super) fn usage(message: impl Into<String>) -> Self {
         Self::Usage { message: message.into() }
     }
-
-    /// Returns the error of arguments that clap refuses, without clap's advice to read the help.
-    pub(super) fn refused(message: &str) -> Self {
-        let message = message.split("\n\nUsage:").next().unwrap_or_default();
-        Self::usage(message.trim().trim_start_matches("error: "))
-    }
 }
 
 impl From<SourceError> for CliError {
@@ -202,16 +197,17 @@ impl From<SourceError> for CliError {
 }
 
 /// Returns the option that reads a trajectory file in spite of the problem, if there is one.
-fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
-    match problem {
-        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => "; --mirror-d turns the position",
-        TrajectoryFileProblem::LanesAgainstPosition { .. } => "; --lanes-from-right turns the lanes",
+fn remedy(problem: &TrajectoryFileProblem) -> String {
+    let (name, effect) = match problem {
+        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => ("mirror-d", "turns the position"),
+        TrajectoryFileProblem::LanesAgainstPosition { .. } => ("lanes-from-right", "turns the lanes"),
         TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
-            "; --location NAME reads one data set of NGSIM's export"
+            ("location", "names the data set of NGSIM's export to read")
         }
-        problem if problem.affects_one_row() => "; --drop-bad-rows skips such rows, and counts them",
-        _ => "",
-    }
+        problem if problem.affects_one_row() => ("drop-bad-rows", "skips such rows, and counts them"),
+        _ => return String::new(),
+    };
+    format!("; {} {effect}", Argument(name))
 }
 
 /// Largest number of tracks that a message suggests.

@@ -12,9 +12,8 @@ use serde_json::json;
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{outln, print_text};
 use super::saved::SavedArgs;
-use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall study fidelity`.
@@ -44,7 +43,7 @@ pub(super) fn fidelity(args: &FidelityArgs) -> Result<ExitCode, CliError> {
             let seed = Some(full.manifest().sampling.seed);
             outln!("{:#}", stamped(json!({ "scenarios": reports }), seed, None));
         }
-        Format::Human => reports.iter().for_each(|report| out!("{}", for_terminal(&Text(report)))),
+        Format::Human => reports.iter().for_each(|report| print_text(Text(report))),
     }
     let has_estimate = |report: &FidelityReport| report.rates.iter().any(|rate| rate.estimate.is_some());
     Ok(if reports.iter().all(has_estimate) { ExitCode::Pass } else { ExitCode::Inconclusive })

@@ -9,8 +9,8 @@ use serde_json::json;
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::outln;
-use super::terminal::{cut, for_terminal};
+use super::output::{outln, print_text};
+use super::terminal::cut;
 use crate::exit_code::ExitCode;
 
 /// The names of the groups that `closecall list` does not list one by one.
@@ -43,7 +43,7 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
             overview(&listed, &members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>())
         }
         (Format::Human, Some(MEMBERS)) => {
-            members.iter().for_each(|member| outln!("{}", for_terminal(member).trim_end()));
+            members.iter().for_each(|member| print_text(format_args!("{}\n", member.to_string().trim_end())));
             outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
         }
         (Format::Human, Some(what)) => {
@@ -60,7 +60,7 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
                     "no scenario has `{what}` in its name: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"
                 )));
             }
-            meant.into_iter().for_each(|scenario| outln!("{}", for_terminal(scenario)));
+            meant.into_iter().for_each(|scenario| print_text(format_args!("{}\n", scenario)));
         }
     }
     Ok(ExitCode::Pass)
@@ -77,22 +77,13 @@ fn overview(listed: &[LibraryEntry], members: &[&str]) {
     for scenario in &plain {
         outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));
     }
-    outln!(
-        "{}",
-        for_terminal(&format!(
-            "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.",
-            faults.len()
-        ))
-    );
-    outln!(
-        "{}",
-        for_terminal(&format!("Members of the driver ensemble (`closecall list {MEMBERS}`): {}", members.join(", ")))
-    );
-    outln!(
-        "{}",
-        for_terminal(&format!(
-            "A command takes a name in place of a file: `closecall run {}`. `closecall new NAME --from LIBRARY_NAME` writes a copy.",
-            plain.first().map_or("paper-figure", |first| first.name)
-        ))
-    );
+    print_text(format_args!(
+        "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.\n",
+        faults.len()
+    ));
+    print_text(format_args!("Members of the driver ensemble (`closecall list {MEMBERS}`): {}\n", members.join(", ")));
+    print_text(format_args!(
+        "A command takes a name in place of a file: `closecall run {}`. `closecall new NAME --from LIBRARY_NAME` writes a copy.\n",
+        plain.first().map_or("paper-figure", |first| first.name)
+    ));
 }

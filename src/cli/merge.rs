@@ -18,10 +18,9 @@ use super::advice::after_verdict;
 use super::args::Format;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{out, outln, print_error};
+use super::output::{out, outln, print_error, print_text};
 use super::results::{ArtifactArgs, print_results, remember, selection};
 use super::saved::TrustArgs;
-use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall tool merge`.
@@ -91,11 +90,11 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
-            out!("{}", for_terminal(&CountsText(&tally.summary)));
+            print_text(CountsText(&tally.summary));
             out!("{}", ensemble_text(&tally.summary, saved.manifest()));
-            out!("{}", for_terminal(&CoverageText(&judged)));
+            print_text(CoverageText(&judged));
             out!("{}", FlakyText(&tally.overview));
-            out!("{}", for_terminal(&VerdictText { judged: &judged, scenarios: works.len() }));
+            print_text(VerdictText { judged: &judged, scenarios: works.len() });
             out!("{}", after_verdict(&judged));
         }
     }

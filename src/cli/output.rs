@@ -1,6 +1,6 @@
 //! Prints results and messages. Writing to a pipe whose reader has closed it is not an error.
 
-use std::fmt::{self, Arguments};
+use std::fmt::{self, Arguments, Display};
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -15,17 +15,23 @@ use closecall_traffic::shown::shown;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::CliError;
+use super::terminal::for_terminal;
 use crate::exit_code::ExitCode;
 
-/// Prints to standard output, without control characters of others (see [`shown`]). A reader that
-/// has closed the pipe (`closecall … | head`) does not change the exit code. Any other failure ends
-/// the program with [`ExitCode::Io`].
+/// Prints to standard output, without control characters of others (see [`shown`]).
 pub(super) fn print(text: Arguments<'_>) {
-    let text = text.to_string();
-    let text = shown(&text);
-    if session::keep_output(format_args!("{text}")) {
-        return;
-    }
+    write(&shown(&text.to_string()));
+}
+
+/// Prints a text for people to standard output. Control characters of others are replaced before a
+/// terminal gets its colours.
+pub(super) fn print_text(text: impl Display) {
+    write(&for_terminal(&shown(&text.to_string())));
+}
+
+/// Writes to standard output. A reader that has closed the pipe (`closecall … | head`) does not
+/// change the exit code. Any other failure ends the program with [`ExitCode::Io`].
+fn write(text: &str) {
     let mut out = stdout().lock();
     if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush())
         && error.kind() != ErrorKind::BrokenPipe
@@ -36,20 +42,26 @@ pub(super) fn print(text: Arguments<'_>) {
 }
 
 /// Prints to standard error, without control characters of others (see [`shown`]). A failure is
-/// ignored, since there is nowhere left to report it.
+/// ignored, since there is nowhere left to report it. A program that calls the command has no reader
+/// of such texts.
 pub(super) fn print_error(text: Arguments<'_>) {
-    let text = text.to_string();
-    let text = shown(&text);
-    if session::keep_message(format_args!("{text}")) {
-        return;
+    if !session::is_active() {
+        drop(stderr().lock().write_all(shown(&text.to_string()).as_bytes()));
     }
-    drop(stderr().lock().write_all(text.as_bytes()));
+}
+
+/// Warns the user, or the program that calls the command.
+pub(super) fn warn(text: impl Display) {
+    let text = text.to_string();
+    if !session::keep_warning(&shown(&text)) {
+        print_error(format_args!("warning: {text}\n"));
+    }
 }
 
 /// Prints why a command has no result. On a terminal, the frame of the message has colours.
 pub(super) fn print_failure(error: CliError) {
-    let text = format!("{:?}\n", miette::Report::new(Shown(error)));
-    if !session::keep_message(format_args!("{}", shown(&text))) {
+    if !session::keep_warning(&shown(&error.to_string())) {
+        let text = format!("{:?}\n", miette::Report::new(Shown(error)));
         drop(stderr().lock().write_all(text.as_bytes()));
     }
 }
@@ -116,12 +128,12 @@ pub(super) fn reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Returns the command line of this program, as it was called.
+/// Returns the command line of this program, as it was called, or the call of another program.
 pub(super) fn command_line() -> String {
-    std::iter::once("closecall".to_owned())
-        .chain(session::arguments().into_iter().skip(1))
-        .collect::<Vec<_>>()
-        .join(" ")
+    match &session::arguments()[..] {
+        [call] => call.clone(),
+        words => words.iter().skip(1).fold("closecall".to_owned(), |line, word| format!("{line} {word}")),
+    }
 }
 
 /// Returns the text of a scenario that was made from the trajectory file `source`, with a heading

@@ -3,15 +3,16 @@
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use closecall_campaign::arguments::{count, share};
+use closecall_campaign::arguments::{Count, Share, WallTime, parsed_option};
 use closecall_campaign::gate::PresetGates;
 use closecall_campaign::ledger::Inference;
-use closecall_campaign::stop::duration;
 use closecall_campaign::validity::CheckPlan;
 use closecall_scenarios::sampling::Design;
+use serde::Deserialize;
 
 use super::CliError;
 use super::help::heading;
+use super::keywords::Argument;
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;
@@ -20,7 +21,8 @@ const SAMPLES: u64 = 200;
 const MAX_SAMPLES: u64 = 1_000_000;
 
 /// A set of settings for a purpose. Settings that are given explicitly take precedence.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 enum Preset {
     /// For a pull request, in minutes: 1,000 paired samples of each scenario. If none ends in a
     /// collision, its probability is at most 0.3 % with 95 % confidence. Without a seed it draws
@@ -50,12 +52,14 @@ impl Preset {
 }
 
 /// The size of a campaign.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct PlanArgs {
     /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the
     /// largest number [default: 1000000]
-    #[arg(short = 'n', long = "samples", allow_negative_numbers = true, value_parser = count, help_heading = heading::SAMPLES)]
-    samples: Option<u64>,
+    #[arg(short = 'n', long = "samples", allow_negative_numbers = true, help_heading = heading::SAMPLES)]
+    #[serde(rename = "n")]
+    samples: Option<Count>,
     /// Number of samples for a purpose, paired with the baseline unless the controller under test
     /// is the baseline
     #[arg(long, value_enum, help_heading = heading::SAMPLES)]
@@ -63,25 +67,26 @@ pub(super) struct PlanArgs {
     /// With --max-probability: stop each scenario as soon as its samples show whether its
     /// probability is low enough. The bounds (confidence sequences) are valid although they are
     /// evaluated after every sample
-    #[arg(long, requires = "max_probability", conflicts_with_all = ["partition", "max_collisions", "max_induced"], help_heading = heading::SAMPLES)]
+    #[arg(long, conflicts_with_all = ["partition", "max_collisions", "max_induced"], help_heading = heading::SAMPLES)]
     pub(super) until_certain: bool,
     /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only
     /// the samples before the first unfinished one are judged
     #[arg(
         long,
         value_name = "TIME",
-        value_parser = duration,
         conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"],
         help_heading = heading::SAMPLES
     )]
-    pub(super) time_budget: Option<Duration>,
+    #[serde(deserialize_with = "parsed_option")]
+    time_budget: Option<WallTime>,
     /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1.
-    /// The first two samples of each scenario are always checked
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE, help_heading = heading::VALIDITY)]
-    check_share: f64,
+    /// The first two samples of each scenario are always checked [default: 0.01]
+    #[arg(long, value_name = "SHARE", help_heading = heading::VALIDITY)]
+    check_share: Option<Share>,
     /// Largest number of samples of each scenario that are checked, besides the first two
-    #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST, help_heading = heading::VALIDITY)]
-    check_at_most: u64,
+    /// [default: 1000]
+    #[arg(long, value_name = "N", help_heading = heading::VALIDITY)]
+    check_at_most: Option<u64>,
     /// Check the validity of the simulator in no sample, for measurements of speed. Every report
     /// says so
     #[arg(long, conflicts_with_all = ["check_share", "check_at_most"], help_heading = heading::VALIDITY)]
@@ -89,6 +94,11 @@ pub(super) struct PlanArgs {
 }
 
 impl PlanArgs {
+    /// Returns the wall time after which the samples stop.
+    pub(super) fn time_budget(&self) -> Option<Duration> {
+        self.time_budget.map(|time| time.0)
+    }
+
     /// Returns the gates of the preset, if there is one and the campaign is paired.
     pub(super) fn preset_gates(&self, is_paired: bool) -> Option<PresetGates> {
         self.preset.filter(|_| is_paired).map(Preset::gates)
@@ -102,7 +112,7 @@ impl PlanArgs {
     /// Returns the largest number of samples of each scenario.
     pub(super) fn samples(&self) -> u64 {
         let default = if self.is_sequential() { MAX_SAMPLES } else { SAMPLES };
-        self.samples.or(self.preset.map(Preset::samples)).unwrap_or(default)
+        self.named_samples().or(self.preset.map(Preset::samples)).unwrap_or(default)
     }
 
     /// Returns true if the campaign judges a pull request, so that its seed is drawn unless it is
@@ -112,8 +122,8 @@ impl PlanArgs {
     }
 
     /// Returns the number of samples that is named.
-    pub(super) const fn named_samples(&self) -> Option<u64> {
-        self.samples
+    pub(super) fn named_samples(&self) -> Option<u64> {
+        self.samples.map(|samples| samples.0)
     }
 
     /// Returns true if a preset is named.
@@ -123,9 +133,7 @@ impl PlanArgs {
 
     /// Returns true if other checks than the usual ones are named.
     pub(super) fn names_checks(&self) -> bool {
-        self.no_validity_checks
-            || self.check_share.to_bits() != CheckPlan::SHARE.to_bits()
-            || self.check_at_most != CheckPlan::AT_MOST
+        self.no_validity_checks || self.check_share.is_some() || self.check_at_most.is_some()
     }
 
     /// Returns true if a preset requests a baseline.
@@ -140,7 +148,8 @@ impl PlanArgs {
             (Design::Random, false) => Ok(Inference::FixedSamples),
             (_, false) => Ok(Inference::Design),
             (design, true) => Err(CliError::usage(format!(
-                "--time-budget needs independent samples: --design random draws them, and --design {design} does not"
+                "{} needs independent samples: the design `random` draws them, and `{design}` does not",
+                Argument("time-budget")
             ))),
         }
     }
@@ -155,7 +164,8 @@ impl PlanArgs {
         if self.no_validity_checks {
             return Ok(CheckPlan::off());
         }
-        CheckPlan::new(self.check_share, self.check_at_most)
-            .map_err(|error| CliError::Usage { message: format!("--check-share: {error}") })
+        let share = self.check_share.map_or(CheckPlan::SHARE, |share| share.0);
+        CheckPlan::new(share, self.check_at_most.unwrap_or(CheckPlan::AT_MOST))
+            .map_err(|error| CliError::usage(format!("{}: {error}", Argument("check-share"))))
     }
 }

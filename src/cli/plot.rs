@@ -18,7 +18,7 @@ use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
-use super::saved::{LimitArgs, TrustArgs};
+use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
@@ -97,9 +97,9 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         ));
     };
     protect(&files_of_campaign(&args.source), &[("--out", Some(args.output.path()))])?;
-    let LimitArgs { controller_timeout_ms, controller_memory_mib } = args.arm.controller.limits;
+    let (timeout_ms, memory_mib) = args.arm.controller.limits.stated();
     let mut saved = args.trust.open(&args.source)?;
-    saved.limit(controller_timeout_ms, controller_memory_mib);
+    saved.limit(timeout_ms, memory_mib);
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.arms()?;
     saved.folder().check_journal()?;

@@ -1,5 +1,5 @@
 //! `closecall campaign --design subset|importance`: the probability of a rare event, with an
-//! interval.
+//! interval. `--design search`: the first case of an event, reduced to a scenario.
 
 use std::fmt;
 use std::path::Path;
@@ -18,10 +18,12 @@ use closecall_campaign::rare::{
 use closecall_campaign::runner::Work;
 use closecall_campaign::session;
 use closecall_report::json::stamped;
-use closecall_scenarios::criteria::{EventExpression, Guide};
+use closecall_scenarios::criteria::{EGO_COLLIDED, EventExpression, Guide, PairFlag, Quantity};
 use closecall_scenarios::library;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_studies::case::Case;
+use closecall_studies::minimize::{MinimizedText, minimize, output_files, write_files};
 use closecall_traffic::statistics::format::percent;
 use serde_json::{Value, json};
 
@@ -31,12 +33,13 @@ use super::args::Format;
 use super::backend::{check_backend, check_networks};
 use super::campaign::progress_bar;
 use super::help::heading;
-use super::output::{heartbeat, out, outln, print_error, print_written};
-use super::terminal::for_terminal;
+use super::output::{heartbeat, outln, print_error, print_text, print_written};
 use crate::exit_code::ExitCode;
 
-/// Largest number of runs of each scenario, unless another one is named.
+/// Largest number of runs of each scenario, unless another one is named: of an estimate, and of a
+/// search.
 const BUDGET: u64 = 200_000;
+const SEARCH_BUDGET: u64 = 2_000;
 
 /// How the samples of a campaign are drawn: by a design, or by a method for rare events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +58,12 @@ impl DesignChoice {
             Self::Plain(design) => design,
             Self::Rare(_) => Design::Random,
         }
+    }
+}
+
+impl Default for DesignChoice {
+    fn default() -> Self {
+        Self::Plain(Design::Random)
     }
 }
 
@@ -81,9 +90,9 @@ impl FromStr for DesignChoice {
 }
 
 /// The rare event of a campaign.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub(super) struct RareArgs {
-    /// With --design subset or importance: the event whose probability is estimated, a flag such as
+    /// With --design subset, importance or search: the event that is estimated or sought, a flag such as
     /// `collision` or `induced`, a number with a bound such as "min_ttc_rear_s < 0.3", or a
     /// difference such as "prevented - induced". docs/reference/criteria.md lists the measures
     #[arg(long, value_name = "EVENT", help_heading = heading::SAMPLES)]
@@ -144,6 +153,11 @@ impl Rare<'_> {
     /// Samples the event in every scenario of a plan, and prints the estimates.
     pub(super) fn run(&self, plan: &Plan) -> Result<ExitCode, CliError> {
         let nearness = self.args.nearness(self.method)?;
+        if self.method == Method::Search && (self.gate.is_some() || self.args.relative_width.is_some()) {
+            return Err(CliError::usage(
+                "--design search states no probability: --max-probability and --relative-width belong to --design importance or subset",
+            ));
+        }
         let campaign = plan.campaign();
         if let Some(work) = campaign.works.first() {
             check_event(nearness.expression(), work, self.gate.is_some())?;
@@ -152,7 +166,7 @@ impl Rare<'_> {
         check_networks(plan.crop_networks(), plan.mask_rcnn_cameras())?;
         let goal = Goal {
             relative_width: self.args.relative_width.unwrap_or(RELATIVE_WIDTH),
-            budget: self.budget.unwrap_or(BUDGET),
+            budget: self.budget.unwrap_or(if self.method == Method::Search { SEARCH_BUDGET } else { BUDGET }),
             value: if nearness.expression().second.is_some() { 2 } else { 0 },
         };
         let rare = RarePlan { method: self.method, nearness, goal, workers: campaign.workers };
@@ -189,6 +203,11 @@ impl Rare<'_> {
             Format::Json => outln!("{result:#}"),
             Format::Human => self.print(&reports, &campaign.works, plan.sensors),
         }
+        if self.method == Method::Search {
+            for (report, work) in reports.iter().zip(&campaign.works) {
+                self.minimize(report, work, nearness.expression())?;
+            }
+        }
         Ok(ExitCode::first_of(reports.iter().map(|report| self.code(report))))
     }
 
@@ -217,6 +236,9 @@ impl Rare<'_> {
     fn code(&self, report: &RareReport) -> ExitCode {
         if report.errors > 0 {
             return ExitCode::SampleError;
+        }
+        if let Some(search) = report.search {
+            return if search.has_event { ExitCode::Fail } else { ExitCode::Pass };
         }
         match (&self.gate, report.main()) {
             (Some(_), _) => self
@@ -260,9 +282,33 @@ impl Rare<'_> {
         stamped(json!({ "scenarios": reports, "gate": verdicts }), seed, None)
     }
 
+    /// Reduces the case that a search has found to the smallest one, and writes it as a scenario into
+    /// the folder. An event without a collision is not reduced.
+    fn minimize(&self, report: &RareReport, work: &Work, event: EventExpression) -> Result<(), CliError> {
+        let Some(nearest) = report.nearest.first() else { return Ok(()) };
+        let Some(case) = case(work, nearest, event) else { return Ok(()) };
+        let Some(minimized) = minimize(&case)? else { return Ok(()) };
+        let Some(folder) = self.folder else {
+            if self.format == Format::Human {
+                outln!("  smallest case: {}", minimized.sentence);
+                outln!("  --out DIR keeps it as a scenario file");
+            }
+            return Ok(());
+        };
+        let file = folder.join(format!("{}-found.toml", work.file.config().name));
+        let paths = output_files(&case, Some(&file))?;
+        let files = write_files(&case, &minimized, &paths, command_for)?;
+        match self.format {
+            Format::Human => outln!("{}", MinimizedText { minimized: &minimized, files: &files, command_for }),
+            Format::Json => {}
+        }
+        [Some(&files.failing), files.twin.as_ref()].into_iter().flatten().for_each(|path| print_written(path));
+        Ok(())
+    }
+
     fn print(&self, reports: &[RareReport], works: &[Arc<Work>], sensors: Option<SensorMode>) {
         for (report, work) in reports.iter().zip(works) {
-            out!("{}", for_terminal(report));
+            print_text(report);
             if let Some(gate) = self.gate {
                 let verdict = self.word(report);
                 let (max, confidence) = (gate.max(), percent(gate.confidence()));
@@ -284,6 +330,28 @@ impl Rare<'_> {
             outln!("  drawn for this campaign: --seed {}", work.sampling.seed);
         }
     }
+}
+
+/// Returns the case in which vehicles collide in one arm, and for an event of both arms in the other
+/// one not. `None` of an event that is no collision.
+fn case(work: &Work, nearest: &Nearest, event: EventExpression) -> Option<Case> {
+    let happened = event.events().zip(nearest.events).find(|(_, happened)| *happened)?.0;
+    let (first, last) = (work.arms.first()?, work.arms.last()?);
+    let (arm, reference) = match happened.quantity {
+        Quantity::Pair(PairFlag::Induced) => (last, Some(first)),
+        Quantity::Pair(PairFlag::Prevented) => (first, Some(last)),
+        Quantity::Tested(measure) if measure.name == EGO_COLLIDED => (last, None),
+        Quantity::Baseline(measure) if measure.name == EGO_COLLIDED => (first, None),
+        _ => return None,
+    };
+    Some(Case {
+        file: work.file.clone(),
+        sampling: work.sampling,
+        sample: nearest.noise,
+        arm: arm.clone(),
+        parameters: Some(nearest.parameters.clone()),
+        reference: reference.cloned(),
+    })
 }
 
 /// Returns the command that runs an event again.
@@ -338,13 +406,13 @@ mod tests {
 
     #[test]
     fn a_design_is_named_as_on_the_command_line() {
-        for word in ["random", "sobol", "grid", "coverage", "subset", "importance"] {
+        for word in ["random", "sobol", "grid", "coverage", "subset", "importance", "search"] {
             assert_eq!(word.parse::<DesignChoice>().unwrap().to_string(), word);
         }
         let error = "halton".parse::<DesignChoice>().unwrap_err();
         assert_eq!(
             error,
-            "`halton` is not a sampling design: one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance` is needed"
+            "`halton` is not a sampling design: one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance`, `search` is needed"
         );
     }
 }

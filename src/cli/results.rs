@@ -16,15 +16,15 @@ use closecall_campaign::rare::RareManifest;
 use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
-use closecall_campaign::session;
 use closecall_report::campaign::{RecordedSample, Written};
 use closecall_report::run::rerun::is_recording_enabled;
 use closecall_traffic::atomic::WriteError;
+use serde::Deserialize;
 
 use super::CliError;
 use super::actions::{command_for, quoted};
 use super::help::heading;
-use super::output::{print_error, print_report_files};
+use super::output::{print_error, print_report_files, warn};
 use super::protect::{of_controller, of_scenario};
 use crate::exit_code::ExitCode;
 
@@ -40,7 +40,8 @@ const OPEN: &str = if cfg!(target_os = "macos") {
 };
 
 /// The place in which a campaign keeps its results.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct ResultsArgs {
     /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and
     /// recordings. It must be new or empty [default: closecall-results, which replaces the last
@@ -49,6 +50,7 @@ pub(super) struct ResultsArgs {
     out: Option<PathBuf>,
     /// Keep no results, only print them
     #[arg(long, conflicts_with_all = ["out", "resume"], help_heading = heading::OUTPUT)]
+    #[serde(skip)]
     no_out: bool,
     /// Resume the interrupted campaign in the folder of --out, or in closecall-results
     #[arg(long, help_heading = heading::EXECUTION)]
@@ -79,7 +81,7 @@ impl ResultsArgs {
 
     /// Returns the seed of the campaign that is to be resumed, if there is one.
     pub(super) fn resumed_seed(&self) -> Option<u64> {
-        let folder = match self.place().ok().filter(|_| self.resume)? {
+        let folder = match Some(self.place()).filter(|_| self.resume)? {
             Place::Named(path) => path,
             Place::Default => Path::new(RESULTS),
             Place::Nowhere => return None,
@@ -89,22 +91,19 @@ impl ResultsArgs {
         manifest.map(|manifest| manifest.sampling.seed)
     }
 
-    /// Returns the place of the results. A caller in its own process, such as a Python program, has
-    /// no default folder.
-    pub(super) fn place(&self) -> Result<Place<'_>, CliError> {
+    /// Returns the place of the results.
+    pub(super) fn place(&self) -> Place<'_> {
         match &self.out {
-            Some(path) => Ok(Place::Named(path)),
-            None if session::is_active() && self.resume => {
-                Err(CliError::usage("--resume: name the folder of the campaign with --out"))
-            }
-            None if self.no_out || session::is_active() => Ok(Place::Nowhere),
-            None => Ok(Place::Default),
+            Some(path) => Place::Named(path),
+            None if self.no_out => Place::Nowhere,
+            None => Place::Default,
         }
     }
 }
 
 /// The consequence of a missing report.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Copy, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct ArtifactArgs {
     /// End with the exit code of the failure if a report or a recording cannot be written. Without
     /// it, that is a warning, and the verdict decides
@@ -122,7 +121,7 @@ impl ArtifactArgs {
     /// code. `verdict` is the code of the verdict.
     pub(super) fn code(self, verdict: ExitCode, written: &Written) -> ExitCode {
         for failure in &written.failures {
-            print_error(format_args!("warning: {failure}\n"));
+            warn(failure);
         }
         if !written.failures.is_empty() {
             print_error(format_args!(
@@ -149,7 +148,7 @@ pub(super) struct Results {
 impl Results {
     /// Locks the folder of a campaign, which is told whether it goes on without the folder.
     pub(super) fn start(args: &ResultsArgs, campaign: &mut Campaign, manifest: &Manifest) -> Result<Self, CliError> {
-        let (locked, lost) = match args.place()? {
+        let (locked, lost) = match args.place() {
             Place::Nowhere => (None, None),
             Place::Named(path) => (Some(Folder::lock(path, manifest, args.resume)?), None),
             Place::Default => {
@@ -157,8 +156,8 @@ impl Results {
                 match in_default_folder(args.resume, campaign, manifest) {
                     Ok(locked) => (Some(locked), None),
                     Err(error) if may_go_on(&error) && !args.resume => {
-                        print_error(format_args!(
-                            "warning: {error}: the results will not be kept; name a folder with --out DIR, or keep none with --no-out\n"
+                        warn(format_args!(
+                            "{error}: the results will not be kept; name a folder with --out DIR, or keep none with --no-out"
                         ));
                         (None, Some(CliError::Results(error)))
                     }
@@ -200,9 +199,7 @@ pub(super) fn remember(folder: &Folder) {
         return;
     }
     if let Err(error) = folder.remember() {
-        print_error(format_args!(
-            "warning: {error}: commands that run samples of the folder again need --trust-folder\n"
-        ));
+        warn(format_args!("{error}: commands that run samples of the folder again need --trust-folder"));
     }
 }
 

@@ -17,9 +17,8 @@ use super::CliError;
 use super::args::{FittedArgs, Format, SimulationArgs};
 use super::arms::ComparisonArgs;
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{outln, print_text};
 use super::protect::{of_scenario, protect};
-use super::terminal::for_terminal;
 use super::watch::{WatchArgs, run_watched};
 use crate::exit_code::ExitCode;
 
@@ -82,7 +81,7 @@ pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome],
         (Format::Human, outcomes) => {
             for (outcome, arm) in outcomes.iter().zip(arms) {
                 let sentence = causal_sentence(scenario, arm.sensors, outcome);
-                out!("{}", for_terminal(&OutcomeText { outcome, sentence: &sentence }));
+                print_text(OutcomeText { outcome, sentence: &sentence });
             }
         }
     }

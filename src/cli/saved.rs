@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use clap::Args;
+use closecall_campaign::arguments::{MemoryMib, TimeoutMs};
 use closecall_campaign::rare::RareManifest;
 use closecall_campaign::saved::SavedCampaign;
+use serde::Deserialize;
 
 use super::CliError;
 use super::help::heading;
@@ -42,15 +44,23 @@ pub(super) fn refuse_rare(path: &Path) -> Result<(), CliError> {
 }
 
 /// The limits of the processes of controllers.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Copy, Debug, Default, Args, Deserialize)]
+#[serde(default)]
 pub(super) struct LimitArgs {
     /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]. The
     /// first may take 10 s
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000), help_heading = heading::CONTROLLER)]
-    pub(super) controller_timeout_ms: Option<u64>,
+    #[arg(long, value_name = "MS", help_heading = heading::CONTROLLER)]
+    controller_timeout_ms: Option<TimeoutMs>,
     /// Memory limit of the processes of an `exec`, `lib` or `fmu` controller [default: 1024]
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576), help_heading = heading::CONTROLLER)]
-    pub(super) controller_memory_mib: Option<u64>,
+    #[arg(long, value_name = "MIB", help_heading = heading::CONTROLLER)]
+    controller_memory_mib: Option<MemoryMib>,
+}
+
+impl LimitArgs {
+    /// Returns the time (ms) and the memory (MiB), if they are stated.
+    pub(super) fn stated(self) -> (Option<u64>, Option<u64>) {
+        (self.controller_timeout_ms.map(|time| time.0), self.controller_memory_mib.map(|memory| memory.0))
+    }
 }
 
 /// How a folder is opened whose samples run again.
@@ -67,7 +77,8 @@ impl SavedArgs {
     /// some.
     pub(super) fn open(self, dir: &Path) -> Result<SavedCampaign, CliError> {
         let mut saved = self.trust.open(dir)?;
-        saved.limit(self.limits.controller_timeout_ms, self.limits.controller_memory_mib);
+        let (timeout_ms, memory_mib) = self.limits.stated();
+        saved.limit(timeout_ms, memory_mib);
         Ok(saved)
     }
 }

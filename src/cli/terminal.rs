@@ -3,10 +3,8 @@
 //!
 //! `NO_COLOR` and `CLICOLOR` are respected (crate `console`).
 
-use std::fmt::Display;
 use std::io::{IsTerminal, stdout};
 
-use closecall_campaign::session;
 use console::{Style, Term};
 use textwrap::{Options, WordSplitter, wrap};
 
@@ -15,21 +13,21 @@ const HANGING: usize = 2;
 /// Narrowest terminal to which texts are wrapped (columns).
 const LEAST_WIDTH: usize = 20;
 
-/// Returns a text for standard output.
-pub(super) fn for_terminal(text: &impl Display) -> String {
-    let text = text.to_string();
-    if session::is_active() || !stdout().is_terminal() {
-        return text;
+/// Returns a text for standard output. Nothing may replace control characters afterwards: the colours
+/// are such.
+pub(super) fn for_terminal(text: &str) -> String {
+    if !stdout().is_terminal() {
+        return text.to_owned();
     }
     let width = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    let wrapped = width.map_or(text.clone(), |width| wrapped(&text, width));
+    let wrapped = width.map_or_else(|| text.to_owned(), |width| wrapped(text, width));
     if console::colors_enabled() { coloured(&wrapped) } else { wrapped }
 }
 
 /// Returns a line that is cut off at the width of the terminal.
 pub(super) fn cut(line: &str) -> String {
     let columns = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    match columns.filter(|_| stdout().is_terminal() && !session::is_active()) {
+    match columns.filter(|_| stdout().is_terminal()) {
         Some(width) if line.chars().count() > width.max(LEAST_WIDTH) => {
             let kept: String = line.chars().take(width.max(LEAST_WIDTH) - 1).collect();
             format!("{kept}…")

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use closecall_campaign::arguments::{positive, recording as trajectory_path};
+use closecall_campaign::arguments::{Positive, recording as trajectory_path};
 use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
 use closecall_recorded::filters::smooth_file;
 use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
@@ -17,17 +17,21 @@ use closecall_report::traffic::fit::FitText;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_charts};
 use closecall_traffic::atomic::WriteError;
+use serde::Deserialize;
+use serde_json::Value;
 
 use super::CliError;
 use super::args::{FilesArgs, Format, LanesChoice, ReadArgs};
 use super::help::{examples, heading};
-use super::output::{command_line, out, outln, print_error, print_written, reading, write_charts};
+use super::keywords::Argument;
+use super::output::{command_line, out, outln, print_error, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::no_lane_change;
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum CriterionChoice {
     /// Peaks of the lateral speed
     #[default]
@@ -49,7 +53,7 @@ impl CriterionChoice {
 }
 
 /// Arguments of `closecall traffic lane-changes`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize)]
 #[command(after_help = examples([
     "closecall traffic lane-changes traffic.csv",
     "closecall traffic lane-changes traffic.csv --lanes none --format json",
@@ -62,9 +66,11 @@ pub(super) struct LaneChangesArgs {
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]
+    #[serde(rename = "..read")]
     read: ReadArgs,
     /// Criterion by which lane changes are found
     #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
+    #[serde(default)]
     criterion: CriterionChoice,
     /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with
     /// the columns recording_id, track_id, time_s, direction, clear
@@ -72,11 +78,12 @@ pub(super) struct LaneChangesArgs {
     reference: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
+    #[serde(skip)]
     format: Format,
 }
 
 /// Arguments of `closecall traffic criticality`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize)]
 #[command(after_help = examples([
     "closecall traffic criticality traffic.csv",
     "closecall traffic criticality traffic.csv --speed-limit-mps 27.8 --plot histograms",
@@ -87,16 +94,19 @@ pub(super) struct CriticalityArgs {
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]
+    #[serde(rename = "..read")]
     read: ReadArgs,
     /// Speed limit in m/s [default: 120 km/h]
-    #[arg(long, value_name = "M/S", value_parser = positive, help_heading = heading::METHOD)]
-    speed_limit_mps: Option<f64>,
+    #[arg(long, value_name = "M/S", help_heading = heading::METHOD)]
+    speed_limit_mps: Option<Positive>,
     /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or overlapping
     #[arg(long, help_heading = heading::METHOD)]
+    #[serde(default)]
     all: bool,
     /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which
     /// DCE is evaluated
     #[arg(long, help_heading = heading::METHOD)]
+    #[serde(default)]
     ttce_alone: bool,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or the lane change
     /// of the track that --track names
@@ -110,11 +120,12 @@ pub(super) struct CriticalityArgs {
     plot: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
+    #[serde(skip)]
     format: Format,
 }
 
 /// Arguments of `closecall traffic fit`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize)]
 #[command(after_help = examples([
     "closecall traffic fit traffic.csv",
     "closecall traffic fit one.csv two.csv --correlations -o fitted.toml",
@@ -122,38 +133,66 @@ pub(super) struct CriticalityArgs {
 ]))]
 pub(super) struct FitArgs {
     #[command(flatten)]
+    #[serde(rename = "..data")]
     data: FilesArgs,
     /// File to write [default: standard output]
     #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Origin of the trajectory files, for the heading of the output
     #[arg(long, default_value = "", help_heading = heading::OUTPUT)]
+    #[serde(default)]
     provenance: String,
     /// Also write how the quantities of one lane change, or of one pair of vehicles, depend on each
     /// other: rank correlations, by which scenarios sample them together
     #[arg(long, help_heading = heading::METHOD)]
+    #[serde(default)]
     correlations: bool,
     /// Seed of the bootstrap, which computes the confidence intervals
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
+    #[serde(default)]
     seed: u64,
     /// Output format; without --out, `human` prints the text of the file
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
+    #[serde(skip)]
     format: Format,
 }
 
+/// The answer of a command: for programs, and for readers.
+pub(super) struct Answer {
+    pub(super) value: Value,
+    text: String,
+}
+
+/// Prints the answer.
+fn print(format: Format, answer: &Answer) -> ExitCode {
+    match format {
+        Format::Json => outln!("{:#}", answer.value),
+        Format::Human => out!("{}", answer.text),
+    }
+    ExitCode::Pass
+}
+
 pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
+    Ok(print(args.format, &find_lane_changes(args)?))
+}
+
+pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliError> {
     let references = args.reference.as_deref().map(read_references).transpose()?;
     let mut tracks = reading(&args.file, || open(&args.file, args.read.options()))?;
     if args.criterion == CriterionChoice::Gradient && tracks.layout() != Layout::InCar {
         let message = format!(
             "{}: the gradient criterion needs the measured distances to the lane markings, which only in-car logs have: use \
-             `--criterion peak` or `distance`",
+             `peak` or `distance` as {}",
             args.file.display(),
+            Argument("criterion")
         );
         return Err(CliError::Usage { message });
     }
     if args.criterion != CriterionChoice::Peak && args.read.lanes == LanesChoice::None {
-        return Err(CliError::usage("`--lanes none` is for `--criterion peak`: other criteria need lanes or markings"));
+        return Err(CliError::usage(format!(
+            "{} `none` is for the criterion `peak`: other criteria need lanes or markings",
+            Argument("lanes")
+        )));
     }
     let name = tracks.name().to_owned();
     let references = references.map(|all| listed_for(all, &name)).transpose();
@@ -162,24 +201,27 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         reading(&args.file, || find(&mut tracks, args.criterion.criterion()))?;
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
     for warning in tracks.warnings().into_iter().chain(basis.warnings()) {
-        print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
+        warn(format_args!("{}: {warning}", args.file.display()));
     }
     if basis.lacks_recorded_crossings() {
         print_error(format_args!("help: `--lanes none` takes no lane as recorded\n"));
     }
-    match (args.format, scored) {
-        (Format::Json, scored) => outln!("{:#}", stamped(json::lane_changes(&changes, scored.as_ref()), None, None)),
-        (Format::Human, scored) => {
-            let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
-            outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
-            outln!("{basis}");
-            out!("{}{}", LaneChangesText(&changes), scored.as_ref().map_or_else(String::new, ScoreText::text));
-        }
-    }
-    Ok(ExitCode::Pass)
+    let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
+    let score = scored.as_ref().map_or_else(String::new, ScoreText::text);
+    Ok(Answer {
+        value: stamped(json::lane_changes(&changes, scored.as_ref()), None, None),
+        text: format!(
+            "{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped\n{basis}\n{}{score}",
+            LaneChangesText(&changes)
+        ),
+    })
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
+    Ok(print(args.format, &find_criticality(args)?))
+}
+
+pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliError> {
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
     protect(&inputs, &[("--record", args.record.as_deref())])?;
     let charts = args.plot.as_ref().map(|folder| CRITICALITY_CHARTS.map(|name| folder.join(name)));
@@ -188,10 +230,11 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     }
     let file = reading(&args.file, || smooth_file(&args.file, args.read.options()))?;
     for warning in &file.warnings {
-        print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
+        warn(format_args!("{}: {warning}", args.file.display()));
     }
     let smoothed = &file.data;
-    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: args.ttce_alone };
+    let speed_limit_mps = args.speed_limit_mps.map(|limit| limit.0);
+    let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone };
     let changes = evaluate(smoothed, &judgement);
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
@@ -206,16 +249,21 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
         print_written(path);
     }
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
-        write_charts(folder, paths, &criticality_charts(&changes, args.speed_limit_mps)?)?;
+        write_charts(folder, paths, &criticality_charts(&changes, speed_limit_mps)?)?;
     }
-    match args.format {
-        Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
-        Format::Human => out!("{}", CriticalityText { file: &file, changes: &changes, counted }),
-    }
-    Ok(ExitCode::Pass)
+    Ok(Answer {
+        value: stamped(serde_json::json!(changes), None, None),
+        text: CriticalityText { file: &file, changes: &changes, counted }.to_string(),
+    })
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
+    let code = print(args.format, &find_fit(args)?);
+    args.output.iter().for_each(|path| print_written(path));
+    Ok(code)
+}
+
+pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     let data_sets = args.data.read_all()?;
     let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
@@ -223,13 +271,11 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     if let Some(path) = &args.output {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }
-    match (args.format, &args.output) {
-        (Format::Json, _) => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
-        (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
-        (Format::Human, Some(path)) => {
-            out!("{}", FitText(&fitted));
-            print_written(path);
-        }
-    }
-    Ok(ExitCode::Pass)
+    Ok(Answer {
+        value: stamped(json::fitted(&fitted), None, None),
+        text: match &args.output {
+            None => to_toml(&fitted, &heading),
+            Some(_) => FitText(&fitted).to_string(),
+        },
+    })
 }

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::FolderError;
-use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_campaign::runner::{Sampling, run_guarded};
 use closecall_campaign::saved::{SavedCampaign, SavedError};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting, SettingError};
 use closecall_sensors::SensorMode;
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError};
+use closecall_traffic::Parameters;
 use closecall_traffic::atomic::WriteError;
 
 use crate::map::MapError;
@@ -131,6 +132,10 @@ pub struct Case {
     pub sample: u64,
     /// The arm.
     pub arm: Arm,
+    /// Values of the parameters instead of those that the campaign draws, as a search has chosen them.
+    pub parameters: Option<Parameters>,
+    /// An arm in which the case must not fail.
+    pub reference: Option<Arm>,
 }
 
 impl std::fmt::Debug for Case {
@@ -154,7 +159,23 @@ impl Case {
         // Checks that there is such a sample.
         saved.sample(scenario, sample)?;
         let (file, sampling) = (saved.file(scenario)?, saved.manifest().sampling);
-        Ok(Self { file, sampling, sample, arm: saved.arm(controller)? })
+        Ok(Self { file, sampling, sample, arm: saved.arm(controller)?, parameters: None, reference: None })
+    }
+
+    /// Returns the values of the parameters of the sample.
+    pub fn sampled(&self) -> Parameters {
+        self.sampled_of(&self.file)
+    }
+
+    /// Returns the values of the parameters of the sample in a file with further settings.
+    fn sampled_of(&self, file: &ScenarioFile) -> Parameters {
+        let Sampling { design, seed, samples, .. } = self.sampling;
+        let mut values = file.space().sample(design, seed, self.sample, samples);
+        let chosen = self.parameters.iter().flat_map(Parameters::iter);
+        for (name, value) in chosen.filter(|(name, _)| file.space().varying().any(|(varying, _)| varying == *name)) {
+            values.insert(name.clone(), value.clone());
+        }
+        values
     }
 
     /// Returns the depth of the sensor simulation.
@@ -177,7 +198,8 @@ impl Case {
     /// [`CausesError`] if a setting does not fit, or the sampled values contradict each other.
     pub fn concrete(&self, settings: &[Setting]) -> Result<Scenario, CausesError> {
         let file = ScenarioFile::parse(self.file.path(), self.file.text(), settings)?;
-        concrete(&file, self.sampling, self.sample).map_err(|source| self.failed(source))
+        let parameters = self.sampled_of(&file);
+        file.config().check(&parameters).map_err(|source| self.failed(SampleError::Scenario(source)))
     }
 
     /// Runs the sample with further settings.

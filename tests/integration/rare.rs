@@ -1,5 +1,6 @@
-//! `campaign --design subset|importance` estimates the probability of a rare event, resumes to the
-//! same bytes, and refuses options that do not fit.
+//! `campaign --design subset|importance` estimates the probability of a rare event, and `--design
+//! search` looks for its first case. They resume to the same bytes, and refuse options that do not
+//! fit.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -135,8 +136,14 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
         ("--design subset --event crash", "not a measure; there are"),
         ("--design subset --event induced", "it needs --paired or --arms"),
         ("--design subset --event collision --guide engaged", "is not a number of a sample"),
-        ("--design halton --event collision", "one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance`"),
-        ("--event collision", "--design subset or importance"),
+        ("--design search --event collision --max-probability 0.1", "--design search states no probability"),
+        ("--design search --event collision --relative-width 0.3", "--design search states no probability"),
+        ("--design search", "name one with --event"),
+        (
+            "--design halton --event collision",
+            "one of `random`, `sobol`, `grid`, `coverage`, `subset`, `importance`, `search`",
+        ),
+        ("--event collision", "--design subset, importance or search"),
         ("--guide min_gap_rear_m --design subset", "--event"),
     ] {
         let output = rare(words);
@@ -225,4 +232,59 @@ fn a_folder_of_weighted_runs_is_named_for_what_it_is() {
     }
     let plain = rare(&format!("-n 10 --no-gate --out {path}"));
     assert!(message(&plain).contains("samples a rare event"), "{}", message(&plain));
+}
+
+#[test]
+fn a_search_finds_a_collision_that_is_rare_and_writes_its_smallest_case() {
+    let place = folder();
+    let [found, again] = ["found", "again"].map(|name| place.path().join(name));
+    let run = |out: &Path, more: &str| {
+        rare(&format!("--design search --event collision --seed 1 --out {} {more}", out.display()))
+    };
+    let text = stdout(&run(&found, "--jobs 1"), 1);
+    assert!(text.contains("a search states no probability"), "{text}");
+    let result: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(found.join("rare.json")).unwrap()).unwrap();
+    let report = &result["scenarios"][0];
+    assert_eq!(report["search"]["has_event"], true);
+    assert!(report["runs"].as_u64().unwrap() < 2_000, "{report}");
+    assert_eq!(report["estimates"].as_array().unwrap().len(), 0);
+    let case = |name: &str| {
+        let path = found.join(name);
+        stdout(&closecall(["run", path.to_str().unwrap(), "--controller", "acc"]), 0)
+    };
+    assert!(case("known-rare-probability-found.toml").contains("COLLISION"));
+    assert!(!case("known-rare-probability-found-passes.toml").contains("COLLISION"));
+    // Cut off and resumed: the same journal.
+    run(&again, "--jobs 2");
+    let journal = |out: &Path| fs::read(out.join("rare-journal.jsonl")).unwrap();
+    assert_eq!(journal(&found), journal(&again));
+    let kept = journal(&again);
+    fs::write(again.join("rare-journal.jsonl"), &kept[..kept.len() / 2]).unwrap();
+    code(&run(&again, "--resume"));
+    assert_eq!(journal(&again), kept);
+}
+
+#[test]
+fn a_regression_is_found_in_a_case_in_which_the_earlier_controller_does_not_fail() {
+    let place = folder();
+    let out = place.path().join("out");
+    let words =
+        "campaign low-thw-overtake --arms acc,gap-1.6 --sensors object --design search --event induced --seed 7";
+    let text = stdout(&closecall(words.split_whitespace().chain(["--out", out.to_str().unwrap()])), 1);
+    assert!(text.contains("no vehicle collides in it with acc"), "{text}");
+    let path = out.join("low-thw-overtake-found.toml");
+    let run = |controller: &str| stdout(&closecall(["run", path.to_str().unwrap(), "--controller", controller]), 0);
+    assert!(run("gap-1.6").contains("COLLISION"), "{text}");
+    assert!(!run("acc").contains("COLLISION"), "{text}");
+}
+
+#[test]
+fn a_search_that_finds_nothing_spends_its_budget_and_says_what_that_means() {
+    let words = "campaign slow-approach --controller mis --sensors object --design search --event collision -n 300";
+    let text = stdout(&closecall(words.split_whitespace()), 0);
+    assert!(
+        text.contains("300 runs") && text.contains("not found") && text.contains("bounds no probability"),
+        "{text}"
+    );
 }

@@ -7,7 +7,7 @@
 //! - A block whose info string has a second word is a file of that name: `toml my.toml`.
 //! - A `text` block that is the next one after a `sh` block is the output of its commands, to the
 //!   letter. Only the wall time of a campaign, its number of threads and the share of its validity
-//!   checks may differ.
+//!   checks may differ. If its last line is `…`, it is the beginning of the output.
 //!
 //! With `CLOSECALL_WRITE_DOCUMENTS=1` the documents get the outputs that their commands print.
 
@@ -27,6 +27,9 @@ const FROM_SOURCE: &str = "cargo run --release -- ";
 
 /// The smallest number of commands in all documents together.
 const LEAST_COMMANDS: usize = 8;
+
+/// The smallest number of lines of an output that is cut.
+const LEAST_SHOWN: usize = 3;
 
 /// A fenced block of a Markdown file.
 #[derive(Debug, PartialEq, Eq)]
@@ -90,6 +93,29 @@ fn without_wall_time(text: &str) -> Vec<String> {
         _ => line.to_owned(),
     };
     text.trim_end().lines().map(steady).collect()
+}
+
+/// The last line of a `text` block that shows only the beginning of an output.
+const CUT: &str = "…";
+
+/// Whether a `text` block shows the output of its commands.
+fn shows(shown: &str, printed: &str) -> bool {
+    let (mut shown, printed) = (without_wall_time(shown), without_wall_time(printed));
+    if shown.last().is_some_and(|line| line == CUT) {
+        shown.pop();
+        return shown.len() >= LEAST_SHOWN && shown.len() < printed.len() && printed.starts_with(&shown);
+    }
+    shown == printed
+}
+
+/// Returns what a `text` block should show: as much of the output as it shows now.
+fn cut_like(shown: &str, printed: &str) -> String {
+    let kept = shown.trim_end().lines().count() - 1;
+    if shown.trim_end().lines().last() == Some(CUT) && kept < printed.trim_end().lines().count() {
+        let lines: Vec<&str> = printed.lines().take(kept).chain([CUT]).collect();
+        return lines.join("\n");
+    }
+    printed.to_owned()
 }
 
 /// Copies a folder with everything in it.
@@ -211,8 +237,8 @@ fn follow(path: &Path) -> Findings {
         }
         findings.outputs += 1;
         findings.has_campaign |= lines(&block.text).iter().any(|line| line.command.starts_with("closecall campaign "));
-        if without_wall_time(&shown.text) != without_wall_time(&printed) {
-            outputs.push((shown.line, printed.clone()));
+        if !shows(&shown.text, &printed) {
+            outputs.push((shown.line, cut_like(&shown.text, &printed)));
             findings.wrong.push(format!("{place} shows\n{}\nbut the commands print\n{printed}", shown.text));
         }
     }
@@ -288,4 +314,15 @@ fn only_wall_times_and_threads_may_differ() {
     for (from, to) in [("400", "401"), ("20 samples", "21 samples"), ("PASS", "..."), ("simulated", "")] {
         assert_ne!(without_wall_time(printed), without_wall_time(&elsewhere.replace(from, to)), "{to}");
     }
+}
+
+#[test]
+fn the_beginning_of_an_output_is_shown_only_with_a_mark_and_to_the_letter() {
+    let printed = "a: 20 samples\none\ntwo\nPASS\nmet: all\n";
+    assert!(shows("a: 20 samples\none\ntwo\nPASS\n…\n", printed));
+    for wrong in ["a: 20 samples\none\ntwo\nPASS\n", "a: 20 samples\none\nother\n…\n", "…\n", "one\ntwo\nPASS\n…\n"]
+    {
+        assert!(!shows(wrong, printed), "{wrong}");
+    }
+    assert_eq!(cut_like("a: 19 samples\none\n…\n", printed), "a: 20 samples\none\n…");
 }

@@ -13,17 +13,20 @@ pub enum Method {
     Subset,
     /// Importance sampling from a mixture that cross-entropy finds.
     Importance,
+    /// A search for the first case. It states no probability.
+    Search,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 2] = [Self::Subset, Self::Importance];
+    pub const ALL: [Self; 3] = [Self::Subset, Self::Importance, Self::Search];
 
     /// Returns the name, as on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Subset => "subset",
             Self::Importance => "importance",
+            Self::Search => "search",
         }
     }
 }
@@ -36,7 +39,7 @@ impl fmt::Display for Method {
 
 /// A word that is not the name of a method.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is not a method for rare events: one of `subset`, `importance` is needed")]
+#[error("`{word}` is not a method for rare events: one of `subset`, `importance`, `search` is needed")]
 pub struct UnknownMethod {
     word: String,
 }

@@ -1,12 +1,13 @@
-//! Rare events: probabilities that plain sampling does not reach, with intervals that hold.
+//! Rare events: probabilities that plain sampling does not reach, with intervals that hold, and
+//! the search for the first case of an event.
 //!
 //! ```text
-//!  scenario ─▶ standard normal space ─▶ importance │ subset ─▶ points ─▶ runs ─▶ journal
+//!  scenario ─▶ standard normal space ─▶ importance │ subset │ search ─▶ points ─▶ runs ─▶ journal
 //!                                          ▲                              │
 //!                                          └────────── responses ─────────┘
 //! ```
 //!
-//! The methods, `importance` and `subset`, are pure: they know points and responses only. The rest
+//! The methods, `importance`, `subset` and `search`, are pure: they know points and responses only. The rest
 //! of the module runs points as samples of a scenario (`runs`), reads how near a sample came to an
 //! event (`nearness`), and keeps a journal (`journal`). A method's next points depend on its seed
 //! and on the responses so far, never on threads or time, so that a campaign that goes on from its
@@ -28,6 +29,7 @@ mod plan;
 mod problem;
 mod report;
 mod runs;
+mod search;
 mod subset;
 #[cfg(test)]
 mod tests;
@@ -44,4 +46,5 @@ pub use nearness::{Nearness, NoGuide};
 pub use plan::RarePlan;
 pub use problem::{Point, Response, Seed, Simulator};
 pub use report::{Estimate, Nearest, RareReport};
+pub use search::{SearchResult, search};
 pub use subset::{Level, SubsetResult, subset};

@@ -3,7 +3,8 @@
 //! A score decides how many runs a search needs, and nothing else: no estimate and no interval
 //! depends on it. A bound of a number is its own guide. A collision of the ego is guided by its
 //! smallest gap, and `induced` and `prevented` by the smallest gap in the arm that is to collide,
-//! plus the change of velocity of a collision in the arm that is not to.
+//! plus the change of velocity of a collision in the arm that is not to. A search for the first case
+//! is also led by what sets the arms apart ([`Nearness::with_contrast`]).
 
 use closecall_scenarios::criteria::{EGO_COLLIDED, Event, EventExpression, Guide, Measure, PairFlag, Quantity};
 use closecall_scenarios::outcome::Outcome;
@@ -17,6 +18,8 @@ use crate::record::Record;
 pub struct Nearness {
     expression: EventExpression,
     guide: Option<Guide>,
+    /// Whether the difference of two arms leads to an event of both, too.
+    contrasts: bool,
 }
 
 /// An event to which nothing leads.
@@ -41,8 +44,16 @@ impl Nearness {
         };
         match expression.events().find(|event| !has_guide(event)) {
             Some(event) => Err(NoGuide { event }),
-            None => Ok(Self { expression, guide }),
+            None => Ok(Self { expression, guide, contrasts: false }),
         }
+    }
+
+    /// Returns the same events, to which the difference of the two arms leads as well: a sample in
+    /// which one arm keeps its distance and the other does not is nearer than a sample in which both
+    /// come equally close.
+    #[must_use]
+    pub const fn with_contrast(self) -> Self {
+        Self { contrasts: true, ..self }
     }
 
     /// Returns the events.
@@ -89,14 +100,22 @@ impl Nearness {
             // The sample does not have the number.
             return None;
         }
-        let struck = other.and_then(outcome).and_then(Outcome::ego_delta_v_mps).unwrap_or(0.0);
-        Some(-(smallest_gap_m(outcome(own)?) + struck))
+        let other = other.and_then(outcome);
+        let struck = other.and_then(Outcome::ego_delta_v_mps).unwrap_or(0.0);
+        let gap_m = smallest_gap_m(outcome(own)?);
+        let lead_m =
+            other.filter(|_| self.contrasts).map_or(0.0, |other| smallest_gap_m(other).min(SAFE_GAP_M) - gap_m);
+        Some(lead_m - gap_m - struck)
     }
 }
 
 /// Gap of a sample in which no vehicle is near the ego in its lane (m): beyond the range of the
 /// sensors.
 const NO_GAP_M: f64 = 200.0;
+
+/// Gap from which on it does not matter how much larger it is (m): an assumption; 5 to 30 are
+/// plausible. It decides what a search tries next, and no result.
+const SAFE_GAP_M: f64 = 10.0;
 
 /// Returns the smallest gap of the ego to the vehicle ahead or behind.
 fn smallest_gap_m(outcome: &Outcome) -> f64 {

@@ -10,6 +10,7 @@ use super::nearness::Nearness;
 use super::problem::Seed;
 use super::report::RareReport;
 use super::runs::Runs;
+use super::search::search;
 use super::subset::subset;
 use crate::runner::Work;
 use crate::stop::StopFlag;
@@ -66,6 +67,10 @@ impl RarePlan {
                 RareReport::of_importance(self, &result)
             }
             Method::Subset => RareReport::of_subset(self, &subset(&mut runs, dimensions, Seed(seed), self.goal)?),
+            Method::Search => {
+                runs.nearness = self.nearness.with_contrast();
+                RareReport::of_search(self, &search(&mut runs, dimensions, Seed(seed), self.goal.budget)?)
+            }
         };
         if let Some(journal) = &runs.journal {
             journal.sync()?;

@@ -9,6 +9,7 @@ use super::estimate::{COVERAGE, Mean};
 use super::importance::{ImportanceResult, NoInterval};
 use super::method::Method;
 use super::plan::RarePlan;
+use super::search::SearchResult;
 use super::subset::{Level, SubsetResult};
 use crate::gate::rounded_up;
 use crate::record::SampleFailure;
@@ -80,8 +81,20 @@ pub struct RareReport {
     /// Details of subset simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subset: Option<SubsetDetails>,
+    /// Details of a search for the first case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search: Option<SearchDetails>,
     /// The events nearest to the nominal case.
     pub nearest: Vec<Nearest>,
+}
+
+/// Details of a search for the first case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct SearchDetails {
+    /// How often the search began.
+    pub starts: u64,
+    /// Whether some run had the event.
+    pub has_event: bool,
 }
 
 /// Details of importance sampling.
@@ -149,6 +162,7 @@ impl RareReport {
             parameters: Vec::new(),
             importance: None,
             subset: None,
+            search: None,
             nearest: Vec::new(),
         }
     }
@@ -174,6 +188,11 @@ impl RareReport {
         let details =
             SubsetDetails { levels: result.levels.clone(), repetitions: result.repetitions, extinct: result.extinct };
         Self { subset: Some(details), ..Self::new(plan, result.runs, result.means, result.no_interval) }
+    }
+
+    pub(super) fn of_search(plan: &RarePlan, result: &SearchResult) -> Self {
+        let details = SearchDetails { starts: result.starts, has_event: result.has_event };
+        Self { search: Some(details), ..Self::new(plan, result.runs, None, None) }
     }
 
     /// Returns the estimate that the goal is about: the event, or the difference.
@@ -252,6 +271,16 @@ impl fmt::Display for RareReport {
                 f,
                 "  {repetitions} independent repetitions with {levels} levels, {extinct} of them without the event"
             )?;
+        }
+        if let Some(SearchDetails { starts, has_event }) = self.search {
+            let started = if starts == 1 { "one start".to_owned() } else { format!("{starts} starts") };
+            match has_event {
+                true => writeln!(f, "  found, after {started}; a search states no probability")?,
+                false => writeln!(
+                    f,
+                    "  not found, after {started}: the event may be rarer, or nothing leads to it; a search bounds no probability"
+                )?,
+            }
         }
         writeln!(f, "  moved: {}; drawn anew: all random streams of drivers and sensors", self.parameters.join(", "))?;
         if let Some(error) = &self.first_error {

@@ -214,7 +214,7 @@ fn lucky(count: usize, rest: usize, rng: &mut Stream) -> Vec<bool> {
 }
 
 /// Proposes a point beside another one.
-fn moved(point: &Point, step: f64, rng: &mut Stream) -> Point {
+pub(super) fn moved(point: &Point, step: f64, rng: &mut Stream) -> Point {
     let kept = (1.0 - step * step).sqrt();
     let normals = point.normals.iter().map(|z| kept * z + step * rng.sample::<f64, _>(StandardNormal)).collect();
     let noise = draw_noise(rng);

@@ -152,6 +152,40 @@ fn span_in(line: &str, field: &str) -> Range<usize> {
     start..start + field.len()
 }
 
+/// A row of a table: the number of its line, and its text with its fields, or why it has none.
+pub(super) type TableRow<'a> = (u64, Result<(&'a str, &'a Fields), TrajectoryFileProblem>);
+
+/// Passes on each row of a table with `width` columns. Between semicolons, a comma is a decimal
+/// point.
+///
+/// # Errors
+/// The first error of `take`.
+pub(super) fn each_row<R: BufRead, E>(
+    lines: &mut Lines<R>,
+    (separator, width): (Separator, usize),
+    mut take: impl FnMut(TableRow<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut fields = Fields::default();
+    loop {
+        let (number, line) = match lines.next() {
+            Ok(Some(next)) => next,
+            Ok(None) => return Ok(()),
+            Err((number, problem)) => {
+                take((number, Err(problem)))?;
+                continue;
+            }
+        };
+        let has_commas = separator == Separator::Semicolon && line.contains(',');
+        let with_points = has_commas.then(|| line.replace(',', "."));
+        let line = with_points.as_deref().unwrap_or(line);
+        let split = fields.split(line, separator).and_then(|()| match fields.len() {
+            actual if actual == width => Ok((line, &fields)),
+            actual => Err(TrajectoryFileProblem::ColumnCount { actual, needed: width }),
+        });
+        take((number, split))?;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

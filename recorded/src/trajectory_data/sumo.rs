@@ -30,7 +30,7 @@ use super::file_layout::Layout;
 use super::header::Header;
 use super::markings::LANE_WIDTHS_M;
 use super::plain::allowed;
-use super::rows::{Fields, Lines, Separator};
+use super::rows::{Lines, Separator, each_row};
 use super::source::{Clock, ReadError};
 use super::xml::{Node, Xml};
 
@@ -149,43 +149,21 @@ pub(super) fn read_table<R: BufRead>(
         }
     }
     let mut reader = Reader::default();
-    let mut fields = Fields::default();
-    loop {
-        let (number, line) = match lines.next() {
-            Ok(Some((number, line))) => (number, line),
-            Ok(None) => break,
-            Err((number, problem)) => {
-                reader.collected.push(Err(ReadError::new(number, problem)))?;
-                continue;
-            }
+    each_row(&mut lines, (separator, width), |(number, split)| {
+        let (line, fields) = match split {
+            Ok(split) => split,
+            Err(problem) => return reader.collected.push(Err(ReadError::new(number, problem))),
         };
-        let with_points;
-        let line = if separator == Separator::Semicolon && line.contains(',') {
-            with_points = line.replace(',', ".");
-            &with_points
-        } else {
-            line
-        };
-        let split = fields.split(line, separator);
-        let actual = fields.len();
-        if let Err(problem) = split {
-            reader.collected.push(Err(ReadError::new(number, problem)))?;
-            continue;
-        }
-        if actual != width {
-            let problem = TrajectoryFileProblem::ColumnCount { actual, needed: width };
-            reader.collected.push(Err(ReadError::new(number, problem)))?;
-            continue;
-        }
         let field = |wanted: &'static str| {
             let index = columns.iter().find(|(name, _)| *name == wanted).and_then(|(_, index)| *index);
             index.map_or("", |index| fields.get(line, index))
         };
         // A time step without vehicles, or a row of a person, names no vehicle.
-        if !field("id").is_empty() {
-            reader.push(&Entry { time: field("time"), line: number, field: &field })?;
+        if field("id").is_empty() {
+            return Ok(());
         }
-    }
+        reader.push(&Entry { time: field("time"), line: number, field: &field })
+    })?;
     reader.finish()
 }
 

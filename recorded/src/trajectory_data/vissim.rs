@@ -32,7 +32,7 @@ use super::file_layout::Layout;
 use super::header::Header;
 use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 use super::plain::allowed;
-use super::rows::{Fields, Lines, Separator};
+use super::rows::{Fields, Lines, Separator, each_row};
 use super::source::{Clock, ReadError};
 
 /// The start of the header.
@@ -215,32 +215,10 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
         latest: BTreeMap::new(),
         steps: [0.0; 2],
     };
-    let mut fields = Fields::default();
-    loop {
-        let (number, line) = match lines.next() {
-            Ok(Some((number, line))) => (number, line),
-            Ok(None) => break,
-            Err((number, problem)) => {
-                reader.collected.push(Err(ReadError::new(number, problem)))?;
-                continue;
-            }
-        };
-        let with_points;
-        let line = if line.contains(',') {
-            with_points = line.replace(',', ".");
-            &with_points
-        } else {
-            line
-        };
-        let row = fields.split(line, Separator::Semicolon).map_err(FieldError::from).and_then(|()| {
-            let actual = fields.len();
-            if actual != width {
-                return Err(TrajectoryFileProblem::ColumnCount { actual, needed: width }.into());
-            }
-            reader.row(line, &fields, number)
-        });
-        reader.collected.push(row.map_err(|error| ReadError::new(number, error)))?;
-    }
+    each_row(&mut lines, (Separator::Semicolon, width), |(number, split)| {
+        let row = split.map_err(FieldError::from).and_then(|(line, fields)| reader.row(line, fields, number));
+        reader.collected.push(row.map_err(|error| ReadError::new(number, error)))
+    })?;
     reader.finish()
 }
 

@@ -4,8 +4,9 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig, kept};
+use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 use super::optics::{LensConfig, Optics};
+use crate::kept::kept;
 
 /// The processing of the camera's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -1,8 +1,5 @@
 //! The configuration of the pipeline `mask-rcnn`.
 
-use std::collections::BTreeSet;
-use std::sync::{Mutex, PoisonError};
-
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::image::CHANNELS;
 use super::labels::LabelMap;
 use super::picture::WIDTH_PX;
+use crate::kept::kept;
 
 /// Share of the vehicles from [`SHIPPED_MIN_SHOWN_PX`] on that the shipped network misses at a
 /// score of 0.5, on the held-out renders of all lights and weathers (`models/MASK_RCNN_CARD.md`).
@@ -142,18 +140,6 @@ impl Check for MaskRcnnConfig {
             labels: self.labels.as_deref().map(kept),
         })
     }
-}
-
-/// Returns the same text, which is kept until the process ends. Each text is kept once.
-pub(super) fn kept(text: &str) -> &'static str {
-    static KEPT: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
-    let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(interned) = all.get(text) {
-        return interned;
-    }
-    let leaked: &'static str = Box::leak(text.to_owned().into_boxed_str());
-    all.insert(leaked);
-    leaked
 }
 
 #[cfg(test)]

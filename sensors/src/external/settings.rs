@@ -1,9 +1,8 @@
 //! The keys of the `[sensors]` table that name a program, and what they are checked into.
 
-use std::collections::BTreeSet;
-use std::sync::{Mutex, PoisonError};
-
 use closecall_traffic::{ConfigError, Problem, Time};
+
+use crate::kept::kept;
 
 /// The value of `perception` that stands for the built-in chain.
 pub const BUILT_IN: &str = "built-in";
@@ -107,19 +106,6 @@ pub(crate) fn check_program(keys: &ProgramChecks<'_>) -> Result<Option<ProgramSe
         ));
     };
     Ok(Some(ProgramSettings { command: kept(command), timeout_ms, memory_mib, images, folder: None }))
-}
-
-/// Returns the same text, which is kept until the process ends. A process sees few commands, and
-/// each is kept once.
-fn kept(text: &str) -> &'static str {
-    static KEPT: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
-    let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(interned) = all.get(text) {
-        return interned;
-    }
-    let leaked: &'static str = Box::leak(text.to_owned().into_boxed_str());
-    all.insert(leaked);
-    leaked
 }
 
 #[cfg(test)]

@@ -75,7 +75,9 @@ impl PerceptionProcess {
         }
     }
 
+    /// Returns the failure at the time of a question. A program that was not greeted was asked none.
     fn failure(&self, error: &ProgramError, time: Time) -> SensorError {
+        let time = self.started.is_some().then_some(time);
         SensorError::Program { program: self.program.name(), reason: error.to_string(), is_late: error.is_late(), time }
     }
 }

@@ -4,10 +4,10 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use closecall_sensors::external::{CameraMount, LidarMount, OutsideImage, OutsideScan, PerceptionQuestion, Pose};
 use closecall_sensors::lidar::MirrorSide;
-use closecall_traffic::{CONTROL_STEP, Dimensions, Road, Side};
+use closecall_traffic::{CONTROL_STEP, Dimensions, Road};
 use serde::Serialize;
 
-use crate::controller::exec::PROTOCOL;
+use crate::controller::exec::{PROTOCOL, RoadMessage};
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
@@ -36,15 +36,6 @@ enum Message<'a> {
 struct EgoMessage {
     length_m: f64,
     width_m: f64,
-}
-
-#[derive(Serialize)]
-struct RoadMessage {
-    lanes: u8,
-    lane_width_m: f64,
-    curvature_per_m: f64,
-    speed_limit_mps: f64,
-    overtaking_side: Side,
 }
 
 #[derive(Serialize)]
@@ -131,20 +122,13 @@ impl<'a> Setup<'a> {
 
     /// Returns the first message.
     pub(super) fn hello(&self) -> Vec<u8> {
-        let road = self.road;
         to_line(&Message::Hello {
             kind: "perception",
             protocol: PROTOCOL,
             control_step_s: CONTROL_STEP.s(),
             latency_s: self.latency_s,
             ego: EgoMessage { length_m: self.size.length_m, width_m: self.size.width_m },
-            road: RoadMessage {
-                lanes: road.lanes(),
-                lane_width_m: road.lane_width_m(),
-                curvature_per_m: road.curvature_per_m(),
-                speed_limit_mps: road.speed_limit_mps(),
-                overtaking_side: road.overtaking_side(),
-            },
+            road: RoadMessage::of(self.road),
             lidars: self.lidars.iter().map(lidar_message).collect(),
             camera: self.camera.map(camera_message),
         })

@@ -37,7 +37,7 @@ impl ComputingTime {
     /// Calls `step`, and adds the time that it takes.
     ///
     /// # Errors
-    /// The error of `step`, or [`ControllerError::Own`] if the mean computing time, or that of too
+    /// The error of `step`, or [`ControllerError::Late`] if the mean computing time, or that of too
     /// many steps, exceeds the control period.
     pub(super) fn of<T>(
         &mut self,
@@ -53,7 +53,7 @@ impl ComputingTime {
     /// Adds the time of a step of a controller.
     fn add(&mut self, time: Time, spent: Duration) -> Result<(), ControllerError> {
         match self.exceeded(spent, 1e3 * CONTROL_STEP.s()) {
-            Some(message) => Err(ControllerError::Own { reason: format!("the controller {message}"), time }),
+            Some(message) => Err(ControllerError::Late { reason: format!("the controller {message}"), time }),
             None => Ok(()),
         }
     }

@@ -47,8 +47,7 @@ pub(super) fn usual_settings(stage: Stage, case: &Case) -> Vec<String> {
 
 /// Returns the values of the case's parameters.
 fn parameters(case: &Case) -> Parameters {
-    let sampling = case.sampling;
-    case.file.space().sample(sampling.design, sampling.seed, case.sample, sampling.samples)
+    case.sampled()
 }
 
 /// Returns by how much an injected fault delays the reaction of drivers behind the ego (s).

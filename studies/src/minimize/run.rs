@@ -45,6 +45,9 @@ pub struct Minimized {
     pub controller: String,
     /// The controller as the option `--controller` takes it.
     pub choice: String,
+    /// The controller with which the case does not fail, if it was sought so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference: Option<String>,
     /// Depth of the sensor simulation.
     pub sensors: String,
     /// The parameters that are off their nominal values.
@@ -75,7 +78,8 @@ impl Minimized {
     }
 }
 
-/// Minimizes a failing case. Returns `None` if no vehicle collides in it.
+/// Minimizes a failing case. Returns `None` if no vehicle collides in it. If the case has a
+/// reference, no vehicle collides with it in the smallest case either.
 ///
 /// # Errors
 /// [`CausesError`] if the sample has no outcome.
@@ -103,6 +107,7 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
         sample: case.sample,
         controller: controller.to_owned(),
         choice: controller.to_owned(),
+        reference: case.reference.as_ref().map(|arm| arm.controller.name().to_owned()),
         sensors: case.sensors().name().to_owned(),
         off_nominal,
         sampled_off_nominal: trial.differing.len(),

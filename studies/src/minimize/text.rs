@@ -38,6 +38,9 @@ impl fmt::Display for MinimizedText<'_> {
             writeln!(f, "  {why}")?;
         }
         writeln!(f, "{}", minimized.sentence)?;
+        if let Some(reference) = &minimized.reference {
+            writeln!(f, "no vehicle collides in it with {reference}")?;
+        }
         let command = |path: &Path| minimized.run_command(&path.display().to_string(), *command_for);
         writeln!(f, "fails:  {}", command(&files.failing))?;
         match (&minimized.twin, &files.twin) {

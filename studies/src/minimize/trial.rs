@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use closecall_campaign::runner::run_guarded;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, Setting, SettingError};
-use closecall_simulation::NoObserver;
+use closecall_simulation::{Arm, NoObserver};
 use closecall_traffic::{ParameterName, Parameters, Value};
 
 use super::grid;
@@ -31,10 +31,7 @@ pub(super) struct Trial<'a> {
 impl<'a> Trial<'a> {
     /// Creates the trials of a case.
     pub(super) fn new(case: &'a Case) -> Self {
-        let space = case.file.space();
-        let sampling = case.sampling;
-        let sampled = space.sample(sampling.design, sampling.seed, case.sample, sampling.samples);
-        let nominal = space.nominal();
+        let (sampled, nominal) = (case.sampled(), case.file.space().nominal());
         let differing = sampled.iter().filter(|(name, value)| nominal.get(name) != Some(value));
         let differing = differing.map(|(name, _)| name.clone()).collect();
         let trial = Self { case, sampled, nominal, differing, is_robust: true, results: Mutex::default() };
@@ -59,7 +56,7 @@ impl<'a> Trial<'a> {
         if let Some(result) = self.results.lock().ok().and_then(|results| results.get(&key).copied()) {
             return result;
         }
-        let does_fail = self.case.file.concrete(parameters).is_ok_and(|scenario| self.holds_in(&scenario, fails));
+        let does_fail = self.case.file.concrete(parameters).is_ok_and(|scenario| self.is_failed(&scenario));
         if let Ok(mut results) = self.results.lock() {
             results.insert(key, does_fail);
         }
@@ -71,15 +68,21 @@ impl<'a> Trial<'a> {
         self.case.file.concrete(parameters).is_ok_and(|scenario| self.is_passed(&scenario))
     }
 
-    /// Returns whether no vehicle collides in a scenario.
-    pub(super) fn is_passed(&self, scenario: &Scenario) -> bool {
-        self.holds_in(scenario, |outcome| !fails(outcome))
+    /// Returns whether vehicles collide in a scenario, and none in the arm that must not fail.
+    fn is_failed(&self, scenario: &Scenario) -> bool {
+        let passes_in = |arm: &Arm| self.holds_in(scenario, arm, |outcome| !fails(outcome));
+        self.holds_in(scenario, &self.case.arm, fails) && self.case.reference.as_ref().is_none_or(passes_in)
     }
 
-    /// Returns whether a condition holds for the outcome of a scenario, at the time step and at
-    /// half of it.
-    fn holds_in(&self, scenario: &Scenario, holds: impl Fn(&Outcome) -> bool) -> bool {
-        let run = |scenario: &Scenario| run_guarded(scenario, self.case.key(), &self.case.arm, &mut NoObserver);
+    /// Returns whether no vehicle collides in a scenario.
+    pub(super) fn is_passed(&self, scenario: &Scenario) -> bool {
+        self.holds_in(scenario, &self.case.arm, |outcome| !fails(outcome))
+    }
+
+    /// Returns whether a condition holds for the outcome of a scenario in an arm, at the time step
+    /// and at half of it.
+    fn holds_in(&self, scenario: &Scenario, arm: &Arm, holds: impl Fn(&Outcome) -> bool) -> bool {
+        let run = |scenario: &Scenario| run_guarded(scenario, self.case.key(), arm, &mut NoObserver);
         let has = |scenario: &Scenario| run(scenario).is_ok_and(|outcome| holds(&outcome));
         has(scenario) && (!self.is_robust || has(&scenario.at_half_step()))
     }

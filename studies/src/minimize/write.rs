@@ -149,7 +149,10 @@ fn sentence(text: &Text<'_>) -> String {
     let twin = text.minimized.twin.as_ref();
     match (text.is_twin, twin) {
         (true, Some(twin)) => format!("Passes when {}. Otherwise: {}", twin.words, text.minimized.sentence),
-        _ => text.minimized.sentence.clone(),
+        _ => match &text.minimized.reference {
+            Some(reference) => format!("{} No vehicle collides with {reference}.", text.minimized.sentence),
+            None => text.minimized.sentence.clone(),
+        },
     }
 }
 

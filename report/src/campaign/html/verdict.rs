@@ -78,12 +78,15 @@ pub(super) fn gates(findings: &Findings<'_>) -> Markup {
     }
     let is_met = |gate: &&GateResult| gate.standing() <= Standing::NotChecked;
     let (met, unmet): (Vec<&GateResult>, Vec<&GateResult>) = worst_first(findings.judged).into_iter().partition(is_met);
+    let unchecked = met.iter().filter(|gate| gate.standing() == Standing::NotChecked).count();
+    let counted = match unchecked {
+        0 => format!("{} of {} gates are met", met.len(), met.len() + unmet.len()),
+        _ => format!("{} of {} gates are met, {unchecked} not checked", met.len() - unchecked, met.len() + unmet.len()),
+    };
     html! {
         h2 { "Gates" }
-        @if unmet.is_empty() { p { "All " (met.len()) " gates are met or not checked." } } @else { (gate_table(&unmet)) }
-        @if !met.is_empty() {
-            details { summary { (met.len()) " gates that are met or not checked" } (gate_table(&met)) }
-        }
+        @if !unmet.is_empty() { (gate_table(&unmet)) }
+        @if !met.is_empty() { details { summary { (counted) } (gate_table(&met)) } } @else { p { (counted) } }
     }
 }
 

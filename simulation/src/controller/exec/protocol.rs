@@ -23,13 +23,26 @@ enum Message<'a> {
     Step(StepMessage<'a>),
 }
 
+/// The road in the first message to a process.
 #[derive(Serialize)]
-struct RoadMessage {
+pub(crate) struct RoadMessage {
     lanes: u8,
     lane_width_m: f64,
     curvature_per_m: f64,
     speed_limit_mps: f64,
     overtaking_side: Side,
+}
+
+impl RoadMessage {
+    pub(crate) fn of(road: &Road) -> Self {
+        Self {
+            lanes: road.lanes(),
+            lane_width_m: road.lane_width_m(),
+            curvature_per_m: road.curvature_per_m(),
+            speed_limit_mps: road.speed_limit_mps(),
+            overtaking_side: road.overtaking_side(),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -105,13 +118,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Returns the first message.
 pub(super) fn hello(settings: &EgoSettings, road: &Road) -> Vec<u8> {
-    let road = RoadMessage {
-        lanes: road.lanes(),
-        lane_width_m: road.lane_width_m(),
-        curvature_per_m: road.curvature_per_m(),
-        speed_limit_mps: road.speed_limit_mps(),
-        overtaking_side: road.overtaking_side(),
-    };
+    let road = RoadMessage::of(road);
     to_line(&Message::Hello { protocol: PROTOCOL, control_step_s: CONTROL_STEP.s(), settings, road })
 }
 
