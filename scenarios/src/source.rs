@@ -164,7 +164,12 @@ fn of_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, Scena
     let scenario = library::named(word).and_then(|name| Some((name, library::text(name)?)));
     if scenario.is_none() && (is_name(path) || (path.extension().is_none() && library::has_folder(word))) {
         let name = word.rsplit('/').next().unwrap_or_default();
-        return Err(ScenarioError::Unknown { name: word.to_owned(), suggestion: library::suggestion(name) });
+        let suggestion = match library::named(name) {
+            // In another folder of the library.
+            Some(name) => format!("; did you mean `{name}`?"),
+            None => library::suggestion(name),
+        };
+        return Err(ScenarioError::Unknown { name: word.to_owned(), suggestion });
     }
     Ok(scenario)
 }
@@ -274,10 +279,10 @@ mod tests {
 
     #[test]
     fn a_check_of_a_scenario_without_requirements_says_that_there_are_none() {
-        let load = |setting: &str| load(Path::new("low-thw-overtake"), &[setting.parse().unwrap()]);
-        let error = load("requirements=[]").unwrap_err().to_string();
+        let checked = |setting: &str| load(Path::new("low-thw-overtake"), &[setting.parse().unwrap()]).unwrap().check();
+        let error = checked("requirements=[]").unwrap_err().to_string();
         assert!(error.contains("but one of the `requirements` (none is stated) is needed"), "{error}");
-        let error = load("requirements=[\"MIS-2\"]").unwrap_err().to_string();
+        let error = checked("requirements=[\"MIS-2\"]").unwrap_err().to_string();
         assert!(error.contains("but one of the `requirements` (MIS-2) is needed"), "{error}");
     }
 
