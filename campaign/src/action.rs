@@ -27,6 +27,9 @@ pub enum Action<'a> {
     },
     /// Resumes a campaign.
     Resume(Resume<'a>),
+    /// Resumes the campaign in this folder, which another user or another machine has written: with
+    /// a command line that the user knows.
+    ResumeForeign(&'a str),
     /// Opens the recordings of a campaign.
     View {
         /// The campaign's folder.

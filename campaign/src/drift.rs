@@ -16,10 +16,9 @@ use std::path::Path;
 use closecall_recorded::filters::smooth;
 use closecall_recorded::fit::{MIN_VALUES, Quantity, Samples, observe};
 use closecall_recorded::trajectory_data::TrajectoryData;
-use closecall_scenarios::ScenarioError;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
+use closecall_scenarios::{ScenarioError, source};
 use closecall_traffic::Stream;
-use closecall_traffic::input::read_text;
 use closecall_traffic::statistics::holm;
 use closecall_traffic::statistics::quantiles::quantile;
 use closecall_traffic::statistics::two_sample::{self, Summary};
@@ -89,14 +88,13 @@ impl FittedParameter {
 }
 
 impl Fitted {
-    /// Reads a file that `closecall traffic fit` wrote, or a scenario whose parameters come from
-    /// one.
+    /// Reads a file that `closecall traffic fit` wrote, or a scenario, by its file or by its name in
+    /// the library, whose parameters come from one.
     ///
     /// # Errors
     /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
-        let read = |source| ScenarioError::Read { path: path.to_owned(), source };
-        let text = read_text(path).map_err(read)?;
+        let text = source::text(path)?;
         Self::parse(&text).map_err(|message| ScenarioError::Syntax { path: path.to_owned(), line: 1, message })
     }
 

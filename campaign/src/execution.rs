@@ -55,7 +55,7 @@ pub struct ResumeReport {
     pub damaged: Vec<TornLine>,
     /// Number of samples that had ended in an error, and were run again.
     pub retried: u64,
-    /// Number of lines that repeated the line before them, and were removed.
+    /// Number of lines that repeated another line, and were removed.
     pub doubled: u64,
     /// Number of samples that were added to a scenario before the next one, because the campaign
     /// has grown.
@@ -76,7 +76,7 @@ impl ResumeReport {
             format!("the journal was torn at line {line} ({reason}): the samples from there on were run again")
         });
         let doubled = (self.doubled > 0)
-            .then(|| format!("{} lines of the journal that repeated the line before were removed", self.doubled));
+            .then(|| format!("{} lines of the journal that repeated another line were removed", self.doubled));
         let added = (self.added > 0).then(|| format!("{} samples were added to earlier scenarios", self.added));
         damaged.chain(retried).chain(doubled).chain(added).chain(torn).collect()
     }

@@ -38,7 +38,7 @@ pub use crate::folder_error::{FolderError, listed};
 /// The file of a campaign's folder that says how the campaign was made.
 pub const MANIFEST: &str = "manifest.json";
 pub(crate) const JOURNAL: &str = "journal.jsonl";
-const WALL_TIMES: &str = "wall-times.jsonl";
+pub(crate) const WALL_TIMES: &str = "wall-times.jsonl";
 
 /// The report for human readers, in a campaign's folder.
 pub const REPORT: &str = "report.html";
@@ -288,6 +288,23 @@ impl Folder {
     /// samples of the plan are missing.
     pub fn complete_records(&self) -> Result<Records, FolderError> {
         Ok(Records { must_be_complete: true, ..self.records()? })
+    }
+
+    /// Checks that each record of the journal belongs to the plan of the manifest. A folder without
+    /// a journal has no record that does not.
+    ///
+    /// # Errors
+    /// [`FolderError`] as an item of [`Self::records`].
+    pub fn check_journal(&self) -> Result<(), FolderError> {
+        if !self.has(JOURNAL)? {
+            return Ok(());
+        }
+        self.records()?.try_for_each(|record| record.map(drop))
+    }
+
+    /// Returns true if this program wrote the manifest for this user: see [`Self::remember`].
+    pub(crate) fn is_own(&self) -> Result<bool, FolderError> {
+        Ok(trust::is_own(&self.manifest_with_hash()?.1))
     }
 
     /// Returns the plan of the manifest, which the journal follows.

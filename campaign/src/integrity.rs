@@ -3,18 +3,26 @@
 //! | what is looked at | problem | repair |
 //! |---|---|---|
 //! | `manifest.json` | unreadable, another version, a changed scenario text | a copy of the folder |
+//! | `journal.jsonl`, `wall-times.jsonl`, `lock` | no file, such as a named pipe or a link | its removal, then `--resume` |
 //! | `journal.jsonl` | a damaged line, a line that is there twice, missing samples | `--resume` |
 //! | `journal.jsonl` | a record of another sample, another order | a new campaign |
 //! | files made from the journal | missing | `--resume` |
 //!
+//! The command that resumes a campaign stands in its manifest. It is shown only if the folder is the
+//! user's own (see the module `trust`): another author may have written any command there.
+//!
 //! The commands that read a folder make the same checks of its records: see
 //! [`Folder::records`](crate::folder::Folder::records).
+
+use std::path::Path;
 
 use serde::Serialize;
 
 use crate::action::{Action, CommandFor, Resume};
-use crate::folder::{DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST};
+use crate::folder::{DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST, WALL_TIMES};
 use crate::journal::{self, Entry};
+use crate::lock::LOCK;
+use crate::manifest::Manifest;
 
 /// Something that is wrong with a folder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -54,8 +62,16 @@ impl Integrity {
                 return integrity;
             }
         };
-        let resumed = Resume { command: &manifest.command, retries_errors: false, moved_to: None };
-        integrity.resumption = format!("resume the campaign: {}", command_for(&Action::Resume(resumed)));
+        integrity.resumption = resumption(folder, &manifest, command_for);
+        for name in [JOURNAL, WALL_TIMES, LOCK] {
+            if let Some(kind) = kind_of_no_file(&folder.file(name)) {
+                let repair = format!("remove it, then {}", integrity.resumption);
+                integrity.add(name, None, format!("it is {kind}, and no file"), repair);
+            }
+        }
+        if !integrity.is_sound() {
+            return integrity;
+        }
         if let Err(error) = integrity.read_journal(folder) {
             let repair = integrity.resumption.clone();
             integrity.add_error(JOURNAL, &error, &repair);
@@ -92,11 +108,13 @@ impl Integrity {
     fn read_journal(&mut self, folder: &Folder) -> Result<(), FolderError> {
         let path = folder.file(JOURNAL);
         let mut plan = folder.plan()?;
-        let entries = journal::read(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
+        let fail = |source| FolderError::Read { path: path.clone(), source };
+        let copies = journal::copies(&path, |record| plan.place(record)).map_err(fail)?;
+        let entries = journal::read(&path).map_err(fail)?;
         for (index, entry) in entries.enumerate() {
-            match entry.map_err(|source| FolderError::Read { path: path.clone(), source })? {
-                Entry::Record { record, .. } if plan.is_last(&record) => {
-                    self.add_resumable(JOURNAL, Some(index + 1), "it repeats the line before".to_owned());
+            match entry.map_err(fail)? {
+                Entry::Record { .. } if copies.contains(&(index + 1)) => {
+                    self.add_resumable(JOURNAL, Some(index + 1), "it repeats another line".to_owned());
                 }
                 Entry::Record { record, .. } => match plan.check(&record) {
                     Ok(()) => self.records += 1,
@@ -119,5 +137,31 @@ impl Integrity {
             self.add_resumable(JOURNAL, None, format!("it has {} of the {planned} samples", self.records));
         }
         Ok(())
+    }
+}
+
+/// Returns the words that say how the campaign is resumed in this folder, which may have been moved.
+fn resumption(folder: &Folder, manifest: &Manifest, command_for: CommandFor) -> String {
+    let path = folder.path().display().to_string();
+    if folder.is_own().is_ok_and(|is_own| is_own) {
+        let resumed = Resume { command: &manifest.command, retries_errors: false, moved_to: Some(&path) };
+        return format!("resume the campaign: {}", command_for(&Action::Resume(resumed)));
+    }
+    format!(
+        "resume the campaign with your own command line, if you trust the folder: {}; another user or another machine has \
+         written the folder, so the `command` of its {MANIFEST} is not repeated here",
+        command_for(&Action::ResumeForeign(&path))
+    )
+}
+
+/// Returns what is at the path of a file that the campaign writes, if it is no file. Nothing may be
+/// there.
+fn kind_of_no_file(path: &Path) -> Option<&'static str> {
+    let kind = path.symlink_metadata().ok()?.file_type();
+    match () {
+        () if kind.is_file() => None,
+        () if kind.is_symlink() => Some("a symbolic link"),
+        () if kind.is_dir() => Some("a folder"),
+        () => Some("a named pipe, a socket or a device"),
     }
 }

@@ -12,6 +12,7 @@
 //! incomplete or damaged line. The samples of such lines run again, and the same samples give the
 //! same lines.
 
+use std::collections::{HashMap, HashSet};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -166,6 +167,49 @@ impl Entries {
     }
 }
 
+/// Returns the lines of a journal that are copies of others, counted from 1. Of a line that is there
+/// more than once, the copy in the order of the plan stays. `order` returns the place of a record in
+/// the plan, `None` for a record of another campaign.
+///
+/// # Errors
+/// The error of the operating system if the file cannot be read.
+pub(crate) fn copies<K: Ord + Copy>(path: &Path, order: impl Fn(&Record) -> Option<K>) -> io::Result<HashSet<usize>> {
+    let open = || Ok::<_, io::Error>(BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?));
+    let (mut counts, mut line) = (HashMap::<[u8; CHECKSUM_DIGITS], u32>::new(), Vec::new());
+    let mut reader = open()?;
+    while read_line(&mut reader, &mut line)? > 0 {
+        if let Some(sum) = line.first_chunk() {
+            *counts.entry(*sum).or_default() += 1;
+        }
+    }
+    let mut copies = HashSet::new();
+    if counts.values().all(|count| *count == 1) {
+        return Ok(copies);
+    }
+    // The number, the checksum and the place of each intact line.
+    let (mut lines, mut reader) = (Vec::new(), open()?);
+    for number in 1.. {
+        if read_line(&mut reader, &mut line)? == 0 {
+            break;
+        }
+        if let (Some(sum), Ok(record)) = (line.first_chunk::<CHECKSUM_DIGITS>().copied(), parse::<Record>(&line))
+            && let Some(place) = order(&record)
+        {
+            lines.push((number, sum, place));
+        }
+    }
+    let groups: Vec<_> = lines.chunk_by(|one, next| one.1 == next.1).collect();
+    let mut kept = HashSet::new();
+    for (index, group) in groups.iter().enumerate() {
+        let (_, sum, place) = group[0];
+        let is_single = counts.get(&sum) == Some(&1);
+        let is_in_order = groups.get(index + 1).is_none_or(|next| next[0].2 > place);
+        let stays = is_single || (is_in_order && kept.insert(sum));
+        copies.extend(group.iter().skip(usize::from(stays)).map(|(number, ..)| *number));
+    }
+    Ok(copies)
+}
+
 /// Reads a line. Of a line that is too long, as a damaged disk leaves it, no more than
 /// [`MOST_LINE_BYTES`] are kept, without its end. Returns its length (bytes), 0 at the end of the
 /// file.
@@ -238,6 +282,30 @@ mod tests {
             let mut journal = Journal::open(&path, kept).unwrap();
             (complete as u64..3).for_each(|sample| journal.append(&record(sample)).unwrap());
             assert!(std::fs::read(&path).unwrap() == whole, "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn of_a_line_that_is_there_more_than_once_the_copy_in_order_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("journal");
+        let copies_of = |samples: &[u64]| {
+            let lines: Vec<u8> = samples.iter().flat_map(|&sample| line(&record(sample)).unwrap()).collect();
+            std::fs::write(&path, lines).unwrap();
+            let mut numbers: Vec<usize> = copies(&path, |record| Some(record.sample)).unwrap().into_iter().collect();
+            numbers.sort_unstable();
+            numbers
+        };
+        assert_eq!(copies_of(&[0, 1, 2]), [0_usize; 0]);
+        // Another sample in the wrong place is no copy.
+        assert_eq!(copies_of(&[0, 2, 1]), [0_usize; 0]);
+        for (samples, expected) in [
+            (&[0, 1, 1, 1, 2][..], &[3, 4][..]),
+            (&[0, 1, 2, 3, 1], &[5]),
+            (&[0, 3, 3, 1, 2, 3], &[2, 3]),
+            (&[0, 1, 2, 0, 1, 2], &[3, 4, 5]),
+        ] {
+            assert_eq!(copies_of(samples), expected, "{samples:?}");
         }
     }
 

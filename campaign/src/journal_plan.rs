@@ -88,8 +88,15 @@ impl JournalPlan {
     }
 
     /// Returns true if a record is of the same sample as the last one.
-    pub(crate) fn is_last(&self, record: &Record) -> bool {
+    fn is_last(&self, record: &Record) -> bool {
         self.last.as_ref().is_some_and(|(scenario, sample)| (scenario, *sample) == (&record.scenario, record.sample))
+    }
+
+    /// Returns the place of a record in the plan: the index of its scenario, and its number. `None`
+    /// for a scenario that the plan does not have.
+    pub(crate) fn place(&self, record: &Record) -> Option<(usize, u64)> {
+        let work = self.files.iter().position(|file| file.config().name == record.scenario)?;
+        Some((work, record.sample))
     }
 
     /// Returns the next sample of the plan.

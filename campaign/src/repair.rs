@@ -30,7 +30,7 @@ pub(super) struct Repair {
     pub(super) damaged: Vec<TornLine>,
     /// Number of samples that had ended in an error, and were run again.
     pub(super) retried: u64,
-    /// Number of lines that repeated the line before them, and were removed.
+    /// Number of lines that repeated another line, and were removed.
     pub(super) doubled: u64,
     /// Number of samples that were added to a scenario before the next one.
     pub(super) added: u64,
@@ -90,19 +90,22 @@ pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repai
 /// Returns the parts of the journal that are to be replaced, in their order. Damaged lines behind
 /// the last intact one are left out: they are cut off when the journal is opened.
 fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
+    let copies = journal::copies(path, |record| key_of(campaign, record))?;
     let mut reader = BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?);
-    let (mut redos, mut damaged, mut buffer, mut before) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut redos, mut damaged, mut buffer) = (Vec::new(), Vec::new(), Vec::new());
     let (mut last, mut end, mut damaged_from) = (None, 0, 0);
     for number in 1.. {
-        std::mem::swap(&mut buffer, &mut before);
         let read = journal::read_line(&mut reader, &mut buffer)?;
         if read == 0 {
             break;
         }
         let start = end;
         end += read;
-        if damaged.is_empty() && buffer == before {
-            redos.push(Redo { bytes: start..end, samples: Vec::new(), damaged: Vec::new() });
+        if copies.contains(&number) {
+            // Between damaged lines, a copy is replaced with them.
+            if damaged.is_empty() {
+                redos.push(Redo { bytes: start..end, samples: Vec::new(), damaged: Vec::new() });
+            }
             continue;
         }
         let record = match journal::parse(&buffer) {

@@ -26,6 +26,38 @@ fn parameters(calibration: &Calibration) -> impl Iterator<Item = (&'static Param
     specs.zip(&calibration.pooled).map(|((index, spec), pooled)| (spec, *pooled, quantiles_of(calibration, index)))
 }
 
+/// Distance from an end of the searched range from which on a value lies in it, as a share of the range
+/// (-): numerical.
+const AT_LIMIT: f64 = 1e-3;
+
+/// Returns the ends of the searched range of a parameter at which the pooled value or values of single
+/// pairs lie, in words; nothing if there are none. The best value may lie beyond such an end.
+fn at_limits(calibration: &Calibration, index: usize) -> Option<String> {
+    let spec = calibration.model.parameters().get(index)?;
+    let near = AT_LIMIT * (spec.max - spec.min);
+    let all = calibration.pairs.len();
+    let end = |(name, limit): (&str, f64)| {
+        let is_at = |values: &[f64]| values.get(index).is_some_and(|value| (value - limit).abs() <= near);
+        let pooled = is_at(&calibration.pooled).then(|| "pooled".to_owned());
+        let single = calibration.pairs.iter().filter(|pair| is_at(&pair.values)).count();
+        let single = (single > 0).then(|| format!("{single} of {all} pairs"));
+        let who: Vec<String> = pooled.into_iter().chain(single).collect();
+        (!who.is_empty()).then(|| format!("{name} limit {limit}: {}", who.join(", ")))
+    };
+    let ends: Vec<String> = [("lower", spec.min), ("upper", spec.max)].into_iter().filter_map(end).collect();
+    (!ends.is_empty()).then(|| format!("at the {}", ends.join("; at the ")))
+}
+
+/// Returns the end of the searched range at which the pooled value lies, as the end of a sentence.
+fn pooled_limit(spec: &ParameterSpec, pooled: f64) -> String {
+    let near = AT_LIMIT * (spec.max - spec.min);
+    let ends = [("lower", spec.min), ("upper", spec.max)];
+    let end = ends.into_iter().find(|(_, limit)| (pooled - limit).abs() <= near);
+    end.map_or_else(String::new, |(name, limit)| {
+        format!("; the value is the {name} limit of the search, {limit}, and the best one may lie beyond")
+    })
+}
+
 /// Returns why no pair is left to calibrate.
 pub fn no_pair(data: &FollowingData) -> String {
     let reasons = data.left_out.iter().take(3).map(|pair| format!("{}: {}", pair.name, pair.reason));
@@ -51,9 +83,12 @@ pub fn text(calibration: &Calibration, data: &FollowingData) -> String {
         text.push_str(&format!("  left out: {}: {}\n", left_out.name, left_out.reason));
     }
     text.push_str(&format!("{:<26} {:>8}   {}\n", "parameter", "pooled", "single pairs: 5, 25, 50, 75, 95 %"));
-    for (spec, pooled, quantiles) in parameters(calibration) {
+    for (index, (spec, pooled, quantiles)) in parameters(calibration).enumerate() {
         let quantiles: Vec<String> = quantiles.iter().map(|value| format!("{value:>8.3}")).collect();
         text.push_str(&format!("{:<26} {pooled:>8.3}   {}\n", spec.key, quantiles.join(" ")));
+        if let Some(limits) = at_limits(calibration, index) {
+            text.push_str(&format!("  {limits}; the best value may lie beyond\n"));
+        }
     }
     text.push_str("spacing error                  pairs   RMSE (m)   relative\n");
     let mut line = |name: &str, errors: Errors| {
@@ -158,13 +193,14 @@ pub fn member(calibration: &Calibration, data: &FollowingData, command: &str) ->
         text.push_str(&format!(
             "\n[[set]]\nkey = \"{}\"\nvalue = {pooled:.4}\nsource = {}\n",
             spec.key,
-            quoted(&source)
+            quoted(&format!("{source}{}", pooled_limit(spec, pooled)))
         ));
     }
     text.push_str("\n[calibration] # figures for the reader: 5, 25, 50, 75, 95 % over the single pairs\n");
-    for (spec, pooled, quantiles) in parameters(calibration) {
+    for (index, (spec, pooled, quantiles)) in parameters(calibration).enumerate() {
         let quantiles = quantiles.map(|value| format!("{value:.3}")).join(", ");
-        text.push_str(&format!("{} = {{ pooled = {pooled:.4}, quantiles = [{quantiles}] }}\n", spec.key));
+        let limits = at_limits(calibration, index).map_or_else(String::new, |limits| format!(" # {limits}"));
+        text.push_str(&format!("{} = {{ pooled = {pooled:.4}, quantiles = [{quantiles}] }}{limits}\n", spec.key));
     }
     text
 }
@@ -198,5 +234,37 @@ mod tests {
         assert_eq!(sets, ["follow = idm", "acceleration-mps2 = 1.1", "comfortable-braking-mps2 = 1.8"]);
         assert!(text(&calibration, &data).contains("pooled set, held-out pairs         2      3.250       15 %"));
         assert_eq!(json(&calibration, &data)["errors"]["pooled_held_out_pairs"]["rmse_m"], 3.25);
+        assert!(!text(&calibration, &data).contains("limit"));
+    }
+
+    #[test]
+    fn a_value_at_an_end_of_the_search_is_marked_in_the_text_and_in_the_member() {
+        let errors = Errors { pairs: 1, rmse_m: 2.5, relative: 0.15 };
+        let pair = |acceleration_mps2| {
+            let values = vec![30.0, 1.25, 2.0, acceleration_mps2, 1.8];
+            PairResult { name: "a".to_owned(), values, rmse_m: 2.5 }
+        };
+        let calibration = Calibration {
+            model: FollowingModel::Idm,
+            pairs: vec![pair(5.9999), pair(1.2), pair(6.0)],
+            held_out: Vec::new(),
+            pooled: vec![30.0, 1.25, 0.1, 6.0, 1.8],
+            errors_of_single: errors,
+            errors_of_pooled: errors,
+            errors_of_held_out: None,
+            predictive: None,
+        };
+        let data = FollowingData::default();
+        let shown = text(&calibration, &data);
+        assert!(shown.contains("  at the lower limit 0.1: pooled; the best value may lie beyond\n"), "{shown}");
+        assert!(
+            shown.contains("  at the upper limit 6: pooled, 2 of 3 pairs; the best value may lie beyond\n"),
+            "{shown}"
+        );
+        let member = member(&calibration, &data, "closecall");
+        assert!(member.contains("the value is the upper limit of the search, 6,"), "{member}");
+        assert!(member.contains("# at the lower limit 0.1: pooled\n"), "{member}");
+        assert_eq!(member.matches("limit of the search").count(), 1, "{member}");
+        Member::parse("m.toml".as_ref(), &member).unwrap();
     }
 }

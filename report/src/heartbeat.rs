@@ -18,11 +18,20 @@ impl Heartbeat {
     /// Starts to `print` lines. `progress` returns the number of finished samples, and the number
     /// of all samples.
     pub fn start(progress: impl Fn() -> [u64; 2] + Send + 'static, print: impl Fn(&str) + Send + 'static) -> Self {
-        Self::every(INTERVAL, progress, print)
+        Self::every((INTERVAL, "samples"), progress, print)
+    }
+
+    /// Starts to `print` lines about something else than samples, such as `fits`.
+    pub fn of(
+        unit: &'static str,
+        progress: impl Fn() -> [u64; 2] + Send + 'static,
+        print: impl Fn(&str) + Send + 'static,
+    ) -> Self {
+        Self::every((INTERVAL, unit), progress, print)
     }
 
     fn every(
-        interval: Duration,
+        (interval, unit): (Duration, &'static str),
         progress: impl Fn() -> [u64; 2] + Send + 'static,
         print: impl Fn(&str) + Send + 'static,
     ) -> Self {
@@ -31,7 +40,7 @@ impl Heartbeat {
         let thread = std::thread::spawn(move || {
             while receiver.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
                 let [done, all] = progress();
-                print(&line(done, all, started.elapsed()));
+                print(&line([done, all], unit, started.elapsed()));
             }
         });
         Self { running: Some((sender, thread)) }
@@ -66,17 +75,17 @@ pub fn duration_text(seconds: f64) -> String {
     unit.map_or_else(|| format!("{seconds:.0} s"), |(unit_s, name)| format!("{:.0} {name}", seconds / unit_s))
 }
 
-fn line(done: u64, all: u64, elapsed: Duration) -> String {
+fn line([done, all]: [u64; 2], unit: &str, elapsed: Duration) -> String {
     let elapsed_s = elapsed.as_secs_f64();
     let per_second = done as f64 / elapsed_s;
     let left = match done {
         0 => String::new(),
         _ => {
             let left_s = (all.saturating_sub(done)) as f64 / per_second;
-            format!(", {} samples/s, {} left", rate_text(per_second), duration_text(left_s))
+            format!(", {} {unit}/s, {} left", rate_text(per_second), duration_text(left_s))
         }
     };
-    format!("{done} of {all} samples after {}{left}", duration_text(elapsed_s))
+    format!("{done} of {all} {unit} after {}{left}", duration_text(elapsed_s))
 }
 
 #[cfg(test)]
@@ -87,8 +96,12 @@ mod tests {
 
     #[test]
     fn a_line_states_the_progress() {
-        assert_eq!(line(50, 200, Duration::from_secs(10)), "50 of 200 samples after 10 s, 5.0 samples/s, 30 s left");
-        assert_eq!(line(0, 200, Duration::from_secs(30)), "0 of 200 samples after 30 s");
+        assert_eq!(
+            line([50, 200], "samples", Duration::from_secs(10)),
+            "50 of 200 samples after 10 s, 5.0 samples/s, 30 s left"
+        );
+        assert_eq!(line([0, 200], "samples", Duration::from_secs(30)), "0 of 200 samples after 30 s");
+        assert_eq!(line([3, 6], "fits", Duration::from_secs(3)), "3 of 6 fits after 3 s, 1.0 fits/s, 3 s left");
     }
 
     #[test]
@@ -105,7 +118,7 @@ mod tests {
         ] {
             assert_eq!(duration_text(seconds), text);
         }
-        let of_many = line(10, 1_000_000_000_000, Duration::from_secs(10));
+        let of_many = line([10, 1_000_000_000_000], "samples", Duration::from_secs(10));
         assert!(of_many.ends_with("1.0 samples/s, more than a year left"), "{of_many}");
     }
 
@@ -113,7 +126,7 @@ mod tests {
     fn lines_come_until_the_heartbeat_ends() {
         let (sender, lines) = channel();
         let print = move |line: &str| drop(sender.send(line.to_owned()));
-        let heartbeat = Heartbeat::every(Duration::from_millis(1), || [0, 5], print);
+        let heartbeat = Heartbeat::every((Duration::from_millis(1), "samples"), || [0, 5], print);
         assert!(lines.recv().unwrap().starts_with("0 of 5 samples"));
         drop(heartbeat);
         while lines.try_recv().is_ok() {}

@@ -176,7 +176,9 @@ impl ScenarioConfig {
     fn check_criteria(&self) -> Result<(), ConfigError> {
         for mark in self.checks.keys() {
             if !self.requirements.contains(mark) {
-                let allowed = format!("one of the `requirements`: {}", self.requirements.join(", "));
+                let stated = self.requirements.join(", ");
+                let stated = if stated.is_empty() { "none is stated" } else { stated.as_str() };
+                let allowed = format!("the `requirements` ({stated})");
                 let problem = Problem::UnknownWord { value: mark.clone(), allowed };
                 return Err(ConfigError::new(mark, problem).within("checks"));
             }

@@ -235,8 +235,36 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     plain_names().chain(FAULTS.into_iter().map(|(name, _)| name))
 }
 
+/// Returns the scenarios in a folder of `scenarios/library`.
+fn in_folder(folder: &str) -> &'static [(&'static str, &'static str)] {
+    match folder {
+        "traffic" => &TRAFFIC,
+        "as-recorded" => &AS_RECORDED,
+        "aeb" => &AEB,
+        "acc" => &ACC,
+        "anchor" => &ANCHOR,
+        "faults" => &FAULTS,
+        _ => &[],
+    }
+}
+
+/// Returns the name of the scenario that a word names: by its name, or by its folder and its name, as
+/// `traffic/busy-overtake`.
+pub fn named(word: &str) -> Option<&'static str> {
+    match word.split_once('/') {
+        Some((folder, name)) => in_folder(folder).iter().map(|(scenario, _)| *scenario).find(|other| *other == name),
+        None => names().find(|name| *name == word),
+    }
+}
+
+/// Returns true if a word begins with a folder of the library, as `traffic/busy-overtake`.
+pub(crate) fn has_folder(word: &str) -> bool {
+    word.split_once('/').is_some_and(|(folder, _)| !in_folder(folder).is_empty())
+}
+
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
+    let name = named(name)?;
     // Without the scenarios with faults, which are put together from their bases, if possible.
     plain_text(name).or_else(|| all().find(|(scenario, _)| *scenario == name).map(|(_, text)| text))
 }
@@ -260,7 +288,8 @@ pub fn entries() -> Result<Vec<LibraryEntry>, ScenarioError> {
 /// # Errors
 /// [`UnknownScenario`] if the library has no scenario `from`.
 pub fn copy_of(from: &str, name: &str) -> Result<String, UnknownScenario> {
-    let text = text(from)
+    let (from, text) = named(from)
+        .and_then(|named| Some((named, text(named)?)))
         .ok_or_else(|| UnknownScenario { name: from.to_owned(), names: names().collect::<Vec<_>>().join(", ") })?;
     Ok(text.replace(&format!("name = \"{from}\""), &format!("name = \"{name}\"")))
 }

@@ -5,8 +5,14 @@
 //! |---|---|
 //! | `-` | the text of standard input |
 //! | `FILE` | that file |
-//! | `FOLDER` | each `*.toml` directly in it except `closecall.toml`, in alphabetical order, then each scenario of its folders |
+//! | `FOLDER` | each scenario directly in it, in alphabetical order, then each scenario of its folders |
 //! | `NAME` | `NAME.toml`, else `scenarios/NAME.toml`, else the scenario of the library with that name |
+//! | `FOLDER/NAME` | the same scenario of the library by its folder there, as `traffic/busy-overtake` |
+
+//!
+//! A folder may have TOML files of other kinds. `closecall.toml`, and a file with none of the keys `road`,
+//! `actor` and `base`, are no scenarios: they are skipped, and [`skipped`] names the latter. A file that
+//! is no valid TOML, or is empty, may be a scenario with a mistake.
 
 use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -23,7 +29,7 @@ pub const SCENARIOS: &str = "scenarios";
 /// scenario.
 pub const PROJECT_FILE: &str = "closecall.toml";
 /// The keys that identify a scenario: it has at least one of them.
-const KEYS_OF_SCENARIO: [&str; 3] = ["road", "actor", "base"];
+pub const KEYS_OF_SCENARIO: [&str; 3] = ["road", "actor", "base"];
 /// Largest length of a scenario on standard input (bytes).
 const MAX_LENGTH: u64 = 16 * 1024 * 1024;
 
@@ -67,13 +73,25 @@ pub fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, SourceError> {
 }
 
 fn scenario_files(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
-    let mut files = toml_files(folder)?;
-    let mut below = Vec::new();
-    append_below(folder, &mut below)?;
-    files.extend(below.into_iter().filter(|path| may_be_scenario(path)));
+    let mut files = all_toml_files(folder)?;
+    files.retain(|path| may_be_scenario(path));
     if files.is_empty() {
         return Err(SourceError::NoScenario { folder: folder.to_owned() });
     }
+    Ok(files)
+}
+
+/// Returns the TOML files that [`expand`] leaves out because they are no scenarios.
+pub fn skipped(paths: &[PathBuf]) -> Vec<PathBuf> {
+    let folders = paths.iter().filter(|path| path.is_dir());
+    let files = folders.flat_map(|folder| all_toml_files(folder).unwrap_or_default());
+    files.filter(|path| !may_be_scenario(path)).collect()
+}
+
+/// Returns the TOML files in a folder, then those of its folders.
+fn all_toml_files(folder: &Path) -> Result<Vec<PathBuf>, ScenarioError> {
+    let mut files = toml_files(folder)?;
+    append_below(folder, &mut files)?;
     Ok(files)
 }
 
@@ -108,11 +126,12 @@ fn append_below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ScenarioE
     Ok(())
 }
 
-/// Returns false for a TOML file without any key of a scenario, such as the drivers of an ensemble
-/// or a fleet, which may lie below a folder of scenarios. A file that cannot be read as TOML may be
-/// a scenario with a mistake, and is not passed over.
+/// Returns false for a TOML file without any key of a scenario, such as the drivers of an ensemble, a
+/// fleet or a `Cargo.toml`. A file that is empty, or cannot be read as TOML, may be a scenario with a
+/// mistake, and is not passed over.
 fn may_be_scenario(path: &Path) -> bool {
-    let document = read_text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    let text = read_text(path).ok().filter(|text| !text.trim().is_empty());
+    let document = text.and_then(|text| text.parse::<toml::Table>().ok());
     document.is_none_or(|document| KEYS_OF_SCENARIO.iter().any(|key| document.contains_key(*key)))
 }
 
@@ -132,14 +151,41 @@ fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError
     if let Some(file) = existing(path) {
         return ScenarioFile::load(&file, settings);
     }
-    let name = path.to_str().unwrap_or_default();
-    if let Some(text) = library::text(name) {
-        return ScenarioFile::parse(&library::path(name), text, settings);
+    match of_library(path)? {
+        Some((name, text)) => ScenarioFile::parse(&library::path(name), text, settings),
+        None => ScenarioFile::load(path, settings),
     }
-    if is_name(path) {
-        return Err(ScenarioError::Unknown { name: name.to_owned(), suggestion: library::suggestion(name) });
+}
+
+/// Returns the name and the text of the scenario of the library that an argument names; `None` for the
+/// path of a file.
+fn of_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, ScenarioError> {
+    let word = path.to_str().unwrap_or_default();
+    let scenario = library::named(word).and_then(|name| Some((name, library::text(name)?)));
+    if scenario.is_none() && (is_name(path) || (path.extension().is_none() && library::has_folder(word))) {
+        let name = word.rsplit('/').next().unwrap_or_default();
+        let suggestion = match library::named(name) {
+            // In another folder of the library.
+            Some(name) => format!("; did you mean `{name}`?"),
+            None => library::suggestion(name),
+        };
+        return Err(ScenarioError::Unknown { name: word.to_owned(), suggestion });
     }
-    ScenarioFile::load(path, settings)
+    Ok(scenario)
+}
+
+/// Returns the text of the file that an argument names, or of the scenario of the library.
+///
+/// # Errors
+/// [`ScenarioError`] if there is neither, or the file cannot be read as text.
+pub fn text(path: &Path) -> Result<String, ScenarioError> {
+    if existing(path).is_none()
+        && let Some((_, text)) = of_library(path)?
+    {
+        return Ok(text.to_owned());
+    }
+    let file = existing(path).unwrap_or_else(|| path.to_owned());
+    read_text(&file).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })
 }
 
 /// Returns true for a name without folder and extension, which may name a scenario of the library.
@@ -213,6 +259,7 @@ mod tests {
             std::fs::write(path, text).unwrap();
         };
         write("z.toml", "");
+        write("Cargo.toml", "[package]\nname = 'a'\n");
         write("traffic/busy.toml", "road = {}\n");
         write("traffic/closecall.toml", "[gate]\n");
         write("traffic/deep/derived.toml", "base = 'a'\n");
@@ -222,6 +269,21 @@ mod tests {
         let paths = expand(&[folder.path().to_owned()]).unwrap();
         let expected = ["z.toml", "faults/broken.toml", "traffic/busy.toml", "traffic/deep/derived.toml"];
         assert_eq!(paths, expected.map(|path| folder.path().join(path)));
+        // What is skipped is named, except project files.
+        let left_out = ["Cargo.toml", "fleets/cars.toml"].map(|path| folder.path().join(path));
+        assert_eq!(skipped(&[folder.path().to_owned()]), left_out);
+        // A file that is named is not skipped.
+        assert_eq!(expand(&[left_out[0].clone()]).unwrap(), [left_out[0].clone()]);
+        assert!(skipped(&left_out).is_empty());
+    }
+
+    #[test]
+    fn a_check_of_a_scenario_without_requirements_says_that_there_are_none() {
+        let checked = |setting: &str| load(Path::new("low-thw-overtake"), &[setting.parse().unwrap()]).unwrap().check();
+        let error = checked("requirements=[]").unwrap_err().to_string();
+        assert!(error.contains("but one of the `requirements` (none is stated) is needed"), "{error}");
+        let error = checked("requirements=[\"MIS-2\"]").unwrap_err().to_string();
+        assert!(error.contains("but one of the `requirements` (MIS-2) is needed"), "{error}");
     }
 
     #[test]
@@ -241,5 +303,16 @@ mod tests {
         let error = load(Path::new("paper-figur"), &[]).unwrap_err().to_string();
         assert!(error.contains("did you mean `paper-figure`?"), "{error}");
         assert!(!load(Path::new("zzz.toml"), &[]).unwrap_err().to_string().contains("did you mean"));
+        // By its folder in the library, and only by that one.
+        assert_eq!(load(Path::new("traffic/busy-overtake"), &[]).unwrap().config().name, "busy-overtake");
+        assert_eq!(load(Path::new("faults/camera-dead"), &[]).unwrap().config().name, "camera-dead");
+        for word in ["acc/busy-overtake", "traffic/busy-overtak"] {
+            let error = load(Path::new(word), &[]).unwrap_err();
+            assert!(matches!(error, ScenarioError::Unknown { .. }), "{word}: {error}");
+            assert!(error.to_string().contains("did you mean `busy-overtake`?"), "{error}");
+        }
+        assert!(matches!(load(Path::new("some/busy-overtake"), &[]).unwrap_err(), ScenarioError::Read { .. }));
+        assert!(text(Path::new("low-thw-overtake")).unwrap().contains("schema-version"));
+        assert!(text(Path::new("no-such-name")).is_err());
     }
 }

@@ -23,7 +23,7 @@ mod optimise;
 mod predictive;
 mod replaced;
 
-pub use calibrate::{Calibration, Errors, PairResult, calibrate};
+pub use calibrate::{Calibration, Errors, PairResult, calibrate, calibrate_watched};
 pub use follower::{FollowingModel, ParameterSpec};
 pub use predictive::Predictive;
 pub use replaced::{Calibrated, ahead_of, calibrate_replaced, value_of};

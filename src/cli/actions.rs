@@ -18,6 +18,7 @@ pub(super) fn command_for(action: &Action<'_>) -> String {
             format!("closecall run {}{}", quoted(file), option("--controller", controller))
         }
         Action::Resume(resume) => resume_command(resume),
+        Action::ResumeForeign(folder) => format!("closecall campaign SCENARIO … --out {} --resume", quoted(folder)),
         Action::View { folder, is_in_browser: false } => format!("closecall view --recordings {}", quoted(folder)),
         Action::View { folder, is_in_browser: true } => format!("closecall view --recordings --web {}", quoted(folder)),
     }
@@ -44,24 +45,53 @@ fn replay_command(replay: &Replay<'_>) -> String {
 }
 
 /// Returns the command that resumes a campaign: the command that started it, without the options
-/// that would end it at the same sample again.
+/// that would end it at the same sample again, and with the folder in which its results are.
 fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> String {
     if let [call] = command {
-        return resume_call(call, retries_errors);
+        return resume_call(call, retries_errors, moved_to);
     }
-    let is_kept = |word: &&String| !matches!(word.as_str(), "--fail-fast" | "--resume");
-    let words = command.iter().filter(is_kept).map(String::as_str);
-    let folder = moved_to.iter().flat_map(|folder| ["--out", folder]);
+    let is_kept = |word: &&str| !matches!(*word, "--fail-fast" | "--resume");
+    let words: Vec<&str> = command.iter().map(String::as_str).filter(is_kept).collect();
+    let (words, is_named) = moved_to.map_or((words.clone(), false), |folder| with_folder(&words, folder));
+    let folder = moved_to.iter().filter(|_| !is_named).flat_map(|folder| ["--out", folder]);
     let is_retried = retries_errors && !command.iter().any(|word| word == "--retry-errors");
     let resumed = std::iter::once("--resume").chain(is_retried.then_some("--retry-errors"));
-    words.chain(folder).chain(resumed).map(quoted).collect::<Vec<_>>().join(" ")
+    words.into_iter().chain(folder).chain(resumed).map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the words of a command with another folder for its results, and whether it names one.
+fn with_folder<'a>(words: &[&'a str], folder: &'a str) -> (Vec<&'a str>, bool) {
+    const OPTIONS: [&str; 3] = ["--out", "--output", "-o"];
+    let (mut replaced, mut is_value, mut is_named) = (Vec::new(), false, false);
+    for &word in words {
+        let is_joined = word.split_once('=').is_some_and(|(option, _)| OPTIONS.contains(&option))
+            || (word.starts_with("-o") && word.len() > 2);
+        match (is_value, is_joined) {
+            (true, _) => replaced.push(folder),
+            (false, true) => replaced.extend(["--out", folder]),
+            (false, false) => replaced.push(word),
+        }
+        is_named |= is_value || is_joined;
+        is_value = !is_value && OPTIONS.contains(&word);
+    }
+    (replaced, is_named)
 }
 
 /// Returns the call that resumes a campaign: the call of another program that started it, likewise.
-fn resume_call(call: &str, retries_errors: bool) -> String {
+fn resume_call(call: &str, retries_errors: bool, moved_to: Option<&str>) -> String {
     let call = [", fail_fast=True", ", resume=True", ", retry_errors=True"]
         .iter()
         .fold(call.to_owned(), |call, word| call.replace(word, ""));
+    let call = moved_to.map_or_else(
+        || call.clone(),
+        |folder| {
+            let named = call.split_once("out='").and_then(|(before, rest)| Some((before, rest.split_once('\'')?.1)));
+            match named {
+                Some((before, after)) => format!("{before}out='{folder}'{after}"),
+                None => format!("{}, out='{folder}')", call.trim_end_matches(')')),
+            }
+        },
+    );
     let retried = if retries_errors { ", retry_errors=True" } else { "" };
     format!("{}, resume=True{retried})", call.trim_end_matches(')'))
 }
@@ -82,6 +112,11 @@ mod tests {
         );
         assert_eq!(resumed("c campaign --resume --out x", true, None), "c campaign --out x --resume --retry-errors");
         assert_eq!(resumed("c campaign x --resume", false, Some("a b")), "c campaign x --out 'a b' --resume");
+        // A folder that was copied or moved is not the one that the command names.
+        for named in ["-o r/old", "--out r/old", "--out=r/old", "-or/old", "--output r/old"] {
+            let command = resumed(&format!("c campaign x {named} -n 4"), false, Some("r/new"));
+            assert!(command.contains(" r/new -n 4 --resume") && !command.contains("r/old"), "{command}");
+        }
     }
 
     #[test]
@@ -91,6 +126,8 @@ mod tests {
             |retries_errors| command_for(&Action::Resume(Resume { command: &call, retries_errors, moved_to: None }));
         assert_eq!(resumed(false), "closecall.campaign(['x'], out='y', resume=True)");
         assert_eq!(resumed(true), "closecall.campaign(['x'], out='y', resume=True, retry_errors=True)");
+        let moved = Resume { command: &call, retries_errors: false, moved_to: Some("z") };
+        assert_eq!(command_for(&Action::Resume(moved)), "closecall.campaign(['x'], out='z', resume=True)");
     }
 
     #[test]

@@ -272,7 +272,8 @@ impl FittedArgs {
     /// it.
     pub(super) fn load(&self, path: &Path, set: &SetArgs) -> Result<ScenarioFile, ScenarioError> {
         let Some(fitted) = &self.fitted else { return set.load(path) };
-        let settings = FittedFile::read(fitted)?.settings(&source::load(path, &[])?)?;
+        let (settings, notes) = FittedFile::read(fitted)?.settings(&source::load(path, &[])?)?;
+        notes.iter().for_each(|note| print_error(format_args!("note: {note}\n")));
         let replaced = SetArgs { settings: [settings, set.settings.clone()].concat() }.load(path);
         if replaced.is_err() && set.load(path).is_ok() {
             print_error(format_args!(

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use closecall_recorded::following::read;
 use closecall_report::{calibration, json::stamped};
-use closecall_simulation::calibration::{FollowingModel, calibrate as fit};
+use closecall_simulation::calibration::{FollowingModel, calibrate_watched};
 use closecall_traffic::atomic::write_file;
 
 use super::help::{examples, heading};
 use super::output::{out, outln};
+use super::progress::watched;
 use super::protect::protect;
 use super::{CliError, args::Format};
 use crate::exit_code::ExitCode;
@@ -51,7 +52,8 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
         Model::Idm => FollowingModel::Idm,
         Model::Wiedemann99 => FollowingModel::Wiedemann99,
     };
-    let result = fit(model, &data).ok_or_else(|| CliError::Usage { message: calibration::no_pair(&data) })?;
+    let result = watched("fits", |on_progress| calibrate_watched(model, &data, on_progress))
+        .ok_or_else(|| CliError::Usage { message: calibration::no_pair(&data) })?;
     if let Some(path) = &args.output {
         let command = format!("closecall traffic calibrate --model {}", model.name());
         let member = calibration::member(&result, &data, &command);

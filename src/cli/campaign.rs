@@ -30,7 +30,6 @@ use closecall_report::campaign::{
 };
 use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
-use closecall_scenarios::source::expand;
 use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::controller::ControllerChoice;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -43,6 +42,7 @@ use super::advice::after_verdict;
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs, tuned};
 use super::backend::{check_backend, check_networks};
+use super::check::expand;
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;

@@ -60,6 +60,11 @@ pub(super) struct ExplainArgs {
 pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
     let saved = args.saved.open(&args.dir)?;
     saved.check_trust()?;
+    match args.sample {
+        // All failures are those of all samples.
+        None => saved.folder().complete_records()?.try_for_each(|record| record.map(drop))?,
+        Some(_) => saved.folder().check_journal()?,
+    }
     let (explanations, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
     match write_causes(&saved, &failures, command_for) {
         Ok(paths) => paths.iter().for_each(|path| print_written(path)),
@@ -109,6 +114,7 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
         args.saved_sample.controller.as_deref(),
     );
     let case = case.map_err(CausesError::from)?;
+    saved.folder().check_journal()?;
     let paths = output_files(&case, args.output.as_deref())?;
     protect(&of_campaign(&args.saved_sample.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
     let minimized = minimize_sample(&saved, &case)?;

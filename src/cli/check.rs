@@ -8,7 +8,7 @@ use closecall_campaign::folder::Folder;
 use closecall_campaign::integrity::Problem;
 use closecall_report::campaign::check_folder;
 use closecall_report::json::stamped;
-use closecall_scenarios::source::expand;
+use closecall_scenarios::source::{self, KEYS_OF_SCENARIO};
 use closecall_scenarios::{ScenarioError, ScenarioFile};
 use serde_json::{Value, json};
 
@@ -16,10 +16,13 @@ use super::CliError;
 use super::actions::command_for;
 use super::args::{FittedArgs, Format, SetArgs};
 use super::help::{examples, heading};
-use super::output::{outln, print_failure};
+use super::output::{outln, print_error, print_failure};
 use super::saved::refuse_rare;
 use super::watching::{WatchingArgs, watch};
 use crate::exit_code::ExitCode;
+
+/// Largest number of skipped files that a note names.
+const MOST_NAMED: usize = 5;
 
 /// Arguments of `closecall check`.
 #[derive(Debug, Args)]
@@ -82,6 +85,24 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         Format::Human => checked.into_iter().for_each(|(file, path)| print(file, &path)),
     }
     Ok(ExitCode::first_of(codes))
+}
+
+/// Returns the scenarios that the arguments of a command name, and says which files of a folder are
+/// skipped.
+pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
+    let skipped = source::skipped(paths);
+    if !skipped.is_empty() {
+        let keys = KEYS_OF_SCENARIO.map(|key| format!("`{key}`")).join(", ");
+        let named =
+            skipped.iter().take(MOST_NAMED).map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        let more = skipped.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let files = skipped.len();
+        print_error(format_args!(
+            "note: skipped as no scenarios, with none of the keys {keys}: {files} files: {named}{more}\n"
+        ));
+    }
+    Ok(source::expand(paths)?)
 }
 
 /// Checks whether folders of campaigns are whole.

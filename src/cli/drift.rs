@@ -17,12 +17,13 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall traffic drift fitted.toml new.csv",
-    "closecall traffic drift late-braking.toml new-1.csv new-2.csv",
+    "closecall traffic drift low-thw-overtake new-1.csv new-2.csv",
     "closecall traffic drift fitted.toml new.csv --seed 1 --format json",
 ]))]
 pub(super) struct DriftArgs {
-    /// File that `closecall traffic fit` wrote, or a scenario with parameters from one
-    #[arg(value_name = "FITTED.toml")]
+    /// File that `closecall traffic fit` wrote, or a scenario with parameters from one: its file, or
+    /// its name in the library
+    #[arg(value_name = "FITTED.toml|SCENARIO")]
     fitted: PathBuf,
     #[command(flatten)]
     data: FilesArgs,

@@ -148,6 +148,7 @@ fn of_folder(args: &ExportArgs) -> Result<Chosen, CliError> {
         return Err(CliError::usage("a campaign has its own seed and sensors: leave out --seed and --sensors"));
     }
     let saved = args.trust.open(&args.source)?;
+    saved.folder().check_journal()?;
     let name = args.scenario.as_deref();
     let (scenario, key) = saved.sample_with(name, args.sample, &args.set.settings)?;
     let file = saved.file(name)?;

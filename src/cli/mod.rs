@@ -38,6 +38,7 @@ mod paper;
 mod perceive;
 mod plan;
 mod plot;
+mod progress;
 mod protect;
 mod rare;
 mod record;

@@ -102,6 +102,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     saved.limit(timeout_ms, memory_mib);
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.arms()?;
+    saved.folder().check_journal()?;
     if args.comparison.paired && arms.len() < 2 {
         arms.insert(0, arm(&ControllerChoice::ACC, args.arm.sensors));
     }

@@ -38,6 +38,7 @@ pub(super) struct ReplayArgs {
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     let saved = args.saved_sample.saved.open(&args.saved_sample.dir)?;
+    saved.folder().check_journal()?;
     let controllers = saved.manifest().arms.iter().flat_map(of_controller);
     protect(
         &of_campaign(&args.saved_sample.dir).into_iter().chain(controllers).collect::<Vec<_>>(),

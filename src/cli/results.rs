@@ -193,12 +193,13 @@ impl Results {
     }
 }
 
-/// Remembers that the folder is the user's own, if it names code that a later command would run.
+/// Remembers that the folder is the user's own. If that fails, a later command does not run the code that it
+/// names, and does not repeat its command line.
 pub(super) fn remember(folder: &Folder) {
-    if folder.manifest().is_ok_and(|manifest| manifest.foreign_code().is_empty()) {
-        return;
-    }
-    if let Err(error) = folder.remember() {
+    let has_code = !folder.manifest().is_ok_and(|manifest| manifest.foreign_code().is_empty());
+    if let Err(error) = folder.remember()
+        && has_code
+    {
         warn(format_args!("{error}: commands that run samples of the folder again need --trust-folder"));
     }
 }

@@ -12,6 +12,7 @@ use super::args::{Format, SensorsChoice, SetArgs};
 use super::backend::{check_backend, check_camera};
 use super::help::{examples, heading};
 use super::output::{out, outln, print_written};
+use super::progress::watched;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall study sensors`.
@@ -63,7 +64,10 @@ pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
         {
             check_camera(nominal.sensors.camera())?;
         }
-        Ok(Study::of(&file, Some(choice.mode()), args.seed, extent)?)
+        let of_file = |on_progress: &(dyn Fn([u64; 2]) + Sync)| {
+            Study::watched(&file, Some(choice.mode()), (args.seed, extent), on_progress)
+        };
+        Ok(watched("approaches", of_file)?)
     };
     let studies: Result<Vec<Study>, CliError> =
         [Some(&args.scenario), args.compare.as_ref()].into_iter().flatten().map(study).collect();

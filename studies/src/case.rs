@@ -10,8 +10,8 @@ use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting, SettingError};
 use closecall_sensors::SensorMode;
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError};
-use closecall_traffic::Parameters;
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::{Check, Parameters};
 
 use crate::map::MapError;
 

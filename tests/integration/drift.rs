@@ -54,6 +54,11 @@ fn too_few_values_are_inconclusive_and_other_files_are_refused() {
         assert!(message(&output).contains(words), "{}", message(&output));
     };
     refused(["traffic", "drift", "/no/such.toml", first], 6, "/no/such.toml");
+    refused(["traffic", "drift", "low-thw-overtak", first], 2, "did you mean `low-thw-overtake`?");
+    // A scenario of the library by its name.
+    let output = closecall(["traffic", "drift", "low-thw-overtake", first]);
+    assert!([0, 1, 4].contains(&code(&output)), "{}", message(&output));
+    assert!(stdout(&output, code(&output)).contains("front-thw-s"));
     let other = folder.path().join("other.toml");
     fs::write(&other, "[parameters]\nx = { fixed = 1.0 }\n").unwrap();
     refused(["traffic", "drift", other.to_str().unwrap(), first], 3, "no parameter has quantiles");

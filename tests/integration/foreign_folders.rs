@@ -57,6 +57,15 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
         }
         assert!(!ran.exists(), "{words:?}");
     }
+    // A repair does not name the command of another author.
+    let journal = fs::read_to_string(at("out/journal.jsonl")).unwrap();
+    fs::write(at("out/journal.jsonl"), journal.lines().take(2).map(|line| format!("{line}\n")).collect::<String>())
+        .unwrap();
+    let listed = stdout(&run(&mut user(&foreign), &["check", "out"]), 3);
+    assert!(listed.contains("--out out --resume") && listed.contains("another user or another machine"), "{listed}");
+    assert!(!listed.contains("telling.sh"), "{listed}");
+    assert!(stdout(&run(&mut user(&user_folder), &["check", "out"]), 3).contains("telling.sh"));
+    fs::write(at("out/journal.jsonl"), journal).unwrap();
     // The baseline of the program needs nothing of the folder.
     stdout(&run(&mut user(&foreign), &["replay", "out", "1", "--controller", "acc"]), 0);
     assert!(!ran.exists());

@@ -92,6 +92,39 @@ fn a_logical_scenario_of_closecall_comes_back_as_it_left() {
         (outcome["parameters"].clone(), outcome["collisions"].clone(), outcome["margins"].clone())
     };
     assert_eq!(run(output.to_str().unwrap()), run("low-thw-overtake"));
+    let edited = |path: &Path, right: &str, wrong: &str| {
+        let text = fs::read_to_string(case.join("logical.xosc")).unwrap();
+        assert!(text.contains(right), "{right}");
+        fs::write(path, text.replacen(right, wrong, 1)).unwrap();
+    };
+    // What the file or the command line changes is applied, or refused.
+    let fixed = folder.path().join("fixed.toml");
+    stdout(&imported(&case.join("logical.xosc"), &fixed, &["--parameter", "closing_mps=9.5", "--ego", "ego"]), 0);
+    assert_eq!(run(fixed.to_str().unwrap()).0["closing-mps"], 9.5);
+    fs::remove_file(&output).unwrap();
+    let path = case.join("edited.xosc");
+    for (right, wrong) in [
+        ("<ParameterDeclaration name=\"closing_mps\" parameterType=\"double\" value=\"", "&1"),
+        ("<Storyboard>", "<Storyboard><!-- --><Foo/>"),
+        ("name=\"closecall-content\"", "name=\"content\""),
+    ] {
+        edited(&path, right, &wrong.replace("&1", &format!("{right}1")));
+        let refused = imported(&path, &output, &[]);
+        assert_eq!(code(&refused), 3, "{wrong}: {}", message(&refused));
+        assert!(message(&refused).contains("`FileHeader`: it carries a scenario file"), "{}", message(&refused));
+    }
+    for (more, word) in [
+        (["--parameter", "nosuch=9.5"], "there is no parameter `nosuch`, only brake_mps2"),
+        (["--ego", "rear"], "the ego of its scenario is `ego`"),
+    ] {
+        let refused = imported(&case.join("logical.xosc"), &output, &more);
+        assert_eq!(code(&refused), 3, "{word}: {}", message(&refused));
+        assert!(message(&refused).contains(word), "{}", message(&refused));
+    }
+    assert!(!output.exists());
+    // White space between the elements is no edit.
+    edited(&path, "<Storyboard>", "\n<Storyboard>\n\n");
+    stdout(&imported(&path, &output, &[]), 0);
 }
 
 #[test]
@@ -143,6 +176,14 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ),
         ("conditionEdge=\"none\"", "conditionEdge=\"sharp\"", &["Condition", "sharp"]),
         ("rule=\"lessThan\"", "rule=\"nearly\"", &["TimeHeadwayCondition", "nearly"]),
+        ("<Storyboard>", "<Storyboard><Foo/>", &["`Foo`", "no element of `Storyboard`", "Init, Story, StopTrigger"]),
+        ("<Story ", "<Tale/><Story ", &["`Tale`", "no element of `Storyboard`"]),
+        ("${$EgoSpeed / 3.6}", "-50", &["AbsoluteTargetSpeed", "-50 m/s; 0 to 100 m/s"]),
+        ("name=\"Slow_Truck\"", "name=\"Ego\"", &["ScenarioObject", "an entity `Ego` already"]),
+        ("length=\"12\"", "length=\"-12\"", &["Dimensions", "`length` must be above 0 m"]),
+        ("length=\"12\"", "length=\"500\"", &["ScenarioObject", "`Slow_Truck`", "length-m"]),
+        ("a cut-in, for tests", "a cut-in\0", &["U+0000 is not allowed"]),
+        ("a cut-in, for tests", "a cut-in&#1;", &["FileHeader"]),
     ]
 }
 
@@ -171,7 +212,7 @@ fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written
 fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
-    let faults: [(&str, &str, &str); 20] = [
+    let faults: [(&str, &str, &str); 25] = [
         ("<OpenDRIVE>", "<OpenStreet>", "it is no XML"),
         ("</OpenDRIVE>", "", "ends before its root element"),
         ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
@@ -191,7 +232,12 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("a=\"3.5\"", "", "needs `a`"),
         ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
         ("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", "", "no `width`"),
-        ("a=\"3.5\"", "a=\"35\"", "lane-width-m"),
+        ("a=\"3.5\"", "a=\"35\"", "`a` is 35; a lane"),
+        ("a=\"3.5\"", "a=\"-3\"", "`width`: `a` is -3; a lane"),
+        ("curvature=\"0.001\"", "curvature=\"1e9\"", "`arc`: `curvature` is beyond 0.2 1/m"),
+        ("<road ", "<road id=\"1\"/><road ", "`road`: a road before it has the number `1` already"),
+        ("length=\"", "length=\"-", "`length` is -"),
+        ("id=\"-2\"", "id=\"-1\"", "a lane before it has the number -1 already"),
     ];
     for (right, wrong, word) in faults {
         assert!(ROAD.contains(right), "{right}");
@@ -202,7 +248,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
             | "no `laneSection`"
             | "no lanes on the right"
             | "no driving lane"
-            | "lane-width-m" => ROAD.replace(right, wrong),
+            | "`a` is 35; a lane" => ROAD.replace(right, wrong),
             _ => ROAD.replacen(right, wrong, 1),
         };
         let refused = imported(&written(folder.path(), SCENARIO, &road), &output, &[]);

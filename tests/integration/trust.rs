@@ -82,9 +82,23 @@ fn a_record_that_is_not_that_of_its_sample_is_refused_by_every_reader() {
         assert!(message(&output).contains(expected), "{expected}: {}", stderr(&output));
         assert!(lines(&out) == swapped, "the journal is unchanged");
         assert_refused(folder.path(), &out, &sound, expected);
-        // What is next to it is wrong, too.
-        let replay = closecall(["replay", out.to_str().unwrap(), "5"]);
-        assert_eq!(code(&replay), 3, "{}", stderr(&replay));
+        // What is next to it is wrong, too, and so is what stands before it.
+        let [dir, figure, case] = [&out, &folder.path().join("a.svg"), &folder.path().join("case")];
+        let [dir, figure, case] = [dir, figure, case].map(|path| path.to_str().unwrap());
+        let commands: [&[&str]; 6] = [
+            &["replay", dir, "5"],
+            &["replay", dir, "1"],
+            &["minimize", dir, "1"],
+            &["explain", dir, "1"],
+            &["plot", dir, "1", "-o", figure],
+            &["tool", "export", dir, "1", "-o", case],
+        ];
+        for command in commands {
+            let output = closecall(command);
+            assert_eq!(code(&output), 3, "{command:?}: {}", stderr(&output));
+            assert!(message(&output).contains(expected), "{command:?}: {}", stderr(&output));
+        }
+        assert!(!Path::new(figure).exists() && !Path::new(case).exists());
     }
 }
 
@@ -124,9 +138,76 @@ fn a_line_that_is_there_twice_is_refused_and_does_not_block_a_resumption() {
         assert_refused(folder.path(), &out, &sound, "is there twice");
         let output = campaign(&out, &["--resume"]);
         stdout(&output, 0);
-        assert!(message(&output).contains("2 lines of the journal that repeated the line before were removed"));
+        assert!(message(&output).contains("2 lines of the journal that repeated another line were removed"));
         assert!(lines(&out) == kept, "{at}");
     }
+}
+
+#[test]
+fn a_copy_of_a_line_anywhere_is_removed_and_another_line_in_a_wrong_place_is_not() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    stdout(&campaign(&out, &[]), 0);
+    let kept = lines(&out);
+    for (line, at) in [(2, 8), (0, 5), (6, 1)] {
+        let mut doubled = kept.clone();
+        doubled.insert(at, kept[line].clone());
+        write_lines(&out, &doubled);
+        let copy = at + 1;
+        let listed = problems(&out, 3);
+        assert!(listed.contains(&format!("journal.jsonl:{copy}: it repeats another line")), "{listed}");
+        assert!(listed.contains("repair: resume the campaign: "), "{listed}");
+        stdout(&campaign(&out, &["--resume"]), 0);
+        assert!(lines(&out) == kept, "{line} at {at}");
+        assert!(problems(&out, 0).contains("sound"));
+    }
+    // The records of two samples in each other's place are no copies.
+    let mut exchanged = kept.clone();
+    exchanged.swap(2, 5);
+    write_lines(&out, &exchanged);
+    let output = campaign(&out, &["--resume"]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(lines(&out) == exchanged);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_place_of_a_file_is_not_sound_and_its_removal_is_the_repair() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    for name in ["lock", "wall-times.jsonl", "journal.jsonl"] {
+        stdout(&campaign(&out, &[]), 0);
+        let path = out.join(name);
+        fs::remove_file(&path).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let listed = problems(&out, 3);
+        assert!(listed.contains(&format!("{name}: it is a named pipe, a socket or a device, and no file")), "{listed}");
+        assert!(listed.contains("repair: remove it, then resume the campaign: "), "{listed}");
+        assert_eq!(code(&campaign(&out, &["--resume"])), 6);
+        fs::remove_file(&path).unwrap();
+        stdout(&campaign(&out, &["--resume"]), 0);
+        assert!(problems(&out, 0).contains("sound"), "{name}");
+        fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+#[test]
+fn the_repair_of_a_copied_folder_names_the_copy_and_the_failures_of_a_part_are_not_explained() {
+    let folder = folder();
+    let [out, copy] = ["out", "copy"].map(|name| folder.path().join(name));
+    stdout(&campaign(&out, &[]), 0);
+    fs::create_dir(&copy).unwrap();
+    for entry in fs::read_dir(&out).unwrap().map(Result::unwrap).filter(|entry| entry.path().is_file()) {
+        fs::copy(entry.path(), copy.join(entry.file_name())).unwrap();
+    }
+    let kept = lines(&out);
+    write_lines(&copy, &kept[..6]);
+    let listed = problems(&copy, 3);
+    assert!(listed.contains(&format!("--out {} --resume", copy.display())), "{listed}");
+    assert!(!listed.contains(&format!("{} ", out.display())), "{listed}");
+    let output = closecall(["explain", copy.to_str().unwrap()]);
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(message(&output).contains("it has 6 of the 8 samples"), "{}", stderr(&output));
 }
 
 #[test]
@@ -243,7 +324,7 @@ fn a_check_of_a_folder_names_each_problem_and_its_repair() {
     write_lines(&out, &kept[..6]);
     assert!(resumed().contains("journal.jsonl: it has 6 of the 8 samples"));
     write_lines(&out, &[&kept[..2], &kept[1..]].concat());
-    assert!(resumed().contains("journal.jsonl:3: it repeats the line before"));
+    assert!(resumed().contains("journal.jsonl:3: it repeats another line"));
     let mut damaged = kept.clone();
     damaged[4] = damaged[4].replace("\"seed\"", "\"sead\"");
     write_lines(&out, &damaged);

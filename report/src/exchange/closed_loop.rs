@@ -14,6 +14,7 @@
 use closecall_controllers::{
     DriverConfig, FollowConfig, IdmConfig, OvertakerConfig, PrescribedConfig, Wiedemann99Config,
 };
+use closecall_scenarios::openscenario::content_hash;
 use closecall_scenarios::{
     ActorConfig, EffectConfig, EventConfig, NominalEncounterConfig, RelativeStartConfig, Scenario, ScenarioConfig,
     StartConfig, Trigger, TriggerConfig,
@@ -84,8 +85,13 @@ impl Writer<'_> {
         }
         let duration_s = self.scenario.duration.s();
         let parameters = if self.values.are_named { self.declarations() } else { Vec::new() };
-        let header = header(description, unsaid, source);
-        Document { header, parameters, entities, init, groups, duration_s }.text()
+        let with_hash = |hash: &str| header(description, unsaid, source.map(|text| (text, hash)));
+        let document = Document { header: with_hash(""), parameters, entities, init, groups, duration_s };
+        if source.is_none() {
+            return document.text();
+        }
+        let hash = content_hash(&document.clone().text()).unwrap_or_default();
+        Document { header: with_hash(&hash), ..document }.text()
     }
 
     fn declarations(&self) -> Vec<Element> {

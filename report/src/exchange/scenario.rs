@@ -1,5 +1,7 @@
 //! The common parts of all forms of a scenario: header, entities, and the frame of the storyboard.
 
+use closecall_scenarios::openscenario::CONTENT_PROPERTY;
+
 use super::closed_loop::Role;
 use super::element::Element;
 use super::trigger::{at, trigger};
@@ -12,8 +14,8 @@ pub(super) const CATALOG_FOLDER: &str = "catalogs/vehicles";
 pub(super) const ROAD_FILE: &str = "road.xodr";
 
 /// Returns a header that lists what the file cannot express. `source` is the text of the scenario
-/// file.
-pub(super) fn header(description: &str, unsaid: &[String], source: Option<&str>) -> Element {
+/// file, and the hash of the elements that stand beside the header.
+pub(super) fn header(description: &str, unsaid: &[String], source: Option<(&str, &str)>) -> Element {
     let numbered = |(index, statement): (usize, &String)| property(&format!("not-said-{}", index + 1), statement);
     let header = Element::new("FileHeader")
         .with("revMajor", 1)
@@ -25,10 +27,12 @@ pub(super) fn header(description: &str, unsaid: &[String], source: Option<&str>)
         return header;
     }
     let properties = Element::new("Properties").children(unsaid.iter().enumerate().map(numbered));
-    header.child(properties.children(source.map(|text| Element::new("CustomContent").containing(text))))
+    let properties = properties.children(source.map(|(_, hash)| property(CONTENT_PROPERTY, hash)));
+    header.child(properties.children(source.map(|(text, _)| Element::new("CustomContent").containing(text))))
 }
 
 /// A document of the kind that a player runs.
+#[derive(Clone)]
 pub(super) struct Document {
     pub(super) header: Element,
     /// Declarations of parameters; none for a concrete scenario.

@@ -46,12 +46,19 @@ pub(super) fn conclusion(anchor: &Anchor, quantity: Quantity) -> String {
     let verdict = if anchor.covers(quantity) == Some(true) { "COVERED" } else { "MISSED" };
     let agreeing: Vec<&str> = anchor.agreeing(quantity).collect();
     let agreeing = if agreeing.is_empty() { "none".to_owned() } else { agreeing.join(", ") };
-    let mover = anchor.mover(quantity).map_or_else(String::new, |(row, [own, moved])| {
-        format!("; the variation that moves it most: {}, from {own:.2} to {moved:.2}", name(row))
-    });
+    let mover = anchor.mover(quantity).map_or_else(String::new, |(row, change)| moved(&name(row), change));
     format!(
         "{what}: published {published:.2}, ensemble {low:.2} to {high:.2}: {verdict}; intervals that contain it: {agreeing}{mover}"
     )
+}
+
+/// Returns which variation moves a ratio most, as the end of a sentence.
+fn moved(variation: &str, change: [f64; 2]) -> String {
+    let [own, moved] = change.map(|ratio| format!("{ratio:.2}"));
+    if own == moved {
+        return format!("; no variation moves it from {own}");
+    }
+    format!("; the variation that moves it most: {variation}, from {own} to {moved}")
 }
 
 impl Display for AnchorText<'_> {
@@ -109,4 +116,17 @@ pub(super) fn charts(anchor: &Anchor) -> io::Result<Vec<(&'static str, String)>>
         "ratios",
         scatter(&points, &anchor.scenario, ["ratio of striking", "ratio of being struck from behind"])?,
     )])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variation_that_moves_nothing_is_not_the_one_that_moves_it_most() {
+        assert_eq!(moved("late", [0.5, 0.62]), "; the variation that moves it most: late, from 0.50 to 0.62");
+        for unmoved in [[0.0, 0.0], [0.5, 0.501]] {
+            assert!(moved("late", unmoved).starts_with("; no variation moves it from 0."), "{unmoved:?}");
+        }
+    }
 }

@@ -57,6 +57,30 @@ impl Node {
         path.iter().try_fold(self, |node, name| node.child(name))
     }
 
+    /// Returns the hash of all elements but the header, so that an edited file is noticed. White space
+    /// between elements does not count.
+    pub(super) fn content_hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        self.children.iter().filter(|child| child.name != "FileHeader").for_each(|child| child.add_to(&mut hasher));
+        hasher.finalize().to_string()
+    }
+
+    fn add_to(&self, hasher: &mut blake3::Hasher) {
+        let mut add = |text: &str| {
+            hasher.update(&text.len().to_le_bytes());
+            hasher.update(text.as_bytes());
+        };
+        add(&self.name);
+        add(self.text.trim());
+        add(&self.attributes.len().to_string());
+        for (name, value) in &self.attributes {
+            add(name);
+            add(value);
+        }
+        add(&self.children.len().to_string());
+        self.children.iter().for_each(|child| child.add_to(hasher));
+    }
+
     /// Returns an error at this element.
     pub(super) fn error(&self, path: &Path, message: impl Into<String>) -> ImportError {
         ImportError { path: path.to_owned(), line: self.line, element: self.name.clone(), message: message.into() }
@@ -72,6 +96,11 @@ impl Node {
 /// [`ImportError`] if the text is no XML document, has a document type declaration, or is too deep
 /// or too large.
 pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
+    if let Some((at, character)) = text.char_indices().find(|(_, character)| is_forbidden(*character)) {
+        let line = 1 + text[..at].matches('\n').count();
+        let message = forbidden(character);
+        return Err(ImportError { path: path.to_owned(), line, element: String::new(), message });
+    }
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
     let mut open: Vec<Node> = Vec::new();
@@ -128,6 +157,15 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
     }
 }
 
+/// Returns true for a character that no XML document can have.
+const fn is_forbidden(character: char) -> bool {
+    matches!(character, '\0'..='\u{8}' | '\u{b}' | '\u{c}' | '\u{e}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}')
+}
+
+fn forbidden(character: char) -> String {
+    format!("the character U+{:04X} is not allowed in an XML document", u32::from(character))
+}
+
 fn node(start: &BytesStart<'_>, line: usize) -> Result<Node, String> {
     let name = String::from_utf8_lossy(start.local_name().as_ref()).into_owned();
     let mut attributes = Vec::new();
@@ -136,6 +174,9 @@ fn node(start: &BytesStart<'_>, line: usize) -> Result<Node, String> {
         let key = String::from_utf8_lossy(attribute.key.local_name().as_ref()).into_owned();
         let raw = String::from_utf8_lossy(&attribute.value).into_owned();
         let value = quick_xml::escape::unescape(&raw).map_err(|error| format!("`{name}`: `{key}`: {error}"))?;
+        if let Some(character) = value.chars().find(|character| is_forbidden(*character)) {
+            return Err(format!("`{name}`: `{key}`: {}", forbidden(character)));
+        }
         attributes.push((key, value.into_owned()));
     }
     Ok(Node { name, line, attributes, ..Node::default() })

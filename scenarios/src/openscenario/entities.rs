@@ -1,6 +1,8 @@
 //! The vehicles of a scenario, from the file itself or from a catalogue.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::path::{Path, PathBuf};
 
 use closecall_traffic::input;
 
@@ -14,17 +16,22 @@ use super::world::Vehicle;
 /// [`ImportError`] at an entity that is no vehicle, or that no catalogue has.
 pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<String>), ImportError> {
     let entities = reader.child(root, &["Entities"])?;
-    let (mut vehicles, mut controlled) = (Vec::new(), Vec::new());
+    let (mut vehicles, mut controlled) = (Vec::<Vehicle>::new(), Vec::new());
+    let (mut catalogs, mut names) = (Catalogs::default(), BTreeMap::new());
     for entity in &entities.children {
         if entity.name != "ScenarioObject" {
             return Err(reader.error(entity, "only `ScenarioObject` is read"));
         }
         let name = reader.text(entity, "name")?;
+        if let Some(line) = names.insert(name.clone(), entity.line) {
+            return Err(reader
+                .error(entity, format!("line {line} has an entity `{name}` already: each needs a name of its own")));
+        }
         let mut vehicle = None;
         for child in &entity.children {
             match child.name.as_str() {
                 "Vehicle" => vehicle = Some(of_element(reader, child)?),
-                "CatalogReference" => vehicle = Some(of_catalog(reader, root, child)?),
+                "CatalogReference" => vehicle = Some(of_catalog(reader, (root, &mut catalogs), child)?),
                 "ObjectController" => controlled.push(name.clone()),
                 _ => {
                     return Err(reader
@@ -33,12 +40,50 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<St
             }
         }
         let Some(vehicle) = vehicle else { return Err(reader.error(entity, format!("`{name}` has no vehicle"))) };
-        vehicles.push(Vehicle { name, ..vehicle });
+        vehicles.push(Vehicle { name, line: entity.line, ..vehicle });
     }
     Ok((vehicles, controlled))
 }
 
-fn of_catalog(reader: &Reader, root: &Node, reference: &Node) -> Result<Vehicle, ImportError> {
+/// The catalogues of a scenario, each read once.
+#[derive(Default)]
+struct Catalogs {
+    /// The files of a folder, in alphabetical order.
+    folders: BTreeMap<PathBuf, Vec<PathBuf>>,
+    documents: BTreeMap<PathBuf, Node>,
+}
+
+impl Catalogs {
+    fn files(&mut self, folder: &Path) -> Vec<PathBuf> {
+        let read = || {
+            let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+                .map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect())
+                .unwrap_or_default();
+            files.retain(|path| path.extension().is_some_and(|end| end == "xosc"));
+            files.sort();
+            files
+        };
+        self.folders.entry(folder.to_owned()).or_insert_with(read).clone()
+    }
+
+    /// Returns the document of a file. `named` is the element that names its folder.
+    fn document(&mut self, path: &Path, (reader, named): (&Reader, &Node)) -> Result<&Node, ImportError> {
+        match self.documents.entry(path.to_owned()) {
+            Entry::Occupied(document) => Ok(document.into_mut()),
+            Entry::Vacant(place) => {
+                let text = input::read_text(path)
+                    .map_err(|error| reader.error(named, format!("failed to read {}: {error}", path.display())))?;
+                Ok(place.insert(parse(path, &text)?))
+            }
+        }
+    }
+}
+
+fn of_catalog(
+    reader: &Reader,
+    (root, catalogs): (&Node, &mut Catalogs),
+    reference: &Node,
+) -> Result<Vehicle, ImportError> {
     let [catalog, entry] = ["catalogName", "entryName"].map(|name| reader.text(reference, name));
     let (catalog, entry) = (catalog?, entry?);
     let Some(locations) = root.child("CatalogLocations") else {
@@ -48,15 +93,8 @@ fn of_catalog(reader: &Reader, root: &Node, reference: &Node) -> Result<Vehicle,
     for location in &locations.children {
         let Some(directory) = location.child("Directory") else { continue };
         let folder = reader.path_in(directory, "path")?;
-        let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)
-            .map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect())
-            .unwrap_or_default();
-        files.retain(|path| path.extension().is_some_and(|end| end == "xosc"));
-        files.sort();
-        for path in files {
-            let text = input::read_text(&path)
-                .map_err(|error| reader.error(directory, format!("failed to read {}: {error}", path.display())))?;
-            let document = parse(&path, &text)?;
+        for path in catalogs.files(&folder) {
+            let document = catalogs.document(&path, (reader, directory))?;
             let Some(document_catalog) =
                 document.child("Catalog").filter(|document_catalog| document_catalog.raw("name") == Some(&catalog))
             else {
@@ -108,6 +146,11 @@ fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
         _ => return Err(reader.error(node, format!("a `{category}` is no car, truck or motorcycle"))),
     };
     let size = reader.child(node, &["BoundingBox", "Dimensions"])?;
+    for name in ["length", "width", "height"] {
+        if !(reader.number(size, name)? > 0.0) {
+            return Err(reader.error(size, format!("`{name}` must be above 0 m")));
+        }
+    }
     let centre = reader.child(node, &["BoundingBox", "Center"])?;
     Ok(Vehicle {
         class,

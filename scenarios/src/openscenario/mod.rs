@@ -17,13 +17,14 @@ mod formula;
 mod reader;
 mod road;
 mod storyboard;
+mod structure;
 mod world;
 
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::input;
+use closecall_traffic::{Segment, input};
 
 pub use dom::ImportError;
 
@@ -33,7 +34,7 @@ use self::reader::Reader;
 use self::road::ImportedRoad;
 use self::storyboard::Storyboard;
 use self::world::Vehicle;
-use crate::{ScenarioError, ScenarioFile};
+use crate::{ScenarioError, ScenarioFile, Setting};
 
 /// Time gap of the ego's cruise control (s): an assumption, as the file has its own controller; 1
 /// to 2 are plausible.
@@ -113,11 +114,9 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     let mut reader = Reader { path: path.to_owned(), values: Values::new() };
     check_kind(&reader, &root)?;
     if let Some(text) = text_of_closecall(&root) {
-        let parsed = ScenarioFile::parse(path, text, &[]).and_then(|file| file.check());
-        parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
-        let notes = vec!["Closecall wrote this file: the scenario in it is used".to_owned()];
-        return Ok(Imported { text: text.to_owned(), notes, events: Vec::new() });
+        return of_closecall(&reader, &root, (text, options));
     }
+    structure::check(&reader, &root)?;
     for declaration in root.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
     {
         let name = reader.text(declaration, "name")?;
@@ -146,8 +145,31 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     let environment = environment(&reader, &globals, &mut played.notes)?;
     let text = scenario_text(path, &mut played, (&starts, &environment))?;
     let parsed = ScenarioFile::parse(path, &text, &[]).and_then(|file| file.check());
-    parsed.map_err(|source| ImportFailure::Scenario { path: path.to_owned(), source: Box::new(source) })?;
+    parsed.map_err(|source| at_element(&reader, (&root, &starts), source))?;
     Ok(Imported { text, notes: played.notes, events: played.events })
+}
+
+/// Returns the error of the scenario that a file describes at the element that describes its part: the
+/// lines of the scenario file are none of the reader's.
+fn at_element(reader: &Reader, (root, vehicles): (&Node, &[Vehicle]), error: ScenarioError) -> ImportFailure {
+    let ScenarioError::Value { source, .. } = &error else {
+        return ImportFailure::Scenario { path: reader.path.clone(), source: Box::new(error) };
+    };
+    let message = format!("the scenario that it describes is not valid: {source}");
+    let vehicle = match &source.path.0[..] {
+        [Segment::Key(key), Segment::Index(index), ..] if key == "actor" => vehicles.get(*index),
+        _ => None,
+    };
+    let error = match vehicle {
+        Some(vehicle) => ImportError {
+            path: reader.path.clone(),
+            line: vehicle.line,
+            element: "ScenarioObject".to_owned(),
+            message: format!("`{}`: {message}", vehicle.name),
+        },
+        None => reader.error(root, message),
+    };
+    error.into()
 }
 
 fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
@@ -170,6 +192,64 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
         Some(catalog) => Err(reader.error(catalog, "a catalogue is no scenario")),
         None => Ok(()),
     }
+}
+
+/// Name of the property in the header of a logical scenario that has the hash of all other elements.
+pub const CONTENT_PROPERTY: &str = "closecall-content";
+
+/// Returns the hash of the elements of a document without its header; `None` if it is no XML.
+pub fn content_hash(text: &str) -> Option<String> {
+    Some(parse(Path::new(""), text).ok()?.content_hash())
+}
+
+/// Returns the scenario that Closecall wrote into the header of a logical scenario, with the values of
+/// the options in place of its parameters.
+///
+/// # Errors
+/// [`ImportFailure`] if the other elements are not those that were written with it, or an option
+/// does not fit.
+fn of_closecall(
+    reader: &Reader,
+    root: &Node,
+    (text, options): (&str, &ImportOptions),
+) -> Result<Imported, ImportFailure> {
+    let path = &reader.path;
+    let header = reader.child(root, &["FileHeader"])?;
+    let properties = reader.child(header, &["Properties"])?;
+    let written = properties.all("Property").find(|property| property.raw("name") == Some(CONTENT_PROPERTY));
+    if written.and_then(|property| property.raw("value")) != Some(root.content_hash().as_str()) {
+        let message = "it carries a scenario file of Closecall, and the elements beside it are not those that were \
+                       written with it: edit the scenario file instead, or remove `CustomContent` to import the \
+                       elements alone";
+        return Err(reader.error(header, message).into());
+    }
+    let invalid = |source| ImportFailure::Scenario { path: path.clone(), source: Box::new(source) };
+    let file = ScenarioFile::parse(path, text, &[]).map_err(invalid)?;
+    let ego = file.ego_id().map(ToString::to_string).unwrap_or_default();
+    if let Some(asked) = options.ego.as_ref().filter(|asked| **asked != ego) {
+        let message = format!("the ego of its scenario is `{ego}`, and cannot be `{asked}`");
+        return Err(reader.error(header, message).into());
+    }
+    let mut notes = vec![
+        "Closecall wrote this file: the scenario in it is used, and neither the road nor the catalogue is read"
+            .to_owned(),
+    ];
+    let mut settings = Vec::new();
+    for (written, value) in &options.parameters {
+        let name = written.replace('_', "-");
+        if !file.space().iter().any(|(parameter, _)| parameter.as_str() == name) {
+            let names: Vec<_> =
+                file.space().iter().map(|(parameter, _)| parameter.as_str().replace('-', "_")).collect();
+            let message = format!("there is no parameter `{written}`, only {}", names.join(", "));
+            return Err(reader.error(root, message).into());
+        }
+        let setting = format!("{name}={value}").parse::<Setting>();
+        settings.push(setting.map_err(|source| invalid(ScenarioError::Set { path: path.clone(), source }))?);
+        notes.push(format!("`{name}` is {value} in every sample"));
+    }
+    let file = ScenarioFile::parse(path, text, &settings).map_err(invalid)?;
+    file.check().map_err(invalid)?;
+    Ok(Imported { text: file.text().to_owned(), notes, events: Vec::new() })
 }
 
 /// Returns the text of the scenario that Closecall wrote into the header of a logical scenario.

@@ -1,6 +1,7 @@
 //! The part of an OpenDRIVE road that a scenario of parallel lanes has: driving lanes of one
 //! direction, width, curvature, speed.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use closecall_traffic::Road;
@@ -9,6 +10,10 @@ use super::dom::{ImportError, Node, parse};
 
 /// Names of the lane types on which vehicles drive.
 const DRIVING: [&str; 8] = ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
+
+/// Largest curvature of a road (1/m): no car drives through less than 5 m of radius. An assumption; 0.1
+/// to 0.25 are plausible.
+const MOST_CURVATURE_PER_M: f64 = 0.2;
 
 /// The part of a file's road that a scenario can use.
 #[derive(Clone, Debug)]
@@ -31,10 +36,19 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
     if root.name != "OpenDRIVE" {
         return Err(root.error(path, "the root element must be `OpenDRIVE`"));
     }
+    let mut ids = BTreeSet::new();
+    for road in root.all("road") {
+        if let Some(id) = road.raw("id")
+            && !ids.insert(id)
+        {
+            return Err(road.error(path, format!("a road before it has the number `{id}` already")));
+        }
+    }
     let Some(road) = root.all("road").find(|road| road.raw("id") == Some(road_id)) else {
         let roads: Vec<_> = root.all("road").filter_map(|road| road.raw("id")).collect();
         return Err(root.error(path, format!("there is no road `{road_id}`, only {}", roads.join(", "))));
     };
+    check_shape(path, road)?;
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
     let Some(section) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
     let mut notes = Vec::new();
@@ -45,15 +59,24 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
     let mut driving: Vec<(i32, f64)> = Vec::new();
     for node in right.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
         let id = number(path, node, "id")?;
-        let width = match node.child("width") {
-            Some(width) => number(path, width, "a")?,
+        let (width_m, width) = match node.child("width") {
+            Some(width) => (number(path, width, "a")?, width),
             None => return Err(node.error(path, "it has no `width`")),
         };
         #[expect(
             clippy::cast_possible_truncation,
             reason = "a lane's number is small, and compared with the text below"
         )]
-        driving.push((id as i32, width));
+        let id = id as i32;
+        let is_used = id == lane && !Road::LANE_WIDTH_M.contains(width_m);
+        if !(width_m >= 0.0) || is_used {
+            let message = format!("`a` is {width_m}; a lane of a scenario has a width of 2.5 to 5 m");
+            return Err(width.error(path, message));
+        }
+        if driving.iter().any(|(other, _)| *other == id) {
+            return Err(node.error(path, format!("a lane before it has the number {id} already")));
+        }
+        driving.push((id, width_m));
     }
     driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
     let Some(&(_, lane_width_m)) = driving.iter().find(|(id, _)| *id == lane) else {
@@ -81,6 +104,27 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
     };
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
     Ok(ImportedRoad { lanes, lane_width_m, curvature_per_m, speed_limit_mps, notes })
+}
+
+/// Checks that a road can exist: its lengths and its curvatures.
+fn check_shape(path: &Path, road: &Node) -> Result<(), ImportError> {
+    let is_long = |node: &Node| match number(path, node, "length")? {
+        length_m if length_m > 0.0 => Ok(()),
+        length_m => Err(node.error(path, format!("`length` is {length_m}; a length above 0 m is needed"))),
+    };
+    is_long(road)?;
+    for geometry in road.child("planView").into_iter().flat_map(|plan| plan.all("geometry")) {
+        is_long(geometry)?;
+        for shape in &geometry.children {
+            for name in ["curvature", "curvStart", "curvEnd"] {
+                if shape.raw(name).is_some() && !(number(path, shape, name)?.abs() <= MOST_CURVATURE_PER_M) {
+                    let message = format!("`{name}` is beyond {MOST_CURVATURE_PER_M} 1/m: no vehicle can follow it");
+                    return Err(shape.error(path, message));
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Returns the curvature of a road that is one line or one arc. For any other road, returns the

@@ -20,6 +20,9 @@ const LONGEST_S: f64 = 300.0;
 /// Time that is played after the last action ended (s), if no trigger stops the storyboard.
 const AFTER_LAST_S: f64 = 20.0;
 
+/// Highest speed of a scenario file (m/s).
+const MOST_SPEED_MPS: f64 = 100.0;
+
 /// Difference of two values that are the same but for rounding: numerical.
 const SAME: f64 = 1e-9;
 
@@ -356,9 +359,20 @@ impl<'a> Storyboard<'a> {
         }
     }
 
+    /// Returns the speed of an action if a vehicle of a scenario can have it.
+    fn possible(&self, action: &Node, speed_mps: f64) -> Result<f64, ImportError> {
+        // Sums of speeds round.
+        if (-SAME..=MOST_SPEED_MPS).contains(&speed_mps) {
+            return Ok(speed_mps.max(0.0));
+        }
+        let node = action.child("SpeedActionTarget").and_then(|target| target.children.first()).unwrap_or(action);
+        Err(self.reader.error(node, format!("a speed of {speed_mps} m/s; 0 to {MOST_SPEED_MPS} m/s are needed")))
+    }
+
     fn speed_action(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
         let dynamics = self.reader.child(node, &["SpeedActionDynamics"])?;
         let (to_mps, stays) = self.target_speed(node)?;
+        let to_mps = self.possible(node, to_mps)?;
         let from_mps = self.vehicles[actor].speed_mps;
         let (duration_s, is_smooth) = self.transition(dynamics, (from_mps, to_mps), 0.5 * (from_mps + to_mps))?;
         running.is_longitudinal.push(actor);
@@ -420,7 +434,7 @@ impl<'a> Storyboard<'a> {
                 points.pop();
             }
             at_s += duration_s;
-            points.push((at_s, self.reader.number(entry, "speed")?));
+            points.push((at_s, self.possible(entry, self.reader.number(entry, "speed")?)?));
         }
         running.is_longitudinal.push(actor);
         running.actions.push(Running::Profile { vehicle: actor, points });
@@ -572,7 +586,10 @@ impl<'a> Storyboard<'a> {
                                 inner.line, self.vehicles[vehicle].name
                             ));
                         }
-                        self.vehicles[vehicle].speed_mps = speed_mps;
+                        // In the first round, the speed of another vehicle may not be set yet.
+                        let is_last = round == 1;
+                        self.vehicles[vehicle].speed_mps =
+                            if is_last { self.possible(inner, speed_mps)? } else { speed_mps };
                         Ok(())
                     }
                     "LongitudinalDistanceAction" => self.keep_distance(inner, vehicle),

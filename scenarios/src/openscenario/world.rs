@@ -4,6 +4,8 @@
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vehicle {
     pub(super) name: String,
+    /// Line of its element in the file.
+    pub(super) line: usize,
     /// Class of Closecall: `car`, `truck` or `motorcycle`.
     pub(super) class: &'static str,
     pub(super) length_m: f64,

@@ -218,6 +218,24 @@ impl ParameterConfig {
         Self { fixed: Some(value), ..Self::default() }
     }
 
+    /// Cuts the values of a number below the first and above the second limit. The quantiles of an
+    /// empirical distribution take the limit, the other forms are truncated there.
+    pub(crate) fn cut(&mut self, [low, high]: [Option<f64>; 2]) {
+        let cut = |value: f64| value.max(low.unwrap_or(f64::NEG_INFINITY)).min(high.unwrap_or(f64::INFINITY));
+        if let Some(empirical) = &mut self.empirical {
+            empirical.quantiles.iter_mut().for_each(|value| *value = cut(*value));
+        }
+        if let Some(UniformConfig { min, max }) = &mut self.uniform {
+            (*min, *max) = (cut(*min), cut(*max));
+        }
+        if let Some(TruncatedNormalConfig { min, max, .. }) = &mut self.truncated_normal {
+            (*min, *max) = (cut(*min), cut(*max));
+        }
+        if let Some(LogNormalConfig { min, max, .. }) = &mut self.log_normal {
+            (*min, *max) = (low.or(*min), high.or(*max));
+        }
+    }
+
     /// Checks this parameter.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! The split of the pairs, and the calibrations.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use closecall_recorded::following::{FollowingData, FollowingPair};
 use rayon::prelude::*;
 
@@ -64,20 +66,33 @@ fn is_held_out(pair: &FollowingPair) -> bool {
 
 /// Calibrates a model. Returns `None` if no pair is left for the calibration.
 pub fn calibrate(model: FollowingModel, data: &FollowingData) -> Option<Calibration> {
+    calibrate_watched(model, data, &|_| ())
+}
+
+/// Works like [`calibrate`]. `on_progress` receives the number of fits that are done, and of all: one of
+/// each pair, and the pooled one, which counts as one of each pair.
+pub fn calibrate_watched(
+    model: FollowingModel,
+    data: &FollowingData,
+    on_progress: &(dyn Fn([u64; 2]) + Sync),
+) -> Option<Calibration> {
     let (held_out, used): (Vec<&FollowingPair>, Vec<&FollowingPair>) =
         data.pairs.iter().partition(|pair| is_held_out(pair));
     if used.is_empty() {
         return None;
     }
     let dimensions = model.parameters().len();
+    let (all, done) = (2 * used.len() as u64, AtomicU64::new(0));
     let pairs: Vec<PairResult> = used
         .par_iter()
         .map(|pair| {
             let (point, rmse_m) = minimise(dimensions, |point| rmse_m(model, &model.values(point), &[pair]));
+            on_progress([done.fetch_add(1, Ordering::Relaxed) + 1, all]);
             PairResult { name: pair.name.clone(), values: model.values(&point), rmse_m }
         })
         .collect();
     let (point, _) = minimise(dimensions, |point| rmse_m(model, &model.values(point), &used));
+    on_progress([all, all]);
     let pooled = model.values(&point);
     let single = |pair: &&FollowingPair| {
         let result = pairs.iter().find(|result| result.name == pair.name);

@@ -1,5 +1,7 @@
 //! All approaches of all cases.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use closecall_campaign::failure::FailureKind;
 use closecall_scenarios::{ScenarioError, ScenarioFile};
 use closecall_sensors::{SensorError, SensorMode, Sensors};
@@ -96,13 +98,27 @@ impl Study {
     /// # Errors
     /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
     pub fn of(file: &ScenarioFile, mode: Option<SensorMode>, seed: u64, extent: Extent) -> Result<Self, StudyError> {
+        Self::watched(file, mode, (seed, extent), &|_| ())
+    }
+
+    /// Works like [`Self::of`]. `on_progress` receives the number of approaches that are done, and of
+    /// all.
+    ///
+    /// # Errors
+    /// As of [`Self::of`].
+    pub fn watched(
+        file: &ScenarioFile,
+        mode: Option<SensorMode>,
+        (seed, extent): (u64, Extent),
+        on_progress: &(dyn Fn([u64; 2]) + Sync),
+    ) -> Result<Self, StudyError> {
         let scenario = file.concrete(&file.space().nominal())?;
         let sensors = mode.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode));
         if sensors.mode() == SensorMode::GroundTruth {
             return Err(StudyError::GroundTruth);
         }
         let cases = cases(sensors.mode(), &scenario.environment, &scenario.road)?;
-        let cases = study(&cases, &sensors, &scenario.road, [seed, extent.runs()])?;
+        let cases = study(&cases, &sensors, &scenario.road, ([seed, extent.runs()], on_progress))?;
         let name = file.config().name.clone();
         Ok(Self { name, mode: sensors.mode(), seed, runs: extent.runs(), cases })
     }
@@ -113,13 +129,16 @@ pub(crate) fn study(
     cases: &[Case],
     sensors: &Sensors,
     road: &Road,
-    [seed, runs]: [u64; 2],
+    ([seed, runs], on_progress): ([u64; 2], &(dyn Fn([u64; 2]) + Sync)),
 ) -> Result<Vec<(Case, Figures)>, StudyError> {
     let jobs: Vec<(usize, u64)> = (0..cases.len()).flat_map(|case| (0..runs).map(move |run| (case, run))).collect();
+    let (all, done) = (jobs.len() as u64, AtomicU64::new(0));
     let run_one = |&(case, run): &(usize, u64)| {
         let case = &cases[case];
-        approach(case, &case.sensors(sensors), &case.road(road), Address { seed, run })
-            .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
+        let made = approach(case, &case.sensors(sensors), &case.road(road), Address { seed, run })
+            .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source });
+        on_progress([done.fetch_add(1, Ordering::Relaxed) + 1, all]);
+        made
     };
     let approaches: Vec<Approach> = jobs.par_iter().map(run_one).collect::<Result<_, _>>()?;
     let of_case = approaches.chunks(usize::try_from(runs.max(1)).unwrap_or(usize::MAX));
