@@ -111,6 +111,12 @@ pub enum CliError {
         /// The tracks of the file that can be re-enacted.
         possible: Vec<u64>,
     },
+    /// A trajectory file has nothing that the command needs.
+    #[error("{message}")]
+    NothingFound {
+        /// What is missing.
+        message: String,
+    },
     /// A set of rendered images cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -204,8 +210,22 @@ impl From<SourceError> for CliError {
 /// Returns the option that reads a trajectory file in spite of the problem, if there is one.
 fn remedy(problem: &TrajectoryFileProblem) -> &'static str {
     match problem {
-        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => "; --mirror-d turns the position",
-        TrajectoryFileProblem::LanesAgainstPosition { .. } => "; --lanes-from-right turns the lanes",
+        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => {
+            "; --mirror-d turns the position, --lanes-from-right the lanes"
+        }
+        TrajectoryFileProblem::LanesAgainstPosition { .. } => {
+            "; --lanes-from-right turns the lanes, --mirror-d the position: with the wrong one of them, left is called right"
+        }
+        TrajectoryFileProblem::LanesBesideMarkings { .. } => {
+            "; --lanes none takes no lane as recorded, --mirror-d turns the position"
+        }
+        TrajectoryFileProblem::SidesContradict { .. } => {
+            "; --mirror-d turns the position (with --lanes-from-right, if the lanes are counted from the right, too), or leave these \
+             columns out"
+        }
+        TrajectoryFileProblem::AgainstTheRoad { .. } => {
+            "; --reverse-s turns the position along the road of all vehicles"
+        }
         TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
             "; --location NAME reads one data set of NGSIM's export"
         }
@@ -301,6 +321,7 @@ impl From<&CliError> for ExitCode {
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
+            CliError::NothingFound { .. } => Self::Inconclusive,
             CliError::Plan(
                 PlanError::Controller { .. } | PlanError::WithoutMis { .. } | PlanError::WithoutHuman { .. },
             ) => Self::InvalidInput,

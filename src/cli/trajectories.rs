@@ -23,7 +23,7 @@ use super::args::{FilesArgs, Format, LanesChoice, ReadArgs};
 use super::help::{examples, heading};
 use super::output::{command_line, out, outln, print_error, print_written, reading, write_charts};
 use super::protect::{of_trajectories, protect};
-use super::reenact::no_lane_change;
+use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.
@@ -176,7 +176,16 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
             out!("{}{}", LaneChangesText(&changes), scored.as_ref().map_or_else(String::new, ScoreText::text));
         }
     }
-    Ok(ExitCode::Pass)
+    let nothing = basis.unexplained_crossings(changes.len());
+    if let Some(reason) = &nothing {
+        print_error(format_args!("warning: {}: {reason}\n", args.file.display()));
+    }
+    Ok(judged(tracks.is_coarse() || nothing.is_some()))
+}
+
+/// Returns the exit code of a result; `is_in_doubt` if a warning says why it may be wrong.
+fn judged(is_in_doubt: bool) -> ExitCode {
+    if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass }
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
@@ -200,7 +209,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
             let track = args.track.map(|track| (track, smoothed.track_index(track).is_some()));
             let mut others: Vec<u64> = changes.iter().map(|change| change.lane_change.track_id).collect();
             others.dedup();
-            return Err(CliError::usage(no_lane_change(&args.file.display().to_string(), track, &others)));
+            return Err(lacks_lane_change(&args.file.display().to_string(), track, &others));
         };
         write_recording(path, &[film_lane_change(smoothed, chosen)?])?;
         print_written(path);
@@ -212,13 +221,22 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
         Format::Human => out!("{}", CriticalityText { file: &file, changes: &changes, counted }),
     }
-    Ok(ExitCode::Pass)
+    Ok(judged(file.is_coarse))
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     let data_sets = args.data.read_all()?;
     let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
+    if fitted.fitted.is_empty() {
+        match args.format {
+            Format::Json => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
+            Format::Human => out!("{}", FitText(&fitted)),
+        }
+        let message =
+            "no quantity of the trajectory files has enough values to be fitted: nothing was written".to_owned();
+        return Err(CliError::NothingFound { message });
+    }
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
@@ -231,5 +249,5 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
             print_written(path);
         }
     }
-    Ok(ExitCode::Pass)
+    Ok(judged(data_sets.iter().any(|data| data.is_coarse)))
 }
