@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use closecall_traffic::Lane;
+use closecall_traffic::statistics::quantiles::median;
 
 use super::error::TrajectoryFileProblem;
 use super::markings::{LaneMarkings, MarkedCarriageway};
@@ -46,32 +47,60 @@ pub(super) struct Axes {
     options: AxisOptions,
     /// The sum of the old and the new number of a lane that belongs to no marked carriageway.
     lane_sum: u8,
-    carriageways: Vec<MarkedCarriageway>,
+    /// The marked carriageways, each with the sum of the old and the new lateral position of a vehicle if
+    /// positions are mirrored (m).
+    carriageways: Vec<(MarkedCarriageway, f64)>,
 }
 
 impl Axes {
     /// Returns the choices of the options for a file that begins with `rows` and states `markings`.
     pub(super) fn new(options: AxisOptions, rows: &[Row], markings: Option<&LaneMarkings>) -> Self {
         let most = rows.iter().map(|row| row.lane).max().unwrap_or(0);
-        let carriageways = markings.map(LaneMarkings::carriageways).unwrap_or_default();
-        Self { options, lane_sum: most.saturating_add(1), carriageways }
+        let mut axes = Self { options, lane_sum: most.saturating_add(1), carriageways: Vec::new() };
+        if let Some(markings) = markings {
+            let of_road = |road: MarkedCarriageway| (road, mirror_m(&road, options, rows, markings));
+            axes.carriageways = markings.carriageways().into_iter().map(of_road).collect();
+        }
+        axes
     }
 
     /// Turns a row. Lane 0, which means no lane, stays. Each marked carriageway is turned by itself.
     pub(super) fn turn(&self, row: &mut Row) {
-        let within = |road: &&MarkedCarriageway| (road.first..=road.last).contains(&row.lane);
-        let carriageway = self.carriageways.iter().find(within);
+        let carriageway = self.carriageways.iter().find(|(road, _)| road.holds(row.lane));
         if self.options.reverse_s {
             row.s_m = -row.s_m;
         }
         if self.options.mirror_d {
-            row.d_m = 2.0 * carriageway.map_or(0.0, |road| road.left_m) - row.d_m;
+            row.d_m = carriageway.map_or(0.0, |(_, mirror_m)| *mirror_m) - row.d_m;
         }
         if self.options.lanes_from_right && row.lane > 0 {
-            let sum = carriageway.map_or(self.lane_sum, |road| road.first.saturating_add(road.last));
-            row.lane = sum.saturating_sub(row.lane).max(1);
+            row.lane = from_left(carriageway.map(|(road, _)| road), self.lane_sum, row.lane);
         }
     }
+}
+
+/// Returns the number of a lane that is counted from the right.
+fn from_left(carriageway: Option<&MarkedCarriageway>, lane_sum: u8, lane: u8) -> u8 {
+    let sum = carriageway.map_or(lane_sum, |road| road.first.saturating_add(road.last));
+    sum.saturating_sub(lane).max(1)
+}
+
+/// Returns the sum of the old and the new lateral position on a carriageway whose positions are mirrored
+/// (m): twice its left edge, or, if the file is mirrored elsewhere, the sum that puts most vehicles into
+/// the middles of their lanes.
+fn mirror_m(road: &MarkedCarriageway, options: AxisOptions, rows: &[Row], markings: &LaneMarkings) -> f64 {
+    let at_the_edge_m = 2.0 * road.left_m;
+    let sum_m = |row: &Row| {
+        let lane = if options.lanes_from_right { from_left(Some(road), 0, row.lane) } else { row.lane };
+        let (left_m, right_m) = (markings.left_edge_m(Lane(lane))?, markings.right_edge_m(Lane(lane))?);
+        Some(0.5 * (left_m + right_m) + row.d_m)
+    };
+    let sums_m: Vec<f64> = rows.iter().filter(|row| road.holds(row.lane)).filter_map(sum_m).collect();
+    if !options.mirror_d || sums_m.is_empty() {
+        return at_the_edge_m;
+    }
+    let usual_m = median(sums_m);
+    if (usual_m - at_the_edge_m).abs() < LEAST_DISTANCE_M { at_the_edge_m } else { usual_m }
 }
 
 /// Rejects rows in which more neighbouring lanes lie in the opposite order of their numbers than in
@@ -102,7 +131,7 @@ pub(super) fn check_order(rows: &[Row], markings: Option<&LaneMarkings>) -> Resu
     }
     let Some([first, last]) = wrong.filter(|_| contradict > agree) else { return Ok(()) };
     let carriageways = markings.map(LaneMarkings::carriageways).unwrap_or_default();
-    let own = carriageways.iter().find(|road| (road.first..=road.last).contains(&first.0));
+    let own = carriageways.iter().find(|road| road.holds(first.0));
     // To the right of the left edge, positions are negative.
     let is_mirrored = first.1 + last.1 > 2.0 * own.map_or(0.0, |road| road.left_m);
     let lanes = [first.0, last.0];
@@ -114,9 +143,10 @@ pub(super) fn check_order(rows: &[Row], markings: Option<&LaneMarkings>) -> Resu
 /// if some are not. To the side of a carriageway, a vehicle counts as being in the lane at its edge.
 pub(super) fn check_markings(rows: &[Row], markings: &LaneMarkings) -> Result<Option<String>, ReadError> {
     let mut warning = None;
-    for MarkedCarriageway { first, last, .. } in markings.carriageways() {
+    for road in markings.carriageways() {
+        let MarkedCarriageway { first, last, .. } = road;
         let (mut misplaced, mut all) = (0_usize, 0_usize);
-        for row in rows.iter().filter(|row| (first..=last).contains(&row.lane)) {
+        for row in rows.iter().filter(|row| road.holds(row.lane)) {
             let (left, right) = (markings.left_edge_m(Lane(row.lane)), markings.right_edge_m(Lane(row.lane)));
             let Some((left_m, right_m)) = left.zip(right) else { continue };
             let is_too_far_left = row.lane > first && row.d_m > left_m + MISPLACED_M;

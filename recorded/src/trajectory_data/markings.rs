@@ -30,6 +30,13 @@ pub(super) struct MarkedCarriageway {
     pub(super) left_m: f64,
 }
 
+impl MarkedCarriageway {
+    /// Returns true if `lane` is one of its lanes.
+    pub(super) fn holds(&self, lane: u8) -> bool {
+        (self.first..=self.last).contains(&lane)
+    }
+}
+
 /// Lateral positions of lane markings.
 ///
 /// A marking lies where the recorded lane of vehicles changes to the adjacent lane. Its position is

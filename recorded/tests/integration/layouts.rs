@@ -165,12 +165,16 @@ fn a_mirrored_carriageway_of_highd_is_refused_and_the_named_option_mends_it() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());
     let clean = read(folder.path()).unwrap();
-    // The upper carriageway, mirrored at the marking next to the median, y = 16.5 m.
-    rewrite_rows(folder.path(), |fields| {
-        if fields[1] == "1" {
-            fields[3] = format!("{}", 31.2 - fields[3].parse::<f64>().unwrap());
-        }
-    });
+    // The upper carriageway, mirrored at the marking next to the median, y = 16.5 m; then elsewhere.
+    let mirrored = |sum_m: f64| {
+        write_both_ways(folder.path());
+        rewrite_rows(folder.path(), |fields| {
+            if fields[1] == "1" {
+                fields[3] = format!("{}", sum_m - fields[3].parse::<f64>().unwrap());
+            }
+        });
+    };
+    mirrored(31.2);
     let problem = read(folder.path()).unwrap_err().problem;
     let TrajectoryFileProblem::LanesAgainstPosition { is_mirrored, .. } = problem else { panic!("{problem}") };
     assert!(is_mirrored);
@@ -180,6 +184,11 @@ fn a_mirrored_carriageway_of_highd_is_refused_and_the_named_option_mends_it() {
     for (mended, clean) in mended.trajectories[0].points.iter().zip(&clean.trajectories[0].points) {
         assert!((mended.d_m - clean.d_m).abs() < 1e-9 && mended.lane == clean.lane, "{mended:?} {clean:?}");
     }
+    mirrored(60.0);
+    assert!(read(folder.path()).is_err());
+    let mended = read_with(folder.path(), options).unwrap();
+    let [mended, clean] = [&mended, &clean].map(|data| data.trajectories[0].points[0].d_m);
+    assert!((mended - clean).abs() < 0.75, "{mended} {clean}: to a part of a lane");
 }
 
 #[test]
