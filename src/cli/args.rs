@@ -137,6 +137,9 @@ pub(super) struct ReadArgs {
     /// The file counts its lanes from the right
     #[arg(long, help_heading = heading::DATA)]
     lanes_from_right: bool,
+    /// The position along the road falls in the direction of travel
+    #[arg(long, help_heading = heading::DATA)]
+    reverse_s: bool,
     /// Lanes by which the peak criterion finds lane changes
     #[arg(long, value_enum, default_value_t, help_heading = heading::DATA)]
     pub(super) lanes: LanesChoice,
@@ -205,7 +208,8 @@ impl ReadArgs {
             Layout::Vissim => LayoutChoice::Vissim,
             Layout::I24 => LayoutChoice::I24,
         });
-        let axes = AxisOptions { mirror_d: self.mirror_d, lanes_from_right: self.lanes_from_right };
+        let Self { mirror_d, lanes_from_right, reverse_s, .. } = *self;
+        let axes = AxisOptions { mirror_d, lanes_from_right, reverse_s };
         let bad_rows = if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject };
         ReadOptions {
             layout,

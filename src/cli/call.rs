@@ -37,7 +37,8 @@ pub fn call(function: &str, keywords: &str) -> Result<(ExitCode, Value), CliErro
         "fit" => find_fit(&arguments(keywords)?),
         _ => return Err(CliError::usage(format!("there is no function `{function}`"))),
     };
-    Ok((ExitCode::Pass, answer?.value))
+    let answer = answer?;
+    Ok((answer.code(), answer.value))
 }
 
 fn campaign(args: &Campaign) -> Result<(ExitCode, Value), CliError> {

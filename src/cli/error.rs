@@ -124,6 +124,12 @@ pub enum CliError {
         /// How far the closest driver is from the recording.
         source: StepZeroError,
     },
+    /// A trajectory file has nothing that the command needs.
+    #[error("{message}")]
+    NothingFound {
+        /// What is missing.
+        message: String,
+    },
     /// A set of rendered images cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -241,16 +247,32 @@ impl From<SourceError> for CliError {
 
 /// Returns the option that reads a trajectory file in spite of the problem, if there is one.
 fn remedy(problem: &TrajectoryFileProblem) -> String {
-    let (name, effect) = match problem {
-        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => ("mirror-d", "turns the position"),
-        TrajectoryFileProblem::LanesAgainstPosition { .. } => ("lanes-from-right", "turns the lanes"),
-        TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
-            ("location", "names the data set of NGSIM's export to read")
+    let [mirror_d, from_right] = ["mirror-d", "lanes-from-right"].map(Argument);
+    match problem {
+        TrajectoryFileProblem::LanesAgainstPosition { is_mirrored: true, .. } => {
+            format!("; {mirror_d} turns the position, {from_right} the lanes")
         }
-        problem if problem.affects_one_row() => ("drop-bad-rows", "skips such rows, and counts them"),
-        _ => return String::new(),
-    };
-    format!("; {} {effect}", Argument(name))
+        TrajectoryFileProblem::LanesAgainstPosition { .. } => format!(
+            "; {from_right} turns the lanes, {mirror_d} the position: with the wrong one of them, left is called right"
+        ),
+        TrajectoryFileProblem::LanesBesideMarkings { .. } => {
+            format!("; {} `none` takes no lane as recorded, {mirror_d} turns the position", Argument("lanes"))
+        }
+        TrajectoryFileProblem::SidesContradict { .. } => format!(
+            "; {mirror_d} turns the position (with {from_right}, if the lanes are counted from the right, too), or leave these \
+             columns out"
+        ),
+        TrajectoryFileProblem::AgainstTheRoad { .. } => {
+            format!("; {} turns the position along the road of all vehicles", Argument("reverse-s"))
+        }
+        TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
+            format!("; {} names the data set of NGSIM's export to read", Argument("location"))
+        }
+        problem if problem.affects_one_row() => {
+            format!("; {} skips such rows, and counts them", Argument("drop-bad-rows"))
+        }
+        _ => String::new(),
+    }
 }
 
 /// Largest number of tracks that a message suggests.
@@ -351,6 +373,7 @@ impl From<&CliError> for ExitCode {
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
+            CliError::NothingFound { .. } => Self::Inconclusive,
             CliError::Plan(
                 PlanError::Controller { .. } | PlanError::WithoutMis { .. } | PlanError::WithoutHuman { .. },
             ) => Self::InvalidInput,

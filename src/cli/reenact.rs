@@ -109,7 +109,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
 
 /// Returns the message for a track without a lane change, or for a file without one. `track` holds whether the file has the
 /// track at all.
-pub(super) fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u64]) -> String {
+fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u64]) -> String {
     let Some((track, is_recorded)) = track else { return format!("{file} has no lane change") };
     let unknown = if is_recorded { "" } else { ", which it does not hold" };
     let named: Vec<String> = others.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
@@ -119,6 +119,13 @@ pub(super) fn no_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u
         _ => format!("the tracks that change lanes are {}", named.join(", ")),
     };
     format!("{file} has no lane change of track {track}{unknown}; {which}")
+}
+
+/// Returns the error for a track without a lane change, or for a file without one: the command line is
+/// wrong only if it could name another track.
+pub(super) fn lacks_lane_change(file: &str, track: Option<(u64, bool)>, others: &[u64]) -> CliError {
+    let message = no_lane_change(file, track, others);
+    if track.is_some() && !others.is_empty() { CliError::usage(message) } else { CliError::NothingFound { message } }
 }
 
 /// Returns the encounter of the named track of a trajectory file, or the most critical one.
@@ -139,7 +146,7 @@ pub(super) fn chosen_by<T>(
     let file = path.display();
     found.map_err(|error| match error {
         ChoiceError::NoLaneChange { is_recorded, others } => {
-            CliError::usage(no_lane_change(&format!("{file}"), track.map(|track| (track, is_recorded)), &others))
+            lacks_lane_change(&file.to_string(), track.map(|track| (track, is_recorded)), &others)
         }
         ChoiceError::NoSuchNumber { count } => {
             let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));

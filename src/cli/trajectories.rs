@@ -26,7 +26,7 @@ use super::help::{examples, heading};
 use super::keywords::Argument;
 use super::output::{command_line, out, outln, print_error, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
-use super::reenact::no_lane_change;
+use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.
@@ -161,6 +161,15 @@ pub(super) struct FitArgs {
 pub(super) struct Answer {
     pub(super) value: Value,
     text: String,
+    /// Whether a warning says why the result may be wrong.
+    is_in_doubt: bool,
+}
+
+impl Answer {
+    /// Returns the exit code.
+    pub(super) fn code(&self) -> ExitCode {
+        if self.is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass }
+    }
 }
 
 /// Prints the answer.
@@ -169,7 +178,7 @@ fn print(format: Format, answer: &Answer) -> ExitCode {
         Format::Json => outln!("{:#}", answer.value),
         Format::Human => out!("{}", answer.text),
     }
-    ExitCode::Pass
+    answer.code()
 }
 
 pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
@@ -206,6 +215,10 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
     if basis.lacks_recorded_crossings() {
         print_error(format_args!("help: `--lanes none` takes no lane as recorded\n"));
     }
+    let nothing = basis.unexplained_crossings(changes.len());
+    if let Some(reason) = &nothing {
+        warn(format_args!("{}: {reason}", args.file.display()));
+    }
     let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
     let score = scored.as_ref().map_or_else(String::new, ScoreText::text);
     Ok(Answer {
@@ -214,6 +227,7 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
             "{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped\n{basis}\n{}{score}",
             LaneChangesText(&changes)
         ),
+        is_in_doubt: tracks.is_coarse() || nothing.is_some(),
     })
 }
 
@@ -243,7 +257,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
             let track = args.track.map(|track| (track, smoothed.track_index(track).is_some()));
             let mut others: Vec<u64> = changes.iter().map(|change| change.lane_change.track_id).collect();
             others.dedup();
-            return Err(CliError::usage(no_lane_change(&args.file.display().to_string(), track, &others)));
+            return Err(lacks_lane_change(&args.file.display().to_string(), track, &others));
         };
         write_recording(path, &[film_lane_change(smoothed, chosen)?])?;
         print_written(path);
@@ -254,6 +268,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     Ok(Answer {
         value: stamped(serde_json::json!(changes), None, None),
         text: CriticalityText { file: &file, changes: &changes, counted }.to_string(),
+        is_in_doubt: file.is_coarse,
     })
 }
 
@@ -267,6 +282,15 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     let data_sets = args.data.read_all()?;
     let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
+    if fitted.fitted.is_empty() {
+        match args.format {
+            Format::Json => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
+            Format::Human => out!("{}", FitText(&fitted)),
+        }
+        let message =
+            "no quantity of the trajectory files has enough values to be fitted: nothing was written".to_owned();
+        return Err(CliError::NothingFound { message });
+    }
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
@@ -277,5 +301,6 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
             None => to_toml(&fitted, &heading),
             Some(_) => FitText(&fitted).to_string(),
         },
+        is_in_doubt: data_sets.iter().any(|data| data.is_coarse),
     })
 }

@@ -11,6 +11,8 @@ use crate::support::{closecall, folder, json, library, stderr, stdout};
 
 /// Exit code of wrong input.
 const WRONG_INPUT: i32 = 3;
+/// Exit code of a result that cannot be told.
+const INCONCLUSIVE: i32 = 4;
 
 /// Returns the file of this name among the odd recordings.
 fn odd(name: &str) -> Option<PathBuf> {
@@ -79,13 +81,128 @@ fn recorded_traffic_with_fewer_frames_keeps_its_lane_changes() {
     let clean = data.join("ngsim_us101/trajectories/us101_a.csv");
     let folder = folder();
     let whole = lane_changes(&clean, &[]).0.len();
-    for (name, step) in [("second", 2), ("fourth", 4)] {
-        let changes =
-            lane_changes(&thinned(&clean, &folder.path().join(name), |frame, _| frame % step == 0), &[]).0.len();
-        assert!(changes.abs_diff(whole) <= 1, "{name}: {changes} instead of {whole}");
+    for phase in [0, 1] {
+        let second = thinned(&clean, &folder.path().join("second"), |frame, _| frame % 2 == phase);
+        let changes = lane_changes(&second, &[]).0.len();
+        assert!(changes.abs_diff(whole) <= 1, "phase {phase}: {changes} instead of {whole}");
+    }
+    // Every fourth frame misses up to three lane changes, which depends on the first frame.
+    let fourth = thinned(&clean, &folder.path().join("fourth"), |frame, _| frame % 4 == 3);
+    for command in ["lane-changes", "criticality"] {
+        let output = closecall(["traffic", command, fourth.to_str().unwrap()]);
+        stdout(&output, INCONCLUSIVE);
+        assert!(stderr(&output).contains("only every 0.40 s"), "{command}: {}", stderr(&output));
     }
     let lost = lane_changes(&thinned(&clean, &folder.path().join("lost"), |_, line| line % 50 != 7), &[]).0.len();
     assert!(lost.abs_diff(whole) <= 1, "{lost} instead of {whole}");
+}
+
+/// Writes a copy of a plain file, with `change` applied to each row, by the names of its columns, and
+/// returns the file.
+fn changed(clean: &Path, to: &Path, change: impl Fn(&dyn Fn(&str) -> f64) -> Vec<(&'static str, f64)>) -> PathBuf {
+    let text = fs::read_to_string(clean).unwrap();
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|other| *other == name).unwrap();
+    let mut written = header.join(",") + "\n";
+    for line in lines {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let values = change(&|name| fields[column(name)].parse().unwrap());
+        for (name, value) in values {
+            fields[column(name)] = value.to_string();
+        }
+        written += &(fields.join(",") + "\n");
+    }
+    fs::write(to, written).unwrap();
+    to.to_owned()
+}
+
+#[test]
+fn traffic_against_the_axis_of_the_road_is_refused_by_the_direction() {
+    let folder = folder();
+    let clean = recorded(folder.path());
+    let whole = lane_changes(&clean, &[]).0.len();
+    let reversed = changed(&clean, &folder.path().join("reversed.csv"), |row| vec![("s_m", 1_000.0 - row("s_m"))]);
+    let message = refusal(&reversed, &[]);
+    assert!(message.contains("falls in the direction of travel") && message.contains("--reverse-s"), "{message}");
+    assert_eq!(lane_changes(&reversed, &["--reverse-s"]).0.len(), whole);
+    let both = changed(&clean, &folder.path().join("both.csv"), |row| {
+        let s_m = row("s_m");
+        vec![("s_m", if row("track_id") % 2.0 == 0.0 { 1_000.0 - s_m } else { s_m })]
+    });
+    for options in [&[][..], &["--reverse-s"]] {
+        assert!(refusal(&both, options).contains("each direction needs a file of its own"));
+    }
+}
+
+#[test]
+fn a_heading_or_a_position_in_the_plane_against_the_lateral_position_is_refused() {
+    let folder = folder();
+    let clean = recorded(folder.path());
+    let left = |file: &Path, options: &[&str]| {
+        let changes = lane_changes(file, options).0;
+        (changes.iter().filter(|change| change["direction"] == "left").count(), changes.len())
+    };
+    let whole = left(&clean, &[]);
+    // Both axes are turned, so that lanes and positions agree, and left would be called right.
+    let turned = changed(&clean, &folder.path().join("turned.csv"), |row| {
+        vec![("d_m", -row("d_m")), ("lane_id", 3.0 - row("lane_id"))]
+    });
+    let message = refusal(&turned, &[]);
+    assert!(message.contains("`heading_rel_rad` contradict") && message.contains("--mirror-d"), "{message}");
+    assert_eq!(left(&turned, &["--mirror-d", "--lanes-from-right"]), whole);
+    let plane = changed(&clean, &folder.path().join("plane.csv"), |row| vec![("y_m", -row("y_m"))]);
+    assert!(refusal(&plane, &[]).contains("`x_m, y_m` contradict"));
+}
+
+/// Writes three vehicles at 30 m/s, of which the first one moves to the left by 3.75 m within
+/// `duration_s`, if that is given.
+fn three_vehicles(to: &Path, duration_s: Option<f64>) -> PathBuf {
+    let mut text =
+        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    for frame in 0..200 {
+        let time_s = 0.1 * f64::from(frame);
+        let tau = duration_s.map_or(0.0, |duration_s| ((time_s - 10.0) / duration_s).clamp(0.0, 1.0));
+        let left_m = 3.75 * tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+        for (track, s_m, d_m) in [(1, 0.0, 5.625 - left_m), (2, 60.0, 5.625), (3, -80.0, 1.875)] {
+            let (s_m, lane) = (s_m + 30.0 * time_s, if d_m < 3.75 { 1 } else { 2 });
+            text += &format!("{track},{frame},{time_s:.1},{s_m:.3},{d_m:.3},{lane},30,0,4.5,1.8,car\n");
+        }
+    }
+    fs::write(to, text).unwrap();
+    to.to_owned()
+}
+
+#[test]
+fn a_file_without_lane_changes_is_no_wrong_command_line_and_no_success() {
+    let folder = folder();
+    let straight = three_vehicles(&folder.path().join("straight.csv"), None);
+    let fitted = folder.path().join("fitted.toml");
+    let straight = straight.to_str().unwrap();
+    let sample = ["sample", straight, "--vary", "cc1", "--from", "1.5", "--to", "0.3"];
+    for words in [&["reenact", straight][..], &["reenact", straight, "--track", "1"], &sample] {
+        let output = closecall(["traffic"].iter().chain(words));
+        stdout(&output, INCONCLUSIVE);
+        assert!(stderr(&output).contains("has no lane change"), "{words:?}: {}", stderr(&output));
+        assert!(!stderr(&output).contains("--help"), "{}", stderr(&output));
+    }
+    let output = closecall(["traffic", "fit", straight, "-o", fitted.to_str().unwrap()]);
+    stdout(&output, INCONCLUSIVE);
+    assert!(stderr(&output).contains("enough values") && !fitted.exists(), "{}", stderr(&output));
+    // Another track does change lanes: the command line is wrong.
+    let changing = three_vehicles(&folder.path().join("changing.csv"), Some(5.0));
+    stdout(&closecall(["traffic", "reenact", changing.to_str().unwrap(), "--track", "2"]), 2);
+}
+
+#[test]
+fn a_value_beyond_what_a_vehicle_can_do_is_named_in_the_text() {
+    let folder = folder();
+    for (duration_s, implausible) in [(0.6, true), (5.0, false)] {
+        let file = three_vehicles(&folder.path().join(format!("{duration_s}.csv")), Some(duration_s));
+        let text = stdout(&closecall(["traffic", "criticality", file.to_str().unwrap(), "--all"]), 0);
+        assert_eq!(text.contains("implausible: beyond what a vehicle can do"), implausible, "{text}");
+        assert_eq!(text.contains("1 of them implausible"), implausible, "{text}");
+    }
 }
 
 #[test]
@@ -124,7 +241,11 @@ fn lanes_against_the_lateral_position_are_refused_by_the_axis() {
         assert_eq!((left, changes.len()), (2, 2), "{changes:?}");
     };
     for options in [&[][..], &["--lanes", "none"]] {
-        assert!(refusal(&from_right, options).contains("from the right"));
+        let message = refusal(&from_right, options);
+        assert!(
+            ["from the right", "--lanes-from-right", "--mirror-d"].iter().all(|word| message.contains(word)),
+            "{message}"
+        );
         assert!(refusal(&mirrored, options).contains("points to the left"));
     }
     left(&from_right, "--lanes-from-right");
@@ -166,6 +287,10 @@ fn files_of_other_programs_that_lack_something_are_refused_by_that_reason() {
         ("a.parquet", "PAR1\u{15}\u{4}", "no Parquet file that can be read"),
         ("a.fzp", "$VISION\n* File: a.inpx\n$VEHICLE:SIMSEC;NO;LANE\\LINK\\NO\n", "which the Vissim layout needs"),
         ("a.json", "[{\"timestamp\": [1.0], \"x_position\": [2.0]}]", "missing field `y_position`"),
+        ("a.xosc", "<?xml version=\"1.0\"?>\n<OpenSCENARIO>\n</OpenSCENARIO>\n", "an OpenSCENARIO scenario"),
+        ("a.xodr", "<?xml version=\"1.0\"?>\n<OpenDRIVE>\n</OpenDRIVE>\n", "an OpenDRIVE road network"),
+        ("a.osi", "\u{10}\0\0\0\u{1}\u{2}", "a trace of OSI messages"),
+        ("u.csv", "t\0r\0a\0c\0k\0_\0i\0d\0", "UTF-16"),
         ("a.xml", "<?xml version=\"1.0\"?>\n<!-- generated -->\n<fcd-export>\n</fcd-export>\n", "there are no rows"),
     ];
     for (name, text, reason) in files {

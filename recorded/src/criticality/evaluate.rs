@@ -14,6 +14,7 @@ use super::{
 };
 use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::{LaneChange, detect};
+use crate::trajectory_data::Carriageways;
 
 /// Speed below which a vehicle is assumed to point along the road, because its direction of
 /// movement is noise (m/s).
@@ -23,9 +24,6 @@ const HEADING_FROM_MPS: f64 = 1.0;
 const IMPLAUSIBLE_MPS2: f64 = 12.0;
 /// Speed beyond which a recorded value is an error (m/s): 360 km/h.
 const IMPLAUSIBLE_MPS: f64 = 100.0;
-/// Lateral distance within which vehicles are on one carriageway (m). The readers put carriageways
-/// 1 km apart.
-const CARRIAGEWAY_M: f64 = 200.0;
 
 /// What counts as critical, beside the thresholds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,10 +37,11 @@ pub struct Judgement {
 
 /// Detects all lane changes of `data` and evaluates their metrics.
 pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<CriticalLaneChange> {
+    let traffic = Traffic { data, carriageways: &Carriageways::of(data.trajectories()) };
     let evaluated = detect(data).into_iter().filter_map(|lane_change| {
-        let Evaluation { metrics, following } = evaluate(data, &lane_change, window(&lane_change), judgement)?;
+        let Evaluation { metrics, following } = evaluate(traffic, &lane_change, window(&lane_change), judgement)?;
         let (half, crossing) = (Time::from_ns(PERIOD.ns() / 2), Time::from_s(lane_change.crossing_s));
-        let at_crossing = evaluate(data, &lane_change, [crossing - half, crossing + half], judgement)?;
+        let at_crossing = evaluate(traffic, &lane_change, [crossing - half, crossing + half], judgement)?;
         Some(CriticalLaneChange { lane_change, metrics, following, at_crossing })
     });
     evaluated.collect()
@@ -55,10 +54,17 @@ fn window(lane_change: &LaneChange) -> [Time; 2] {
     [Time::from_s(start_s.min(crossing_s)), Time::from_s(end_s.max(crossing_s))]
 }
 
+/// The traffic among which opponents are searched.
+#[derive(Clone, Copy)]
+struct Traffic<'a> {
+    data: &'a SmoothedTrajectoryData,
+    carriageways: &'a Carriageways,
+}
+
 /// Evaluates the metrics of one lane change from the first to the last instant of a window. Returns
 /// `None` if `data` does not have its track.
 fn evaluate(
-    data: &SmoothedTrajectoryData,
+    Traffic { data, carriageways }: Traffic<'_>,
     lane_change: &LaneChange,
     [start, end]: [Time; 2],
     judgement: &Judgement,
@@ -69,7 +75,7 @@ fn evaluate(
     for point in ego.points.iter().filter(|point| point.time >= start && point.time <= end) {
         let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != ego_index);
         let others = others.map(|&presence| VehicleState::new(data.look_up(presence)));
-        let is_opponent = |other: &VehicleState<'_>| (other.point.d_m - point.d_m).abs() < CARRIAGEWAY_M;
+        let is_opponent = |other: &VehicleState<'_>| carriageways.share(other.point.d_m, point.d_m);
         let others: Vec<VehicleState<'_>> = others.filter(is_opponent).collect();
         extremes.observe(&VehicleState::new((ego, point)), &others, Lane(lane_change.to_lane));
     }
@@ -322,6 +328,16 @@ mod tests {
     }
 
     #[test]
+    fn a_vehicle_on_another_carriageway_is_no_opponent() {
+        // As fast as the vehicle in the target lane of the test before, behind a strip of 32 m without
+        // vehicles, and behind one of 6 m.
+        let beyond = |d_m: f64| evaluated(vec![straight_track(2, -70.0, 38.0, d_m, 110)]).metrics;
+        assert_eq!(absent(beyond(-40.0).ttce_s), Some(Absent::NoOpponent));
+        assert_eq!(absent(beyond(-40.0).distance_m), Some(Absent::NoOpponent));
+        assert!(beyond(-12.25).ttce_s.value().is_some());
+    }
+
+    #[test]
     fn a_vehicle_that_drives_away_is_no_encounter() {
         let metrics = evaluated(vec![straight_track(2, 50.0, 40.0, -8.75, 110)]).metrics;
         assert_eq!(absent(metrics.ttce_s), Some(Absent::NotApproaching));
@@ -362,8 +378,9 @@ mod tests {
         let ego = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let data = smooth(&trajectory_data_of(vec![ego, lead]));
         let whole = detect(&data).remove(0);
+        let traffic = Traffic { data: &data, carriageways: &Carriageways::default() };
         let thw_s = |change: &LaneChange| {
-            let evaluation = evaluate(&data, change, window(change), &Judgement::default()).unwrap();
+            let evaluation = evaluate(traffic, change, window(change), &Judgement::default()).unwrap();
             evaluation.metrics.thw_s.value().unwrap()
         };
         // The estimated end of a manoeuvre can lie before its crossing.

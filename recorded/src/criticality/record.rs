@@ -33,6 +33,11 @@ impl MetricResult {
         matches!(self, Self::Value { critical: true, .. })
     }
 
+    /// Returns true if the recorded value is beyond what a vehicle can do.
+    pub fn is_implausible(&self) -> bool {
+        matches!(self, Self::Absent { absent: Absent::Implausible })
+    }
+
     /// Returns the value, or `None` if it is absent.
     pub fn value(&self) -> Option<f64> {
         match self {

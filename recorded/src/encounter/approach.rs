@@ -104,8 +104,18 @@ pub enum NoApproach {
     #[error("at the crossing it is not behind the vehicle ahead within {LONGEST_THW_S:.0} s")]
     NotBehind,
     /// The road cannot be built.
-    #[error("{0}")]
+    #[error("{}", without_track(.0))]
     Road(NoEncounter),
+}
+
+/// Returns the reason without the number of the track, so that equal reasons are counted together.
+fn without_track(reason: &NoEncounter) -> String {
+    match reason {
+        NoEncounter::TooManyLanes { lanes, most, .. } => {
+            format!("its road has {lanes} lanes; at most {most} are possible")
+        }
+        reason => reason.to_string(),
+    }
 }
 
 /// Reads the approach of the lane change `change` from `data`.

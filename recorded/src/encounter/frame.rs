@@ -8,6 +8,7 @@ use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 use super::NoEncounter;
 use crate::filters::{SmoothedTrajectoryData, resample};
 use crate::lane_change::LaneChange;
+use crate::trajectory_data::Carriageways;
 
 /// Largest number of lanes of a road.
 const MAX_LANES: u8 = 8;
@@ -44,9 +45,14 @@ impl RoadSection {
         ego: &Trajectory,
         change: &LaneChange,
     ) -> Result<Self, NoEncounter> {
-        let mut occupied_lanes: BTreeSet<u8> =
-            data.trajectories().flat_map(|track| &track.points).map(|point| point.lane.0).collect();
-        occupied_lanes.extend((1..=u8::MAX).filter(|&lane| data.markings.right_edge_m(Lane(lane)).is_some()));
+        let carriageways = Carriageways::of(data.trajectories());
+        let at = ego.at(Time::from_s(change.crossing_s)).or(ego.points.first());
+        let is_beside = |point: &&TrajectoryPoint| at.is_none_or(|at| carriageways.share(at.d_m, point.d_m));
+        let points = data.trajectories().flat_map(|track| &track.points);
+        let mut occupied_lanes: BTreeSet<u8> = points.filter(is_beside).map(|point| point.lane.0).collect();
+        let is_marked = |lane: &u8| data.markings.right_edge_m(Lane(*lane)).is_some();
+        occupied_lanes.extend((1..=u8::MAX).filter(is_marked));
+        occupied_lanes.retain(|lane| !data.markings.is_median(Lane(*lane)));
         occupied_lanes.extend([change.from_lane, change.to_lane]);
         let left = change.from_lane.min(change.to_lane);
         let first = (1..=left).rev().take_while(|lane| occupied_lanes.contains(lane)).last().unwrap_or(left);

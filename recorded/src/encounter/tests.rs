@@ -3,6 +3,7 @@ use closecall_traffic::{CONTROL_STEP, Lane, Time, Trajectory};
 use super::*;
 use crate::filters::smooth;
 use crate::lane_change::detect;
+use crate::trajectory_data::LaneMarkings;
 use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
 /// Rear vehicle that changes from lane 2 to lane 1 between 10 and 15 s, 150 m behind the ego
@@ -58,6 +59,27 @@ fn vehicles_of_another_carriageway_are_left_out() {
     let encounter = encounter_among(ego_and_lead().into_iter().chain([far, near]).collect()).unwrap();
     let tracks: Vec<u64> = encounter.vehicles.iter().map(|vehicle| vehicle.trajectory.track_id).collect();
     assert_eq!((tracks, encounter.lanes), (vec![1, 2, 3, 6], 2));
+}
+
+#[test]
+fn a_road_is_one_carriageway_of_several_with_markings() {
+    let edges = [(1, -3.5), (2, -7.0), (3, -1_007.0), (4, -1_010.5), (5, -1_014.0)];
+    let markings = LaneMarkings::from_right_edges(edges.map(|(lane, edge_m)| (Lane(lane), edge_m)));
+    for shift_m in [0.0, -1_007.0] {
+        let tracks = std::iter::once(rear()).chain(ego_and_lead()).map(|mut track| {
+            let moved = track.points.iter_mut().filter(|_| shift_m < 0.0);
+            moved.for_each(|point| (point.d_m, point.lane) = (point.d_m + shift_m, Lane(point.lane.0 + 3)));
+            track
+        });
+        let mut data = trajectory_data_of(tracks.collect());
+        data.markings = markings.clone();
+        let data = smooth(&data);
+        let changes = detect(&data);
+        let encounter = encounter(&data, &changes[0], &changes, (CONTROL_STEP, Lead::Required)).unwrap();
+        assert_eq!((encounter.lanes, encounter.home, encounter.target), (2, Lane(2), Lane(1)), "{shift_m}");
+        let [ego, ..] = encounter.ego_lead_rear();
+        assert!((ego.points[0].d_m + 5.25).abs() < 1e-6, "{}", ego.points[0].d_m);
+    }
 }
 
 #[test]

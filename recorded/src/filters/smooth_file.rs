@@ -22,6 +22,8 @@ pub struct SmoothedFile {
     pub flaws: FlawCounts,
     /// Time between two recorded frames.
     pub period: Time,
+    /// Whether the frames are too far apart for every lane change to be found.
+    pub is_coarse: bool,
     /// What a reader of results has to know of the file.
     pub warnings: Vec<String>,
 }
@@ -50,7 +52,7 @@ pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, Tr
     }
     let data = read_with(path, options)?;
     let (flaws, warnings) = (count_flaws(&data), data.warnings());
-    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, warnings })
+    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, is_coarse: data.is_coarse, warnings })
 }
 
 /// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
@@ -74,5 +76,6 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     let markings = if file.states_markings() { file.markings().clone() } else { markings.finish() };
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
     let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
-    Ok(Some(SmoothedFile { data, flaws: inspector.count_flaws(), period: file.period(), warnings }))
+    let (flaws, period, is_coarse) = (inspector.count_flaws(), file.period(), file.is_coarse());
+    Ok(Some(SmoothedFile { data, flaws, period, is_coarse, warnings }))
 }

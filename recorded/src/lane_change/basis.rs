@@ -58,6 +58,19 @@ impl DetectionBasis {
         (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable) && self.recorded_crossings == 0
     }
 
+    /// Returns why vehicles change their recorded lanes although no lane change was found, of `found`
+    /// lane changes.
+    pub fn unexplained_crossings(&self, found: usize) -> Option<String> {
+        let by_lane = (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
+        (by_lane && found == 0 && self.recorded_crossings > 0).then(|| {
+            format!(
+                "the recorded lane changes {} times, but no lateral movement carries a vehicle over a marking: the file shows no lane \
+                 change that can be followed",
+                self.recorded_crossings
+            )
+        })
+    }
+
     /// Returns the reasons for which lane changes may be missing, or their quantities may be wrong.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.markings.ignored().iter().map(ToString::to_string).collect();

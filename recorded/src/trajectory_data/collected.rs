@@ -46,6 +46,8 @@ pub(super) enum Position {
         heading_rad: f64,
         /// `true` if the vehicle leaves its lane in this row.
         changes_lane: bool,
+        /// The lane that the file names, as a number of its own.
+        named_lane: Option<u64>,
     },
     /// On a road, of which a file may hold several. `s_m` is the centre of the vehicle's box.
     Road { road: u32, s_m: f64, d_m: f64, lane: u8 },
@@ -148,10 +150,15 @@ impl Collected {
                 let row = &rows[index];
                 let (place, road_index) = match row.position {
                     Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road),
-                    Position::Plane { point, heading_rad, .. } => {
+                    Position::Plane { point, heading_rad, named_lane, .. } => {
                         let inferred = road.as_ref();
                         direction = direction.or_else(|| inferred.and_then(|road| road.direction(heading_rad)));
-                        (inferred.zip(direction).and_then(|(road, direction)| road.place(direction, point)), 0)
+                        (
+                            inferred
+                                .zip(direction)
+                                .and_then(|(road, direction)| road.place(direction, point, named_lane)),
+                            0,
+                        )
                     }
                 };
                 let Some(Placed { s_m, d_m, lane }) = place else { continue };
@@ -260,8 +267,9 @@ fn infer_road(
     let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
         for &index in order {
             let row = &rows[index];
-            if let Position::Plane { point, heading_rad, changes_lane } = row.position {
-                visit(Pose { vehicle: u64::from(row.vehicle), point, heading_rad, lane_width_m, changes_lane });
+            if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
+                let vehicle = u64::from(row.vehicle);
+                visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
             }
         }
         Ok::<(), ReadError>(())

@@ -55,6 +55,9 @@ pub enum TrajectoryFileProblem {
     /// The file is not a text file.
     #[error("this is not text; CSV or blank-separated text, or either compressed with gzip, is needed")]
     Binary,
+    /// The file is text in another encoding.
+    #[error("this is text in UTF-16, but UTF-8 is needed: save it again in that encoding (`iconv -f UTF-16 -t UTF-8`)")]
+    Utf16,
     /// A line is not valid UTF-8 text.
     #[error("the line is not text in UTF-8")]
     NotText,
@@ -323,6 +326,49 @@ pub enum TrajectoryFileProblem {
         apart_m: f64,
         /// Whether the positions have the sign of the other side, too.
         is_mirrored: bool,
+    },
+    /// Vehicles are not between the markings of their lanes.
+    #[error(
+        "in {percent:.0} % of the rows of lanes {} to {}, as they are numbered from the left, a vehicle is not between the \
+         markings of its lane: the numbers of lanes and the stated markings contradict each other",
+        lanes[0], lanes[1]
+    )]
+    LanesBesideMarkings {
+        /// The leftmost and the rightmost lane of the carriageway.
+        lanes: [u8; 2],
+        /// Share of these rows (%).
+        percent: f64,
+    },
+    /// Columns that the reader only checks contradict the lateral position.
+    #[error(
+        "`{columns}` contradict `d_m`: in {percent:.0} % of {compared}, they say left where `d_m` says right, or the reverse; \
+         one of both points to the other side"
+    )]
+    SidesContradict {
+        /// The columns.
+        columns: &'static str,
+        /// Share of the comparisons that contradict (%).
+        percent: f64,
+        /// What is compared.
+        compared: &'static str,
+    },
+    /// Vehicles drive against the road.
+    #[error(
+        "the position along the road falls in the direction of travel of {against} of {all} vehicles, such as vehicle {first}: \
+         {}",
+        if against == all {
+            "it has to grow"
+        } else {
+            "they drive in the other direction, and each direction needs a file of its own"
+        }
+    )]
+    AgainstTheRoad {
+        /// Number of vehicles that drive against the road.
+        against: usize,
+        /// Number of vehicles.
+        all: usize,
+        /// Number of the first of them.
+        first: u64,
     },
     /// The tracks fall to pieces.
     #[error(

@@ -17,7 +17,7 @@
 //!    common distance. If the modes lie near the middles of lanes that begin at d = 0, the left edge
 //!    of lane 1 by the definition of the layouts, the markings are shifted back by it.
 //!
-//! The lanes of several carriageways, which lie more than 20 m apart, are estimated one by one. The
+//! The lanes of several carriageways, which lie more than 12 m apart, are estimated one by one. The
 //! estimate fails if a carriageway has few vehicles or a single lane, or if no period stands out.
 
 use std::collections::BTreeSet;
@@ -25,7 +25,7 @@ use std::f64::consts::PI;
 
 use closecall_traffic::{Lane, maths};
 
-use super::markings::LaneMarkings;
+use super::markings::{CARRIAGEWAY_GAP_M, LaneMarkings};
 use super::source::Row;
 
 /// Lane widths that are tried (m), and their step.
@@ -50,8 +50,6 @@ const LEAST_SHARE: f64 = 0.01;
 /// Largest distance between the modes and the middles of lanes that begin at d = 0 (m): a third of a
 /// lane. Beyond it, a mode may belong to either of two lanes. The windows of US-101 have 0.3 to 0.9 m.
 const LARGEST_OFFSET_M: f64 = 1.1;
-/// Distance between two carriageways (m): more than any lane without vehicles.
-const GAP_M: f64 = 20.0;
 /// Number of rows that are evaluated.
 const ENOUGH_ROWS: usize = 50_000;
 
@@ -85,7 +83,7 @@ impl EstimatedLanes {
         positions.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut carriageways: Vec<Carriageway> = Vec::new();
         let mut first_lane = 0_u8;
-        for group in positions.chunk_by(|left, right| left.0 - right.0 < GAP_M) {
+        for group in positions.chunk_by(|left, right| left.0 - right.0 < CARRIAGEWAY_GAP_M) {
             let carriageway = Carriageway::of(group, first_lane, carriageways.is_empty())?;
             let lanes = u8::try_from(carriageway.markings_m.len() + 1).unwrap_or(u8::MAX);
             first_lane = first_lane.saturating_add(lanes).saturating_add(1);

@@ -11,8 +11,8 @@
 //!
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
 //! another format. The reader therefore infers the road from the traffic before it reads the rows;
-//! see `inferred_road`. A vehicle changes its lane where `laneChange` is 1, or where its offset
-//! from the lane's centre jumps.
+//! see `inferred_road`. A lanelet becomes the lane at its vehicles' mean position. A vehicle changes
+//! its lane where `laneChange` is 1, or where its offset from the lane's centre jumps.
 //!
 //! **inD, rounD.** Their columns are the first ones of exiD's. They record intersections and
 //! roundabouts, which are no roads with lanes: they are read with a warning, or refused if most
@@ -89,6 +89,11 @@ impl ColumnIndices {
         })
     }
 
+    /// Returns the number of the lanelet that a row names.
+    fn named_lane(&self, line: &str, fields: &Fields) -> Option<u64> {
+        first_of(fields.get(line, self.lanelet?)).parse().ok()
+    }
+
     /// Returns the vehicle number, the position and the heading (rad) of a row.
     fn pose(&self, line: &str, fields: &Fields) -> Result<(u64, Point, f64), FieldError> {
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
@@ -149,7 +154,8 @@ pub(super) fn road_from_traffic(path: &Path) -> Result<InferredRoad, TrajectoryF
             let jumps = before_m.zip(offset_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() > least_m);
             latest = offset_m.map(|offset_m| (vehicle, offset_m));
             let changes_lane = jumps || field(columns.lane_change) == "1";
-            visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane });
+            let named_lane = columns.named_lane(line, fields);
+            visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
         })
     })?;
     road.map_err(|problem| with_path(path, ReadError::of_file(problem)))
@@ -240,7 +246,8 @@ impl TextLayout for ExidColumns {
         let latest_index = self.latest.filter(|(latest, _)| *latest == track).map(|(_, index)| index);
         let index = latest_index.or_else(|| self.road.direction(heading_rad)).unwrap_or(0);
         self.latest = Some((track, index));
-        let Some(Placed { s_m, d_m, lane }) = self.road.place(index, point) else { return Ok(None) };
+        let named_lane = self.columns.named_lane(line, fields);
+        let Some(Placed { s_m, d_m, lane }) = self.road.place(index, point, named_lane) else { return Ok(None) };
         let frame = integer(fields.get(line, self.columns.frame), "frame", allowed::FRAMES)?;
         Ok(Some(Row {
             number: track,

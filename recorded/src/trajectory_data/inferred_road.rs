@@ -1,20 +1,30 @@
-//! A road that is inferred from its traffic: for layouts that state positions in a plane, and no
-//! lanes.
+//! A road that is inferred from its traffic: for layouts that state positions in a plane, and lanes
+//! only by names.
 //!
 //! ```text
-//!   ── ── ── ── ── ── ── ── ──   the lanes beside it: steps of the mean lane width, as far as
-//!   ═══════════════════════════   2 % of the rows reach
+//!   ── ── ── ── ── ── ── ── ──   the lanes beside it, as far as 2 % of the rows reach
+//!   ═══════════════════════════
 //!   ── ── ── ── ── ── ── ── ──
 //!     reference line: the longest path of a vehicle that keeps its lane
 //! ```
 //!
 //! Each direction of travel has a reference line. Directions are placed 1 km beside each other, so
-//! that their vehicles never meet. Lateral positions are relative to the path of one driver and
-//! contain its slow weaving of a decimetre or two. Vehicles on ramps count as being in the
-//! outermost lane.
+//! that their vehicles never meet. Vehicles on ramps count as being in the outermost lane.
+//!
+//! **Recorded lanes.** If rows name the lane of their vehicle (an edge with an index, a lanelet), each
+//! name gets the lane number of its vehicles' mean position; names beside each other get different
+//! numbers. A vehicle is then in the lane that the file names. Markings lie halfway between the median
+//! positions in neighbouring lanes. A name whose vehicles are spread over more than a lane is ignored.
+//! Without names, lanes are steps of the mean lane width, and a vehicle is in the lane at its position.
+//!
+//! **Weaving.** The reference line contains the weaving and the errors of one vehicle. If rows name
+//! lanes, the line is smoothed first. Along the road, the median departure of all vehicles that keep
+//! their lanes from the median position of their lane then shows the weaving, and it is subtracted.
+//! Where fewer than ten vehicles show it, or rows name no lanes, a decimetre or two remain.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{Lane, maths};
 
 use super::error::TrajectoryFileProblem;
@@ -54,6 +64,26 @@ const ASTRAY_M: f64 = 35.0;
 const WARNED_SHARE: f64 = 0.05;
 const REFUSED_SHARE: f64 = 0.5;
 
+/// Largest standard deviation of the vehicles of a named lane, as a share of the lane width (-): that
+/// of vehicles within a lane is 0.1, that of vehicles in two lanes 0.5.
+const LARGEST_SPREAD: f64 = 0.4;
+
+/// Least distance between the mean positions of two named lanes beside each other, as a share of the
+/// lane width (-): vehicles that merge keep to the near side of a lane.
+const LEAST_APART: f64 = 0.4;
+
+/// Length of the sections in which the weaving of the reference line is measured, and half the length
+/// over which the line is smoothed (m): parts of the 150 to 300 m in which a driver weaves.
+/// Assumptions with plausible ranges of 20 to 60 m and 40 to 80 m. In a bend with a radius of 150 m,
+/// the smoothing shifts the line by 0.1 m.
+const SECTION_M: f64 = 40.0;
+const SMOOTHED_M: f64 = 60.0;
+/// Least number of vehicles that show the weaving in a section: the mean of ten drivers with a
+/// standard deviation of 0.3 m is accurate to a decimetre.
+const LEAST_DRIVERS: usize = 10;
+/// Number of times that lanes and weaving are estimated in turns.
+const TURNS: usize = 5;
+
 /// The position of one vehicle in one row, and what it says of the lanes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pose {
@@ -64,6 +94,8 @@ pub(super) struct Pose {
     pub(super) lane_width_m: Option<f64>,
     /// `true` if the vehicle leaves its lane in this row.
     pub(super) changes_lane: bool,
+    /// The lane that the file names, as a number of its own.
+    pub(super) named_lane: Option<u64>,
 }
 
 /// A position on the road.
@@ -82,10 +114,55 @@ struct Direction {
     /// Number of lanes to the left of the reference line's own lane.
     left: i64,
     lanes: i64,
+    /// For each named lane, by how many lanes it lies to the left of the reference line's lane.
+    named: BTreeMap<u64, i64>,
+    /// Positions along the line and the distance of the lanes there to the left of where they usually
+    /// are (m), in order.
+    weaving_m: Vec<(f64, f64)>,
+    /// Distances to the left of the line (m) of the edges of the lanes, from left to right.
+    edges_m: Vec<f64>,
     /// Offset of the lane numbers, so that directions share no lane.
     first_lane: i64,
     /// Offset of the lateral position, so that directions do not meet (m).
     shift_m: f64,
+}
+
+/// The rows of one named lane.
+#[derive(Clone, Debug, Default)]
+struct NamedLane {
+    rows: f64,
+    sum_m: f64,
+    squares_m2: f64,
+    /// Positions of the vehicles that keep their lanes (m), one for each vehicle, by the section of the
+    /// road.
+    sections: BTreeMap<i64, Vec<f64>>,
+    /// The first and the last section of its rows.
+    reach: Option<(i64, i64)>,
+}
+
+impl NamedLane {
+    fn add(&mut self, d_m: f64, section: i64) {
+        let (first, last) = self.reach.unwrap_or((section, section));
+        self.reach = Some((first.min(section), last.max(section)));
+        self.rows += 1.0;
+        self.sum_m += d_m;
+        self.squares_m2 += d_m * d_m;
+    }
+
+    /// Returns true if both lanes are recorded in a section of the road, or in the next one.
+    fn is_beside(&self, other: &Self) -> bool {
+        self.reach.zip(other.reach).is_some_and(|((first, last), (others_first, others_last))| {
+            first <= others_last + 1 && others_first <= last + 1
+        })
+    }
+
+    fn mean_m(&self) -> f64 {
+        self.sum_m / self.rows
+    }
+
+    fn sd_m(&self) -> f64 {
+        (self.squares_m2 / self.rows - self.mean_m() * self.mean_m()).max(0.0).sqrt()
+    }
 }
 
 /// The road of a data set, as inferred from its traffic.
@@ -104,6 +181,7 @@ struct DrivenPath {
     heading_rad: f64,
     points: Vec<Point>,
     changes_lanes: bool,
+    names_lanes: bool,
 }
 
 impl InferredRoad {
@@ -119,6 +197,7 @@ impl InferredRoad {
         let mut paths: Vec<(bool, f64, DrivenPath)> = Vec::new();
         let mut current = DrivenPath::default();
         let (mut width_sum_m, mut widths) = (0.0, 0_u32);
+        let mut changing: BTreeSet<u64> = BTreeSet::new();
         each_row(&mut |pose| {
             if let Some(metres) = pose.lane_width_m {
                 width_sum_m += metres;
@@ -130,6 +209,10 @@ impl InferredRoad {
                 current = DrivenPath { vehicle, heading_rad, ..DrivenPath::default() };
             }
             current.changes_lanes |= pose.changes_lane;
+            current.names_lanes |= pose.named_lane.is_some();
+            if pose.changes_lane {
+                changing.insert(pose.vehicle);
+            }
             let point = pose.point;
             let is_far = |last: &Point| maths::hypot(point.0 - last.0, point.1 - last.1) >= SPACING_M;
             if current.points.last().is_none_or(is_far) && current.points.len() < MAX_POINTS {
@@ -139,25 +222,33 @@ impl InferredRoad {
         keep_best_path(&mut paths, current);
         let lane_width_m = if widths > 0 { width_sum_m / f64::from(widths) } else { FALLBACK_LANE_WIDTH_M };
         let directions = paths.into_iter().filter_map(|(_, _, path)| {
-            let line = ReferenceLine::through(path.points.into_iter());
+            let points = if path.names_lanes { smoothed(&path.points) } else { path.points };
+            let line = ReferenceLine::through(points.into_iter());
             line.length_m()?;
             let heading_rad = path.heading_rad;
-            Some(Direction { heading_rad, line, left: 0, lanes: 1, first_lane: 0, shift_m: 0.0 })
+            Some(Direction::along(line, heading_rad))
         });
         let mut road = Self { lane_width_m, directions: directions.collect(), astray: 0.0 };
         if road.directions.is_empty() {
             return Ok(Err(TrajectoryFileProblem::NothingMoves));
         }
-        road.count_lanes(each_row)?;
+        road.count_lanes(each_row, &changing)?;
         if road.astray > REFUSED_SHARE {
             return Ok(Err(TrajectoryFileProblem::NoRoad { percent: 100.0 * road.astray }));
         }
         Ok(Ok(road))
     }
 
-    /// Counts the rows in each lane, and from them sets the lanes of each direction.
-    fn count_lanes<E>(&mut self, mut each_row: impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>) -> Result<(), E> {
-        let mut rows: BTreeMap<(usize, i64), u64> = BTreeMap::new();
+    /// Counts the rows in each lane, and from them sets the lanes of each direction. `changing` holds
+    /// the vehicles that change lanes.
+    fn count_lanes<E>(
+        &mut self,
+        mut each_row: impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
+        changing: &BTreeSet<u64>,
+    ) -> Result<(), E> {
+        let mut rows: BTreeMap<(usize, Option<u64>, i64), u64> = BTreeMap::new();
+        let mut named: BTreeMap<(usize, u64), NamedLane> = BTreeMap::new();
+        let mut latest_section: Option<(u64, u64, i64)> = None;
         let (mut astray, mut all) = (0_u64, 0_u64);
         let mut latest: Option<(u64, usize)> = None;
         each_row(&mut |pose| {
@@ -170,19 +261,46 @@ impl InferredRoad {
                 && projection.d_m.abs() <= ASTRAY_M;
             all += 1;
             astray += u64::from(!follows);
-            *rows.entry((direction, self.lane_beside(projection.d_m))).or_default() += 1;
+            *rows.entry((direction, pose.named_lane, self.lane_beside(projection.d_m))).or_default() += 1;
+            if let Some(name) = pose.named_lane {
+                let lane = named.entry((direction, name)).or_default();
+                let section = section(projection.s_m);
+                lane.add(projection.d_m, section);
+                let here = Some((pose.vehicle, name, section));
+                if follows && latest_section != here && !changing.contains(&pose.vehicle) {
+                    lane.sections.entry(section).or_default().push(projection.d_m);
+                }
+                latest_section = here;
+            }
         })?;
         self.astray = if all > 0 { astray as f64 / all as f64 } else { 0.0 };
         let (mut first_lane, mut shift_m) = (0, 0.0);
         for (index, direction) in self.directions.iter_mut().enumerate() {
-            let in_direction = || rows.iter().filter(|((other, _), _)| *other == index);
-            let least = MIN_SHARE * in_direction().map(|(_, count)| *count).sum::<u64>() as f64;
-            let used = || in_direction().filter(|(_, count)| **count as f64 >= least).map(|((_, lane), _)| *lane);
-            let (left, right) = (used().max().unwrap_or(0).max(0), used().min().unwrap_or(0).min(0));
+            let of_direction = named.iter().filter(|((other, _), _)| *other == index);
+            let usable = of_direction.filter(|(_, lane)| lane.sd_m() <= LARGEST_SPREAD * self.lane_width_m);
+            let usable: Vec<(u64, &NamedLane)> = usable.map(|((_, name), lane)| (*name, lane)).collect();
+            direction.named = numbered(&usable, self.lane_width_m);
+            let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
+            for ((_, name, beside), count) in rows.iter().filter(|((other, ..), _)| *other == index) {
+                let lane = name.and_then(|name| direction.named.get(&name)).unwrap_or(beside);
+                *counts.entry(*lane).or_default() += count;
+            }
+            let least = MIN_SHARE * counts.values().sum::<u64>() as f64;
+            let used = || counts.iter().filter(|(_, count)| **count as f64 >= least).map(|(lane, _)| *lane);
+            let (mut left, mut right) = (used().max().unwrap_or(0).max(0), used().min().unwrap_or(0).min(0));
+            // A named lane next to the others counts, however few vehicles use it. Ramps apart do not.
+            let is_named = |lane: i64| direction.named.values().any(|named| *named == lane);
+            while is_named(left + 1) {
+                left += 1;
+            }
+            while is_named(right - 1) {
+                right -= 1;
+            }
             (direction.left, direction.lanes) = (left, left - right + 1);
             (direction.first_lane, direction.shift_m) = (first_lane, shift_m);
+            direction.place_lanes(&usable, self.lane_width_m);
             first_lane += direction.lanes + 1;
-            shift_m -= self.lane_width_m * direction.lanes as f64 + SEPARATION_M;
+            shift_m -= direction.width_m() + SEPARATION_M;
         }
         Ok(())
     }
@@ -198,16 +316,20 @@ impl InferredRoad {
         })
     }
 
-    /// Places a point on the road in the given direction. Returns `None` if there is no such
-    /// direction.
-    pub(super) fn place(&self, direction: usize, point: Point) -> Option<Placed> {
+    /// Places a point on the road in the given direction, in the lane that the file names, if it does.
+    /// Returns `None` if there is no such direction.
+    pub(super) fn place(&self, direction: usize, point: Point, named_lane: Option<u64>) -> Option<Placed> {
         let direction = self.directions.get(direction)?;
         let projection = direction.line.project(point);
-        let lane = (direction.left - self.lane_beside(projection.d_m) + 1).clamp(1, direction.lanes);
+        let d_m = projection.d_m - direction.weaving_at(projection.s_m);
+        let lane = match named_lane.and_then(|name| direction.named.get(&name)) {
+            Some(lanes) => direction.left - lanes + 1,
+            None => direction.edges_m.iter().skip(1).filter(|edge_m| d_m < **edge_m).count() as i64 + 1,
+        };
         Some(Placed {
             s_m: projection.s_m,
-            d_m: projection.d_m - self.lane_width_m * (direction.left as f64 + 0.5) + direction.shift_m,
-            lane: u8::try_from(lane + direction.first_lane).unwrap_or(u8::MAX),
+            d_m: d_m - direction.left_edge_m() + direction.shift_m,
+            lane: u8::try_from(lane.clamp(1, direction.lanes) + direction.first_lane).unwrap_or(u8::MAX),
         })
     }
 
@@ -220,9 +342,7 @@ impl InferredRoad {
 
     /// Returns by how many lanes `d_m` lies to the left of the reference line's lane.
     fn lane_beside(&self, d_m: f64) -> i64 {
-        #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and what is far away is clamped")]
-        let lane = (d_m / self.lane_width_m).round() as i64;
-        lane.clamp(-MAX_LANES_BESIDE, MAX_LANES_BESIDE)
+        lanes_of(d_m, self.lane_width_m)
     }
 
     /// Returns the lane markings of all directions.
@@ -230,13 +350,145 @@ impl InferredRoad {
         let edges = self.directions.iter().flat_map(|direction| {
             // Lane 0 of the first direction does not exist. Lane 0 of a later direction is the
             // omitted lane, whose right edge is the direction's left edge.
-            (0..=direction.lanes).map(move |lane| {
-                let edge_m = direction.shift_m - self.lane_width_m * lane as f64;
+            direction.edges_m.iter().zip(0..).map(move |(edge_m, lane)| {
+                let edge_m = direction.shift_m + edge_m - direction.left_edge_m();
                 (u8::try_from(direction.first_lane + lane).unwrap_or(u8::MAX), edge_m)
             })
         });
         LaneMarkings::from_right_edges(edges.filter(|(lane, _)| *lane > 0).map(|(lane, edge_m)| (Lane(lane), edge_m)))
     }
+}
+
+impl Direction {
+    /// Creates a direction of a single lane.
+    fn along(line: ReferenceLine, heading_rad: f64) -> Self {
+        let (named, weaving_m, edges_m) = (BTreeMap::new(), Vec::new(), Vec::new());
+        Self { heading_rad, line, left: 0, lanes: 1, named, weaving_m, edges_m, first_lane: 0, shift_m: 0.0 }
+    }
+
+    /// Sets the edges of the lanes, and the weaving of the reference line, from the named lanes.
+    fn place_lanes(&mut self, named: &[(u64, &NamedLane)], lane_width_m: f64) {
+        let mut sections: BTreeMap<i64, Vec<(i64, f64)>> = BTreeMap::new();
+        for (name, lane) in named {
+            let lanes = self.named.get(name).copied().unwrap_or_default();
+            for (section, positions_m) in &lane.sections {
+                sections.entry(*section).or_default().extend(positions_m.iter().map(|d_m| (lanes, *d_m)));
+            }
+        }
+        let mut middles_m: BTreeMap<i64, f64> = BTreeMap::new();
+        for _ in 0..TURNS {
+            let mut positions_m: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
+            for (section, vehicles) in &sections {
+                let weaving_m = self.weaving_at(middle_of(*section));
+                for (lanes, d_m) in vehicles {
+                    positions_m.entry(*lanes).or_default().push(d_m - weaving_m);
+                }
+            }
+            middles_m = positions_m.into_iter().map(|(lanes, values)| (lanes, median(values))).collect();
+            let shown = sections.iter().filter(|(_, vehicles)| vehicles.len() >= LEAST_DRIVERS);
+            let weaving = shown.map(|(section, vehicles)| {
+                let departures = vehicles.iter().filter_map(|(lanes, d_m)| Some(d_m - middles_m.get(lanes)?));
+                (middle_of(*section), median(departures.collect()))
+            });
+            self.weaving_m = weaving.collect();
+        }
+        let middle_m = |lanes: i64| middles_m.get(&lanes).copied();
+        let edge_m = |right_of: i64| match (middle_m(right_of), middle_m(right_of - 1)) {
+            (Some(left_m), Some(right_m)) => 0.5 * (left_m + right_m),
+            (Some(left_m), None) => left_m - 0.5 * lane_width_m,
+            (None, Some(right_m)) => right_m + 0.5 * lane_width_m,
+            (None, None) => (right_of as f64 - 0.5) * lane_width_m,
+        };
+        self.edges_m = (0..=self.lanes).map(|lane| edge_m(self.left + 1 - lane)).collect();
+    }
+
+    /// Returns the left edge of the leftmost lane (m to the left of the line).
+    fn left_edge_m(&self) -> f64 {
+        self.edges_m.first().copied().unwrap_or_default()
+    }
+
+    /// Returns the width of all lanes (m).
+    fn width_m(&self) -> f64 {
+        self.left_edge_m() - self.edges_m.last().copied().unwrap_or_default()
+    }
+
+    /// Returns by how much the lanes are to the left of where they usually are (m), because the
+    /// reference line weaves.
+    fn weaving_at(&self, s_m: f64) -> f64 {
+        let next = self.weaving_m.partition_point(|(at_m, _)| *at_m < s_m);
+        match (next.checked_sub(1).and_then(|before| self.weaving_m.get(before)), self.weaving_m.get(next)) {
+            (Some((from_m, from)), Some((to_m, to))) => from + (to - from) * (s_m - from_m) / (to_m - from_m),
+            (Some((_, value)), None) | (None, Some((_, value))) => *value,
+            (None, None) => 0.0,
+        }
+    }
+}
+
+/// Returns the number of each named lane: by how many lanes it lies to the left of the reference line.
+/// The nearest lanes are numbered first.
+fn numbered(named: &[(u64, &NamedLane)], lane_width_m: f64) -> BTreeMap<u64, i64> {
+    let mut by_distance = named.to_vec();
+    by_distance.sort_by(|(_, a), (_, b)| a.mean_m().abs().total_cmp(&b.mean_m().abs()));
+    let mut placed: Vec<(u64, &NamedLane, i64)> = Vec::new();
+    for (name, lane) in by_distance {
+        let mut number = lanes_of(lane.mean_m(), lane_width_m);
+        for (_, other, others_number) in placed.iter().filter(|(_, other, _)| lane.is_beside(other)) {
+            let left_m = lane.mean_m() - other.mean_m();
+            if left_m > LEAST_APART * lane_width_m {
+                number = number.max(others_number + 1);
+            } else if left_m < -LEAST_APART * lane_width_m {
+                number = number.min(others_number - 1);
+            }
+        }
+        placed.push((name, lane, number));
+    }
+    placed.into_iter().map(|(name, _, number)| (name, number)).collect()
+}
+
+/// Returns a path without what is shorter than [`SMOOTHED_M`]: twice its moving average less the
+/// average of that, which keeps bends where they are (J. W. Tukey, *Exploratory Data Analysis*, 1977,
+/// "twicing").
+fn smoothed(points: &[Point]) -> Vec<Point> {
+    let mut along_m = vec![0.0];
+    for pair in points.windows(2) {
+        let step_m = maths::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        along_m.push(along_m.last().copied().unwrap_or_default() + step_m);
+    }
+    let length_m = along_m.last().copied().unwrap_or_default();
+    let average = |values: &[Point]| -> Vec<Point> {
+        let at = |&middle_m: &f64| {
+            // The window is symmetrical, so that it shrinks towards both ends.
+            let half_m = SMOOTHED_M.min(middle_m).min(length_m - middle_m);
+            let first = along_m.partition_point(|m| *m < middle_m - half_m);
+            let after = along_m.partition_point(|m| *m <= middle_m + half_m).max(first + 1);
+            let window = &values[first.min(values.len() - 1)..after.min(values.len())];
+            let sum = window.iter().fold((0.0, 0.0), |sum, point| (sum.0 + point.0, sum.1 + point.1));
+            (sum.0 / window.len() as f64, sum.1 / window.len() as f64)
+        };
+        along_m.iter().take(values.len()).map(at).collect()
+    };
+    let once = average(points);
+    let twice = average(&once);
+    once.iter().zip(&twice).map(|(once, twice)| (2.0 * once.0 - twice.0, 2.0 * once.1 - twice.1)).collect()
+}
+
+/// Returns the number of lane widths in a distance.
+fn lanes_of(d_m: f64, lane_width_m: f64) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and what is far away is clamped")]
+    let lanes = (d_m / lane_width_m).round() as i64;
+    lanes.clamp(-MAX_LANES_BESIDE, MAX_LANES_BESIDE)
+}
+
+/// Returns the section of the road at `s_m`.
+fn section(s_m: f64) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates")]
+    let section = (s_m / SECTION_M).floor() as i64;
+    section
+}
+
+/// Returns the middle of a section (m).
+fn middle_of(section: i64) -> f64 {
+    (section as f64 + 0.5) * SECTION_M
 }
 
 /// Keeps the best path of each direction. A path without a lane change is better than a path with

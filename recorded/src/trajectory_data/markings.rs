@@ -14,6 +14,29 @@ pub const DEFAULT_LANE_WIDTH_M: f64 = 3.5;
 /// ramps, 5.5 m. The lanes of motorways are 3.25 to 3.75 m wide.
 pub const LANE_WIDTHS_M: RangeInclusive<f64> = 2.5..=5.5;
 
+/// Least width of the strip without vehicles between two carriageways (m): three lanes of 3.75 m, the
+/// widest of motorways (RAA 2008), may be empty on one carriageway. An assumption with a plausible
+/// range of 8 to 20 m.
+pub(super) const CARRIAGEWAY_GAP_M: f64 = 12.0;
+
+/// A carriageway between known markings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MarkedCarriageway {
+    /// Number of its leftmost lane.
+    pub(super) first: u8,
+    /// Number of its rightmost lane.
+    pub(super) last: u8,
+    /// Lateral position of its left edge (m).
+    pub(super) left_m: f64,
+}
+
+impl MarkedCarriageway {
+    /// Returns true if `lane` is one of its lanes.
+    pub(super) fn holds(&self, lane: u8) -> bool {
+        (self.first..=self.last).contains(&lane)
+    }
+}
+
 /// Lateral positions of lane markings.
 ///
 /// A marking lies where the recorded lane of vehicles changes to the adjacent lane. Its position is
@@ -130,6 +153,26 @@ impl LaneMarkings {
         if lane.0 == 1 { Some(0.0) } else { self.right_edge_m(Lane(lane.0.checked_sub(1)?)) }
     }
 
+    /// Returns true if `lane` is the number that the readers leave out between two carriageways: its
+    /// markings are the edges of both.
+    pub fn is_median(&self, lane: Lane) -> bool {
+        let edges = self.left_edge_m(lane).zip(self.right_edge_m(lane));
+        lane.0 > 1 && edges.is_some_and(|(left_m, right_m)| left_m - right_m >= CARRIAGEWAY_GAP_M)
+    }
+
+    /// Returns the carriageways whose lanes have known markings, from left to right.
+    pub(super) fn carriageways(&self) -> Vec<MarkedCarriageway> {
+        let mut carriageways: Vec<MarkedCarriageway> = Vec::new();
+        for &lane in self.right_edge_m.keys().filter(|lane| !self.is_median(Lane(**lane))) {
+            let Some(left_m) = self.left_edge_m(Lane(lane)) else { continue };
+            match carriageways.last_mut() {
+                Some(carriageway) if carriageway.last + 1 == lane => carriageway.last = lane,
+                _ => carriageways.push(MarkedCarriageway { first: lane, last: lane, left_m }),
+            }
+        }
+        carriageways
+    }
+
     /// Returns the width of `lane` (m), or `None` unless both of its markings are known and it lies
     /// in [`LANE_WIDTHS_M`].
     pub fn lane_width_m(&self, lane: Lane) -> Option<f64> {
@@ -237,6 +280,17 @@ mod tests {
         let class = VehicleClass::Car;
         let dimensions = class.typical_dimensions();
         Trajectory { track_id: 1, vehicle_id: 1, class, dimensions, points: (0..4).map(point).collect() }
+    }
+
+    #[test]
+    fn the_number_between_two_carriageways_is_no_lane() {
+        let edges = [(1, -3.5), (2, -7.0), (3, -1_007.0), (4, -1_010.5)].map(|(lane, edge_m)| (Lane(lane), edge_m));
+        let markings = LaneMarkings::from_right_edges(edges);
+        let medians: Vec<u8> = (1..=5).filter(|lane| markings.is_median(Lane(*lane))).collect();
+        assert_eq!(medians, [3]);
+        let carriageways = [(1, 2, 0.0), (4, 4, -1_007.0)];
+        let carriageways = carriageways.map(|(first, last, left_m)| MarkedCarriageway { first, last, left_m });
+        assert_eq!(markings.carriageways(), carriageways);
     }
 
     #[test]

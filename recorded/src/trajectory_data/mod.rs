@@ -57,6 +57,7 @@
 mod assemble;
 mod axes;
 mod builder;
+mod carriageways;
 mod class_names;
 mod collected;
 mod commonroad;
@@ -80,6 +81,7 @@ mod markings;
 mod ngsim;
 mod open;
 mod order;
+mod orientation;
 mod parquet;
 mod plain;
 mod plausible;
@@ -101,6 +103,7 @@ mod xml;
 
 pub use axes::AxisOptions;
 pub use builder::PIECE_STRIDE;
+pub(crate) use carriageways::Carriageways;
 pub use class_names::UnknownClass;
 pub use continuity::Continuity;
 pub use data::{MarkingDistances, RecordedTrack, TrajectoryData, refuse_duplicates};

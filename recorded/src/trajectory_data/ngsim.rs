@@ -23,6 +23,11 @@ pub(super) const PERIOD: Time = Time::from_ms(100);
 const CLASSES: [(i64, VehicleClass); 3] =
     [(1, VehicleClass::Motorcycle), (2, VehicleClass::Car), (3, VehicleClass::Truck)];
 
+/// Columns with the numbers of intersections and of street sections.
+const STREET: [&str; 2] = ["Int_ID", "Section_ID"];
+/// The locations of the urban streets.
+const URBAN: [&str; 2] = ["lankershim", "peachtree"];
+
 /// Allowed values of the columns, in the units of the file.
 mod feet {
     use super::{Bounds, FOOT_M, allowed};
@@ -57,6 +62,10 @@ pub(super) struct NgsimColumns {
     acceleration: usize,
     lane: usize,
     location: Option<usize>,
+    /// Columns with the numbers of intersections and of street sections, which are 0 on motorways.
+    street: [Option<usize>; 2],
+    /// `true` if a row is of an urban street.
+    is_urban: bool,
 }
 
 impl NgsimColumns {
@@ -89,6 +98,8 @@ impl NgsimColumns {
         acceleration: 12,
         lane: 13,
         location: None,
+        street: [None; 2],
+        is_urban: false,
     };
 
     /// Finds the columns in `header`.
@@ -111,6 +122,8 @@ impl NgsimColumns {
             acceleration: need(acceleration)?,
             lane: need(lane)?,
             location: header.find("Location"),
+            street: STREET.map(|name| header.find(name)),
+            is_urban: false,
         })
     }
 
@@ -130,7 +143,21 @@ impl TextLayout for NgsimColumns {
         self.location.map(|index| ("Location", fields.get(line, index)))
     }
 
+    fn warnings(&self) -> Vec<String> {
+        let urban = self.is_urban.then(|| {
+            "it records an urban street, with intersections: the quantities of motorway traffic may mean nothing here".to_owned()
+        });
+        urban.into_iter().collect()
+    }
+
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
+        if !self.is_urban {
+            let text = |column: Option<usize>| column.map_or("", |index| fields.get(line, index));
+            let is_street = |column| text(column).parse::<f64>().is_ok_and(|number| number != 0.0);
+            let location = text(self.location);
+            self.is_urban =
+                self.street.into_iter().any(is_street) || URBAN.iter().any(|name| name.eq_ignore_ascii_case(location));
+        }
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let metres = |index, name, bounds| -> Result<f64, FieldError> {
             Ok(number(fields.get(line, index), name, bounds)? * FOOT_M)

@@ -28,7 +28,9 @@ const ARCHIVES: [(&[u8], &str); 5] = [
 ];
 
 /// The first bytes of formats of other programs, with a description of each.
-const FOREIGN: [(&[u8], &str); 2] = [
+const FOREIGN: [(&[u8], &str); 4] = [
+    (b"\x89MCAP", "an MCAP file, such as a trace of OSI messages"),
+    (b"\x89HDF", "an HDF5 file"),
     (b"[", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`)"),
     (b"{", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`), such as OpenLABEL"),
 ];
@@ -44,6 +46,18 @@ const I24_START: [&[u8]; 3] = [b"\"timestamp\"", b"\"coarse_vehicle_class\"", b"
 /// A word at the start of SUMO's floating car data, and one of CommonRoad's.
 const SUMO: &[u8] = b"<fcd-export";
 const COMMONROAD: &[u8] = b"<commonRoad";
+
+/// XML formats of other programs by the beginnings of their roots, with a description of each.
+const FOREIGN_ROOTS: [(&[u8], &str); 4] = [
+    (b"<OpenSCENARIO", "an OpenSCENARIO scenario"),
+    (b"<OpenDRIVE", "an OpenDRIVE road network"),
+    (b"<osm", "a map of OpenStreetMap or Lanelet2"),
+    (b"<net ", "a road network of SUMO"),
+];
+
+/// Ends of the names of files without a beginning by which they are recognised, with a description of
+/// each.
+const FOREIGN_NAMES: [(&str, &str); 1] = [("osi", "a trace of OSI messages")];
 
 /// Size of the buffer for the text of a Parquet file (bytes).
 const PARQUET_BUFFER_BYTES: usize = 1 << 16;
@@ -105,8 +119,19 @@ pub fn open_from<'a>(
 ) -> Result<Tracks<'a>, TrajectoryFileError> {
     let digest = Digest::default();
     let input = digest.input(source).map_err(|error| with_path(path, error))?;
-    let source = reader_for(input, &options).map_err(|error| with_path(path, error))?;
+    let source = reader_for(input, &options).map_err(|error| with_path(path, named_format(error, path)))?;
     Tracks::new((path, digest), source, options, window)
+}
+
+/// Names the format of a file that is no text, if the name of the file tells it.
+fn named_format(error: ReadError, path: &Path) -> ReadError {
+    let ends_with = |end: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(end));
+    match FOREIGN_NAMES.iter().find(|(end, _)| ends_with(end)) {
+        Some((_, kind)) if matches!(error.problem, TrajectoryFileProblem::Binary) => {
+            ReadError::of_file(TrajectoryFileProblem::Foreign { kind })
+        }
+        _ => error,
+    }
 }
 
 /// Returns the files that are read for `path`: several for a highD or exiD data set.
@@ -163,6 +188,12 @@ fn reader_for<'a>(
         return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
     let holds = |word: &[u8]| text.windows(word.len()).any(|window| window == word);
+    if let Some((_, kind)) = FOREIGN_ROOTS.into_iter().find(|(root, _)| text.starts_with(b"<") && holds(root))
+        && !holds(COMMONROAD)
+        && !holds(SUMO)
+    {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
+    }
     let source: Box<dyn RowSource + 'a> = if text.starts_with(parquet::MAGIC) {
         let rows = BufReader::with_capacity(PARQUET_BUFFER_BYTES, ParquetText::new(input)?);
         text_source(rows, options)?

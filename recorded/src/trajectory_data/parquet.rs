@@ -3,6 +3,7 @@
 
 use std::io::{self, BufRead, Read};
 
+use parquet::basic::Compression;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::serialized_reader::ReadOptionsBuilder;
 use parquet::record::Field;
@@ -41,6 +42,16 @@ impl ParquetText {
         let options = ReadOptionsBuilder::new().build();
         let reader = SerializedFileReader::new_with_options(bytes::Bytes::from(bytes), options);
         let reader = reader.map_err(|error| unreadable(error.to_string()))?;
+        let chunks = reader.metadata().row_groups().iter().flat_map(|group| group.columns());
+        let is_read = |codec: &Compression| matches!(codec, Compression::UNCOMPRESSED | Compression::SNAPPY);
+        if let Some(codec) = chunks.map(|chunk| chunk.compression()).find(|codec| !is_read(codec)) {
+            let name = format!("{codec:?}");
+            let name = name.split('(').next().unwrap_or_default();
+            return Err(unreadable(format!(
+                "its columns are compressed with {name}, but only Snappy and no compression are read: write it again with the option \
+                 compression='snappy', which pandas, pyarrow and polars have"
+            )));
+        }
         let schema = reader.metadata().file_metadata().schema_descr();
         let mut names = Vec::new();
         for column in schema.columns() {

@@ -8,6 +8,7 @@ use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, optional_number};
 use super::file_layout::Layout;
 use super::header::Header;
+use super::orientation::{Orientation, Stated};
 use super::rows::Fields;
 use super::source::{Clock, FileInfo, Row};
 use super::text_layout::TextLayout;
@@ -71,9 +72,12 @@ pub(super) struct PlainColumns {
     class: usize,
     vehicle: Option<usize>,
     data: Option<usize>,
-    /// Columns that are only validated: the lateral position gives the heading, and s and d give
-    /// the position.
-    validated_only: Vec<(usize, &'static str, Bounds)>,
+    /// Columns that are only checked: the lateral position gives the heading, and s and d give the
+    /// position.
+    heading: Option<usize>,
+    x: Option<usize>,
+    y: Option<usize>,
+    orientation: Orientation,
     unknown_classes: UnknownClasses,
 }
 
@@ -87,8 +91,6 @@ impl PlainColumns {
     /// Fails if a required column is missing.
     pub(super) fn new(header: &Header) -> Result<Self, TrajectoryFileProblem> {
         let need = |name| header.require(name, "plain");
-        let bounded = [("heading_rel_rad", allowed::HEADING_RAD), ("x_m", allowed::PLANE_M), ("y_m", allowed::PLANE_M)];
-        let present = bounded.into_iter().filter_map(|(name, bounds)| Some((header.find(name)?, name, bounds)));
         Ok(Self {
             track: need("track_id")?,
             frame: need("frame")?,
@@ -103,7 +105,10 @@ impl PlainColumns {
             class: need("vehicle_class")?,
             vehicle: header.find("vehicle_id"),
             data: header.find("recording_id"),
-            validated_only: present.collect(),
+            heading: header.find("heading_rel_rad"),
+            x: header.find("x_m"),
+            y: header.find("y_m"),
+            orientation: Orientation::default(),
             unknown_classes: UnknownClasses::default(),
         })
     }
@@ -122,12 +127,18 @@ impl TextLayout for PlainColumns {
         self.unknown_classes.names()
     }
 
+    fn check_sides(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
+        self.orientation.check(is_mirrored)
+    }
+
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
-        for &(index, name, bounds) in &self.validated_only {
-            optional_number(fields.get(line, index), name, bounds)?;
-        }
+        let checked = |column: Option<usize>, name, bounds| {
+            column.map_or(Ok(None), |index| optional_number(fields.get(line, index), name, bounds))
+        };
+        let heading_rad = checked(self.heading, "heading_rel_rad", allowed::HEADING_RAD)?;
+        let point = checked(self.x, "x_m", allowed::PLANE_M)?.zip(checked(self.y, "y_m", allowed::PLANE_M)?);
         let track = whole(self.track, "track_id", allowed::TRACKS)?;
         let stated_vehicle = self.vehicle.filter(|index| !fields.get(line, *index).is_empty());
         let vehicle = stated_vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::TRACKS))?;
@@ -151,6 +162,7 @@ impl TextLayout for PlainColumns {
             marking_distances: MarkingDistances::default(),
             line: 0,
         };
+        self.orientation.add(row.number, Stated { s_m: row.s_m, d_m: -row.d_m, heading_rad, point });
         Ok(Some(row))
     }
 }

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | median length of cars | 2 to 12 m | feet instead of metres and the reverse, swapped length and width |
 //! | median width of cars | 1 to 3 m | the same |
+//! | vehicles whose position falls as they drive | below 5 % | a reversed axis, the other carriageway in the same file |
 //! | median of (distance between two frames) / (speed · time) | 0.6 to 1.6; 0.8 to 1.25 in simulations | km/h, mph or ft/s instead of m/s (3.6, 2.2, 3.3), a wrong frame rate, swapped s and d, traffic that drives backwards |
 
 use std::collections::BTreeMap;
@@ -24,6 +25,21 @@ const MIN_SPEED_MPS: f64 = 5.0;
 
 /// Minimum number of steps between frames for their median to be judged.
 const MIN_STEPS: usize = 10;
+
+/// Share of a vehicle's steps that lead backwards above which it drives against the road (-).
+const AGAINST_STEPS: f64 = 0.5;
+/// Share of vehicles against the road above which the file is refused (-): an error of numbers may
+/// make a vehicle jump back once. An assumption with a plausible range of 0.01 to 0.1.
+const AGAINST_VEHICLES: f64 = 0.05;
+
+/// One step of a vehicle between two frames.
+struct RoadStep {
+    vehicle: (u64, Time),
+    /// Distance as a share of the distance that the speed predicts (-).
+    ratio: f64,
+    /// Line of the later row.
+    line: u64,
+}
 
 /// Rejects rows whose medians are implausible for road traffic.
 pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(), ReadError> {
@@ -44,6 +60,8 @@ pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(
     if steps.len() < MIN_STEPS {
         return Ok(());
     }
+    check_direction(&steps)?;
+    let steps = steps.into_iter().map(|step| (step.ratio, step.line)).collect();
     let quantity = "the median distance between two frames, as a share of what the recorded speed makes,";
     // A simulation has no noise: km/h and mph, which differ by 1.6, can be told apart.
     let (range, allowed) = match layout {
@@ -53,9 +71,28 @@ pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(
     check_median(steps, Plausible { quantity, unit: "", range, allowed })
 }
 
-/// Returns, for each step between two frames, the travelled distance as a share of what the speed
-/// predicts, and the line of the later row.
-fn steps(rows: &[Row], clock: FrameClock) -> Vec<(f64, u64)> {
+/// Rejects steps that lead backwards: traffic of the other carriageway, or a reversed axis.
+fn check_direction(steps: &[RoadStep]) -> Result<(), ReadError> {
+    let mut vehicles: BTreeMap<(u64, Time), (usize, usize, u64)> = BTreeMap::new();
+    for step in steps {
+        let (backwards, all, _) = vehicles.entry(step.vehicle).or_insert((0, 0, step.line));
+        *backwards += usize::from(step.ratio < 0.0);
+        *all += 1;
+    }
+    let is_against = |(backwards, all): (usize, usize)| backwards as f64 > AGAINST_STEPS * all as f64;
+    let against = vehicles.iter().filter(|(_, (backwards, all, _))| is_against((*backwards, *all)));
+    let against: Vec<(u64, u64)> = against.map(|((number, _), (.., line))| (*number, *line)).collect();
+    match against.first() {
+        Some(&(first, line)) if against.len() as f64 > AGAINST_VEHICLES * vehicles.len() as f64 => {
+            let (against, all) = (against.len(), vehicles.len());
+            Err(ReadError::new(line, TrajectoryFileProblem::AgainstTheRoad { against, all, first }))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Returns the steps between two frames.
+fn steps(rows: &[Row], clock: FrameClock) -> Vec<RoadStep> {
     let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
     let mut steps = Vec::new();
     for row in rows {
@@ -63,7 +100,8 @@ fn steps(rows: &[Row], clock: FrameClock) -> Vec<(f64, u64)> {
         let (time_s, speed_mps) = ((row.time - before.time).s(), 0.5 * (row.speed_mps + before.speed_mps));
         let follows = row.frame == before.frame + clock.frames && time_s > 0.0;
         if follows && speed_mps > MIN_SPEED_MPS {
-            steps.push(((row.s_m - before.s_m) / (speed_mps * time_s), row.line));
+            let ratio = (row.s_m - before.s_m) / (speed_mps * time_s);
+            steps.push(RoadStep { vehicle: (row.number, row.origin), ratio, line: row.line });
         }
     }
     steps

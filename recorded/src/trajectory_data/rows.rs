@@ -49,6 +49,9 @@ impl<R: BufRead> Lines<R> {
             if self.number == 1 && self.buffer.starts_with(BYTE_ORDER_MARK) {
                 self.buffer.drain(..BYTE_ORDER_MARK.len());
             }
+            if self.number == 1 && is_utf16(&self.buffer) {
+                return Err((self.number, TrajectoryFileProblem::Utf16));
+            }
             if self.buffer.contains(&0) {
                 return Err((self.number, TrajectoryFileProblem::Binary));
             }
@@ -70,6 +73,16 @@ impl<R: BufRead> Lines<R> {
     /// Returns `true` if the latest line is not terminated, so that its last field may be cut.
     pub(super) fn is_unterminated(&self) -> bool {
         self.buffer.last().is_some_and(|byte| *byte != b'\n')
+    }
+}
+
+/// Returns true if a file begins like text in UTF-16: with its byte order mark, or with a letter and a
+/// zero byte, or the reverse.
+fn is_utf16(start: &[u8]) -> bool {
+    match start {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        [letter, 0, next, 0, ..] | [0, letter, 0, next, ..] => letter.is_ascii_graphic() && next.is_ascii_graphic(),
+        _ => false,
     }
 }
 

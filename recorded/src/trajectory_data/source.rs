@@ -81,6 +81,15 @@ pub(super) trait RowSource {
         Vec::new()
     }
 
+    /// Checks that the columns which are not read agree with the lateral position, which is mirrored
+    /// if `is_mirrored`, in the rows so far.
+    ///
+    /// # Errors
+    /// They contradict it.
+    fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
+        Ok(())
+    }
+
     /// Returns the next row in the order of the file, or `None` at its end.
     ///
     /// # Errors

@@ -11,13 +11,14 @@
 //!
 //! - `x`, `y`: middle of the front bumper (m); `angle`: clockwise from north (°); `speed`: m/s.
 //! - `lane`: edge and index, counted from the right. An edge ends at each junction, so the road is
-//!   inferred from the traffic; see `inferred_road`. The distance between vehicles of neighbouring
-//!   lanes gives the lane width.
+//!   inferred from the traffic, and each lane of an edge becomes the lane of the road at its vehicles'
+//!   mean position; see `inferred_road`. The distance between vehicles of neighbouring lanes gives the
+//!   lane width.
 //! - FCD states no sizes. A vehicle has the default size of the class that its type names; a note
 //!   says so.
 //! - Persons and containers are left out.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::BufRead;
 
 use closecall_traffic::{Time, VehicleClass, maths};
@@ -83,6 +84,8 @@ struct Beside {
 struct Reader {
     collected: Collected,
     unknown_classes: UnknownClasses,
+    /// A number for each lane, by its name.
+    named_lanes: HashMap<String, u64>,
     /// Edge and lane index of the latest row of each vehicle.
     latest: BTreeMap<u32, (String, i64)>,
     /// The vehicles of the current time step.
@@ -194,7 +197,8 @@ impl Reader {
             let before = self.latest.insert(vehicle, (edge.to_owned(), index));
             before.is_some_and(|(before_edge, before_index)| before_edge == edge && before_index != index)
         });
-        let position = Position::Plane { point, heading_rad, changes_lane };
+        let named_lane = lane.map(|_| self.named_lane(field("lane")));
+        let position = Position::Plane { point, heading_rad, changes_lane, named_lane };
         Ok(CollectedRow {
             vehicle,
             time,
@@ -206,6 +210,16 @@ impl Reader {
             class,
             line: *line,
         })
+    }
+
+    /// Returns the number of the lane with this name.
+    fn named_lane(&mut self, name: &str) -> u64 {
+        if let Some(number) = self.named_lanes.get(name) {
+            return *number;
+        }
+        let number = self.named_lanes.len() as u64;
+        self.named_lanes.insert(name.to_owned(), number);
+        number
     }
 
     /// Returns the class that a type names, and its size.

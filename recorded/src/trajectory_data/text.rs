@@ -120,6 +120,10 @@ impl<R: BufRead> RowSource for TextSource<R> {
         self.format.columns.warnings()
     }
 
+    fn check_sides(&self, is_mirrored: bool) -> Result<(), ReadError> {
+        self.format.columns.check_sides(is_mirrored).map_err(ReadError::of_file)
+    }
+
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         let Self { lines, format, fields, name, first, usual_last_field, location } = self;
         loop {

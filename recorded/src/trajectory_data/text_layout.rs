@@ -1,6 +1,7 @@
 //! The interface of the text layouts, which have one row per line.
 
 use super::class_names::UnknownClass;
+use super::error::TrajectoryFileProblem;
 use super::fields::FieldError;
 use super::rows::Fields;
 use super::source::{FileInfo, Row};
@@ -28,6 +29,15 @@ pub(super) trait TextLayout {
     /// Returns what a reader of results has to know of the file.
     fn warnings(&self) -> Vec<String> {
         Vec::new()
+    }
+
+    /// Checks that the columns which are not read agree with the lateral position, which is mirrored
+    /// if `is_mirrored`, in the rows so far.
+    ///
+    /// # Errors
+    /// Returns the columns that contradict it.
+    fn check_sides(&self, _is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
+        Ok(())
     }
 
     /// Checks, at the end of the file, that nothing is missing.

@@ -37,6 +37,10 @@ const SHREDS_PER_VEHICLE: u64 = 3;
 /// Mean duration below which pieces are shreds (s): no lane change fits into it.
 const SHRED_S: f64 = 2.0;
 
+/// Longest time between two frames at which no lane change is missed. The published method samples
+/// at 5 Hz. In a window of US-101, frames of 0.3 s show all 21 lane changes, frames of 0.4 s 18 to 21.
+const LONGEST_PERIOD: Time = Time::from_ms(300);
+
 /// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
@@ -122,6 +126,10 @@ pub struct Tracks<'a> {
     bad_rows: BadRows,
     axis_options: AxisOptions,
     axes: Axes,
+    /// What a reader of results has to know of the axes.
+    axis_warning: Option<String>,
+    /// `true` if the file is of a simulation, in which a lane change may take a single step.
+    is_simulated: bool,
     lanes: LaneReliability,
     /// The lanes that are estimated from the traffic, or the reason why they cannot be.
     estimated: Option<Result<EstimatedLanes, String>>,
@@ -151,6 +159,8 @@ impl<'a> Tracks<'a> {
             bad_rows: options.bad_rows,
             axis_options: options.axes,
             axes: Axes::default(),
+            axis_warning: None,
+            is_simulated: false,
             lanes: options.lanes,
             estimated: None,
             builder,
@@ -180,6 +190,11 @@ impl<'a> Tracks<'a> {
     /// Returns the time between two frames.
     pub fn period(&self) -> Time {
         self.period
+    }
+
+    /// Returns `true` if the frames are too far apart for every lane change to be found.
+    pub fn is_coarse(&self) -> bool {
+        !self.is_simulated && self.period > LONGEST_PERIOD
     }
 
     /// Returns the lane markings that the file states, or else those derived from the tracks among
@@ -240,7 +255,9 @@ impl<'a> Tracks<'a> {
                  located at half of the shift"
             )
         });
-        self.source.warnings().into_iter().chain(unknown_lanes).collect()
+        let coarse = self.is_coarse().then(|| coarse_frames(self.period));
+        let notes = self.source.warnings().into_iter().chain(self.axis_warning.clone());
+        notes.chain(coarse).chain(unknown_lanes).collect()
     }
 
     /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last
@@ -274,7 +291,7 @@ impl<'a> Tracks<'a> {
             data.markings = markings;
         }
         let (hash, continuity) = (self.hash(), self.continuity());
-        let (notes, lanes) = (self.notes(), self.lanes());
+        let (notes, lanes, is_coarse) = (self.notes(), self.lanes(), self.is_coarse());
         if let Some(estimated) = self.estimated_markings() {
             data.markings = estimated;
         }
@@ -284,6 +301,7 @@ impl<'a> Tracks<'a> {
             continuity,
             notes,
             lanes,
+            is_coarse,
             unknown_classes: self.unknown_classes().to_vec(),
             ..data
         })
@@ -385,12 +403,21 @@ impl<'a> Tracks<'a> {
         let clock = FrameClock::of_rows(beginning, frame_period);
         self.period = clock.period;
         let start = start(beginning);
-        plausible::check(beginning, self.source.info().layout, clock)?;
-        self.axes = Axes::new(self.axis_options, beginning);
+        let FileInfo { layout, markings: stated, .. } = self.source.info();
+        self.axes = Axes::new(self.axis_options, beginning, stated.as_ref());
         rows.iter_mut().for_each(|row| self.axes.turn(row));
-        if matches!(self.source.info().layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25) {
-            axes::check(&rows[..rows.len().min(WINDOW_ROWS)])?;
+        let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
+        plausible::check(beginning, layout, clock)?;
+        // Other readers derive the lanes from the positions, so that only an option can part them.
+        let states_lanes = matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd);
+        if states_lanes || self.axis_options != AxisOptions::default() {
+            axes::check_order(beginning, stated.as_ref())?;
         }
+        self.source.check_sides(self.axis_options.mirror_d)?;
+        if let (Layout::Highd, LaneReliability::Reliable, Some(markings)) = (layout, self.lanes, &stated) {
+            self.axis_warning = axes::check_markings(beginning, markings)?;
+        }
+        self.is_simulated = beginning.first().is_some_and(|row| row.clock == Clock::Simulated);
         // The log of one vehicle shows no lanes of a road.
         if self.lanes == LaneReliability::Unreliable && self.source.info().layout != Layout::InCar {
             self.estimated = Some(EstimatedLanes::of(&rows[..rows.len().min(WINDOW_ROWS)]));
@@ -443,6 +470,14 @@ impl Iterator for Tracks<'_> {
     fn next(&mut self) -> Option<Self::Item> {
         self.next_track().transpose()
     }
+}
+
+/// Returns the warning for frames that are too far apart.
+fn coarse_frames(period: Time) -> String {
+    format!(
+        "there is a row only every {period}, but the method needs one every {LONGEST_PERIOD} at least: lane changes near the ends of \
+         tracks are missed, and shares may differ by several lane changes"
+    )
 }
 
 /// The time and the frame of a row.

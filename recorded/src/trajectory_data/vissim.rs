@@ -402,5 +402,6 @@ fn in_plane(front: (f64, f64), rear: (f64, f64)) -> Result<(Position, f64), Fiel
         return Err(FieldError::at("COORDREAR", wrong_value(&text, "a length above 0 and up to 60 m".to_owned())));
     }
     let point = (0.5 * (front.0 + rear.0), 0.5 * (front.1 + rear.1));
-    Ok((Position::Plane { point, heading_rad: maths::atan2(dy, dx), changes_lane: false }, length_m))
+    let heading_rad = maths::atan2(dy, dx);
+    Ok((Position::Plane { point, heading_rad, changes_lane: false, named_lane: None }, length_m))
 }

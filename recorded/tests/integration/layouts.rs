@@ -4,9 +4,10 @@
 use std::path::Path;
 
 use closecall_recorded::filters::smooth;
-use closecall_recorded::lane_change::detect;
+use closecall_recorded::lane_change::{LaneReliability, detect};
 use closecall_recorded::trajectory_data::{
-    Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read, read_from, read_with,
+    AxisOptions, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read, read_from,
+    read_with,
 };
 use closecall_traffic::{Lane, Side, Time, maths};
 
@@ -143,6 +144,68 @@ fn both_carriageways_are_driven_forwards_and_are_separated() {
     );
     assert!(upper.points[29].d_m < upper.points[0].d_m, "the vehicle moves to its right");
     assert_eq!(data.markings.lane_width_m(Lane(5)), Some(4.0));
+}
+
+/// Changes the rows of a highD data set.
+fn rewrite_rows(folder: &Path, change: impl Fn(&mut Vec<String>)) {
+    let path = folder.join("07_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let mut written = header.to_owned() + "\n";
+    for row in rows.lines() {
+        let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
+        change(&mut fields);
+        written += &(fields.join(",") + "\n");
+    }
+    std::fs::write(&path, written).unwrap();
+}
+
+#[test]
+fn a_mirrored_carriageway_of_highd_is_refused_and_the_named_option_mends_it() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let clean = read(folder.path()).unwrap();
+    // The upper carriageway, mirrored at the marking next to the median, y = 16.5 m; then elsewhere.
+    let mirrored = |sum_m: f64| {
+        write_both_ways(folder.path());
+        rewrite_rows(folder.path(), |fields| {
+            if fields[1] == "1" {
+                fields[3] = format!("{}", sum_m - fields[3].parse::<f64>().unwrap());
+            }
+        });
+    };
+    mirrored(31.2);
+    let problem = read(folder.path()).unwrap_err().problem;
+    let TrajectoryFileProblem::LanesAgainstPosition { is_mirrored, .. } = problem else { panic!("{problem}") };
+    assert!(is_mirrored);
+    let axes = AxisOptions { mirror_d: true, ..AxisOptions::default() };
+    let options = ReadOptions { axes, ..ReadOptions::default() };
+    let mended = read_with(folder.path(), options).unwrap();
+    for (mended, clean) in mended.trajectories[0].points.iter().zip(&clean.trajectories[0].points) {
+        assert!((mended.d_m - clean.d_m).abs() < 1e-9 && mended.lane == clean.lane, "{mended:?} {clean:?}");
+    }
+    mirrored(60.0);
+    assert!(read(folder.path()).is_err());
+    let mended = read_with(folder.path(), options).unwrap();
+    let [mended, clean] = [&mended, &clean].map(|data| data.trajectories[0].points[0].d_m);
+    assert!((mended - clean).abs() < 0.75, "{mended} {clean}: to a part of a lane");
+}
+
+#[test]
+fn lane_numbers_of_highd_that_do_not_fit_its_markings_are_refused() {
+    for off in [1, -1] {
+        let folder = tempfile::tempdir().unwrap();
+        write_both_ways(folder.path());
+        rewrite_rows(folder.path(), |fields| {
+            let lane: i64 = fields[11].parse().unwrap();
+            fields[11] = (lane + off).to_string();
+        });
+        let problem = read(folder.path()).unwrap_err().problem;
+        assert!(matches!(problem, TrajectoryFileProblem::LanesBesideMarkings { .. }), "{off}: {problem}");
+        // Lanes that are not used may be wrong.
+        let options = ReadOptions { lanes: LaneReliability::Unreliable, ..ReadOptions::default() };
+        assert!(read_with(folder.path(), options).is_ok());
+    }
 }
 
 #[test]

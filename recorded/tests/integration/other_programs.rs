@@ -142,6 +142,86 @@ fn a_lane_change_in_a_single_step_of_sumo_is_one_and_its_duration_is_named_as_me
     assert!(tracks[1].points.windows(2).any(|pair| pair[0].lane != pair[1].lane));
 }
 
+/// Fifteen vehicles that weave within three lanes of different widths, and a sixteenth that changes
+/// lanes: name, lane, seconds, position along the road, to the left and lane at that time.
+fn weaving(mut visit: impl FnMut(u32, f64, f64, f64, usize)) {
+    const MIDDLES_M: [f64; 3] = [0.0, 3.3, 7.1];
+    for step in 0..250 {
+        let time_s = 0.1 * f64::from(step);
+        for vehicle in 0..16_u32 {
+            let speed_mps = 24.0 + 0.3 * f64::from(vehicle);
+            let x_m = speed_mps * time_s;
+            let (lane, shift_m) = match vehicle {
+                15 => {
+                    let tau = ((time_s - 10.0) / 5.0).clamp(0.0, 1.0);
+                    let share = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+                    (usize::from(time_s >= 12.5), share * MIDDLES_M[1])
+                }
+                _ => {
+                    let lane = vehicle as usize % 3;
+                    let phase = 2.4 * f64::from(vehicle);
+                    (lane, MIDDLES_M[lane] + 0.9 * maths::sin(x_m / 35.0 + phase))
+                }
+            };
+            visit(vehicle, time_s, x_m, shift_m, lane);
+        }
+    }
+}
+
+/// Asserts that a recording of [`weaving`] has one lane change, and its positions within a few
+/// decimetres.
+fn assert_is_weaving(data: &TrajectoryData) {
+    let changes: Vec<_> = detect(&smooth(data)).iter().map(|change| (change.vehicle_id, change.direction)).collect();
+    let last = data.trajectories.last().unwrap();
+    assert_eq!(changes, [(last.vehicle_id, Side::Left)]);
+    let mut departures: Vec<f64> = Vec::new();
+    weaving(|vehicle, time_s, _, left_m, lane| {
+        let track = &data.trajectories[vehicle as usize];
+        let point = track.at(Time::from_s(time_s)).unwrap();
+        assert_eq!(usize::from(point.lane.0), 3 - lane, "vehicle {vehicle} at {time_s} s");
+        departures.push(point.d_m - left_m);
+    });
+    departures.sort_by(f64::total_cmp);
+    let spread_m = departures[departures.len() * 19 / 20] - departures[departures.len() / 20];
+    assert!(spread_m < 0.9, "{spread_m}: a single driver weaves by 1.8 m");
+}
+
+#[test]
+fn the_lanes_that_a_file_names_are_kept_while_every_driver_weaves() {
+    let mut table = "timestep_time,vehicle_id,vehicle_x,vehicle_y,vehicle_angle,vehicle_type,vehicle_speed,vehicle_pos,vehicle_lane\n"
+        .to_owned();
+    weaving(|vehicle, time_s, x_m, left_m, lane| {
+        let speed_mps = 24.0 + 0.3 * f64::from(vehicle);
+        let edge = if x_m < 200.0 { "in" } else { "out" };
+        writeln!(table, "{time_s:.2},{vehicle},{x_m:.3},{left_m:.3},90.00,car,{speed_mps:.2},0.00,{edge}_{lane}")
+            .unwrap();
+    });
+    assert_is_weaving(&read_text(table.as_bytes()).unwrap());
+
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows: Vec<(u32, String)> = Vec::new();
+    weaving(|vehicle, time_s, x_m, left_m, lane| {
+        let speed_mps = 24.0 + 0.3 * f64::from(vehicle);
+        let lanelet = if x_m < 200.0 { 10 + lane } else { 20 + lane };
+        let frame = (10.0 * time_s).round();
+        let offset_m = left_m - [0.0, 3.3, 7.1][lane];
+        let line = format!(
+            "1,{vehicle},{frame},{x_m:.3},{left_m:.3},0.0,1.8,4.5,{speed_mps},0,{offset_m:.3},3.5,{lanelet},0\n"
+        );
+        rows.push((vehicle, line));
+    });
+    rows.sort_by_key(|(vehicle, _)| *vehicle);
+    let header = "recordingId,trackId,frame,xCenter,yCenter,heading,width,length,lonVelocity,lonAcceleration,latLaneCenterOffset,\
+                  laneWidth,laneletId,laneChange\n";
+    let text: String = rows.iter().map(|(_, line)| line.as_str()).collect();
+    std::fs::write(folder.path().join("01_tracks.csv"), header.to_owned() + &text).unwrap();
+    let meta: String = (0..16).map(|vehicle| format!("1,{vehicle},250,car\n")).collect();
+    std::fs::write(folder.path().join("01_tracksMeta.csv"), "recordingId,trackId,numFrames,class\n".to_owned() + &meta)
+        .unwrap();
+    std::fs::write(folder.path().join("01_recordingMeta.csv"), "recordingId,frameRate\n1,10\n").unwrap();
+    assert_is_weaving(&read(folder.path()).unwrap());
+}
+
 #[test]
 fn malformed_floating_car_data_is_refused() {
     let good = sumo_xml(false);
@@ -458,6 +538,13 @@ fn malformed_parquet_is_refused() {
     assert_mentions(&error(&parquet_of(&plain_columns(40, -30.0))), &["line 2", "`speed_mps`", "0 to 150"], "negative");
     assert_mentions(&error(&parquet_of(&plain_columns(40, f64::NAN))), &["line 2", "`speed_mps`", "NaN"], "NaN");
     assert_mentions(&error(&parquet_of(&[Column::Whole("a", vec![1])])), &["1 columns", "starts with `a`"], "other");
+    // In the metadata of a column, the number of its codec follows its name. In Thrift's compact
+    // protocol, 12 is the number 6: Zstandard.
+    let (codec, of_column) = ([0x15, 0x0c, 0x16], b"d_m\x15\x00\x16");
+    let at = good.windows(of_column.len()).position(|window| window == of_column).unwrap();
+    let mut packed = good.clone();
+    packed[at + 3..at + 6].copy_from_slice(&codec);
+    assert_mentions(&error(&packed), &["compressed with ZSTD", "Snappy"], "another codec");
     let mut damaged = good.clone();
     let middle = good.len() / 3;
     damaged[middle..middle + 200].fill(0xff);
@@ -560,7 +647,7 @@ fn one_location_of_an_export_can_be_chosen() {
     let header = "Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_Length,v_Width,\
                   v_Class,v_Vel,v_Acc,Lane_ID,Location";
     let mut text = header.to_owned() + "\n";
-    for (location, lane) in [("us-101", 2), ("i-80", 3)] {
+    for (location, lane) in [("us-101", 2), ("i-80", 3), ("lankershim", 1)] {
         for frame in 1..20 {
             writeln!(
                 text,
@@ -579,8 +666,10 @@ fn one_location_of_an_export_can_be_chosen() {
     assert!(matches!(refused.problem, TrajectoryFileProblem::SeveralRecordings { .. }), "{refused}");
     let data = read(asked("i-80")).unwrap();
     assert_eq!((data.name.as_str(), data.trajectories[0].points[0].lane.0), ("i-80", 3));
+    let is_urban = |data: &TrajectoryData| data.warnings().iter().any(|warning| warning.contains("urban street"));
+    assert!(!is_urban(&data) && is_urban(&read(asked("lankershim")).unwrap()));
     let error = read(asked("peachtree")).unwrap_err();
-    assert_mentions(&error, &["`peachtree`", "i-80, us-101"], "another location");
+    assert_mentions(&error, &["`peachtree`", "i-80, lankershim, us-101"], "another location");
 }
 
 #[test]

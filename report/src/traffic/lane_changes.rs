@@ -86,10 +86,12 @@ impl fmt::Display for CriticalityText<'_> {
             writeln!(f, "{}", line(&change.lane_change))?;
             for (name, whole, crossing) in change.named() {
                 let mark = if whole.is_critical() { "  CRITICAL" } else { "" };
+                let is_implausible = whole.is_implausible() || crossing.is_implausible();
+                let doubt = if is_implausible { "  implausible: beyond what a vehicle can do" } else { "" };
                 let number =
                     |metric: MetricResult| metric.value().map_or("-".to_owned(), |value| format!("{value:.2}"));
                 let (whole, crossing) = (number(whole), number(crossing));
-                writeln!(f, "         {name:<12} {whole:>9}  at the crossing {crossing:>9}{mark}")?;
+                writeln!(f, "         {name:<12} {whole:>9}  at the crossing {crossing:>9}{mark}{doubt}")?;
             }
         }
         let shares = shares(changes, counted);
@@ -105,7 +107,13 @@ impl fmt::Display for CriticalityText<'_> {
                 .interval_95
                 .map_or(String::new(), |[low, high]| format!("95 %: {:.0} to {:.0} %, ", 100.0 * low, 100.0 * high));
             let (metric, critical, absent) = (share.metric, share.critical, share.absent);
-            writeln!(f, "  {metric:<12} {critical:>4}  {percent:>6}  ({interval}{absent} absent)")?;
+            let is_counted = |change: &&CriticalLaneChange| counted == Counted::All || change.lane_change.complete;
+            let named = changes.iter().filter(is_counted).flat_map(|change| change.metrics.named());
+            let doubt = match named.filter(|(name, value)| *name == metric && value.is_implausible()).count() {
+                0 => String::new(),
+                number => format!(", {number} of them implausible"),
+            };
+            writeln!(f, "  {metric:<12} {critical:>4}  {percent:>6}  ({interval}{absent} absent{doubt})")?;
         }
         writeln!(f, "  {:<12} {:>4}", "any", shares.any)?;
         Ok(())

@@ -269,8 +269,8 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     let sampled =
         program(&["traffic", "sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
     hold("sample", [&sampled]);
-    let fit = |file: &str| program(&["traffic", "fit", file, "--correlations"], 0);
-    hold("fit", [&fit(&csv), &fit(&few)]);
+    let fit = |file: &str, code| program(&["traffic", "fit", file, "--correlations"], code);
+    hold("fit", [&fit(&csv, 0), &fit(&few, 4)]);
     let (fitted, headline) = (at("fitted.toml"), library("low-thw-overtake").display().to_string());
     stdout(&closecall(["traffic", "fit", &csv, "-o", &fitted]), 0);
     hold(
