@@ -283,12 +283,10 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     let data_sets = args.data.read_all()?;
     let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
     if fitted.fitted.is_empty() {
-        match args.format {
-            Format::Json => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
-            Format::Human => out!("{}", FitText(&fitted)),
-        }
-        let message =
-            "no quantity of the trajectory files has enough values to be fitted: nothing was written".to_owned();
+        let message = format!(
+            "no quantity of the trajectory files has enough values to be fitted: nothing was written\n{}",
+            FitText(&fitted)
+        );
         return Err(CliError::NothingFound { message });
     }
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
