@@ -13,8 +13,8 @@ use serde::Deserialize;
 
 use super::CliError;
 use super::args::SensorsChoice;
+use super::argument::Argument;
 use super::help::heading;
-use super::keywords::Argument;
 use super::protect::of_controller;
 use super::saved::LimitArgs;
 

@@ -8,8 +8,8 @@ use closecall_scenarios::member::{Ensemble, ensemble_of, members};
 use serde::Deserialize;
 
 use super::CliError;
+use super::argument::Argument;
 use super::help::heading;
-use super::keywords::Argument;
 use super::output::print_error;
 
 /// The driver ensemble of a campaign.

@@ -41,7 +41,7 @@ use closecall_studies::perception::StudyError;
 use closecall_studies::perception::recorded::RecordedStudyError;
 use closecall_traffic::atomic::WriteError;
 
-use super::keywords::Argument;
+use super::argument::Argument;
 use super::view_error::ViewError;
 use crate::exit_code::ExitCode;
 

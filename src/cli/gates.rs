@@ -10,8 +10,9 @@ use closecall_scenarios::sampling::Design;
 use serde::Deserialize;
 
 use super::CliError;
+use super::argument::Argument;
 use super::help::heading;
-use super::keywords::{Argument, needs};
+use super::keywords::needs;
 use super::output::print_error;
 
 /// The gates of a campaign.

@@ -4,17 +4,16 @@
 //! the keywords of a call. A field that is such a struct itself has a name that begins with `..`:
 //! its keywords stand beside the others. Which arguments exclude each other is stated for clap.
 
-use std::fmt;
 use std::slice::Iter;
 
 use clap::{Arg, Args, Command};
-use closecall_campaign::session;
 use serde::de::value::StrDeserializer;
 use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, IntoDeserializer, MapAccess, Visitor};
 use serde::forward_to_deserialize_any;
 use serde_json::{Map, Value};
 
 use super::CliError;
+use super::argument::Argument;
 
 /// The begin of a field's name whose keywords stand beside the others.
 const GROUP: &str = "..";
@@ -107,19 +106,6 @@ impl<'de> MapAccess<'de> for Fields<'_> {
             let why = KINDS.iter().fold(error.to_string(), |text, (kind, word)| text.replace(kind, word));
             Error::custom(format!("{}=: {why}", self.field))
         })
-    }
-}
-
-/// An argument in a message: `--max-induced` on the command line, `max_induced=` in a call.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Argument(pub(super) &'static str);
-
-impl fmt::Display for Argument {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match session::is_active() {
-            true => write!(f, "{}=", self.0.replace('-', "_")),
-            false => write!(f, "--{}", self.0),
-        }
     }
 }
 

@@ -4,6 +4,7 @@ mod actions;
 mod advice;
 mod aerial;
 mod args;
+mod argument;
 mod arms;
 mod backend;
 mod baseline;

@@ -11,8 +11,8 @@ use closecall_scenarios::sampling::Design;
 use serde::Deserialize;
 
 use super::CliError;
+use super::argument::Argument;
 use super::help::heading;
-use super::keywords::Argument;
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;

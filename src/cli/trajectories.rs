@@ -22,8 +22,8 @@ use serde_json::Value;
 
 use super::CliError;
 use super::args::{FilesArgs, Format, LanesChoice, ReadArgs};
+use super::argument::Argument;
 use super::help::{examples, heading};
-use super::keywords::Argument;
 use super::output::{command_line, out, outln, print_error, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::lacks_lane_change;

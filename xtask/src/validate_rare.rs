@@ -151,6 +151,8 @@ fn of_function(method: Method, regions: Regions, probability: f64, repetitions: 
                 let Ok(found) = subset(&mut function, DIMENSIONS, Seed(seed), goal);
                 (found.means, found.runs)
             }
+            // It states no probability.
+            Method::Search => (None, 0),
         };
         let interval = means.and_then(|[mean, ..]| Some((mean.value, mean.interval_of_probability(0.95)?)));
         total.push(probability, runs, interval);
