@@ -148,7 +148,7 @@ fn results_are_on_standard_output_and_the_paths_of_files_on_standard_error() {
         ["campaign", "paper-figure", "-n", "2", "--sensors", "ground-truth", "--no-gate", "--out", "results"];
     assert_eq!(code(&run_in(folder.path(), &campaign)), 0);
     let recorded =
-        ["traffic", "record", "low-thw-overtake", "-n", "12", "--sensors", "ground-truth", "-o", "traffic.csv"];
+        ["traffic", "record", "overtake-without-brake", "-n", "12", "--sensors", "ground-truth", "-o", "traffic.csv"];
     for (words, file) in [
         (&["new", "mine"][..], "mine.toml"),
         (&["init", "repository"], "repository/closecall.toml"),
