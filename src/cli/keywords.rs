@@ -122,6 +122,7 @@ pub(super) fn needs((name, is_given): Given, (needed, needed_is_given): Given) -
 
 #[cfg(test)]
 mod tests {
+    use closecall_campaign::session;
     use serde::Deserialize;
 
     use super::*;
