@@ -16,7 +16,7 @@ pub(crate) fn this_platform() -> String {
     format!("{ARCH} {OS}")
 }
 
-/// Largest shared library (bytes): an assumption, ten times the size of large ones.
+/// Largest shared library (bytes): a limit of this program.
 const MOST_LIBRARY_BYTES: u64 = 4 << 30;
 
 /// Checks that a file is a shared library for this platform, and that it exports the functions

@@ -232,7 +232,7 @@ pub(super) fn environment(backend: &Backend) -> Result<&'static Environment, Cla
     loaded.as_ref().map_err(|reason| ClassifierError::Load { backend: backend.clone(), reason: reason.clone() })
 }
 
-/// Largest file of a network (bytes): an assumption, ten times the largest that ships.
+/// Largest file of a network (bytes): a limit of this program.
 const MOST_NETWORK_BYTES: u64 = 2 << 30;
 
 /// Reads the file of a network.
