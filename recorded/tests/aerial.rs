@@ -3,14 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use closecall_recorded::aerial::dataset::{AerialDatasetOptions, dataset_picture};
-use closecall_recorded::aerial::footprint::{corrected, height_m, raw};
 use closecall_recorded::aerial::{Detector, FlightOptions, fly, intersection_over_union, losses};
 use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_sensors::camera::Backend;
 use closecall_sensors::datasets::Set;
 use closecall_traffic::geometry::OrientedBox;
-use closecall_traffic::{ActorId, Dimensions, Lane, Time, Trajectory, TrajectoryPoint, VehicleClass, stream};
-use rand::RngExt;
+use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
 fn plane(image_box: &closecall_recorded::aerial::ImageBox) -> OrientedBox {
     let [x_m, y_m] = image_box.centre_px;
@@ -72,73 +70,6 @@ fn the_same_picture_gives_the_same_bytes_and_the_same_detections() {
     let (other, _, _) = dataset_picture(&AerialDatasetOptions { seed: 6, ..options }, 1).unwrap();
     assert_ne!(other.image, detect().0);
 }
-
-/// Errors of the centre of a class's detected vehicles across the road, away from the camera (m).
-#[derive(Default)]
-struct Across {
-    raw_m: Vec<f64>,
-    corrected_m: Vec<f64>,
-}
-
-/// Returns the errors of cars and of trucks with held-out body shapes, in strips across a road.
-fn errors_across(seed: u64, pictures: u32) -> [Across; 2] {
-    let mut detector = Detector::shipped(&Backend::Tract).unwrap();
-    let options = AerialDatasetOptions { set: Set::HeldOut, pictures, seed };
-    let mut both = [Across::default(), Across::default()];
-    // Every second picture is a strip.
-    for index in (0..pictures).step_by(2) {
-        let (picture, scene, camera) = dataset_picture(&options, index).unwrap();
-        for detection in detector.detect(&picture.image, 0.3).unwrap() {
-            let labelled =
-                picture.labels.iter().filter(|label| label.is_visible).find(|label| {
-                    intersection_over_union(&plane(&detection.image_box), &plane(&label.image_box)) >= 0.5
-                });
-            let vehicle = labelled.and_then(|label| scene.vehicles.iter().find(|vehicle| vehicle.id == label.id));
-            let (Some(vehicle), Some(seen)) = (vehicle, raw(&camera, &detection.image_box)) else { continue };
-            if vehicle.vehicle.class != detection.class {
-                continue;
-            }
-            let flat = corrected(&camera, &seen, height_m(&camera, &seen, detection.class));
-            // The camera looks across the road, to the left.
-            let away = camera.view().azimuth_rad.sin().signum();
-            let of_class = &mut both[usize::from(detection.class == VehicleClass::Truck)];
-            of_class.raw_m.push(away * (seen.y_m - vehicle.at_m[1]));
-            of_class.corrected_m.push(away * (flat.y_m - vehicle.at_m[1]));
-        }
-    }
-    both
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-/// The correction holds for body shapes that neither the detector nor the correction knows, on scenes
-/// that nobody has chosen: their seeds are drawn.
-#[test]
-fn the_correction_holds_for_held_out_cars_and_trucks_on_drawn_seeds() {
-    let mut rng = stream(1, 0, &ActorId::new("ego").unwrap(), "held-out-seeds");
-    let mut all = [Across::default(), Across::default()];
-    for _ in 0..SEEDS {
-        for (sum, of_class) in all.iter_mut().zip(errors_across(rng.random(), 24)) {
-            sum.raw_m.extend(of_class.raw_m);
-            sum.corrected_m.extend(of_class.corrected_m);
-        }
-    }
-    for (name, of_class, largest_m) in [("car", &all[0], LARGEST_CAR_M), ("truck", &all[1], LARGEST_TRUCK_M)] {
-        let (raw_m, corrected_m) = (mean(&of_class.raw_m), mean(&of_class.corrected_m));
-        let count = of_class.raw_m.len();
-        assert!(count > 40, "{name}: {count}");
-        assert!(raw_m > 2.0 * largest_m, "{name}: the boxes as they are seen are {raw_m} m beside their place");
-        assert!(corrected_m.abs() < largest_m, "{name}: {corrected_m} m of {raw_m} m, {count} vehicles");
-    }
-}
-
-/// Number of drawn seeds.
-const SEEDS: usize = 4;
-/// Largest mean error across the road of cars and of trucks (m).
-const LARGEST_CAR_M: f64 = 0.1;
-const LARGEST_TRUCK_M: f64 = 0.15;
 
 /// A vehicle at constant speed that changes from the right lane to the left one between 2 and 7 s
 /// if `changes`.

@@ -35,7 +35,7 @@ struct Cli {
 }
 
 /// The commands that may run the camera's network, each as the words that name it.
-const WITH_NETWORK: [&[&str]; 22] = [
+const WITH_NETWORK: [&[&str]; 21] = [
     &["run"],
     &["campaign"],
     &["replay"],
@@ -44,7 +44,6 @@ const WITH_NETWORK: [&[&str]; 22] = [
     &["plot"],
     &["view"],
     &["check"],
-    &["traffic", "aerial"],
     &["traffic", "chain"],
     &["traffic", "calibrate"],
     &["traffic", "paper"],
@@ -166,8 +165,7 @@ enum Command {
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
 /// know them by their name alone.
-const GROUPED: [(&str, &str); 30] = [
-    ("aerial", "traffic aerial"),
+const GROUPED: [(&str, &str); 29] = [
     ("anchor", "study anchor"),
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),

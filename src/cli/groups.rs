@@ -6,8 +6,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, aerial, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper,
-    perceive, record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
+    CliError, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper, perceive,
+    record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -46,9 +46,6 @@ pub(super) enum Traffic {
     /// Sample a recorded lane change: the other vehicles drive as recorded, a parameter of a driver
     /// varies
     Sample(sample::SampleArgs),
-    /// Watch traffic with an aerial camera, detect and track the vehicles in its pictures, and compare
-    /// lane changes and metrics with the truth
-    Aerial(aerial::AerialArgs),
     /// Simulate samples of a scenario, and write their traffic as a trajectory file
     Record(record::RecordArgs),
     /// Calibrate a car-following model on recorded pairs, and judge it on pairs that were held out
@@ -127,7 +124,6 @@ impl Traffic {
             Self::Paper(args) => paper::paper(args),
             Self::Reenact(args) => reenact::reenact(args),
             Self::Sample(args) => sample::sample(args),
-            Self::Aerial(args) => aerial::aerial(args),
             Self::Record(args) => record::record(args),
             Self::Calibrate(args) => calibrate::calibrate(args),
         }

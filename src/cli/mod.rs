@@ -2,7 +2,6 @@
 
 mod actions;
 mod advice;
-mod aerial;
 mod args;
 mod argument;
 mod arms;

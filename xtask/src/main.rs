@@ -16,6 +16,7 @@ mod render_aerial;
 mod render_dataset;
 mod root;
 mod throughput;
+mod validate_aerial;
 mod validate_camera;
 mod validate_cameras;
 mod validate_durability;
@@ -56,6 +57,8 @@ enum Task {
     RenderDataset(Words),
     /// Measures the speed of the loop, or counts its instructions
     Throughput(Words),
+    /// Flies the aerial camera over trajectory files, and measures its losses
+    ValidateAerial(Words),
     /// Measures what lens, shutter and darkness do to the classifier
     ValidateCamera(Words),
     /// Compares the two pipelines of the rear camera
@@ -105,6 +108,7 @@ fn main() -> ExitCode {
         Task::RenderAerial(Words { words }) => render_aerial::main(words).report(),
         Task::RenderDataset(Words { words }) => render_dataset::main(words).report(),
         Task::Throughput(Words { words }) => throughput::main(words).report(),
+        Task::ValidateAerial(Words { words }) => validate_aerial::main(words).report(),
         Task::ValidateCamera(Words { words }) => validate_camera::main(words).report(),
         Task::ValidateCameras(args) => validate_cameras::main(args).report(),
         Task::ValidateDurability(Words { words }) => validate_durability::main(words).report(),

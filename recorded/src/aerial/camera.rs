@@ -22,9 +22,7 @@ use serde::Serialize;
 
 /// Focal length of a wide-angle lens of 24 mm (35 mm equivalent), as usual drones have it, on
 /// [`WIDTH_PX`] columns (px).
-pub const FOCAL_PX: f64 = FOCAL_SHARE * WIDTH_PX as f64;
-/// Focal length of that lens, as a share of the columns of an image (-).
-pub const FOCAL_SHARE: f64 = 24.0 / 36.0;
+pub const FOCAL_PX: f64 = 24.0 / 36.0 * WIDTH_PX as f64;
 /// Columns of a frame.
 pub const WIDTH_PX: usize = 1_280;
 /// Rows of a frame: a strip of the image with the road in it.

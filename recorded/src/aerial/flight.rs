@@ -12,15 +12,16 @@ use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::aerial::acquisition::Acquisition;
 use crate::aerial::camera::{ALTITUDE_M, AerialCamera, OFF_NADIR_RAD, View};
 use crate::aerial::detector::{DETECTED_FROM, Detector};
 use crate::aerial::error::AerialError;
-use crate::aerial::footprint::{corrected, height_m, raw};
+use crate::aerial::footprint::{corrected, raw};
 use crate::aerial::ground::Ground;
-use crate::aerial::picture::{AerialPicture, AerialScene, GroundVehicle, Light, render_sampled};
+use crate::aerial::picture::{AerialPicture, AerialScene, GroundVehicle, Light, render};
 use crate::aerial::tracker::{AerialTrack, GroundDetection, track};
 
+/// Time between two pictures: every second one of a video of 25 Hz, as highD has it.
+pub const FRAME: Time = Time::from_ms(80);
 /// Assumption: standard deviation, along each axis, of the constant error of georeferencing by
 /// control points (m). Published errors of all causes together are 0.1 m (highD) and 0.2 m (Kruber
 /// et al.).
@@ -46,8 +47,6 @@ pub struct FlightOptions {
     pub jitter_sigma_m: f64,
     /// Time before and after each lane change that is watched (s), 2 to 1000.
     pub reach_s: f64,
-    /// The rate and the size of the pictures.
-    pub acquisition: Acquisition,
     /// Seed of the errors, the paints and the ground.
     pub seed: u64,
 }
@@ -60,7 +59,6 @@ impl Default for FlightOptions {
             offset_sigma_m: OFFSET_SIGMA_M,
             jitter_sigma_m: JITTER_SIGMA_M,
             reach_s: 7.0,
-            acquisition: Acquisition::STRIP,
             seed: 0,
         }
     }
@@ -106,7 +104,6 @@ pub struct Flight {
 /// detector fails.
 pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) -> Result<Flight, AerialError> {
     options.check()?;
-    let frame = options.acquisition.frame;
     let edges_m = edges_m(data);
     let spans = spans(data, options)?;
     let frames = spans.iter().map(Vec::len).sum();
@@ -117,24 +114,24 @@ pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) ->
     for times in &spans {
         let scenes: Vec<AerialScene> = times.iter().map(|time| scene_at(data, &edges_m, *time, options)).collect();
         let cameras: Vec<AerialCamera> = scenes.iter().map(|scene| camera_above(scene, &edges_m, options)).collect();
-        let [raw, corrected] = detections(&scenes, &cameras, (options.acquisition, backend))?;
+        let [raw, corrected] = detections(&scenes, &cameras, backend)?;
         let (span_errors, rest) = errors.split_at(times.len());
         errors = rest;
         for (frames, all) in [(raw, &mut seen), (corrected, &mut flat)] {
-            let tracks = track(&shifted(frames, span_errors), frame.s());
+            let tracks = track(&shifted(frames, span_errors), FRAME.s());
             let first_id = all.iter().map(|track: &Trajectory| track.track_id).max().unwrap_or(0);
-            all.extend(tracks.iter().map(|track| trajectory((track, first_id), (times[0], frame), &edges_m)));
+            all.extend(tracks.iter().map(|track| trajectory(track, first_id, times[0], &edges_m)));
         }
         truth.extend(watched(data, times, &cameras));
         let middle = times.len() / 2;
-        example.get_or_insert_with(|| render_sampled(&scenes[middle], &cameras[middle], options.acquisition.samples));
+        example.get_or_insert_with(|| render(&scenes[middle], &cameras[middle]));
     }
     for (index, track) in truth.iter_mut().enumerate() {
         track.track_id = index as u64 + 1;
     }
     let named = |name: &str, all: Vec<Trajectory>| TrajectoryData {
         markings: data.markings.clone(),
-        ..TrajectoryData::new(&format!("{}-{name}", data.name), frame, all)
+        ..TrajectoryData::new(&format!("{}-{name}", data.name), FRAME, all)
     };
     let Some(example) = example else { return Err(nothing(data)) };
     let (raw, corrected) = (named("aerial-raw", seen), named("aerial-corrected", flat));
@@ -146,7 +143,7 @@ pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) ->
 fn detections(
     scenes: &[AerialScene],
     cameras: &[AerialCamera],
-    (acquisition, backend): (Acquisition, &Backend),
+    backend: &Backend,
 ) -> Result<[Vec<Vec<GroundDetection>>; 2], AerialError> {
     // A thread keeps its detector.
     let detect = |slot: &mut Option<Detector>, index: usize| -> Result<[Vec<GroundDetection>; 2], AerialError> {
@@ -154,15 +151,13 @@ fn detections(
             Some(detector) => detector,
             None => slot.insert(Detector::shipped(backend)?),
         };
-        let picture = render_sampled(&scenes[index], &cameras[index], acquisition.samples);
-        let detections = detector.detect(&acquisition.reduced(&picture.image), DETECTED_FROM)?;
-        let detections: Vec<_> = detections.into_iter().map(|found| acquisition.enlarged(found)).collect();
+        let picture = render(&scenes[index], &cameras[index]);
+        let detections = detector.detect(&picture.image, DETECTED_FROM)?;
         let ground = |is_corrected: bool| -> Vec<GroundDetection> {
             let all = detections.iter().filter_map(|detection| {
                 let seen = raw(&cameras[index], &detection.image_box)?;
-                let camera = &cameras[index];
-                let flat = || corrected(camera, &seen, height_m(camera, &seen, detection.class));
-                let footprint = if is_corrected { flat() } else { seen };
+                let height_m = detection.class.typical_dimensions().height_m;
+                let footprint = if is_corrected { corrected(&cameras[index], &seen, height_m) } else { seen };
                 Some(GroundDetection { footprint, class: detection.class, score: detection.score })
             });
             all.collect()
@@ -175,7 +170,7 @@ fn detections(
     Ok([seen, flat])
 }
 
-/// Returns the instants of the pictures, all of them multiples of their interval: those near a lane
+/// Returns the instants of the pictures, all of them multiples of [`FRAME`]: those near a lane
 /// change, in spans without gaps.
 fn spans(data: &TrajectoryData, options: &FlightOptions) -> Result<Vec<Vec<Time>>, AerialError> {
     let mut crossings: Vec<Time> = detect(&smooth(data)).iter().map(|change| Time::from_s(change.crossing_s)).collect();
@@ -184,14 +179,13 @@ fn spans(data: &TrajectoryData, options: &FlightOptions) -> Result<Vec<Vec<Time>
     let recorded = data.trajectories.iter().filter_map(Trajectory::span).reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
     let Some((first, last)) = recorded.filter(|_| !crossings.is_empty()) else { return Err(nothing(data)) };
     let mut spans: Vec<Vec<Time>> = Vec::new();
-    let frame = options.acquisition.frame;
-    for tick in (first.ns() + frame.ns() - 1).div_euclid(frame.ns())..=last.ns().div_euclid(frame.ns()) {
-        let time = frame * tick;
+    for tick in (first.ns() + FRAME.ns() - 1).div_euclid(FRAME.ns())..=last.ns().div_euclid(FRAME.ns()) {
+        let time = FRAME * tick;
         if !crossings.iter().any(|crossing| (time - *crossing).ns().abs() <= reach.ns()) {
             continue;
         }
         match spans.last_mut() {
-            Some(span) if span.last().is_some_and(|last| time - *last == frame) => span.push(time),
+            Some(span) if span.last().is_some_and(|last| time - *last == FRAME) => span.push(time),
             _ => spans.push(vec![time]),
         }
     }
@@ -280,9 +274,7 @@ fn camera_above(scene: &AerialScene, edges_m: &[f64], options: &FlightOptions) -
     let middle_m = 0.5 * (edges_m[0] + edges_m[edges_m.len() - 1]);
     // The roofs of tall vehicles lean to the left.
     let target_m = [s_m, middle_m + 0.5];
-    let view = View::beside_road(target_m, options.altitude_m, options.off_nadir_rad);
-    let Acquisition { size_px, .. } = options.acquisition;
-    AerialCamera::new(View { focal_px: options.acquisition.focal_px(), size_px, ..view })
+    AerialCamera::new(View::beside_road(target_m, options.altitude_m, options.off_nadir_rad))
 }
 
 /// Returns the error of georeferencing of each picture (m).
@@ -306,13 +298,13 @@ fn shifted(mut frames: Vec<Vec<GroundDetection>>, errors_m: &[[f64; 2]]) -> Vec<
 
 /// Returns the trajectory of a track, whose number counts on after those `before`; lanes are those
 /// between the known markings.
-fn trajectory((track, before): (&AerialTrack, u64), (start, frame): (Time, Time), edges_m: &[f64]) -> Trajectory {
+fn trajectory(track: &AerialTrack, before: u64, start: Time, edges_m: &[f64]) -> Trajectory {
     let lane_at = |d_m: f64| {
         let passed = edges_m[1..edges_m.len() - 1].iter().filter(|edge_m| d_m < **edge_m).count();
         Lane(u8::try_from(passed + 1).unwrap_or(u8::MAX))
     };
     let point = |point: &crate::aerial::tracker::TrackPoint| TrajectoryPoint {
-        time: start + frame * point.frame as i64,
+        time: start + FRAME * point.frame as i64,
         s_m: point.at_m[0],
         // Positions to the left of the road are not part of a lane.
         d_m: point.at_m[1].min(0.0),
@@ -361,4 +353,4 @@ fn is_within(camera: &AerialCamera, point: &TrajectoryPoint) -> bool {
 
 // The criteria for lane changes use a common clock. The interval of two pictures must not be longer
 // than its period.
-const _: () = assert!(Acquisition::STRIP.frame.ns() <= PERIOD.ns() && Acquisition::PUBLISHED.frame.ns() <= PERIOD.ns());
+const _: () = assert!(FRAME.ns() <= PERIOD.ns());

@@ -9,18 +9,11 @@
 //! Along each axis of a vehicle of size L and height h, the box that is seen on the ground reaches
 //! from min(−L/2, δ − kL/2) to max(L/2, δ + kL/2), with k = H/(H − h). Its centre lies about δ/2
 //! beside the centre of the footprint: 1 m for a truck of 4 m that is seen at 25° from 100 m.
-//! [`corrected`] inverts this for a height. F. Kruber et al. (IV 2020) correct the same displacement
-//! by the height of their test vehicle.
-//!
-//! Nobody knows the height of a vehicle in a picture, and trucks are built from 3.2 to 4.1 m high.
-//! But all vehicles of a class are nearly equally wide, and the box that is seen is wider than that
-//! by the displacement of the roof. [`height_m`] is the height that explains the width best, under
-//! the widths and heights of the class. For a body whose roof is narrower than its sides the result
-//! is lower than the vehicle, as is the displacement that it stands for.
+//! [`corrected`] inverts this for the typical height of the class. F. Kruber et al. (IV 2020)
+//! correct the same displacement by the height of their test vehicle.
 
-use closecall_sensors::camera::HELD_OUT_SHAPES;
 use closecall_traffic::geometry::OrientedBox;
-use closecall_traffic::{BodyShape, Dimensions, VehicleClass, maths};
+use closecall_traffic::maths;
 use nalgebra::Vector2;
 
 use crate::aerial::camera::AerialCamera;
@@ -30,16 +23,6 @@ use crate::aerial::image_box::ImageBox;
 const STEPS: usize = 12;
 /// Least size that is left of a box (m).
 const SMALLEST_M: f64 = 0.3;
-/// Standard deviation of the width of a detected box (m): an assumption, about a pixel; 0.05 to 0.25
-/// are plausible.
-const DETECTED_WIDTH_SIGMA_M: f64 = 0.13;
-/// Smallest standard deviation of the width and of the height of a class (m): assumptions. Bodies of
-/// one shape differ by about 5 %.
-const LEAST_WIDTH_SIGMA_M: f64 = 0.08;
-const LEAST_HEIGHT_SIGMA_M: f64 = 0.2;
-/// Heights that are tried (m): from a flat vehicle on, up to 4.5 m.
-const HEIGHT_STEP_M: f64 = 0.05;
-const HEIGHT_STEPS: u32 = 90;
 
 /// Returns the box on the ground that an image box covers, as if the vehicle were flat. `None` if a
 /// corner lies above the horizon.
@@ -81,46 +64,6 @@ fn covered(size_m: f64, displaced_m: f64, growth: f64) -> (f64, f64) {
     let (half, roof) = (0.5 * size_m, 0.5 * size_m * growth);
     let (low, high) = ((-half).min(displaced_m - roof), half.max(displaced_m + roof));
     (0.5 * (low + high), high - low)
-}
-
-/// A size of the vehicles of a class (m).
-#[derive(Clone, Copy)]
-struct Spread {
-    mean_m: f64,
-    sigma_m: f64,
-}
-
-impl Spread {
-    /// Returns the mean and the standard deviation of a size over the body shapes of a class, without
-    /// those that are kept for evaluation.
-    fn over(class: VehicleClass, size: impl Fn(Dimensions) -> f64, least_m: f64) -> Self {
-        let shapes = BodyShape::of_class(class).iter().filter(|shape| !HELD_OUT_SHAPES.contains(shape));
-        let sizes: Vec<f64> = shapes.map(|shape| size(shape.usual_dimensions())).collect();
-        let count = sizes.len().max(1) as f64;
-        let mean_m = sizes.iter().sum::<f64>() / count;
-        let variance_m2 = sizes.iter().map(|size_m| (size_m - mean_m).powi(2)).sum::<f64>() / count;
-        Self { mean_m, sigma_m: variance_m2.sqrt().max(least_m) }
-    }
-
-    /// Returns the squared deviation of a value, in standard deviations that include an error of
-    /// measurement (m).
-    fn squared_deviation(self, value_m: f64, error_m: f64) -> f64 {
-        (value_m - self.mean_m).powi(2) / (self.sigma_m * self.sigma_m + error_m * error_m)
-    }
-}
-
-/// Returns the most probable height of a vehicle of this class whose visible body covers the box
-/// `seen_m` (m).
-pub fn height_m(camera: &AerialCamera, seen_m: &OrientedBox, class: VehicleClass) -> f64 {
-    let width = Spread::over(class, |size| size.width_m, LEAST_WIDTH_SIGMA_M);
-    let height = Spread::over(class, |size| size.height_m, LEAST_HEIGHT_SIGMA_M);
-    let heights = (0..=HEIGHT_STEPS).map(|step| HEIGHT_STEP_M * f64::from(step));
-    let cost = |height_m: f64| {
-        let footprint = corrected(camera, seen_m, height_m);
-        width.squared_deviation(footprint.width_m, DETECTED_WIDTH_SIGMA_M) + height.squared_deviation(height_m, 0.0)
-    };
-    let tried = heights.map(|height_m| (height_m, cost(height_m)));
-    tried.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(height.mean_m, |(height_m, _)| height_m)
 }
 
 /// Returns the footprint whose visible body covers the box `seen_m`, for a vehicle of this height.

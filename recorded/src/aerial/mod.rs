@@ -6,7 +6,6 @@
 //!                  ─▶ tracker  Kalman filter, oriented overlap ─▶ trajectory data ─▶ losses  compared with the truth
 //! ```
 
-mod acquisition;
 pub mod camera;
 pub mod dataset;
 mod detector;
@@ -23,10 +22,9 @@ mod random_scene;
 mod raster;
 mod tracker;
 
-pub use acquisition::Acquisition;
 pub use detector::{DETECTED_FROM, Detector, ImageDetection, SHIPPED_DETECTOR};
 pub use error::AerialError;
-pub use flight::{Flight, FlightOptions, fly};
+pub use flight::{FRAME, Flight, FlightOptions, fly};
 pub use ground::Ground;
 pub use image_box::ImageBox;
 pub use losses::{CriterionLoss, LossRow, Losses, MetricLoss, losses};

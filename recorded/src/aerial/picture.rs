@@ -99,13 +99,8 @@ pub struct AerialPicture {
 
 /// Renders a picture. The same scene and camera give the same bytes.
 pub fn render(scene: &AerialScene, camera: &AerialCamera) -> AerialPicture {
-    render_sampled(scene, camera, SAMPLES)
-}
-
-/// Renders a picture with another number of samples for each pixel along each axis, at least 1.
-pub(super) fn render_sampled(scene: &AerialScene, camera: &AerialCamera, per_pixel: usize) -> AerialPicture {
     let [width, height] = camera.view().size_px;
-    let mut samples = Samples::new(width * per_pixel, height * per_pixel);
+    let mut samples = Samples::new(width * SAMPLES, height * SAMPLES);
     let mut colours: Vec<([f64; 3], usize)> = vec![([0.0; 3], usize::MAX)];
     let mut labels = Vec::new();
     for (index, vehicle) in scene.vehicles.iter().enumerate() {
@@ -113,7 +108,7 @@ pub(super) fn render_sampled(scene: &AerialScene, camera: &AerialCamera, per_pix
         if let Some(image_box) = label_box(vehicle, &triangles, camera) {
             labels.push((index, Label { id: vehicle.id, image_box, is_visible: false }));
         }
-        draw_body(scene, (camera, per_pixel), (vehicle, &triangles, index), (&mut samples, &mut colours));
+        draw_body(scene, camera, (vehicle, &triangles, index), (&mut samples, &mut colours));
     }
     let mut shown = vec![0_usize; scene.vehicles.len()];
     for face in &samples.face {
@@ -122,17 +117,17 @@ pub(super) fn render_sampled(scene: &AerialScene, camera: &AerialCamera, per_pix
         }
     }
     let labels = labels.into_iter().map(|(index, label)| {
-        let area = label.image_box.length_px * label.image_box.width_px * (per_pixel * per_pixel) as f64;
+        let area = label.image_box.length_px * label.image_box.width_px * (SAMPLES * SAMPLES) as f64;
         Label { is_visible: shown[index] as f64 >= VISIBLE_SHARE * area, ..label }
     });
     let labels = labels.collect();
-    AerialPicture { image: develop(scene, (camera, per_pixel), &samples, &colours), labels }
+    AerialPicture { image: develop(scene, camera, &samples, &colours), labels }
 }
 
 /// Draws the body of a vehicle and its shadow; each face gets a colour.
 fn draw_body(
     scene: &AerialScene,
-    (camera, per_pixel): (&AerialCamera, usize),
+    camera: &AerialCamera,
     (vehicle, triangles, index): (&GroundVehicle, &[BodyTriangle], usize),
     (samples, colours): (&mut Samples, &mut Vec<([f64; 3], usize)>),
 ) {
@@ -140,7 +135,7 @@ fn draw_body(
     let on_ground = |p: Vec3| [p[0] - to_sun[0] * p[2] / to_sun[2], p[1] - to_sun[1] * p[2] / to_sun[2], 0.0];
     let sampled = |point: Vec3| -> Option<Corner> {
         let [column, row, depth] = camera.project_with_depth(point)?;
-        Some([column * per_pixel as f64, row * per_pixel as f64, depth])
+        Some([column * SAMPLES as f64, row * SAMPLES as f64, depth])
     };
     let corners = |points: [Vec3; 3]| -> Option<[Corner; 3]> {
         let [a, b, c] = points.map(&sampled);
@@ -190,12 +185,7 @@ fn label_box(vehicle: &GroundVehicle, triangles: &[BodyTriangle], camera: &Aeria
 }
 
 /// Turns samples into an image: colours, the mean of the samples of each pixel, gamma, noise.
-fn develop(
-    scene: &AerialScene,
-    (camera, per_pixel): (&AerialCamera, usize),
-    samples: &Samples,
-    colours: &[([f64; 3], usize)],
-) -> Image {
+fn develop(scene: &AerialScene, camera: &AerialCamera, samples: &Samples, colours: &[([f64; 3], usize)]) -> Image {
     /// Linear value that saturates the sensor at exposure 1.
     const WHITE: f64 = 0.75;
     let [width, height] = camera.view().size_px;
@@ -204,12 +194,12 @@ fn develop(
     for row in 0..height {
         for column in 0..width {
             let mut sum = [0.0; 3];
-            let grid = (0..per_pixel).flat_map(|dy| (0..per_pixel).map(move |dx| (dx, dy)));
+            let grid = (0..SAMPLES).flat_map(|dy| (0..SAMPLES).map(move |dx| (dx, dy)));
             for (dx, dy) in grid {
-                let index = (row * per_pixel + dy) * width * per_pixel + column * per_pixel + dx;
+                let index = (row * SAMPLES + dy) * width * SAMPLES + column * SAMPLES + dx;
                 let colour = match samples.face[index] {
                     0 => {
-                        let offset = |part: usize| (part as f64 + 0.5) / per_pixel as f64;
+                        let offset = |part: usize| (part as f64 + 0.5) / SAMPLES as f64;
                         let at = camera.ground_at([column as f64 + offset(dx), row as f64 + offset(dy)]);
                         let light = if samples.is_shadowed[index] { sky } else { 1.0 };
                         at.map_or([0.6; 3], |at| scene.ground.albedo(at).map(|value| value * light))
@@ -219,7 +209,7 @@ fn develop(
                 (0..3).for_each(|channel| sum[channel] += colour[channel]);
             }
             for (channel, sum) in sum.iter().enumerate() {
-                let linear = scene.light.exposure * sum / ((per_pixel * per_pixel) as f64 * WHITE);
+                let linear = scene.light.exposure * sum / ((SAMPLES * SAMPLES) as f64 * WHITE);
                 let noise = gaussian(scene.key, row * width + column, channel);
                 let encoded = 255.0 * linear.max(0.0).sqrt() + NOISE * noise;
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
