@@ -208,7 +208,7 @@ impl RecordedPoints {
         let beam = self.beam.take().unwrap_or_default();
         let (start, offset_ns) = self.timed(lidar, pattern, &beam);
         if frame == PointFrame::Sensor {
-            self.into_ego_frame(&mounting, motion, (start, &offset_ns));
+            self.turn_to_ego_frame(&mounting, motion, (start, &offset_ns));
         }
         let mut resolution = lidar.kind.resolution;
         resolution.mount_height_m = lidar.mount_height_m;
@@ -286,7 +286,7 @@ impl RecordedPoints {
     /// Moves the points from the sensor's frame when they were measured to the ego's frame at the
     /// end of the scan.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    fn into_ego_frame(&mut self, mounting: &Mounting, motion: ScanMotion, (start, offset_ns): (Time, &[u32])) {
+    fn turn_to_ego_frame(&mut self, mounting: &Mounting, motion: ScanMotion, (start, offset_ns): (Time, &[u32])) {
         let ego_from_sensor = mounting.sensor_from_ego.inverse();
         for (point, &offset_ns) in offset_ns.iter().enumerate() {
             let seen_m = Vector3::from(std::array::from_fn(|axis| f64::from(self.at_m[axis][point])));
