@@ -148,7 +148,7 @@ impl FittedFile {
                 parameters.insert(name.clone(), Value::Number(value));
                 file.concrete(&parameters).is_ok()
             };
-            let limits = bounds.map(|bound| usable_end(*median, bound, &is_usable));
+            let limits = bounds.map(|bound| usable_end(*median, bound, is_usable));
             if limits == bounds {
                 continue;
             }

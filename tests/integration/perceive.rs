@@ -9,7 +9,7 @@ use std::process::Command;
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::datatypes::{DataType, Float32Type, Float64Type, UInt16Type, UInt32Type};
 use closecall_testing::python_with;
-use closecall_traffic::Time;
+use closecall_traffic::{Time, maths};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -128,7 +128,7 @@ fn other_settings_of_the_chain_give_other_tracks() {
 
 /// A value of a message in CDR, appended at a multiple of its size.
 fn put(bytes: &mut Vec<u8>, value: &[u8]) {
-    while bytes.len() % value.len() != 0 {
+    while !bytes.len().is_multiple_of(value.len()) {
         bytes.push(0);
     }
     bytes.extend_from_slice(value);
@@ -187,7 +187,7 @@ fn odometry([time_s, x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps]: [f64; 6]) ->
     let mut body = Vec::new();
     put_header(&mut body, time_s);
     put_text(&mut body, "base_link");
-    let (sin, cos) = (0.5 * yaw_rad).sin_cos();
+    let (sin, cos) = maths::sin_cos(0.5 * yaw_rad);
     let pose = [x_m, y_m, 0.0, 0.0, 0.0, sin, cos];
     let twist = [speed_mps, 0.0, 0.0, 0.0, 0.0, yaw_rate_radps];
     for value in pose.into_iter().chain([0.0; 36]).chain(twist).chain([0.0; 36]) {

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use closecall_testing::data;
+use closecall_traffic::maths;
 use serde_json::Value;
 
 use crate::support::{closecall, code, folder, json, library, message, stdout};
@@ -237,7 +238,7 @@ fn a_driver_with_nobody_ahead_is_sampled_and_starts_as_recorded() {
 #[test]
 fn a_follower_is_reproduced_and_lower_values_bring_it_closer() {
     let folder = folder();
-    let leader = |time_s: f64| [60.0 + 20.0 * time_s - 4.0 * (0.4 * time_s).sin(), 1.5 * LANE_M];
+    let leader = |time_s: f64| [60.0 + 20.0 * time_s - 4.0 * maths::sin(0.4 * time_s), 1.5 * LANE_M];
     // The follower keeps about 20 m, with a delay of 1 s.
     let follower = |time_s: f64| [leader(time_s - 1.0)[0] - 4.6, changing(time_s, 11.0, 0.0)];
     let ends_early = |to_s: f64| [(1, [0.0, to_s], &leader as Motion<'_>), (2, [0.0, 22.0], &follower)];
@@ -263,7 +264,7 @@ fn a_follower_is_reproduced_and_lower_values_bring_it_closer() {
 fn a_lane_change_that_no_driver_reproduces_is_refused_with_the_error() {
     let folder = folder();
     // Without a reason ahead the vehicle brakes to a fifth of its speed and accelerates again, twice.
-    let motion = |time_s: f64| [18.0 * time_s + 12.0 * (1.1 * time_s).sin(), changing(time_s, 9.0, 0.0)];
+    let motion = |time_s: f64| [18.0 * time_s + 12.0 * maths::sin(1.1 * time_s), changing(time_s, 9.0, 0.0)];
     let file = recording(folder.path(), &[(1, [0.0, 20.0], &motion)]);
     let refused = sample(&file, "1", &["--from", "1.5"]);
     assert_eq!(code(&refused), 3);
