@@ -345,7 +345,7 @@ fn the_points_of_a_design_bound_no_probability() {
         );
     }
     let message = message(&campaign(&library("low-thw-overtake"), &["--design", "grid", "--time-budget", "1s"]));
-    assert!(message.contains("--design random"), "{message}");
+    assert!(message.contains("the design `random` draws them"), "{message}");
 }
 
 #[test]

@@ -94,7 +94,7 @@ mod tests {
         for [x, d] in points {
             assert!((path.at(x)[0] - d).abs() < 1e-12, "{x}");
         }
-        assert_eq!(path.at(40.0)[1..], [0.0, 0.0]);
+        assert!(path.at(40.0)[1..].iter().all(|slope| slope.abs() < 1e-12), "{:?}", path.at(40.0));
         assert_eq!(path.at(1_000.0), path.at(40.0));
         // Neither the slope nor its derivative jumps between two pieces.
         for x in [10.0, 25.0] {

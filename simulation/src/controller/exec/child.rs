@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
-use super::error::{ExecError, is_starting};
+use super::error::{ExecError, is_long};
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::processes::{self, Entry};
 use super::settings::ExecSettings;
@@ -141,7 +141,9 @@ impl Child {
     /// # Errors
     /// [`ExecError`] if the process ends, or does not keep to its limits.
     pub fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
-        let answer = self.reject_unrequested_line().and_then(|()| {
+        // What the process writes before it is greeted is accepted as the answer to the greeting.
+        let checked = if self.answered > 0 { self.reject_unrequested_line() } else { Ok(()) };
+        let answer = checked.and_then(|()| {
             self.send(line);
             self.wait(limit)
         });
@@ -249,9 +251,9 @@ impl Child {
         self.send(line);
         match self.wait(limit)? {
             Some(answer) => Ok(answer),
-            // A second wait distinguishes a late process from one that hangs. The limit of the start
+            // A second wait distinguishes a late process from one that hangs. The limit of a start
             // is long enough for that.
-            None => Err(match if is_starting(self.answered) { None } else { self.wait(limit)? } {
+            None => Err(match if is_long(limit.as_millis()) { None } else { self.wait(limit)? } {
                 Some(_) => ExecError::Late { limit_ms: limit.as_millis(), answered: self.answered },
                 None => {
                     let (limit_ms, answered, stderr) = (limit.as_millis(), self.answered, self.last_lines());

@@ -49,10 +49,10 @@ pub enum ExecError {
         /// Number of answers before, including the greeting.
         answered: u64,
     },
-    /// The process did not answer within twice the time limit, or at its start within the limit.
+    /// The process did not answer within twice the time limit, or within a long limit.
     #[error(
         "the process hangs: no answer in {}the {limit_ms} ms allowed, {}{}",
-        if is_starting(*answered) { "" } else { "twice " }, when(*answered), last_lines(stderr)
+        if is_long(*limit_ms) { "" } else { "twice " }, when(*answered), last_lines(stderr)
     )]
     Hangs {
         /// The time limit (ms).
@@ -137,9 +137,9 @@ impl ExecError {
     }
 }
 
-/// Returns true until the first answer after the greeting: a process has a longer limit for both.
-pub(super) const fn is_starting(answered: u64) -> bool {
-    answered < 2
+/// Returns true if a time limit is as long as that of a start: whoever exceeds it hangs.
+pub(super) const fn is_long(limit_ms: u128) -> bool {
+    limit_ms >= 10_000
 }
 
 /// Describes when an error happened by the number of answers before it. The first answer is the
