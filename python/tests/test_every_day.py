@@ -153,5 +153,5 @@ def test_what_is_kept_in_a_folder_needs_one(keyword: dict[str, str]) -> None:
 
 def test_an_outcome_shows_numbers_that_can_be_read() -> None:
     outcome = cc.run("low-thw-overtake", sample=3, sensors="object")
-    assert not re.search(r"\d\.\d{6,}", repr(outcome)), repr(outcome)
-    assert re.search(r"\d\.\d{6,}", str(dict(outcome.parameters))), "the attributes have all digits"
+    assert not re.search(r"\d\.\d{9,}", repr(outcome)), repr(outcome)
+    assert re.search(r"\d\.\d{9,}", str(dict(outcome.parameters))), "the attributes have all digits"
