@@ -173,8 +173,7 @@ mod tests {
         assert!(found >= 38, "{found} of {SEEDS}");
         let plain = |seed: &u64| {
             let mut rng = Seed(*seed).stream("plain", 0);
-            (0..10 * BUDGET)
-                .any(|_| Narrow { hides: false }.response(&Point::draw(8, &mut rng)).is_event())
+            (0..10 * BUDGET).any(|_| Narrow { hides: false }.response(&Point::draw(8, &mut rng)).is_event())
         };
         let by_chance = (0..SEEDS).filter(plain).count();
         assert!(by_chance <= 12, "{by_chance} of {SEEDS}: the region is not rare");
