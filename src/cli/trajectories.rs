@@ -283,6 +283,9 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     let data_sets = args.data.read_all()?;
     let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
     if fitted.fitted.is_empty() {
+        if let Format::Json = args.format {
+            outln!("{:#}", stamped(json::fitted(&fitted), None, None));
+        }
         let message = format!(
             "no quantity of the trajectory files has enough values to be fitted: nothing was written\n{}",
             FitText(&fitted)
