@@ -55,8 +55,8 @@ pub fn set_arguments(arguments: &[OsString]) {
     RUNNING.set(Running { arguments, session: None });
 }
 
-/// Returns the words of the command line, of which the first is the program's name; a call of
-/// another program is one word.
+/// Returns the words of the command line, which begin with the program's name. A call from another
+/// program is one word.
 pub fn arguments() -> Vec<String> {
     RUNNING.with_borrow(|running| running.arguments.clone())
 }

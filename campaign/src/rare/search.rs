@@ -7,8 +7,8 @@
 //!
 //! An evolution strategy (H.-G. Beyer and H.-P. Schwefel, *Evolution strategies: a comprehensive
 //! introduction*, Natural Computing 1 (2002) 3–52) of the kind (μ + λ): the nearest μ runs stay, and
-//! λ new ones are moved from them. The moves are those of subset simulation. Their widths are drawn
-//! anew for each of them, because a search does not know how narrow its region is. Some runs are
+//! λ new ones are moved from them, as in subset simulation. Each move has a width of its own, drawn at
+//! random, because a search does not know how narrow its region is. Some runs are
 //! drawn from the scenario itself, and a search that comes no nearer starts again.
 //!
 //! The runs depend on the seed and on the responses only, and not on the number of threads: a search
