@@ -205,8 +205,10 @@ def campaign(
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         if out is None and resume:
             raise UsageError("resume: name the folder of the campaign with `out`")
-        for name in ("record", "partition"):
-            if out is None and options.get(name) is not None:
+        # What selects no recording, and what is no selection, passes: the campaign below refuses the latter.
+        keeps = {"record": re.search(r"each-kind|:0*[1-9]|^0*[1-9]\d*$", str(options.get("record", ""))), "partition": options.get("partition")}
+        for name, value in keeps.items():
+            if out is None and value is not None:
                 raise UsageError(f"{name}: the files are kept in the folder of the campaign: name one with `out`")
         kept = tempfile.TemporaryDirectory(prefix="closecall-") if out is None else None
         folder = Path(kept.name, "results") if kept is not None else Path(os.fspath(out or ""))

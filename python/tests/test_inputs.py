@@ -39,7 +39,9 @@ import closecall.gym as ccgym
         ({"jobs": 0}, "jobs=: `0` is not a whole number from 1 to 1024"),
         ({"preset": "weekly"}, "preset=: `weekly`, expected `pr` or `nightly`"),
         ({"time_budget": "soon"}, "time_budget=: `soon` is not a time above 0"),
-        ({"record": "best:3"}, "record=: `best:3` is not"),
+        ({"record": "best"}, "record=: `best` is not"),
+        ({"record": "worst:2"}, "record: the files are kept in the folder of the campaign: name one with `out`"),
+        ({"partition": "1/2"}, "partition: the files are kept in the folder of the campaign: name one with `out`"),
         ({"check_share": 1.5}, "check_share=: `1.5` is not a number from 0 to 1"),
         ({"retry_crashed": 101}, "retry_crashed=: `101` is not a whole number from 0 to 100"),
         ({"paired": "yes"}, "paired=: string \"yes\", expected true or false"),
@@ -52,7 +54,7 @@ import closecall.gym as ccgym
         ({"judge_seed": 3, "seed": 4}, "judge_seed= cannot be used with seed="),
         ({"no_validity_checks": True, "check_at_most": 3}, "no_validity_checks= cannot be used with check_at_most="),
         ({"ray": "local", "jobs": 2}, "ray= cannot be used with jobs="),
-        ({"partition": "1/2", "time_budget": "9s"}, "time_budget= cannot be used with partition="),
+        ({"partition": "1/2", "time_budget": "9s", "out": "unused"}, "time_budget= cannot be used with partition="),
     ],
 )
 def test_a_wrong_argument_of_a_campaign_is_named(arguments: dict[str, Any], message: str) -> None:
