@@ -17,7 +17,8 @@
 //!
 //! The idea comes from FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled
 //! Transactional Key Value Store", SIGMOD 2021). `CLOSECALL_SCHEDULES=1000000` sets the number of
-//! schedules, `CLOSECALL_SCHEDULE=SEED` runs one of them.
+//! schedules and `CLOSECALL_FIRST_SCHEDULE=SEED` the first one; `CLOSECALL_SCHEDULE=SEED` runs one
+//! alone.
 
 mod machine;
 mod process;
@@ -51,7 +52,10 @@ fn no_schedule_files_a_wrong_outcome_or_hides_a_lost_one() {
     let setup = Arc::new(Setup::new());
     let seeds = match number_from_env("CLOSECALL_SCHEDULE") {
         Some(seed) => seed..seed + 1,
-        None => 0..number_from_env("CLOSECALL_SCHEDULES").unwrap_or(SCHEDULES),
+        None => {
+            let first = number_from_env("CLOSECALL_FIRST_SCHEDULE").unwrap_or(0);
+            first..first + number_from_env("CLOSECALL_SCHEDULES").unwrap_or(SCHEDULES)
+        }
     };
     let count = seeds.end - seeds.start;
     let (violation, disturbed) = run(&setup, Reader::OfTheProgram, seeds);
