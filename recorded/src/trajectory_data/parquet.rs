@@ -43,13 +43,14 @@ impl ParquetText {
         let reader = SerializedFileReader::new_with_options(bytes::Bytes::from(bytes), options);
         let reader = reader.map_err(|error| unreadable(error.to_string()))?;
         let chunks = reader.metadata().row_groups().iter().flat_map(|group| group.columns());
-        let is_read = |codec: &Compression| matches!(codec, Compression::UNCOMPRESSED | Compression::SNAPPY);
+        let is_read =
+            |codec: &Compression| !matches!(codec, Compression::LZO | Compression::BROTLI(_) | Compression::LZ4);
         if let Some(codec) = chunks.map(|chunk| chunk.compression()).find(|codec| !is_read(codec)) {
             let name = format!("{codec:?}");
             let name = name.split('(').next().unwrap_or_default();
             return Err(unreadable(format!(
-                "its columns are compressed with {name}, but only Snappy and no compression are read: write it again with the option \
-                 compression='snappy', which pandas, pyarrow and polars have"
+                "its columns are compressed with {name}, but Snappy, Gzip, Zstandard, LZ4_RAW and no compression are read: write it \
+                 again with the option compression='snappy', which pandas, pyarrow and polars have"
             )));
         }
         let schema = reader.metadata().file_metadata().schema_descr();

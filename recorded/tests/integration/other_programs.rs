@@ -12,6 +12,7 @@ use closecall_recorded::trajectory_data::{
     read, read_from, read_with,
 };
 use closecall_traffic::{Side, Time, VehicleClass, maths};
+use parquet::basic::{Compression, GzipLevel, ZstdLevel};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
@@ -456,6 +457,10 @@ enum Column {
 }
 
 fn parquet_of(columns: &[Column]) -> Vec<u8> {
+    compressed_parquet_of(columns, Compression::UNCOMPRESSED)
+}
+
+fn compressed_parquet_of(columns: &[Column], codec: Compression) -> Vec<u8> {
     let schema: String = columns
         .iter()
         .map(|column| match column {
@@ -466,7 +471,8 @@ fn parquet_of(columns: &[Column]) -> Vec<u8> {
         .collect();
     let schema = Arc::new(parse_message_type(&format!("message rows {{ {schema} }}")).unwrap());
     let mut bytes = Vec::new();
-    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(WriterProperties::default())).unwrap();
+    let properties = WriterProperties::builder().set_compression(codec).build();
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties)).unwrap();
     let mut group = writer.next_row_group().unwrap();
     for column in columns {
         let mut writer = group.next_column().unwrap().unwrap();
@@ -531,6 +537,22 @@ fn a_parquet_file_has_the_layout_of_its_columns() {
 }
 
 #[test]
+fn a_compressed_parquet_file_has_the_rows_of_an_uncompressed_one() {
+    let columns = plain_columns(40, 30.0);
+    let plain = read_text(&parquet_of(&columns)).unwrap();
+    let codecs = [
+        Compression::SNAPPY,
+        Compression::GZIP(GzipLevel::default()),
+        Compression::ZSTD(ZstdLevel::default()),
+        Compression::LZ4_RAW,
+    ];
+    for codec in codecs {
+        let data = read_text(&compressed_parquet_of(&columns, codec)).unwrap();
+        assert_eq!(data.trajectories[0].points, plain.trajectories[0].points, "{codec}");
+    }
+}
+
+#[test]
 fn malformed_parquet_is_refused() {
     let good = parquet_of(&plain_columns(40, 30.0));
     let error = |bytes: &[u8]| read_text(bytes).unwrap_err();
@@ -539,12 +561,12 @@ fn malformed_parquet_is_refused() {
     assert_mentions(&error(&parquet_of(&plain_columns(40, f64::NAN))), &["line 2", "`speed_mps`", "NaN"], "NaN");
     assert_mentions(&error(&parquet_of(&[Column::Whole("a", vec![1])])), &["1 columns", "starts with `a`"], "other");
     // In the metadata of a column, the number of its codec follows its name. In Thrift's compact
-    // protocol, 12 is the number 6: Zstandard.
-    let (codec, of_column) = ([0x15, 0x0c, 0x16], b"d_m\x15\x00\x16");
+    // protocol, 8 is the number 4: Brotli.
+    let (codec, of_column) = ([0x15, 0x08, 0x16], b"d_m\x15\x00\x16");
     let at = good.windows(of_column.len()).position(|window| window == of_column).unwrap();
     let mut packed = good.clone();
     packed[at + 3..at + 6].copy_from_slice(&codec);
-    assert_mentions(&error(&packed), &["compressed with ZSTD", "Snappy"], "another codec");
+    assert_mentions(&error(&packed), &["compressed with BROTLI", "Snappy, Gzip, Zstandard"], "another codec");
     let mut damaged = good.clone();
     let middle = good.len() / 3;
     damaged[middle..middle + 200].fill(0xff);
