@@ -19,7 +19,7 @@ use crate::support::{closecall, code, folder, library, message, program, stderr,
 const TIMEOUT_MS: &str = "2000";
 
 /// The faults of `bad.sh`: its arguments, and a part of the error message.
-const FAULTS: [(&str, &str); 16] = [
+const FAULTS: [(&str, &str); 17] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
@@ -32,6 +32,7 @@ const FAULTS: [(&str, &str); 16] = [
     ("state", "`state` must be one of following, increasing"),
     ("huge", "answered with a line of more than 1048576 bytes"),
     ("twice", "wrote a line that nobody had asked for"),
+    ("ahead", "wrote a line that nobody had asked for"),
     ("chatter", "the process answered \"this is not an answer\", which is not JSON"),
     ("other-step", "for the control step at 80000000 ns, and was asked for the one at 40000000 ns"),
     ("farewell", "wrote a line that nobody had asked for"),

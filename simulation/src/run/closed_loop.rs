@@ -22,13 +22,9 @@ pub fn simulate(
     let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm), observer)?;
     let mut controller = controller(scenario, settings_of(scenario), arm);
     let mut computing = (!arm.controller.is_built_in()).then(ComputingTime::default);
-    loop {
+    let end = loop {
         match run.go_on(observer)? {
-            Next::End(end) => {
-                controller.finish(run.time())?;
-                run.finish_sensors()?;
-                return Ok(run.finish(end));
-            }
+            Next::End(end) => break end,
             Next::Control => {
                 let input = run.input();
                 let command = match &mut computing {
@@ -36,13 +32,17 @@ pub fn simulate(
                     None => controller.step(&input),
                 }?;
                 if let Some(end) = run.command(command, observer)? {
-                    controller.finish(run.time())?;
-                    run.finish_sensors()?;
-                    return Ok(run.finish(end));
+                    break end;
                 }
             }
         }
+    };
+    controller.finish(run.time())?;
+    if let Some(computing) = &computing {
+        computing.finish(run.time())?;
     }
+    run.finish_sensors()?;
+    Ok(run.finish(end))
 }
 
 #[cfg(test)]

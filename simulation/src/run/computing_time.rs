@@ -12,9 +12,13 @@ use std::time::{Duration, Instant};
 use closecall_controllers::ControllerError;
 use closecall_traffic::{CONTROL_STEP, Time};
 
-/// Number of steps from which on the mean counts (-): five seconds of a run. An assumption; 25 to
-/// 250 are plausible.
+/// Number of steps from which on the mean counts during a run (-): five seconds. An assumption; 25
+/// to 250 are plausible.
 const LEAST_STEPS: u32 = 125;
+
+/// Number of steps from which on the mean counts at the end of a run (-): one second. An assumption;
+/// 10 to 125 are plausible.
+const LEAST_STEPS_OF_A_RUN: u32 = 25;
 
 /// Largest share of steps that may exceed the period (-). An assumption: a vehicle's controller has
 /// less than 1 %, and a loaded machine delays some steps beyond what Linux counts; 0.02 to 0.15 are
@@ -72,7 +76,24 @@ impl ComputingTime {
             let of_machine = self.waited.saturating_sub(before);
             self.late += u32::from(1e3 * spent.saturating_sub(of_machine).as_secs_f64() > allowed_ms);
         }
-        if self.steps < LEAST_STEPS {
+        self.judged(LEAST_STEPS, allowed_ms)
+    }
+
+    /// Judges a run that is over, and may have been short.
+    ///
+    /// # Errors
+    /// [`ControllerError::Late`] as in [`ComputingTime::of`].
+    pub(super) fn finish(&self, time: Time) -> Result<(), ControllerError> {
+        match self.judged(LEAST_STEPS_OF_A_RUN, 1e3 * CONTROL_STEP.s()) {
+            Some(message) => Err(ControllerError::Late { reason: format!("the controller {message}"), time }),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns a message if the mean, or the time of too many steps, exceeds `allowed_ms`, and there
+    /// are enough steps.
+    fn judged(&self, least_steps: u32, allowed_ms: f64) -> Option<String> {
+        if self.steps < least_steps {
             return None;
         }
         let steps = f64::from(self.steps);
@@ -119,6 +140,18 @@ mod tests {
     fn a_slow_start_and_single_delays_are_not() {
         assert_eq!(refused(|step| if step == 0 { 9_000 } else { 2 }), None);
         assert_eq!(refused(|step| if step % 50 == 7 { 900 } else { 2 }), None);
+    }
+
+    #[test]
+    fn a_short_run_is_judged_at_its_end() {
+        let ended_after = |steps: u32, took_ms: u64| {
+            let mut computing = ComputingTime::default();
+            (0..=steps).for_each(|_| computing.add(Time::ZERO, Duration::from_millis(took_ms)).unwrap());
+            computing.finish(Time::ZERO)
+        };
+        assert!(ended_after(LEAST_STEPS_OF_A_RUN, 60).is_err());
+        assert!(ended_after(LEAST_STEPS_OF_A_RUN - 1, 60).is_ok());
+        assert!(ended_after(LEAST_STEPS - 1, 2).is_ok());
     }
 
     #[test]

@@ -49,7 +49,9 @@ pub struct Child {
     process: process::Child,
     /// `None` once the standard input of the process is to be closed.
     requests: Option<Sender<Vec<u8>>>,
-    answers: Receiver<Line>,
+    answers: Receiver<(Line, bool)>,
+    /// Whether the process wrote more together with the last line that was received.
+    is_followed: bool,
     /// The pipe from which the reading thread reads, to see what it has not read yet.
     answer_pipe: Option<OwnedFd>,
     /// The end of standard error.
@@ -98,6 +100,7 @@ impl Child {
             process,
             requests: Some(requests),
             answers,
+            is_followed: false,
             answer_pipe: pipes.1.as_ref().and_then(|stdout| stdout.as_fd().try_clone_to_owned().ok()),
             stderr: Arc::clone(&stderr_tail),
             stderr_end,
@@ -165,7 +168,7 @@ impl Child {
         let started = Instant::now();
         let mut ended: Option<Instant> = None;
         let left_over = loop {
-            match self.answers.recv_timeout(FINISH_POLL_INTERVAL) {
+            match self.receive_within(FINISH_POLL_INTERVAL) {
                 Ok(line) => break Some(line),
                 Err(RecvTimeoutError::Disconnected) => break None,
                 Err(RecvTimeoutError::Timeout) if started.elapsed() >= EXIT_TIMEOUT => {
@@ -268,10 +271,10 @@ impl Child {
     fn reject_unrequested_line(&mut self) -> Result<(), ExecError> {
         let line = match self.answers.try_recv() {
             // The process has written, and the reading thread has not come to it.
-            Err(TryRecvError::Empty) if self.has_unread() => self.answers.recv_timeout(EXIT_TIMEOUT),
+            Err(TryRecvError::Empty) if self.is_followed || self.has_unread() => self.receive_within(EXIT_TIMEOUT),
             Err(TryRecvError::Empty) => return Ok(()),
             Err(TryRecvError::Disconnected) => return Err(self.exit_error()),
-            Ok(line) => Ok(line),
+            Ok((line, _)) => Ok(line),
         };
         match line {
             Ok(Line::Whole(line)) => Err(ExecError::OutOfTurn { answered: self.answered, line: excerpt(&line) }),
@@ -280,6 +283,13 @@ impl Child {
             // The begin of a line: its end may come as an answer.
             Err(RecvTimeoutError::Timeout) => Ok(()),
         }
+    }
+
+    /// Returns the next line.
+    fn receive_within(&mut self, limit: Duration) -> Result<Line, RecvTimeoutError> {
+        let (line, is_followed) = self.answers.recv_timeout(limit)?;
+        self.is_followed = is_followed;
+        Ok(line)
     }
 
     /// Returns whether the process has written what nobody has read yet.
@@ -292,7 +302,7 @@ impl Child {
         let started = Instant::now();
         loop {
             let left = limit.saturating_sub(started.elapsed());
-            let line = self.answers.recv_timeout(left.min(MEMORY_CHECK_INTERVAL));
+            let line = self.receive_within(left.min(MEMORY_CHECK_INTERVAL));
             if line != Err(RecvTimeoutError::Disconnected)
                 && (self.peak_memory_mib() > self.memory_mib || self.tree_memory_mib() > self.memory_mib)
             {
@@ -304,7 +314,7 @@ impl Child {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.exit_error()),
                 // A descendant may hold the pipe open after the end of the process. What the
                 // process has written still arrives.
-                Err(RecvTimeoutError::Timeout) if self.has_ended() => match self.answers.recv_timeout(EXIT_TIMEOUT) {
+                Err(RecvTimeoutError::Timeout) if self.has_ended() => match self.receive_within(EXIT_TIMEOUT) {
                     Ok(Line::Whole(line)) => return Ok(Some(line)),
                     _ => return Err(self.exit_error()),
                 },

@@ -30,7 +30,8 @@ pub(super) enum Line {
 }
 
 /// Sends every line to `lines`, until the source ends, a line is too long, or the receiver is gone.
-pub(super) fn read_lines(source: impl Read, lines: &SyncSender<Line>) {
+/// With each line goes whether more bytes arrived together with it.
+pub(super) fn read_lines(source: impl Read, lines: &SyncSender<(Line, bool)>) {
     let mut source = BufReader::new(source);
     loop {
         let line = match next_line(&mut source) {
@@ -38,7 +39,7 @@ pub(super) fn read_lines(source: impl Read, lines: &SyncSender<Line>) {
             Ok(None) | Err(_) => return,
         };
         let is_last = line == Line::TooLong;
-        if lines.send(line).is_err() || is_last {
+        if lines.send((line, !source.buffer().is_empty())).is_err() || is_last {
             return;
         }
     }
@@ -112,7 +113,7 @@ mod tests {
         let (sender, receiver) = sync_channel(16);
         read_lines(text, &sender);
         drop(sender);
-        receiver.iter().collect()
+        receiver.iter().map(|(line, _)| line).collect()
     }
 
     #[test]
@@ -123,6 +124,14 @@ mod tests {
     }
 
     #[test]
+    fn a_line_says_whether_another_one_came_with_it() {
+        let (sender, receiver) = sync_channel(16);
+        read_lines(&b"a\nb\n"[..], &sender);
+        drop(sender);
+        assert_eq!(receiver.iter().map(|(_, is_followed)| is_followed).collect::<Vec<_>>(), [true, false]);
+    }
+
+    #[test]
     fn reading_stops_at_a_line_that_is_too_long() {
         assert_eq!(lines_of(&vec![b'x'; MAX_LINE_BYTES + 1]), [Line::TooLong]);
         let longest = vec![b'x'; MAX_LINE_BYTES];
@@ -130,7 +139,7 @@ mod tests {
         // Reading an endless source without a line feed stops, too.
         let (sender, receiver) = sync_channel(1);
         read_lines(io::repeat(b'x'), &sender);
-        assert_eq!(receiver.recv(), Ok(Line::TooLong));
+        assert!(matches!(receiver.recv(), Ok((Line::TooLong, _))));
     }
 
     #[test]
