@@ -28,6 +28,17 @@ pub fn open(path: &Path) -> io::Result<File> {
     if is_stream { File::open(path) } else { checked(path, OpenOptions::new().read(true), false) }
 }
 
+/// Opens a file that another program has named, to write at its end.
+///
+/// # Errors
+/// As of [`open`].
+pub fn append(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.create(true).append(true);
+    let is_stream = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/dev/null"].iter().any(|at| path.starts_with(at));
+    if is_stream { options.open(path) } else { checked(path, &mut options, false) }
+}
+
 /// Opens a file of a campaign's folder with these options.
 ///
 /// # Errors

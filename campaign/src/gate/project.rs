@@ -46,9 +46,10 @@ impl ProjectFile {
     /// [`ProjectError`] if the file cannot be read, or has an unknown key or an invalid criterion.
     pub fn find(folder: &Path) -> Result<Option<Self>, ProjectError> {
         for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
-            match path.metadata() {
-                Ok(file) if file.is_file() => return Self::read(&path).map(Some),
-                // A file that cannot be read may hold gates: they must not be left out.
+            // A file that cannot be read may hold gates: they must not be left out. A link that leads
+            // nowhere is one, for example into a submodule that is not checked out.
+            match path.symlink_metadata() {
+                Ok(_) => return Self::read(&path).map(Some),
                 Err(error)
                     if !matches!(
                         error.kind(),
@@ -126,6 +127,22 @@ mod tests {
         ProjectFile::find(&below).unwrap().unwrap().add_to(&mut set).unwrap();
         let gates: Vec<String> = set.specs.iter().map(|spec| spec.expression.to_string()).collect();
         assert_eq!(gates, ["count(ego_collided) <= 5", "max(max_jerk_mps3) <= 3"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_project_file_that_cannot_be_read_is_not_left_out() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join(PROJECT_FILE);
+        let is_refused = || ProjectFile::find(root.path()).unwrap_err().is_io;
+        std::os::unix::fs::symlink("/nonexistent/closecall.toml", &path).unwrap();
+        assert!(is_refused(), "a link that leads nowhere");
+        std::fs::remove_file(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
+        assert!(is_refused(), "a folder");
+        std::fs::remove_dir(&path).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        assert!(is_refused(), "a named pipe");
     }
 
     #[test]

@@ -7,7 +7,6 @@
 //! The most important files are written first. A file that cannot be written costs no other file,
 //! and never the verdict: it is an [`ArtifactError`], which the caller shows.
 
-use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,6 +22,7 @@ use closecall_campaign::selection::Selection;
 use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::input;
 
 use super::arm_pairs::write_arm_pairs;
 use super::findings::{Findings, Recordings};
@@ -231,8 +231,7 @@ impl CampaignReport<'_> {
         };
         let without = Looks { recordings: &Recordings::new(), stills: &[], slowest: &[] };
         let text = self.with_findings(folder, without, markdown);
-        let opened = OpenOptions::new().create(true).append(true).open(&path);
-        let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
+        let written = input::append(&path).and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)
     }
 }
