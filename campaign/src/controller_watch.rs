@@ -2,7 +2,8 @@
 //! the start and at the end, and looked at in between.
 //!
 //! ```text
-//!  the command ─▶ files that it names ─▶ files beside them whose names stand in their text (imports)
+//!  the command ─▶ files that it names ─▶ files beside them whose names stand in their text (imports),
+//!                                         and programs whose paths stand there (launchers)
 //!  its process ─▶ files that it has mapped or opened after its greeting
 //! ```
 //!
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::controller::exec::ExecSettings;
 
 use crate::fingerprint::{Fingerprint, exec_settings, named_files};
 use crate::manifest::{Manifest, file_hash};
@@ -30,6 +32,11 @@ const MOST_TEXT_BYTES: u64 = 4 << 20;
 /// Largest file that is hashed because a process has it open or mapped (bytes), so that hashing
 /// takes less than a second.
 const MOST_OPEN_BYTES: u64 = 512 << 20;
+
+/// Extensions of files that a launcher starts. What is executable is one, too. A file of another
+/// kind, such as a log, may be written by the controller.
+const PROGRAMS: [&str; 14] =
+    ["py", "sh", "bash", "js", "mjs", "lua", "rb", "pl", "jl", "m", "jar", "so", "dylib", "dll"];
 
 /// The state of a file that the system tells without a read.
 type Look = Option<(SystemTime, u64, u64)>;
@@ -57,17 +64,16 @@ impl ControllerWatch {
         let mut paths: BTreeSet<PathBuf> = BTreeSet::new();
         for arm in &manifest.arms {
             let named: Vec<PathBuf> = match arm {
-                ControllerChoice::Exec(exec) => named_files(exec, folder).into_iter().map(|(_, path)| path).collect(),
+                ControllerChoice::Exec(exec) => command_files(exec, folder),
                 ControllerChoice::Native(native) => vec![in_folder(folder, Path::new(&native.path))],
                 ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => continue,
             };
-            paths.extend(imports(&named));
+            paths.extend(imports(&named, folder));
             paths.extend(named);
         }
         for program in manifest.programs() {
-            let named: Vec<PathBuf> =
-                named_files(&exec_settings(&program), folder).into_iter().map(|(_, path)| path).collect();
-            paths.extend(imports(&named));
+            let named = command_files(&exec_settings(&program), folder);
+            paths.extend(imports(&named, folder));
             paths.extend(named);
         }
         let is_small =
@@ -136,16 +142,65 @@ fn look(path: &Path) -> Look {
     Some((metadata.modified().ok()?, metadata.len(), place(&metadata)))
 }
 
+/// Returns the files that a command names, also within a word, as in `sh -c "python3 a.py"`.
+fn command_files(exec: &ExecSettings, folder: Option<&Path>) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = named_files(exec, folder).into_iter().map(|(_, path)| path).collect();
+    let words = exec.words().unwrap_or_default();
+    let beside = in_folder(folder, Path::new("."));
+    for file in
+        words.iter().filter(|word| word.contains(char::is_whitespace)).flat_map(|word| programs(word, &[&beside]))
+    {
+        if !files.contains(&file) {
+            files.push(file);
+        }
+    }
+    files
+}
+
+/// Returns the programs whose paths stand in a text. A path is relative to one of the folders. What
+/// stands before a path, such as the value of a variable, is taken for one of them.
+fn programs(text: &str, folders: &[&Path]) -> BTreeSet<PathBuf> {
+    let is_separator = |c: char| c.is_whitespace() || "\"'`=;,:()[]{}<>|&$".contains(c);
+    let is_program = |path: &PathBuf| {
+        let is_script = path
+            .extension()
+            .and_then(|extension| extension.to_str())
+            .is_some_and(|extension| PROGRAMS.contains(&extension));
+        path.metadata().is_ok_and(|file| file.is_file() && (is_script || is_executable(&file)))
+    };
+    let words = text.split(is_separator).filter(|word| word.contains(['.', '/']));
+    let absolute = words.clone().filter(|word| word.starts_with('/')).map(PathBuf::from);
+    let relative = words.flat_map(|word| folders.iter().map(|folder| folder.join(word.trim_start_matches('/'))));
+    absolute.chain(relative).filter(is_program).take(MOST_IMPORTS).collect()
+}
+
+#[cfg(unix)]
+fn is_executable(file: &fs::Metadata) -> bool {
+    std::os::unix::fs::PermissionsExt::mode(&file.permissions()) & 0o111 != 0
+}
+
+#[cfg(not(unix))]
+const fn is_executable(_: &fs::Metadata) -> bool {
+    false
+}
+
 /// Returns the files that a text among the named files seems to load. They lie beside it, or in
-/// folders beside it. The text holds their names as words, and they have its extension.
-fn imports(named: &[PathBuf]) -> BTreeSet<PathBuf> {
+/// folders beside it. The text holds their names as words, and they have its extension. What is
+/// started by its path, relative to the text or to the working folder, is one of them.
+fn imports(named: &[PathBuf], working_folder: Option<&Path>) -> BTreeSet<PathBuf> {
     let mut import_files = BTreeSet::new();
     let mut left: Vec<PathBuf> = named.to_vec();
     while let Some(path) = left.pop() {
-        let (Some(folder), Some(extension)) = (path.parent(), path.extension()) else { continue };
+        let Some(folder) = path.parent() else { continue };
         let Some(text) = text_of(&path) else { continue };
         let words: BTreeSet<&str> = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-')).collect();
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        for file in programs(&text, &[folder, &in_folder(working_folder, Path::new("."))]) {
+            if !named.contains(&file) && import_files.len() < MOST_IMPORTS && import_files.insert(file.clone()) {
+                left.push(file);
+            }
+        }
+        let Some(extension) = path.extension() else { continue };
         let Ok(entries) = fs::read_dir(folder) else { continue };
         for entry in entries.flatten().map(|entry| entry.path()) {
             let is_meant = entry.file_stem().and_then(|stem| stem.to_str()).is_some_and(|stem| words.contains(stem));
@@ -201,7 +256,28 @@ mod tests {
             fs::write(at(name), text).unwrap();
         }
         let expected: BTreeSet<PathBuf> = ["b.py", "e.py", "package/c.py"].map(at).into();
-        assert_eq!(imports(&[at("a.py")]), expected);
-        assert!(imports(&[at("b.json"), at("none.py")]).is_empty());
+        assert_eq!(imports(&[at("a.py")], None), expected);
+        assert!(imports(&[at("b.json"), at("none.py")], None).is_empty());
+    }
+
+    #[test]
+    fn what_a_launcher_starts_is_followed_and_what_it_writes_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("lib")).unwrap();
+        for (name, text) in [
+            ("run", "#!/bin/sh\ncd \"$(dirname \"$0\")\"; exec python3 \"${HERE}/lib/main.py\" >run.log\n"),
+            ("lib/main.py", "import helper"),
+            ("lib/helper.py", ""),
+            ("run.log", ""),
+            ("other.py", ""),
+        ] {
+            fs::write(at(name), text).unwrap();
+        }
+        let expected: BTreeSet<PathBuf> = ["lib/main.py", "lib/helper.py"].map(at).into();
+        assert_eq!(imports(&[at("run")], None), expected);
+        let command = "sh -c 'cd /; exec python3 lib/main.py'".to_owned();
+        let settings = ExecSettings { command, timeout_ms: 1, memory_mib: 1 };
+        assert!(command_files(&settings, Some(folder.path())).contains(&folder.path().join("./lib/main.py")));
     }
 }
