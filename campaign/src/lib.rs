@@ -19,6 +19,7 @@
 pub mod action;
 pub mod arguments;
 pub mod arm_pairs;
+pub mod attribution;
 pub mod baseline;
 mod campaign_error;
 pub mod compare;

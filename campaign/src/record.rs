@@ -1,5 +1,6 @@
 //! The record of one sample in the journal of a campaign.
 
+use closecall_scenarios::criteria::SLOWED_MPS;
 use closecall_scenarios::outcome::{IMPOSED_BRAKING_MPS2, Outcome};
 use closecall_simulation::SampleError;
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,23 @@ pub struct Flaky {
     pub first: SampleFailure,
 }
 
+/// What the ego does in the same sample without the vehicles behind it, while nothing happens ahead.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NobodyBehind {
+    /// The largest amount by which the ego was slower than its lead vehicle (m/s); `None` if that
+    /// run ended in an error.
+    pub deficit_mps: Option<f64>,
+}
+
+impl NobodyBehind {
+    /// Returns true if the ego slowed down by more than it does with the baseline, or its controller
+    /// failed.
+    pub fn is_slowed(self, baseline: Option<Self>) -> bool {
+        let baseline_mps = baseline.and_then(|baseline| baseline.deficit_mps).unwrap_or(0.0);
+        self.deficit_mps.is_none_or(|deficit_mps| deficit_mps > SLOWED_MPS + baseline_mps.max(0.0))
+    }
+}
+
 /// The result of one sample in one arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArmRecord {
@@ -43,6 +61,9 @@ pub struct ArmRecord {
     /// The findings of the validity checks; `None` if this sample was not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checks: Option<ArmChecks>,
+    /// The run without the vehicles behind; `None` if this sample was not chosen for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nobody_behind: Option<NobodyBehind>,
     /// The crashes before this outcome, if a repeated run has it (`--retry-crashed`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flaky: Option<Flaky>,
@@ -51,7 +72,7 @@ pub struct ArmRecord {
 impl ArmRecord {
     /// Returns the result of a single run that was not checked.
     pub const fn new(controller: String, result: Result<Outcome, SampleFailure>) -> Self {
-        Self { controller, result, checks: None, flaky: None }
+        Self { controller, result, checks: None, nobody_behind: None, flaky: None }
     }
 }
 

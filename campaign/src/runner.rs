@@ -10,6 +10,7 @@ use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
 use closecall_traffic::Check;
 
+use super::attribution;
 use super::host;
 use super::identity::Identity;
 use super::partition::Partition;
@@ -89,8 +90,8 @@ impl Samples for Work {
 }
 
 impl Work {
-    /// Runs one sample in one arm in this thread. `on_outcome` gets the result before the checks,
-    /// if there are any.
+    /// Runs one sample in one arm in this thread. `on_outcome` gets the result before the checks and
+    /// the run without vehicles behind, if there are any.
     fn run_here(&self, sample: u64, arm: &Arm, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
@@ -103,9 +104,12 @@ impl Work {
         let wall_s = started.elapsed().as_secs_f64();
         let record = ArmRecord::new(arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
         let mut done = ArmRun { record, wall_s, check_s: 0.0 };
-        if let (Ok(run), true, true) = (&run, done.record.result.is_ok(), self.checks.includes(key)) {
+        let [is_checked, is_attributed] =
+            [self.checks.includes(key), attribution::includes(&self.file.config().requirements, key)];
+        if let (Ok(run), Ok(outcome), true) = (&run, done.record.result.clone(), is_checked || is_attributed) {
             on_outcome(&done);
-            done.record.checks = done.record.result.as_ref().ok().map(|outcome| run.check(outcome));
+            done.record.checks = is_checked.then(|| run.check(&outcome));
+            done.record.nobody_behind = is_attributed.then(|| run.with_nobody_behind()).flatten();
             done.check_s = started.elapsed().as_secs_f64() - wall_s;
         }
         done

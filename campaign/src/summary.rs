@@ -6,6 +6,7 @@ use closecall_scenarios::promise::{Goal, Hindrance};
 use closecall_simulation::Arm;
 
 use super::arm_pairs::ArmPair;
+use super::attribution::Attribution;
 use super::failures::{FailureKindCount, Failures};
 use super::ledger::{ArmCounts, Inference, PairFate, Pairs, Tally};
 use super::record::Record;
@@ -33,6 +34,8 @@ pub struct Counts {
     pub invalid: u64,
     /// The findings of the validity checks.
     pub checks: CheckCounts,
+    /// The runs of the arm under test without the vehicles behind.
+    pub attribution: Attribution,
     /// Simulated time of all runs (s).
     pub simulated_s: f64,
     /// Samples that repeat the parameters or the outcome of an earlier one. They count in
@@ -71,6 +74,11 @@ impl Counts {
                 self.checks.push(checks, outcome.ego_collided());
             }
         }
+        if let [before @ .., tested] = &record.arms[..]
+            && let Some(run) = tested.nobody_behind
+        {
+            self.attribution.push(run, before.first().and_then(|baseline| baseline.nobody_behind));
+        }
         self.invalid += u64::from(record.is_invalid());
     }
 
@@ -102,6 +110,7 @@ impl Counts {
         self.samples += other.samples;
         self.invalid += other.invalid;
         self.checks.add(&other.checks);
+        self.attribution.add(&other.attribution);
         self.simulated_s += other.simulated_s;
         self.repeated += other.repeated;
     }

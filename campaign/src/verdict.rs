@@ -19,6 +19,7 @@ use std::fmt;
 use closecall_traffic::statistics::format::percent;
 use serde::Serialize;
 
+use super::attribution;
 use super::coverage::CoverageResult;
 use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
@@ -229,6 +230,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let flaky = judge_flaky(total.flaky(), allowed.max_flaky, &mut findings);
     judge_validity(&total.checks, allowed.max_flip_rate, &mut findings);
     let expectations = judge_expectations(judge, &mut findings);
+    let unattributed = judge_attribution(summary, &mut findings);
     judge_samples(summary, judge, &mut findings);
     judge_action(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
@@ -251,7 +253,12 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         let reason = format!("{subject} has no value in any scenario, so that the gate on it says nothing");
         findings.add(Decision::Inconclusive, reason);
     }
-    let requirements = judge.requirements(&gates);
+    let mut requirements = judge.requirements(&gates);
+    for missed in requirements.iter_mut().filter(|missed| missed.mark == attribution::REQUIREMENT) {
+        if unattributed.contains(&missed.scenario.as_str()) {
+            missed.standing = Standing::Fail;
+        }
+    }
     let has_criteria = |requirement: &RequirementResult| {
         gates.iter().any(|gate| gate.scenario == requirement.scenario && gate.is_of(&requirement.mark))
     };
@@ -353,6 +360,21 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
         }
     }
     expectations
+}
+
+/// Returns the scenarios in which the ego slows down without a vehicle behind.
+fn judge_attribution<'a>(summary: &'a Summary, findings: &mut Findings) -> Vec<&'a str> {
+    let mut unattributed = Vec::new();
+    for (name, counts) in summary.scenarios.iter().filter(|(_, counts)| counts.attribution.slowed > 0) {
+        let sentence = format!("{name} ({}): {}", attribution::REQUIREMENT, counts.attribution.sentence());
+        if counts.attribution.is_missed() {
+            findings.add(Decision::Fail, sentence);
+            unattributed.push(name.as_str());
+        } else {
+            findings.note(sentence);
+        }
+    }
+    unattributed
 }
 
 /// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on

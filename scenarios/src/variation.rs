@@ -1,4 +1,5 @@
-//! Variations of a scenario that must not change its outcome. The validity checks run them.
+//! Variations of a scenario: those that must not change its outcome, which the validity checks run,
+//! and the one in which nobody comes from behind.
 
 use closecall_sensors::lidar::ClusteringCheck;
 use closecall_traffic::{Road, Time, VehicleState};
@@ -28,6 +29,21 @@ impl Scenario {
     #[must_use]
     pub fn with_clustering_check(&self, check: ClusteringCheck) -> Self {
         Self { sensors: self.sensors.with_clustering_check(check), ..self.clone() }
+    }
+
+    /// Returns the same scenario without the vehicles that start behind the ego, in any lane, and
+    /// without the events of the others: nobody comes, and nothing happens ahead. Returns `None` if
+    /// nobody is behind.
+    pub fn with_nobody_behind(&self) -> Option<Self> {
+        let ego_s_m = self.actors[self.ego].start.s_m;
+        let stays: Vec<bool> = self.actors.iter().map(|actor| actor.start.s_m >= ego_s_m).collect();
+        if !stays.contains(&false) {
+            return None;
+        }
+        let ego = stays[..self.ego].iter().filter(|stays| **stays).count();
+        let staying = self.actors.iter().zip(&stays).filter(|(_, stays)| **stays);
+        let actors = staying.map(|(actor, _)| Actor { events: Vec::new(), ..actor.clone() }).collect();
+        Some(Self { actors, ego, ..self.clone() })
     }
 
     /// Returns the mirror image, in which left and right are swapped. Returns `None` on a curved
@@ -111,6 +127,20 @@ mod tests {
         };
         assert_eq!(named(&scenario), ["rear"]);
         assert_eq!(named(&scenario.reversed()), ["rear"]);
+    }
+
+    #[test]
+    fn with_nobody_behind_the_vehicles_ahead_stay_and_nothing_happens() {
+        let scenario = headline();
+        let alone = scenario.with_nobody_behind().unwrap();
+        let names = |scenario: &Scenario| scenario.actors.iter().map(|actor| actor.id.to_string()).collect::<Vec<_>>();
+        assert_eq!(names(&scenario), ["ego", "front", "rear"]);
+        assert_eq!(names(&alone), ["ego", "front"]);
+        assert_eq!(alone.ego_id(), scenario.ego_id());
+        assert!(!scenario.actors[1].events.is_empty() && alone.actors[1].events.is_empty());
+        let reversed = scenario.reversed().with_nobody_behind().unwrap();
+        assert_eq!((names(&reversed), reversed.ego), (vec!["front".to_owned(), "ego".to_owned()], 1));
+        assert!(alone.with_nobody_behind().is_none());
     }
 
     #[test]

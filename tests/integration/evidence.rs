@@ -5,7 +5,7 @@ use std::process::Output;
 
 use closecall_testing::has_python;
 
-use crate::support::{closecall, code, folder, headline_with, json, library, message, stderr, stdout};
+use crate::support::{ROOT, closecall, code, folder, headline_with, json, library, message, stderr, stdout};
 
 /// Egos that are slower than the rest from the first second on, and do not look back.
 const BLIND: [&str; 2] = ["blind", "crawl"];
@@ -58,6 +58,37 @@ fn an_ego_that_is_slower_fails_where_nobody_comes_and_where_nothing_happens() {
             let is_refused = |line: &str| line.contains("NOT MET") && line.contains("upper(slowed_unprompted) <= 0.05");
             assert!(text.lines().any(is_refused), "{name} {controller}: {text}");
         }
+    }
+}
+
+/// Writes a controller without a rear sensor: from a time on, which suits most encounters of the
+/// headline, it brakes until it is 10 m/s slower.
+fn clock(folder: &Path) -> String {
+    let text = std::fs::read_to_string(Path::new(ROOT).join("examples/acc_controller.py")).unwrap();
+    let last = "        answer = {\"acceleration_mps2\": a,";
+    assert!(text.contains(last));
+    let braking = "        start = v if step == 0.0 else start\n        a = min(a, -2.0) if now >= 5.7e9 and v > start - 10.0 else a\n";
+    std::fs::write(folder.join("clock.py"), text.replace(last, &format!("{braking}{last}"))).unwrap();
+    format!("exec:python3 {}", folder.join("clock.py").display())
+}
+
+#[test]
+fn a_clock_in_place_of_a_rear_sensor_fails_the_headline() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let out = folder.path().join("out");
+    let controller = clock(folder.path());
+    for checks in [&[][..], &["--no-validity-checks"]] {
+        let _ = std::fs::remove_dir_all(&out);
+        let args = ["-n", "40", "--seed", "31", "--paired", "--sensors", "object", "--controller", &controller];
+        let args = [&args[..], checks, &["--out", out.to_str().unwrap()]].concat();
+        let text = stdout(&campaign(&library("low-thw-overtake"), &args), 1);
+        let reason = "low-thw-overtake (MIS-9): without the vehicles behind it, the ego still slows down by up to 10";
+        assert!(text.contains(reason), "{text}");
+        let junit = std::fs::read_to_string(out.join("junit.xml")).unwrap();
+        assert!(junit.contains("the ego still slows down"), "{junit}");
     }
 }
 
@@ -283,6 +314,23 @@ fn a_controller_that_computes_for_longer_than_its_period_ends_its_sample_as_an_e
         let said = stdout(&output, 5);
         assert!(said.contains("ERROR") && said.contains(reason), "{said} {}", stderr(&output));
     }
+    // A run that ends before the fifth second.
+    let controller = python_controller(folder.path(), "time.sleep(0.06)");
+    let args = [
+        "-n",
+        "1",
+        "--sensors",
+        "ground-truth",
+        "--set",
+        "duration-s=2",
+        "--set",
+        "expects=[]",
+        "--no-gate",
+        "--controller",
+        &controller,
+    ];
+    let said = stdout(&campaign(&library("overtake-without-brake"), &args), 5);
+    assert!(said.contains("ms in the mean of"), "{said}");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 
 use super::mirror::is_mirror_image;
 use super::{ArmChecks, Invariance};
+use crate::record::NobodyBehind;
 use crate::runner::run_guarded;
 
 /// One sample in one arm, to be checked.
@@ -33,6 +34,15 @@ impl CheckedRun<'_> {
     /// determine the cause.
     pub(crate) fn check(&self, outcome: &Outcome) -> ArmChecks {
         self.check_with(ClusteringCheck::default(), outcome)
+    }
+
+    /// Runs this sample without the vehicles behind the ego. `None` if nobody is behind, if the run
+    /// took too long, or if nothing was measured in it.
+    pub(crate) fn with_nobody_behind(&self) -> Option<NobodyBehind> {
+        match self.run(&self.scenario.with_nobody_behind()?, self.arm) {
+            Ok(outcome) => outcome.cost.map(|cost| NobodyBehind { deficit_mps: Some(cost.unprompted_deficit_mps) }),
+            Err(error) => (!error.is_late()).then_some(NobodyBehind { deficit_mps: None }),
+        }
     }
 
     fn check_with(&self, clustering: ClusteringCheck, outcome: &Outcome) -> ArmChecks {

@@ -130,7 +130,7 @@ fn mis(outcome: &Outcome, value: fn(&MisSummary) -> Measured) -> Option<f64> {
 
 /// Amount by which an ego may be slower than its lead vehicle without a reason (m/s): an
 /// assumption, above what a cruise control needs to keep its gap; 0.2 to 1 are plausible.
-const SLOWED_MPS: f64 = 0.5;
+pub const SLOWED_MPS: f64 = 0.5;
 
 fn cost(outcome: &Outcome, value: fn(&Cost) -> f64) -> Option<f64> {
     outcome.cost.as_ref().map(value)

@@ -1,0 +1,116 @@
+//! Whether what the ego does is an answer to the vehicles behind it.
+//!
+//! Whoever is slower has a longer gap ahead, and prevents collisions without looking back. Such an
+//! ego also slows down if nobody is behind. In scenarios with the requirement `MIS-9`, some samples
+//! therefore run again without the vehicles that start behind the ego, while nothing happens ahead.
+//! An ego that slows down there by more than it does with the baseline misses the requirement,
+//! whenever it begins to.
+
+use closecall_simulation::RunKey;
+use closecall_traffic::statistics::format::percent;
+use closecall_traffic::statistics::interval::lower_bound;
+
+use crate::record::NobodyBehind;
+use crate::validity::CheckPlan;
+
+/// The requirement that the system does not slow the ego unless a vehicle behind is the reason.
+pub(crate) const REQUIREMENT: &str = "MIS-9";
+
+/// Share of the samples that run again, besides the first two: a choice. Five hundred samples have
+/// twelve such runs.
+const SHARE: f64 = 0.02;
+
+/// Largest share of these runs in which the ego may slow down: that of the library for
+/// `slowed_unprompted`.
+const MOST: f64 = 0.05;
+
+/// Confidence of the bound on that share.
+const CONFIDENCE: f64 = 0.95;
+
+/// Returns true if a sample of a scenario with these requirements runs again without the vehicles
+/// behind.
+pub(crate) fn includes(requirements: &[String], key: RunKey) -> bool {
+    CheckPlan::new(SHARE, CheckPlan::AT_MOST).is_ok_and(|plan| plan.includes(key))
+        && requirements.iter().any(|mark| mark == REQUIREMENT)
+}
+
+/// The runs without the vehicles behind, of the arm under test.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Attribution {
+    /// Number of runs.
+    pub runs: u64,
+    /// Number of runs in which the ego slowed down, or its controller failed.
+    pub slowed: u64,
+    /// The largest amount by which the ego was slower than its lead vehicle (m/s).
+    pub most_mps: f64,
+}
+
+impl Attribution {
+    /// Adds a run, and the one of the baseline if there is one.
+    pub fn push(&mut self, run: NobodyBehind, baseline: Option<NobodyBehind>) {
+        self.runs += 1;
+        self.slowed += u64::from(run.is_slowed(baseline));
+        self.most_mps = self.most_mps.max(run.deficit_mps.unwrap_or(0.0));
+    }
+
+    /// Adds the runs of another scenario.
+    pub fn add(&mut self, other: &Self) {
+        self.runs += other.runs;
+        self.slowed += other.slowed;
+        self.most_mps = self.most_mps.max(other.most_mps);
+    }
+
+    /// Returns true if the ego slows down without a vehicle behind in more runs than it may: the
+    /// one-sided lower bound of their share lies above the allowed one.
+    pub fn is_missed(&self) -> bool {
+        lower_bound(self.slowed, self.runs, CONFIDENCE) > MOST
+    }
+
+    /// Returns what the runs say, as a sentence.
+    pub fn sentence(&self) -> String {
+        let Self { runs, slowed, most_mps } = self;
+        format!(
+            "without the vehicles behind it, the ego still slows down by up to {most_mps:.1} m/s, or its controller fails, in {slowed} of \
+             {runs} checked samples (at most {} of all allowed): what it prevents is no answer to them",
+            percent(MOST)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(slowed: u64, runs: u64) -> Attribution {
+        let mut attribution = Attribution::default();
+        for run in 0..runs {
+            attribution.push(NobodyBehind { deficit_mps: Some(if run < slowed { 8.0 } else { 0.1 }) }, None);
+        }
+        attribution
+    }
+
+    #[test]
+    fn two_runs_decide_and_a_single_false_alarm_of_many_does_not() {
+        assert!(after(2, 2).is_missed());
+        assert!(!after(1, 12).is_missed());
+        assert!(!after(0, 100).is_missed());
+        assert!(!after(0, 0).is_missed());
+        assert!(after(12, 100).is_missed());
+    }
+
+    #[test]
+    fn a_controller_that_fails_without_a_vehicle_behind_is_no_better() {
+        let mut attribution = Attribution::default();
+        let failed = NobodyBehind { deficit_mps: None };
+        (0..2).for_each(|_| attribution.push(failed, Some(failed)));
+        assert!(attribution.is_missed());
+    }
+
+    #[test]
+    fn what_the_baseline_does_as_well_is_not_held_against_the_system() {
+        let [as_baseline, more] = [3.2, 3.6].map(|deficit_mps| NobodyBehind { deficit_mps: Some(deficit_mps) });
+        let baseline = Some(NobodyBehind { deficit_mps: Some(3.0) });
+        assert!(!as_baseline.is_slowed(baseline) && as_baseline.is_slowed(None));
+        assert!(more.is_slowed(baseline));
+    }
+}
