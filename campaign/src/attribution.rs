@@ -20,8 +20,8 @@ pub(crate) const REQUIREMENT: &str = "MIS-9";
 /// twelve such runs.
 const SHARE: f64 = 0.02;
 
-/// Largest share of these runs in which the ego may slow down: that of the library for
-/// `slowed_unprompted`.
+/// Largest share of these runs in which the ego may slow down. The library allows the same share
+/// for `slowed_unprompted`.
 const MOST: f64 = 0.05;
 
 /// Confidence of the bound on that share.

@@ -205,7 +205,7 @@ def campaign(
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         if out is None and resume:
             raise UsageError("resume: name the folder of the campaign with `out`")
-        # What selects no recording, and what is no selection, passes: the campaign below refuses the latter.
+        # A selection of no recordings needs no folder. The campaign refuses a text that is no selection.
         keeps = {"record": re.search(r"each-kind|:0*[1-9]|^0*[1-9]\d*$", str(options.get("record", ""))), "partition": options.get("partition")}
         for name, value in keeps.items():
             if out is None and value is not None:
