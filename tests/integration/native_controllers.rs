@@ -55,9 +55,20 @@ const SAMPLES: &str = "24";
 
 /// Runs a campaign of `low-thw-overtake` with a controller and its baseline.
 pub(crate) fn campaign(controller: &str, out: &Path, jobs: &str, fault: Option<&str>, more: &[&str]) -> Output {
+    campaign_of("low-thw-overtake", controller, out, jobs, fault, more)
+}
+
+pub(crate) fn campaign_of(
+    scenario: &str,
+    controller: &str,
+    out: &Path,
+    jobs: &str,
+    fault: Option<&str>,
+    more: &[&str],
+) -> Output {
     let mut command = program();
     command
-        .args(["campaign", "low-thw-overtake", "-n", SAMPLES, "--seed", "3", "--sensors", "object", "--no-gate"])
+        .args(["campaign", scenario, "-n", SAMPLES, "--seed", "3", "--sensors", "object", "--no-gate"])
         .args(["--paired", "--record", "random:1", "--jobs", jobs, "--controller", controller])
         .args(["--out", out.to_str().unwrap()])
         .args(more);
