@@ -9,6 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use closecall_scenarios::criteria::Expression;
+use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 use crate::action::{Action, CommandFor, Replay, Resume, SavedSample};
@@ -63,7 +64,7 @@ impl fmt::Display for EarlyEnd {
                 write!(f, "sample {sample} of {scenario} has a collision of the ego")
             }
             Self::Gate { scenario, expression } => write!(f, "{expression} can only fail in {scenario}"),
-            Self::Errors { errors } => write!(f, "{errors} samples ended in an error"),
+            Self::Errors { errors } => write!(f, "{} ended in an error", counted(*errors, "sample")),
         }
     }
 }

@@ -17,6 +17,7 @@ use super::verdict::{self, Judgement};
 use super::wall_times::{SpentTime, WallTime};
 use super::workers::{Finished, SampleRunner, Workers};
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::words::{counted, was};
 
 pub use super::stop::End;
 
@@ -70,14 +71,21 @@ impl ResumeReport {
         let damaged = self.damaged.iter().map(|TornLine { line, reason }| {
             format!("line {line} of the journal was damaged ({reason}): its sample was run again")
         });
-        let retried =
-            (self.retried > 0).then(|| format!("{} samples that had ended in an error were run again", self.retried));
+        let retried = (self.retried > 0).then(|| {
+            format!("{} that had ended in an error {} run again", counted(self.retried, "sample"), was(self.retried))
+        });
         let torn = self.torn.iter().map(|TornLine { line, reason }| {
             format!("the journal was torn at line {line} ({reason}): the samples from there on were run again")
         });
-        let doubled = (self.doubled > 0)
-            .then(|| format!("{} lines of the journal that repeated another line were removed", self.doubled));
-        let added = (self.added > 0).then(|| format!("{} samples were added to earlier scenarios", self.added));
+        let doubled = (self.doubled > 0).then(|| {
+            format!(
+                "{} of the journal that repeated another line {} removed",
+                counted(self.doubled, "line"),
+                was(self.doubled)
+            )
+        });
+        let added = (self.added > 0)
+            .then(|| format!("{} {} added to earlier scenarios", counted(self.added, "sample"), was(self.added)));
         damaged.chain(retried).chain(doubled).chain(added).chain(torn).collect()
     }
 }
@@ -146,7 +154,7 @@ impl Campaign {
 
     /// Returns what runs the samples, for a message: `8 threads`.
     pub fn place(&self) -> String {
-        if self.remote.is_some() { "a cluster".to_owned() } else { format!("{} threads", self.workers.jobs) }
+        if self.remote.is_some() { "a cluster".to_owned() } else { counted(self.workers.jobs.get(), "thread") }
     }
 
     /// Returns the number of samples of all scenarios.

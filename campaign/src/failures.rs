@@ -2,8 +2,9 @@
 //! sample to run again.
 //!
 //! Two failures are of one kind if they have the same controller, the same name, and the same
-//! message apart from its numbers: the times and process numbers in messages differ from sample to
-//! sample. The list is bounded, whatever the controllers write.
+//! message apart from the numbers that differ from sample to sample: measured values, times, steps,
+//! process numbers and addresses. Error codes, exit statuses and signals tell kinds apart. The list
+//! is bounded, whatever the controllers write: the failures beyond it are counted as others.
 
 use std::fmt;
 
@@ -15,6 +16,16 @@ use super::record::Record;
 const MOST_KINDS: usize = 16;
 /// Length of a message on a line of its own (characters).
 const LINE_CHARS: usize = 600;
+
+/// Words after a whole number that is a measured value or a count of steps: `12 ms`, `37 answers`.
+const UNITS: [&str; 24] = [
+    "ns", "us", "µs", "ms", "s", "min", "h", "m", "mm", "km", "m/s", "m/s²", "km/h", "rad", "deg", "second", "seconds",
+    "step", "steps", "answer", "answers", "frame", "frames", "samples",
+];
+/// Words before a whole number that says when or where something happened: `step 12`, `pid=7`,
+/// `time_ns: 5`.
+const PLACES: [&str; 13] =
+    ["time", "timestamp", "t", "at", "step", "steps", "frame", "tick", "sample", "pid", "tid", "process", "thread"];
 
 /// The failures of one kind.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -29,6 +40,9 @@ pub struct FailureKindCount {
     pub first_sample: u64,
     /// The message of the first failure.
     pub first_message: String,
+    /// True if these are several kinds: more than 16 messages differ, and the rest is counted
+    /// together.
+    pub others: bool,
 }
 
 impl FailureKindCount {
@@ -44,11 +58,17 @@ impl FailureKindCount {
 }
 
 /// Writes the count, the controller, the sample and its message:
-/// `50 × exec (controller), first in sample 0: the process ended`.
+/// `50 × exec (controller), first in sample 0: the process ended`, or
+/// `and 9 others × exec (controller), first in sample 3: the process ended`.
 impl fmt::Display for FailureKindCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { controller, kind, samples, first_sample, .. } = self;
-        write!(f, "{samples} × {controller} ({kind}), first in sample {first_sample}: {}", self.line())
+        match (self.others, samples) {
+            (false, _) => write!(f, "{samples}")?,
+            (true, 1) => write!(f, "and 1 other")?,
+            (true, _) => write!(f, "and {samples} others")?,
+        }
+        write!(f, " × {controller} ({kind}), first in sample {first_sample}: {}", self.line())
     }
 }
 
@@ -56,6 +76,8 @@ impl fmt::Display for FailureKindCount {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Failures {
     kinds: Vec<FailureKindCount>,
+    /// The shape of the first message of each kind.
+    shapes: Vec<String>,
 }
 
 impl Failures {
@@ -63,12 +85,13 @@ impl Failures {
     pub fn push(&mut self, record: &Record) {
         for arm in &record.arms {
             let Err(failure) = &arm.result else { continue };
-            let is_alike =
-                |count: &&mut FailureKindCount| count.controller == arm.controller && count.kind == failure.kind;
-            let is_same = |count: &FailureKindCount| shape(&count.first_message).eq(shape(&failure.message));
-            let is_full = self.kinds.len() >= MOST_KINDS;
-            let mut alike = self.kinds.iter_mut().filter(is_alike);
-            if let Some(kind) = alike.find(|count| is_full || is_same(count)) {
+            let shape = shape(&failure.message);
+            let is_alike = |count: &FailureKindCount| count.controller == arm.controller && count.kind == failure.kind;
+            let is_same = |count: &FailureKindCount, other: &str| is_alike(count) && !count.others && other == shape;
+            let others = self.kinds.iter().filter(|count| !count.others).count() >= MOST_KINDS;
+            let place = self.kinds.iter().zip(&self.shapes).position(|(count, other)| is_same(count, other));
+            let place = place.or_else(|| self.kinds.iter().position(|count| count.others && is_alike(count)));
+            if let Some(kind) = place.and_then(|place| self.kinds.get_mut(place)) {
                 kind.samples += 1;
                 continue;
             }
@@ -78,7 +101,9 @@ impl Failures {
                 samples: 1,
                 first_sample: record.sample,
                 first_message: failure.message.clone(),
+                others,
             });
+            self.shapes.push(shape);
         }
     }
 
@@ -93,19 +118,42 @@ impl Failures {
     }
 }
 
-/// Returns the characters of a message with each number as one `#`.
-fn shape(message: &str) -> impl Iterator<Item = char> {
-    let is_number = |c: char| c.is_ascii_digit() || c == '.';
-    let mut before = false;
-    message.chars().filter_map(move |c| {
-        let was = before;
-        before = c.is_ascii_digit() || (was && is_number(c));
-        match (before, was) {
-            (true, true) => None,
-            (true, false) => Some('#'),
-            (false, _) => Some(c),
-        }
-    })
+/// Returns a message with `#` for each number that differs from sample to sample.
+fn shape(message: &str) -> String {
+    let is_in_word = |c: char| c.is_alphanumeric() || c == '_';
+    let (mut shape, mut rest) = (String::with_capacity(message.len()), message);
+    while let Some(start) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(start);
+        shape.push_str(before);
+        let end = number.find(|c: char| !is_in_word(c) && c != '.').unwrap_or(number.len());
+        // A full stop ends the sentence, not the number.
+        let (number, after) = number.split_at(number[..end].trim_end_matches('.').len());
+        // The digits of `mps2` are no number.
+        let is_number = !shape.ends_with(is_in_word);
+        shape.push_str(if is_number && differs(&shape, number, after) { "#" } else { number });
+        rest = after;
+    }
+    shape.push_str(rest);
+    shape
+}
+
+/// Returns true if a number of a message differs from sample to sample: `number` stands between
+/// `before` and `after`, and may have its unit attached.
+fn differs(before: &str, number: &str, after: &str) -> bool {
+    let digits = number.trim_end_matches(|c: char| !c.is_ascii_digit());
+    let is_address = number.starts_with("0x");
+    let is_value = number.contains('.') && digits.parse::<f64>().is_ok();
+    let attached = &number[number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len())..];
+    let next = after.strip_prefix([' ', '\u{a0}']).unwrap_or_default();
+    let next = &next[..next.find(|c: char| !c.is_alphanumeric() && c != '/').unwrap_or(next.len())];
+    let is_measured = UNITS.contains(&attached) || (attached.is_empty() && UNITS.contains(&next));
+    let separators = |c: char| c.is_whitespace() || "=:#([\"'\\-".contains(c);
+    let name = before.trim_end_matches(separators);
+    let name = name.rsplit(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default();
+    let is_place = name.split('_').any(|word| PLACES.iter().any(|place| word.eq_ignore_ascii_case(place)));
+    // Sanitizers write the process as `==7==`.
+    let is_process = before.ends_with("==") && after.starts_with("==");
+    is_address || is_value || is_measured || is_place || is_process
 }
 
 #[cfg(test)]
@@ -135,13 +183,53 @@ mod tests {
     }
 
     #[test]
+    fn error_codes_exit_statuses_and_signals_are_kinds_of_their_own() {
+        for (one, other) in [
+            ("the controller answered with error 1", "the controller answered with error 2"),
+            (
+                "the process ended (exit status: 5) after 3 answers",
+                "the process ended (exit status: 6) after 3 answers",
+            ),
+            ("ended (signal: 6 (SIGABRT) (core dumped))", "ended (signal: 11 (SIGSEGV) (core dumped))"),
+            ("failed with code -4.", "failed with code -5."),
+            ("my.py, line 12, in step", "my.py, line 13, in step"),
+        ] {
+            assert_ne!(shape(one), shape(other));
+        }
+        for (one, other) in [
+            ("error 1 after 3 answers", "error 1 after 41 answers"),
+            ("error 1 at t=40 in process 77", "error 1 at t=1040 in process 78"),
+            ("asked for -31.5 m/s² at 2.04 s", "asked for -7 m/s² at 12 s"),
+            (r#"answered "{\"time_ns\": 40000}"#, r#"answered "{\"time_ns\": 80000}"#),
+            ("<Track object at 0x7f3a>", "<Track object at 0x7f4b>"),
+            ("==71==ERROR: AddressSanitizer", "==72==ERROR: AddressSanitizer"),
+            ("late by 40ms in step 3.", "late by 41ms in step 12."),
+        ] {
+            assert_eq!(shape(one), shape(other));
+        }
+        let mut failures = Failures::default();
+        for sample in 0..9 {
+            failures.push(&failed(sample, &format!("the controller answered with error {}", sample % 3)));
+        }
+        assert_eq!(failures.iter().map(|kind| kind.samples).collect::<Vec<_>>(), [3, 3, 3]);
+    }
+
+    #[test]
     fn endless_kinds_are_bounded_and_every_failure_is_counted() {
         let mut failures = Failures::default();
         for sample in 0..1_000 {
             failures.push(&failed(sample, &"x".repeat(sample as usize + 1)));
         }
-        assert_eq!(failures.iter().count(), MOST_KINDS);
+        assert_eq!(failures.iter().count(), MOST_KINDS + 1);
         assert_eq!(failures.iter().map(|kind| kind.samples).sum::<u64>(), 1_000);
+        assert!(
+            failures.iter().take(MOST_KINDS).all(|kind| kind.samples == 1),
+            "no kind counts the messages of others"
+        );
+        let last = failures.iter().last().unwrap().to_string();
+        assert!(last.starts_with("and 984 others × exec (controller), first in sample 16: x"), "{last}");
+        failures.push(&failed(2_000, "x"));
+        assert_eq!(failures.iter().next().unwrap().samples, 2, "a kind of the list goes on to be counted");
         failures.push(&failed(0, &"a\n".repeat(5_000)));
         assert!(failures.iter().all(|kind| kind.to_string().lines().count() == 1));
     }

@@ -16,12 +16,13 @@
 
 use serde::Serialize;
 
-use super::gate::OpenReason;
+use super::gate::{GateSource, OpenReason, Standing};
 use super::ledger::{ArmCounts, Inference};
 use closecall_traffic::statistics::binomial::at_most;
 pub use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::needed;
 use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
+use closecall_traffic::words::counted;
 
 /// The largest collision probability that is allowed, and the confidence in the answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -174,38 +175,60 @@ pub struct Missing {
 }
 
 impl Finding {
-    /// Returns the finding as a sentence.
-    pub fn sentence(&self, counts: &ArmCounts) -> String {
-        let (confidence, allowed) = (percent(self.confidence), percent(self.max));
-        let (hits, samples) = (counts.collisions, counts.outcomes);
-        let [low, high] = [self.lower_bound, self.upper_bound].map(percent);
-        match (self.answer, self.missing) {
-            (Answer::Below, _) => format!(
-                "the collision probability is at most {high} ({hits} of {samples}, {confidence} confidence), {allowed} allowed"
-            ),
-            (Answer::Above, _) => format!(
-                "the collision probability is at least {low} ({hits} of {samples}, {confidence} confidence), {allowed} allowed"
-            ),
-            (Answer::Open, missing) => format!(
-                "the collision probability is between {low} and {high} ({hits} of {samples}, {confidence} confidence), \
-                 {allowed} allowed: {}",
-                missing.map_or_else(|| OpenReason::DependentSamples.text().to_owned(), |missing| missing.sentence())
-            ),
+    /// Returns how the gate fares, in the terms of every gate.
+    pub const fn standing(&self) -> Standing {
+        match self.answer {
+            Answer::Below => Standing::Pass,
+            Answer::Above => Standing::Fail,
+            Answer::Open => Standing::Inconclusive,
         }
+    }
+
+    /// Returns the bounds that decide, or both if none decides, with the confidence: `one-sided
+    /// upper 95 % bound 0.994 %`.
+    pub fn bounds(&self) -> String {
+        let confidence = percent(self.confidence);
+        let [low, high] = [self.lower_bound, self.upper_bound].map(percent);
+        match self.answer {
+            Answer::Below => format!("one-sided upper {confidence} bound {high}"),
+            Answer::Above => format!("one-sided lower {confidence} bound {low}"),
+            Answer::Open => format!("one-sided {confidence} bounds {low} and {high}"),
+        }
+    }
+
+    /// Returns the finding about a scenario in a line with the words of every gate: standing,
+    /// scenario, the value and the required one, and the criterion with its origin.
+    pub fn line(&self, scenario: &str, counts: &ArmCounts, source: &GateSource) -> String {
+        let (hits, samples) = (counts.collisions, counts.outcomes);
+        let share = match samples {
+            0 => String::new(),
+            samples => format!(" ({})", percent(hits as f64 / samples as f64)),
+        };
+        let missing = self.missing.map_or_else(|| OpenReason::DependentSamples.text().to_owned(), Missing::sentence);
+        let open = if self.answer == Answer::Open { format!(" ({missing})") } else { String::new() };
+        format!(
+            "{}: {scenario}: share of the samples in which the ego collides: {hits} of {samples}{share}, {}{open}; required: at \
+             most {} [max-probability {}; from {source}]",
+            self.standing().word(),
+            self.bounds(),
+            percent(self.max),
+            self.max
+        )
     }
 }
 
 impl Missing {
-    fn sentence(&self) -> String {
+    fn sentence(self) -> String {
         let Some(least) = self.without_collisions else {
             return format!("more than {} samples are needed", needed::MAX_SAMPLES);
         };
-        let at_rate = match self.at_observed_rate {
-            Some(more) if more == least => return format!("{least} more samples are needed if none of them collides"),
-            Some(more) => format!("{more} at the observed rate"),
-            None => "at the observed rate no number is enough".to_owned(),
-        };
-        format!("{least} more samples are needed if none of them collides, {at_rate}")
+        let verb = if least == 1 { "is" } else { "are" };
+        let least_text = format!("{} {verb} needed if none of them collides", counted(least, "more sample"));
+        match self.at_observed_rate {
+            Some(more) if more == least => least_text,
+            Some(more) => format!("{least_text}, {more} at the observed rate"),
+            None => format!("{least_text}, at the observed rate no number is enough"),
+        }
     }
 }
 
@@ -259,30 +282,41 @@ mod tests {
     }
 
     #[test]
-    fn the_sentence_says_what_is_missing_and_under_which_assumption() {
+    fn the_line_has_the_words_of_every_gate_and_says_what_is_missing() {
         let gate = ProbabilityGate::new(0.01, 0.95).unwrap();
-        let sentence = |collisions, outcomes| {
+        let line = |collisions, outcomes| {
             let counts = ArmCounts { outcomes, collisions, ..ArmCounts::default() };
-            gate.judge(&counts, 1, Inference::FixedSamples).sentence(&counts)
+            gate.judge(&counts, 1, Inference::FixedSamples).line("a", &counts, &GateSource::CommandLine)
         };
-        let low = "the collision probability is";
-        assert_eq!(sentence(0, 300), format!("{low} at most 0.994 % (0 of 300, 95 % confidence), 1 % allowed"));
-        assert_eq!(sentence(9, 300), format!("{low} at least 1.57 % (9 of 300, 95 % confidence), 1 % allowed"));
-        let open = |bounds| format!("{low} between {bounds}, 95 % confidence), 1 % allowed");
-        assert_eq!(
-            sentence(0, 200),
-            open("0 % and 1.49 % (0 of 200") + ": 99 more samples are needed if none of them collides"
-        );
-        assert_eq!(
-            sentence(1, 200),
-            open("0.0256 % and 2.35 % (1 of 200")
-                + ": 273 more samples are needed if none of them collides, 982 at the observed rate"
-        );
-        assert_eq!(
-            sentence(3, 200),
-            open("0.41 % and 3.83 % (3 of 200")
-                + ": 573 more samples are needed if none of them collides, at the observed rate no number is enough"
-        );
+        let said = |standing: &str, measured: &str| {
+            format!(
+                "{standing}: a: share of the samples in which the ego collides: {measured}; required: at most 1 % \
+                 [max-probability 0.01; from command line]"
+            )
+        };
+        assert_eq!(line(0, 300), said("met", "0 of 300 (0 %), one-sided upper 95 % bound 0.994 %"));
+        assert_eq!(line(9, 300), said("NOT MET", "9 of 300 (3 %), one-sided lower 95 % bound 1.57 %"));
+        for (collisions, measured, missing) in [
+            (
+                0,
+                "0 of 200 (0 %), one-sided 95 % bounds 0 % and 1.49 %",
+                "99 more samples are needed if none of them collides",
+            ),
+            (
+                1,
+                "1 of 200 (0.5 %), one-sided 95 % bounds 0.0256 % and 2.35 %",
+                "273 more samples are needed if none of them collides, 982 at the observed rate",
+            ),
+            (
+                3,
+                "3 of 200 (1.5 %), one-sided 95 % bounds 0.41 % and 3.83 %",
+                "573 more samples are needed if none of them collides, at the observed rate no number is enough",
+            ),
+        ] {
+            assert_eq!(line(collisions, 200), said("open", &format!("{measured} ({missing})")));
+        }
+        let one_more = Missing { without_collisions: Some(1), at_observed_rate: Some(1) };
+        assert_eq!(one_more.sentence(), "1 more sample is needed if none of them collides");
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::ledger::{ArmCounts, Inference, PairFate, Pairs, Tally};
 use super::record::Record;
 use super::repeats::Repeats;
 use super::runner::Work;
-use super::validity::CheckCounts;
+use super::validity::{CheckCounts, RunOfScenario};
 
 /// The counts of one scenario, or of all.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,11 +67,12 @@ impl Counts {
             self.failures.push(record);
             self.samples += 1;
         }
-        for arm in &record.arms {
+        for (index, arm) in record.arms.iter().enumerate() {
             let Ok(outcome) = &arm.result else { continue };
             self.simulated_s += outcome.duration.s();
             if let Some(checks) = &arm.checks {
-                self.checks.push(checks, outcome.ego_collided());
+                let run = RunOfScenario { sample: record.sample, arm: index };
+                self.checks.push(run, checks, outcome.ego_collided());
             }
         }
         if let [before @ .., tested] = &record.arms[..]
@@ -148,6 +149,8 @@ pub struct Summary {
     pub inference: Inference,
     /// True if the validity checks were switched off.
     pub is_unchecked: bool,
+    /// Whether the controller of each arm is one of this program.
+    are_built_in: Vec<bool>,
     /// The samples of each scenario that are new evidence.
     repeats: Vec<Repeats>,
 }
@@ -159,7 +162,8 @@ impl Summary {
         let arms = controllers.len();
         let scenarios: Vec<_> = scenarios.into_iter().map(|name| (name, Counts::new(arms))).collect();
         let repeats = vec![Repeats::default(); scenarios.len()];
-        Self { controllers, scenarios, inference: Inference::default(), is_unchecked: false, repeats }
+        let are_built_in = vec![true; arms];
+        Self { controllers, scenarios, inference: Inference::default(), is_unchecked: false, are_built_in, repeats }
     }
 
     /// Returns a summary without samples of these scenarios.
@@ -168,6 +172,9 @@ impl Summary {
         let controllers = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());
         let mut summary = Self::new(controllers, works.iter().map(|work| work.file.config().name.clone()));
         summary.is_unchecked = works.iter().any(|work| work.checks.is_off());
+        if let Some(work) = works.first() {
+            summary.are_built_in = work.arms.iter().map(|arm| arm.controller.is_built_in()).collect();
+        }
         summary.repeats = works.iter().map(|work| Repeats::of(work.file.space())).collect();
         summary
     }
@@ -214,6 +221,12 @@ impl Summary {
             object
         };
         self.failures().map(to_json).collect()
+    }
+
+    /// Returns the name of an arm's controller if it is none of this program.
+    pub(crate) fn foreign_controller(&self, arm: usize) -> Option<&str> {
+        let is_built_in = self.are_built_in.get(arm).copied().unwrap_or(true);
+        self.controllers.get(arm).map(String::as_str).filter(|_| !is_built_in)
     }
 
     /// Returns true if a baseline stands beside the arm under test.

@@ -17,6 +17,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::{counted, was};
 use serde::Serialize;
 
 use super::attribution;
@@ -25,7 +26,7 @@ use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
 use super::probability::{Answer, Finding};
 use super::summary::Summary;
-use super::validity::CheckCounts;
+use super::validity::{CheckCounts, Invariance, RunOfScenario};
 
 /// Share of the outcomes in which the system under test may not be available for some time, and the
 /// campaign still says what the system does (-). An assumption: with more, the usual run is one in
@@ -228,7 +229,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         findings.note("the validity of the simulator was not checked: the checks were switched off".to_owned());
     }
     let flaky = judge_flaky(total.flaky(), allowed.max_flaky, &mut findings);
-    judge_validity(&total.checks, allowed.max_flip_rate, &mut findings);
+    judge_validity(summary, &total.checks, allowed.max_flip_rate, &mut findings);
     let expectations = judge_expectations(judge, &mut findings);
     let unattributed = judge_attribution(summary, &mut findings);
     judge_samples(summary, judge, &mut findings);
@@ -324,18 +325,20 @@ fn judge_flaky(flaky: u64, max: Option<u64>, findings: &mut Findings) -> Option<
     Some(gate)
 }
 
-fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, findings: &mut Findings) {
+fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, findings: &mut Findings) {
     if checks.not_checked > 0 {
         let sentence = format!(
-            "not checked: {} of {} runs that were chosen for the validity checks, because a check took too long (a campaign that is resumed \
+            "not checked: {} of {} that {} chosen for the validity checks, because a check took too long (a campaign that is resumed \
              and repeats errors runs them again)",
             checks.not_checked,
-            checks.not_checked + checks.runs
+            counted(checks.not_checked + checks.runs, "run"),
+            was(checks.not_checked + checks.runs)
         );
         if checks.runs == 0 { findings.add(Decision::Inconclusive, sentence) } else { findings.note(sentence) }
     }
     for (check, count) in checks.broken() {
-        findings.add(Decision::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
+        let first = first_refuted(summary, check);
+        findings.add(Decision::Invalid, format!("{}: {} of {} checked{first}", check.finding(), count, checks.runs));
     }
     if checks.flips == 0 {
         return;
@@ -348,6 +351,20 @@ fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, findings: &mut Findi
         percent(max_flip_rate)
     );
     if checks.flips > allowed { findings.add(Decision::Invalid, sentence) } else { findings.note(sentence) }
+}
+
+/// Returns which run a check refutes first, and its likely cause.
+fn first_refuted(summary: &Summary, check: Invariance) -> String {
+    let mut runs = summary.scenarios.iter().filter_map(|(name, counts)| Some((name, counts.checks.first(check)?)));
+    let Some((name, RunOfScenario { sample, arm })) = runs.next() else { return String::new() };
+    let controller = summary.controllers.get(arm).map_or("", String::as_str);
+    let cause = summary.foreign_controller(arm).filter(|_| check.is_of_repeatability()).map_or_else(String::new, |foreign| {
+        format!(
+            "; the likely cause is {foreign}, which is not built in: a controller gives the same answers to the same \
+             inputs, without random numbers, a clock, or state of another run"
+        )
+    });
+    format!(", first in sample {sample} of {name} with {controller}{cause}")
 }
 
 fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<ExpectationResult> {
@@ -453,11 +470,11 @@ fn judge_probabilities(summary: &Summary, judge: &Judge, findings: &mut Findings
             continue;
         }
         let finding = spec.gate.judge(counts, specs.len(), summary.inference);
-        let sentence = format!("{name}: {} (from {})", finding.sentence(counts), spec.source);
+        let line = finding.line(name, counts, &spec.source);
         match finding.answer {
-            Answer::Below => findings.note(sentence),
-            Answer::Above => findings.add(Decision::Fail, sentence),
-            Answer::Open => findings.add(Decision::Inconclusive, sentence),
+            Answer::Below => findings.note(line),
+            Answer::Above => findings.add(Decision::Fail, line),
+            Answer::Open => findings.add(Decision::Inconclusive, line),
         }
         probabilities.push(((*name).to_owned(), finding));
     }
@@ -489,7 +506,7 @@ fn allowed_flips(max_flip_rate: f64, checked: u64) -> u64 {
 }
 
 fn samples(count: u64) -> String {
-    if count == 1 { "1 sample".to_owned() } else { format!("{count} samples") }
+    counted(count, "sample")
 }
 
 #[cfg(test)]

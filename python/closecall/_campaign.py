@@ -65,8 +65,9 @@ class CampaignResult:
         table = "".join(f"<tr>{''.join(f'<td>{_escaped(cell)}</td>' for cell in row)}</tr>" for row in rows)
         reasons = "".join(f"<li>{_escaped(str(reason))}</li>" for reason in self.report.get("reasons", []))
         head = "".join(f"<th>{name}</th>" for name in heads)
+        samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"
         return (
-            f"<p><strong>{_escaped(self.verdict)}</strong>: {self.samples} samples</p><ul>{reasons}</ul>"
+            f"<p><strong>{_escaped(self.verdict)}</strong>: {samples}</p><ul>{reasons}</ul>"
             f"<table><thead><tr>{head}</tr></thead><tbody>{table}</tbody></table>{self._outcome_map()}"
         )
 

@@ -8,6 +8,8 @@ pub mod filters;
 pub mod fit;
 pub mod following;
 pub mod lane_change;
+pub mod openlabel;
+pub mod osi;
 pub mod robustness;
 pub mod scans;
 pub mod trajectory_data;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::json::stamped;
 use crate::table::{Column, write_columns};
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 use closecall_studies::perception::figures::{CalibrationBin, CurvePoint, Estimate, Figures, PointErrors};
@@ -240,7 +241,12 @@ impl Display for Studies {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         for study in &self.0 {
             let Study { name, mode, runs, seed, .. } = study;
-            writeln!(f, "sensors of {name}, mode {}: {runs} approaches of each case, seed {seed}", mode.name())?;
+            writeln!(
+                f,
+                "sensors of {name}, mode {}: {} of each case, seed {seed}",
+                mode.name(),
+                counted(*runs, "approach")
+            )?;
             writeln!(
                 f,
                 "  {:<44} {:>17} {:>9} {:>9} {:>9} {:>8} {:>7} {:>6}",

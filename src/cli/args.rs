@@ -83,6 +83,12 @@ pub(super) enum Layout {
     Vissim,
     /// Trajectories of I-24 MOTION in JSON
     I24,
+    /// ASAM OpenLABEL 1.0.0: cuboids of vehicles in frames
+    #[value(name = "openlabel")]
+    #[serde(rename = "openlabel")]
+    OpenLabel,
+    /// Messages of ASAM OSI: a trace file (.osi), or MCAP
+    Osi,
 }
 
 /// Several trajectory files, taken together.
@@ -207,6 +213,8 @@ impl ReadArgs {
             Layout::Sumo => LayoutChoice::Sumo,
             Layout::Vissim => LayoutChoice::Vissim,
             Layout::I24 => LayoutChoice::I24,
+            Layout::OpenLabel => LayoutChoice::OpenLabel,
+            Layout::Osi => LayoutChoice::Osi,
         });
         let Self { mirror_d, lanes_from_right, reverse_s, .. } = *self;
         let axes = AxisOptions { mirror_d, lanes_from_right, reverse_s };

@@ -10,12 +10,13 @@ use closecall_campaign::folder::Folder;
 use closecall_report::campaign::BaselineText;
 use closecall_report::json::stamped;
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::words::counted;
 use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{out, outln, print_written};
+use super::output::{outln, print_text, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall baseline`.
@@ -80,8 +81,9 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
     let baseline = Baseline::of(&Folder::open(dir))?;
     baseline.write(file)?;
     for (name, scenario) in &baseline.scenarios {
-        let (samples, collisions, errors) = (scenario.samples, scenario.collisions, scenario.errors);
-        outln!("{name}: {samples} samples, {collisions} collisions, {errors} errors");
+        let samples = counted(scenario.samples, "sample");
+        let (collisions, errors) = (counted(scenario.collisions, "collision"), counted(scenario.errors, "error"));
+        outln!("{name}: {samples}, {collisions}, {errors}");
     }
     print_written(file);
     Ok(ExitCode::Pass)
@@ -102,7 +104,7 @@ fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<Ex
             outln!("{:#}", stamped(object, Some(current.seed), None));
         }
         Format::Human => {
-            out!("{}", BaselineText(&comparison));
+            print_text(BaselineText(&comparison));
             if !comparison.is_regression() && (comparison.has_fixed() || !comparison.new_scenarios.is_empty()) {
                 outln!("`closecall baseline save DIR {}` keeps this result", file.display());
             }

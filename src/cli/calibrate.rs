@@ -9,7 +9,7 @@ use closecall_simulation::calibration::{FollowingModel, calibrate_watched};
 use closecall_traffic::atomic::write_file;
 
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{outln, print_text};
 use super::progress::watched;
 use super::protect::protect;
 use super::{CliError, args::Format};
@@ -61,7 +61,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(calibration::json(&result, &data), None, None)),
-        Format::Human => out!("{}", calibration::text(&result, &data)),
+        Format::Human => print_text(calibration::text(&result, &data)),
     }
     Ok(ExitCode::Pass)
 }

@@ -32,6 +32,7 @@ use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
 use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::controller::ControllerChoice;
+use closecall_traffic::words::counted;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
@@ -49,7 +50,7 @@ use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::keywords::needs;
-use super::output::{heartbeat, out, outln, print_error, print_failure, print_text};
+use super::output::{heartbeat, outln, print_error, print_failure, print_text};
 use super::plan::PlanArgs;
 use super::rare::{DesignChoice, Rare, RareArgs};
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
@@ -441,6 +442,10 @@ pub(super) struct Judged<'a> {
     report: &'a CampaignReport<'a>,
     companion: &'a dyn Companion,
     wall_s: f64,
+    /// The simulated time of the samples that have just been run (s).
+    simulated_s: f64,
+    /// Number of samples that were there before.
+    resumed: u64,
     /// Where it ran, and the share of the checks in the time.
     place: String,
     has_drawn_seed: bool,
@@ -465,24 +470,33 @@ impl Conclusion<'_> {
     pub(super) fn print(&self, format: Format) {
         match (format, self) {
             (Format::Json, conclusion) => outln!("{:#}", conclusion.json()),
-            (Format::Human, Self::Early(ended)) => out!("{}{ended}", CountsText(ended.summary)),
+            (Format::Human, Self::Early(ended)) => print_text(format_args!("{}{ended}", CountsText(ended.summary))),
             (Format::Human, Self::Judged(judged)) => judged.print(),
         }
     }
+}
+
+/// Returns the simulated time and the wall time of the samples that have just been run (s), where
+/// they ran, and how many samples were there before.
+fn speed_text((simulated_s, wall_s): (f64, f64), resumed: u64, place: &str) -> String {
+    let resumed = match resumed {
+        0 => String::new(),
+        resumed => format!("; not run again: {}", counted(resumed, "sample")),
+    };
+    format!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{resumed}")
 }
 
 impl Judged<'_> {
     fn print(&self) {
         let CampaignReport { manifest, works, tally, judged, .. } = self.report;
         print_text(CountsText(&tally.summary));
-        let simulated_s = tally.summary.total().simulated_s;
-        outln!("{simulated_s:.0} simulated seconds in {:.1} s on {}", self.wall_s, self.place);
-        out!("{}", self.companion.text(&tally.summary));
-        out!("{}", ensemble_text(&tally.summary, manifest));
+        print_text(format_args!("{}\n", speed_text((self.simulated_s, self.wall_s), self.resumed, &self.place)));
+        print_text(self.companion.text(&tally.summary));
+        print_text(ensemble_text(&tally.summary, manifest));
         print_text(CoverageText(judged));
-        out!("{}", FlakyText(&tally.overview));
+        print_text(FlakyText(&tally.overview));
         print_text(VerdictText { judged, scenarios: works.len() });
-        out!("{}", after_verdict(judged));
+        print_text(after_verdict(judged));
         if self.has_drawn_seed {
             outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
         }
@@ -547,6 +561,8 @@ pub(super) fn carry_out(
         report: &report,
         companion,
         wall_s,
+        simulated_s: progress.simulated_s,
+        resumed: progress.resumed,
         place: format!("{}{}", campaign.place(), progress.spent.check_share()),
         has_drawn_seed: planned.has_drawn_seed,
     }));
@@ -574,6 +590,10 @@ struct Progress {
     bar: ProgressBar,
     /// The wall times of all samples that have just been run.
     spent: SpentTime,
+    /// The simulated time of these samples in all arms (s).
+    simulated_s: f64,
+    /// Number of samples that were read from the journal.
+    resumed: u64,
     _heartbeat: Option<Heartbeat>,
 }
 
@@ -589,7 +609,18 @@ impl Progress {
         let bar = progress_bar(campaign.len());
         let tally = Tally::new(campaign, gates);
         let counts = campaign.partition.is_none().then(|| campaign.works.iter().map(|work| work.count()).collect());
-        Self { names, counts, tally, stop, end, spent: SpentTime::default(), _heartbeat: heartbeat(&bar), bar }
+        Self {
+            names,
+            counts,
+            tally,
+            stop,
+            end,
+            spent: SpentTime::default(),
+            simulated_s: 0.0,
+            resumed: 0,
+            _heartbeat: heartbeat(&bar),
+            bar,
+        }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
@@ -597,7 +628,11 @@ impl Progress {
         self.bar.inc(1);
         session::report(self.bar.position(), self.bar.length().unwrap_or_default());
         self.spent += next.spent;
-        if !next.is_new {
+        if next.is_new {
+            let outcomes = next.record.arms.iter().filter_map(|arm| arm.result.as_ref().ok());
+            self.simulated_s += outcomes.map(|outcome| outcome.duration.s()).sum::<f64>();
+        } else {
+            self.resumed += 1;
             // Records read from the journal say nothing about how long the rest will take.
             self.bar.reset_eta();
         }
@@ -645,6 +680,14 @@ mod tests {
     use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS};
 
     use super::*;
+
+    #[test]
+    fn the_speed_is_of_the_samples_that_have_just_been_run() {
+        let whole = "969 simulated seconds in 3.2 s on 1 thread";
+        assert_eq!(speed_text((969.4, 3.21), 0, "1 thread"), whole);
+        let nothing = "0 simulated seconds in 0.0 s on 2 threads; not run again: 20 samples";
+        assert_eq!(speed_text((0.0, 0.01), 20, "2 threads"), nothing);
+    }
 
     #[test]
     fn the_help_states_the_defaults() {

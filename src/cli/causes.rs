@@ -123,7 +123,10 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
         Format::Json => {
             outln!("{:#}", stamped(json!({ "minimized": minimized, "files": files }), Some(minimized.seed), None))
         }
-        Format::Human => outln!("{}", MinimizedText { minimized: &minimized, files: &files, command_for }),
+        Format::Human => {
+            let text = MinimizedText { minimized: &minimized, files: &files, command_for };
+            print_text(format_args!("{text}\n"));
+        }
     }
     Ok(ExitCode::Pass)
 }
@@ -172,7 +175,7 @@ pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!(points), None, None)),
-        Format::Human => outln!("{}", MapText(&points)),
+        Format::Human => print_text(format_args!("{}\n", MapText(&points))),
     }
     Ok(ExitCode::Pass)
 }
@@ -225,9 +228,9 @@ pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!({ "exposure": exposure, "cost": cost }), None, None)),
         Format::Human => {
-            outln!("{}", ExposureText(&exposure));
-            exposure.missing.iter().for_each(|missing| outln!("  {}", to_provide(*missing)));
-            cost.iter().for_each(|cost| outln!("{}", CostText(cost)));
+            print_text(format_args!("{}\n", ExposureText(&exposure)));
+            exposure.missing.iter().for_each(|missing| print_text(format_args!("  {}\n", to_provide(*missing))));
+            cost.iter().for_each(|cost| print_text(format_args!("{}\n", CostText(cost))));
         }
     }
     Ok(if exposure.effect.is_some() { ExitCode::Pass } else { ExitCode::Inconclusive })

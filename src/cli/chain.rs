@@ -39,6 +39,7 @@ use closecall_scenarios::{Function, ScenarioError, ScenarioFile, Spreads, logica
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::engagement::engagements;
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 use super::CliError;
@@ -260,7 +261,14 @@ impl Chain {
             .origins
             .files
             .iter()
-            .map(|file| format!("{}: {} tracks, {} lane changes", file.path, file.tracks, file.lane_changes))
+            .map(|file| {
+                format!(
+                    "{}: {}, {}",
+                    file.path,
+                    counted(file.tracks, "track"),
+                    counted(file.lane_changes, "lane change")
+                )
+            })
             .collect();
         let refused: Vec<String> =
             self.origins.refused.iter().map(|(reason, number)| format!("  {number}: {reason}\n")).collect();

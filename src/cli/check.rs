@@ -10,6 +10,7 @@ use closecall_report::campaign::check_folder;
 use closecall_report::json::stamped;
 use closecall_scenarios::source::{self, KEYS_OF_SCENARIO};
 use closecall_scenarios::{ScenarioError, ScenarioFile};
+use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 use super::CliError;
@@ -97,9 +98,9 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
             skipped.iter().take(MOST_NAMED).map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         let more = skipped.len().saturating_sub(MOST_NAMED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let files = skipped.len();
+        let files = counted(skipped.len(), "file");
         print_error(format_args!(
-            "note: skipped as no scenarios, with none of the keys {keys}: {files} files: {named}{more}\n"
+            "note: skipped as no scenarios, with none of the keys {keys}: {files}: {named}{more}\n"
         ));
     }
     Ok(source::expand(paths)?)
@@ -127,7 +128,7 @@ fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
                     outln!("{}{line}: {message}\n  repair: {repair}", path.join(file).display());
                 }
                 if integrity.is_sound() {
-                    outln!("{}: sound, {} samples", path.display(), integrity.records);
+                    outln!("{}: sound, {}", path.display(), counted(integrity.records, "sample"));
                 }
             }
         }

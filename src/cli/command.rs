@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::error::Error;
-use std::num::{ParseFloatError, ParseIntError};
+use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -13,11 +13,13 @@ use closecall_campaign::session::set_arguments;
 use closecall_controllers::external::remove_unpacked;
 use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 use closecall_traffic::shown::shown;
+use textwrap::{WordSeparator, WordSplitter};
 
 use super::backend::choose_backend;
 use super::groups::{Study, Tool, Traffic};
 use super::help::heading;
 use super::output::{announce, print_error, print_failure};
+use super::terminal::error_columns;
 use super::version::{BUILD, name_commit};
 use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
 use crate::exit_code::ExitCode;
@@ -245,23 +247,33 @@ fn plain_words(error: clap::Error) -> clap::Error {
 }
 
 /// Returns the allowed numbers, if another number is the reason for the error.
-fn allowed_number(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    if error.is::<ParseIntError>() {
-        Some("a whole number, 0 or more")
-    } else if error.is::<ParseFloatError>() {
-        Some("a number, such as 0.5")
-    } else {
-        None
+fn allowed_number(error: &(dyn Error + 'static)) -> Option<String> {
+    if let Some(error) = error.downcast_ref::<ParseIntError>() {
+        return Some(match error.kind() {
+            IntErrorKind::PosOverflow => format!("a whole number from 0 to {}", u64::MAX),
+            _ => "a whole number, 0 or more".to_owned(),
+        });
     }
+    error.is::<ParseFloatError>().then(|| "a number, such as 0.5".to_owned())
 }
 
 /// Runs the program with these arguments. The first is the program's name.
 pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     name_commit();
     set_arguments(arguments);
-    // Messages name their causes themselves. Lines are not wrapped, so that paths can be copied.
+    // Messages name their causes themselves. A terminal receives lines that are wrapped between
+    // words, so that paths can be copied.
     let handler = |_: &_| -> Box<dyn miette::ReportHandler> {
-        Box::new(miette::MietteHandlerOpts::new().without_cause_chain().wrap_lines(false).build())
+        let options = miette::MietteHandlerOpts::new().without_cause_chain();
+        let options = match error_columns() {
+            Some(columns) => options
+                .width(columns)
+                .break_words(false)
+                .word_separator(WordSeparator::AsciiSpace)
+                .word_splitter(WordSplitter::NoHyphenation),
+            None => options.wrap_lines(false),
+        };
+        Box::new(options.build())
     };
     // If a hook is already set, the program that uses this crate as a library has set it: it stays.
     drop(miette::set_hook(Box::new(handler)));

@@ -12,7 +12,7 @@ use closecall_report::json::{self, stamped};
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{outln, print_text};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall compare`.
@@ -62,7 +62,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
         }
         Format::Human => {
             let (scenarios, differences) = (&scenarios[..], &differences[..]);
-            out!("{}", ComparisonText { scenarios, differences, tolerance: args.tolerance });
+            print_text(ComparisonText { scenarios, differences, tolerance: args.tolerance });
             outln!("{regression}");
         }
     }

@@ -10,7 +10,7 @@ use closecall_report::traffic::drift::DriftText;
 use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
-use super::output::{out, outln};
+use super::output::{outln, print_text};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic drift`.
@@ -39,7 +39,7 @@ pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
     let drift = compare(&Fitted::read(&args.fitted)?, &args.data.read_all()?, args.seed);
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(drift), None, None)),
-        Format::Human => out!("{}", DriftText(&drift)),
+        Format::Human => print_text(DriftText(&drift)),
     }
     Ok(match (drift.is_tested, drift.has_drifted) {
         (_, true) => ExitCode::Fail,

@@ -14,6 +14,7 @@ use closecall_recorded::aerial::AerialError;
 use closecall_recorded::encounter::{Lead, NoEncounter};
 use closecall_recorded::following::FollowingError;
 use closecall_recorded::lane_change::ReferenceError;
+use closecall_recorded::openlabel::LabelError;
 use closecall_recorded::scans::{ScanFileError, ScanFileProblem};
 use closecall_recorded::trajectory_data::{
     TrajectoryFileError, TrajectoryFileProblem, WriteError as TrajectoryWriteError,
@@ -245,6 +246,15 @@ impl From<SourceError> for CliError {
     }
 }
 
+impl From<LabelError> for CliError {
+    fn from(error: LabelError) -> Self {
+        match error {
+            LabelError::Read(error) => Self::TrajectoryData(error),
+            LabelError::Write(error) => Self::WriteRecording(error),
+        }
+    }
+}
+
 /// Returns the option that reads a trajectory file in spite of the problem, if there is one.
 fn remedy(problem: &TrajectoryFileProblem) -> String {
     let [mirror_d, from_right] = ["mirror-d", "lanes-from-right"].map(Argument);
@@ -258,12 +268,18 @@ fn remedy(problem: &TrajectoryFileProblem) -> String {
         TrajectoryFileProblem::LanesBesideMarkings { .. } => {
             format!("; {} `none` takes no lane as recorded, {mirror_d} turns the position", Argument("lanes"))
         }
+        TrajectoryFileProblem::NoLanes { .. } => format!("; {} `none` estimates them", Argument("lanes")),
         TrajectoryFileProblem::SidesContradict { .. } => format!(
             "; {mirror_d} turns the position (with {from_right}, if the lanes are counted from the right, too), or leave these \
              columns out"
         ),
         TrajectoryFileProblem::AgainstTheRoad { .. } => {
             format!("; {} turns the position along the road of all vehicles", Argument("reverse-s"))
+        }
+        TrajectoryFileProblem::MostRows { first, .. }
+            if matches!(**first, TrajectoryFileProblem::NegativeSpeed { .. }) =>
+        {
+            format!("; {} turns the position along the road and the speeds of all vehicles", Argument("reverse-s"))
         }
         TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
             format!("; {} names the data set of NGSIM's export to read", Argument("location"))

@@ -7,6 +7,7 @@ use clap::Args;
 use closecall_report::json::stamped;
 use closecall_studies::fidelity::{FidelityReport, fidelity as estimate};
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
 use serde_json::json;
 
 use super::CliError;
@@ -55,9 +56,10 @@ struct Text<'a>(&'a FidelityReport);
 impl fmt::Display for Text<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let FidelityReport { scenario, samples, more_samples, left_out, rates } = self.0;
-        writeln!(f, "{scenario}: {samples} samples in both modes, {more_samples} in the fast mode alone")?;
+        let both = counted(*samples, "sample");
+        writeln!(f, "{scenario}: {both} in both modes, {more_samples} in the fast mode alone")?;
         if *left_out > 0 {
-            writeln!(f, "  {left_out} samples are left out, because a run ended in an error")?;
+            writeln!(f, "  left out, because a run ended in an error: {}", counted(*left_out, "sample"))?;
         }
         for rate in rates {
             let [low, high] = rate.plain_interval_95.map(percent);

@@ -10,7 +10,7 @@ use closecall_report::traffic::quality::QualityText;
 use super::CliError;
 use super::args::{Format, ReadArgs};
 use super::help::{examples, heading};
-use super::output::{out, outln, print_error, reading};
+use super::output::{outln, print_error, print_text, reading};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic inspect`.
@@ -44,7 +44,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     })?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json::quality(&tracks, &inspector), None, None)),
-        Format::Human => out!("{}", QualityText { tracks: &tracks, inspector: &inspector }),
+        Format::Human => print_text(QualityText { tracks: &tracks, inspector: &inspector }),
     }
     let dropped = tracks.dropped();
     if dropped.count() == 0 || args.read.drop_bad_rows {

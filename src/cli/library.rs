@@ -23,12 +23,13 @@ const FAULT_TAG: &str = "fault";
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall list",
-    "closecall list faults",
+    "closecall list headline",
     "closecall list --format json > library.json",
 ]))]
 pub(super) struct ListArgs {
-    /// Describe these scenarios in full: part of their names, `faults`, or the `members` of the
-    /// driver ensemble [default: a line for each scenario without a fault]
+    /// Describe these scenarios in full: part of their names or one of their tags, in any case,
+    /// `faults`, or the `members` of the driver ensemble [default: a line for each scenario without
+    /// a fault]
     what: Option<String>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -37,7 +38,8 @@ pub(super) struct ListArgs {
 
 pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
     let (listed, members) = (entries()?, member::entries()?);
-    match (args.format, args.what.as_deref()) {
+    let wanted = args.what.as_deref().map(str::to_lowercase);
+    match (args.format, wanted.as_deref()) {
         (Format::Json, _) => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
         (Format::Human, None) => {
             overview(&listed, &members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>())
@@ -47,8 +49,10 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
             outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
         }
         (Format::Human, Some(what)) => {
-            let is_meant =
-                |entry: &&LibraryEntry| if what == FAULTS { is_fault(entry) } else { entry.name.contains(what) };
+            let is_meant = |entry: &&LibraryEntry| match what {
+                FAULTS => is_fault(entry),
+                _ => entry.name.contains(what) || entry.tags.iter().any(|tag| tag.to_lowercase() == what),
+            };
             let meant: Vec<&LibraryEntry> = listed.iter().filter(is_meant).collect();
             if meant.is_empty() && members.iter().any(|member| member.name == what) {
                 let said =
@@ -57,7 +61,7 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
             }
             if meant.is_empty() {
                 return Err(CliError::usage(format!(
-                    "no scenario has `{what}` in its name: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"
+                    "no scenario has `{what}` in its name or as a tag: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"
                 )));
             }
             meant.into_iter().for_each(|scenario| print_text(format_args!("{}\n", scenario)));

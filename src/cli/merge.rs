@@ -18,7 +18,7 @@ use super::advice::after_verdict;
 use super::args::Format;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{out, outln, print_error, print_text};
+use super::output::{outln, print_error, print_text};
 use super::results::{ArtifactArgs, print_results, remember, selection};
 use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
@@ -91,11 +91,11 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
             print_text(CountsText(&tally.summary));
-            out!("{}", ensemble_text(&tally.summary, saved.manifest()));
+            print_text(ensemble_text(&tally.summary, saved.manifest()));
             print_text(CoverageText(&judged));
-            out!("{}", FlakyText(&tally.overview));
+            print_text(FlakyText(&tally.overview));
             print_text(VerdictText { judged: &judged, scenarios: works.len() });
-            out!("{}", after_verdict(&judged));
+            print_text(after_verdict(&judged));
         }
     }
     let written = report.write(saved.folder(), selection);

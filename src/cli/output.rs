@@ -15,7 +15,7 @@ use closecall_traffic::shown::shown;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::CliError;
-use super::terminal::for_terminal;
+use super::terminal::{for_error_terminal, for_terminal};
 use crate::exit_code::ExitCode;
 
 /// Prints to standard output, without control characters of others (see [`shown`]).
@@ -46,7 +46,7 @@ fn write(text: &str) {
 /// of such texts.
 pub(super) fn print_error(text: Arguments<'_>) {
     if !session::is_active() {
-        drop(stderr().lock().write_all(shown(&text.to_string()).as_bytes()));
+        drop(stderr().lock().write_all(for_error_terminal(&shown(&text.to_string())).as_bytes()));
     }
 }
 

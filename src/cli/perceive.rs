@@ -19,7 +19,7 @@ use closecall_traffic::atomic::check_writable;
 use super::CliError;
 use super::args::{Format, SetArgs};
 use super::help::{examples, heading};
-use super::output::{out, outln, print_written, reading};
+use super::output::{outln, print_text, print_written, reading};
 use super::protect::protect;
 use crate::exit_code::ExitCode;
 
@@ -178,7 +178,7 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
         RecordedReport { recording: args.recording.display().to_string(), scenario: file.config().name.clone(), study };
     match args.format {
         Format::Json => outln!("{:#}", report.json()),
-        Format::Human => out!("{report}"),
+        Format::Human => print_text(&report),
     }
     if let Some(tracks) = &args.tracks {
         recorder.write(tracks)?;

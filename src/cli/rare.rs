@@ -223,7 +223,7 @@ impl Rare<'_> {
         match (self.format, resume) {
             (Format::Json, resume) => outln!("{:#}", json!({ "ended_early": signal, "runs": runs, "resume": resume })),
             (Format::Human, resume) => {
-                outln!("ENDED EARLY, without a result: {signal}; {runs} runs are done");
+                outln!("ENDED EARLY, without a result: {signal}; runs that are done: {runs}");
                 match resume {
                     Some(command) => outln!("resume: {command}"),
                     None => outln!("nothing was kept: only a campaign with a folder (--out DIR) can be resumed"),
@@ -299,7 +299,10 @@ impl Rare<'_> {
         let paths = output_files(&case, Some(&file))?;
         let files = write_files(&case, &minimized, &paths, command_for)?;
         match self.format {
-            Format::Human => outln!("{}", MinimizedText { minimized: &minimized, files: &files, command_for }),
+            Format::Human => {
+                let text = MinimizedText { minimized: &minimized, files: &files, command_for };
+                print_text(format_args!("{text}\n"));
+            }
             Format::Json => {}
         }
         [Some(&files.failing), files.twin.as_ref()].into_iter().flatten().for_each(|path| print_written(path));

@@ -10,6 +10,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_simulation::trajectories::{InCarRecorder, TrafficRecorder, recorded_actor};
 use closecall_simulation::{Observer, RunKey};
+use closecall_traffic::words::counted;
 
 use super::CliError;
 use super::args::SimulationArgs;
@@ -70,7 +71,7 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let (tracks, instants) =
         (recording.trajectories.len(), recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>());
     write_trajectories(&recording, &args.output)?;
-    outln!("{tracks} vehicles, {instants} instants");
+    outln!("{}, {}", counted(tracks, "vehicle"), counted(instants, "instant"));
     print_written(&args.output);
     Ok(ExitCode::Pass)
 }

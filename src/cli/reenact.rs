@@ -13,12 +13,13 @@ use closecall_report::traffic::reenactment::Reenactment;
 use closecall_scenarios::{RearDriver, reenact as scenario_of};
 use closecall_simulation::{CONTROL_STEP, RunKey};
 use closecall_traffic::atomic::write_file;
+use closecall_traffic::words::counted;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
 use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
-use super::output::{made_by, out, outln};
+use super::output::{made_by, outln, print_text};
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
@@ -102,7 +103,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let reenactment = Reenactment { encounter: &found, comparison: &comparison, films: &films, outcome: &outcome };
     match args.format {
         Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
-        Format::Human => out!("{reenactment}"),
+        Format::Human => print_text(reenactment),
     }
     Ok(ExitCode::Pass)
 }
@@ -150,7 +151,10 @@ pub(super) fn chosen_by<T>(
         }
         ChoiceError::NoSuchNumber { count } => {
             let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
-            CliError::usage(format!("{file} has {count} lane changes{of_track}: --number can be 1 to {count}"))
+            CliError::usage(format!(
+                "{file} has {}{of_track}: --number can be 1 to {count}",
+                counted(count, "lane change")
+            ))
         }
         ChoiceError::NoEncounter { source, possible } => {
             CliError::NoEncounter { lead: wanted.lead, file: file.to_string(), source, possible }

@@ -8,11 +8,12 @@ use closecall_campaign::robustness::{RobustnessError, robustness as study};
 use closecall_recorded::robustness::{FEWEST_LANE_CHANGES, Setup};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, robustness_charts};
+use closecall_traffic::words::counted;
 
 use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
-use super::output::{out, outln, print_error, write_charts};
+use super::output::{outln, print_error, print_text, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
@@ -56,7 +57,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(json::robustness(&study), None, None)),
-        Format::Human => out!("{}", RobustnessText(&study)),
+        Format::Human => print_text(RobustnessText(&study)),
     }
     if study.reference == 0 {
         print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
@@ -64,9 +65,9 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     }
     if study.reference < FEWEST_LANE_CHANGES {
         print_error(format_args!(
-            "the trajectory files have {} lane changes, and the study needs {FEWEST_LANE_CHANGES}: with fewer, the loss of a single one is \
+            "the trajectory files have {}, and the study needs {FEWEST_LANE_CHANGES}: with fewer, the loss of a single one is \
              more than the share at which a criterion fails, so that no level can be told\n",
-            study.reference
+            counted(study.reference, "lane change")
         ));
         return Ok(ExitCode::Inconclusive);
     }

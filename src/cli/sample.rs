@@ -15,7 +15,7 @@ use closecall_traffic::atomic::write_file;
 use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
 use super::help::{examples, heading};
-use super::output::{made_by, out, outln, print_written, write_charts};
+use super::output::{made_by, outln, print_text, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::chosen_by;
 use crate::exit_code::ExitCode;
@@ -133,7 +133,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(all.json(), Some(args.seed), None)),
-        Format::Human => out!("{all}"),
+        Format::Human => print_text(&all),
     }
     Ok(ExitCode::Pass)
 }

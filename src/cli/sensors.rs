@@ -11,7 +11,7 @@ use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
 use super::backend::{check_backend, check_camera};
 use super::help::{examples, heading};
-use super::output::{out, outln, print_written};
+use super::output::{outln, print_text, print_written};
 use super::progress::watched;
 use crate::exit_code::ExitCode;
 
@@ -74,7 +74,7 @@ pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
     let studies = Studies(studies?);
     match args.format {
         Format::Json => outln!("{:#}", studies.json()),
-        Format::Human => out!("{studies}"),
+        Format::Human => print_text(&studies),
     }
     if let Some(out) = &args.out {
         studies.write(out)?.iter().for_each(|path| print_written(path));

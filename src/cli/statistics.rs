@@ -14,7 +14,7 @@ use closecall_report::traffic::statistics::{RecordedChanges, STATISTICS_CHARTS, 
 use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
-use super::output::{out, outln, write_charts};
+use super::output::{outln, print_text, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
@@ -45,6 +45,7 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     let data_sets = args.data.read_all()?;
+    let is_in_doubt = data_sets.iter().any(|data| data.is_in_doubt);
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
     let changes =
         |data: TrajectoryData| RecordedChanges { changes: criticality(&smooth(&data), &judgement), name: data.name };
@@ -57,7 +58,7 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(statistics), None, None)),
-        Format::Human => out!("{}", StatisticsText(&statistics)),
+        Format::Human => print_text(StatisticsText(&statistics)),
     }
-    Ok(ExitCode::Pass)
+    Ok(if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass })
 }

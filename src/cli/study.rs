@@ -27,7 +27,7 @@ use super::arms::ControllerArgs;
 use super::backend::{check_backend, check_cameras};
 use super::campaign::progress_bar;
 use super::help::{examples, heading};
-use super::output::{heartbeat, out, outln, print_written};
+use super::output::{heartbeat, outln, print_text, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments that both studies share.
@@ -181,7 +181,7 @@ fn print(study: Option<Study>, format: Format, folder: Option<&Path>) -> Result<
     };
     match format {
         Format::Json => outln!("{:#}", study.json()),
-        Format::Human => out!("{study}"),
+        Format::Human => print_text(&study),
     }
     if let Some(folder) = folder {
         write_study(folder, &study)?.iter().for_each(|path| print_written(path));

@@ -1,12 +1,14 @@
-//! Texts for people at a terminal: wrapped at words to its width, with verdicts in colour. A pipe
-//! receives the text as it is.
+//! Texts for people at a terminal: wrapped at words to its width, with verdicts in colour. A command
+//! stays on its line, so that it can be copied. A pipe receives the text as it is.
 //!
 //! `NO_COLOR` and `CLICOLOR` are respected (crate `console`).
 
-use std::io::{IsTerminal, stdout};
+use std::io::{IsTerminal, stderr, stdout};
+use std::os::fd::AsFd;
 
-use console::{Style, Term};
-use textwrap::{Options, WordSplitter, wrap};
+use console::Style;
+use rustix::termios::tcgetwinsize;
+use textwrap::{Options, WordSeparator, WordSplitter, wrap};
 
 /// Further indentation of a line that goes on in the next (columns).
 const HANGING: usize = 2;
@@ -19,15 +21,30 @@ pub(super) fn for_terminal(text: &str) -> String {
     if !stdout().is_terminal() {
         return text.to_owned();
     }
-    let width = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    let wrapped = width.map_or_else(|| text.to_owned(), |width| wrapped(text, width));
+    let wrapped = columns(stdout()).map_or_else(|| text.to_owned(), |width| wrapped(text, width, true));
     if console::colors_enabled() { coloured(&wrapped) } else { wrapped }
+}
+
+/// Returns a text for standard error. Its words stay whole, so that paths can be copied.
+pub(super) fn for_error_terminal(text: &str) -> String {
+    error_columns().map_or_else(|| text.to_owned(), |width| wrapped(text, width, false))
+}
+
+/// Returns the width of messages on standard error, if that is a terminal whose width is known
+/// (columns).
+pub(super) fn error_columns() -> Option<usize> {
+    columns(stderr()).filter(|_| stderr().is_terminal()).map(|columns| columns.max(LEAST_WIDTH))
+}
+
+/// Returns the width of a terminal (columns); `None` if it is not known. The number of rows does not
+/// matter: some terminals state none.
+fn columns(terminal: impl AsFd) -> Option<usize> {
+    tcgetwinsize(terminal).ok().map(|size| usize::from(size.ws_col)).filter(|columns| *columns > 0)
 }
 
 /// Returns a line that is cut off at the width of the terminal.
 pub(super) fn cut(line: &str) -> String {
-    let columns = Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    match columns.filter(|_| stdout().is_terminal()) {
+    match columns(stdout()).filter(|_| stdout().is_terminal()) {
         Some(width) if line.chars().count() > width.max(LEAST_WIDTH) => {
             let kept: String = line.chars().take(width.max(LEAST_WIDTH) - 1).collect();
             format!("{kept}…")
@@ -36,14 +53,25 @@ pub(super) fn cut(line: &str) -> String {
     }
 }
 
-/// Wraps each line at words. A line that goes on is indented further than its begin.
-fn wrapped(text: &str, width: usize) -> String {
+/// Returns true if a line is, or ends with, a command.
+fn has_command(line: &str) -> bool {
+    line.split(':').any(|part| part.trim_start().starts_with("closecall "))
+}
+
+/// Wraps each line at words. A line that goes on is indented further than its begin. `breaks_words`
+/// also breaks words that are wider than the terminal.
+fn wrapped(text: &str, width: usize, breaks_words: bool) -> String {
     let width = width.max(LEAST_WIDTH);
     let mut lines = Vec::new();
     for line in text.split('\n') {
+        if has_command(line) {
+            lines.push(line.to_owned());
+            continue;
+        }
         let indent = line.len() - line.trim_start().len();
         let hanging = " ".repeat((indent + HANGING).min(width / 2));
         let options = Options::new(width).subsequent_indent(&hanging).word_splitter(WordSplitter::NoHyphenation);
+        let options = options.break_words(breaks_words).word_separator(WordSeparator::AsciiSpace);
         let begin = " ".repeat(indent);
         lines.extend(wrap(line.trim_start(), options.initial_indent(&begin)).into_iter().map(|line| line.into_owned()));
     }
@@ -105,15 +133,24 @@ mod tests {
     fn no_line_is_wider_than_the_terminal_and_no_word_is_lost() {
         let text = "FAIL\n  NOT MET: low-thw-overtake: MIS-1: prevents at least 50 % of the collisions\n\n  one two\n";
         for width in [20, 34, 80] {
-            let lines = wrapped(text, width);
+            let lines = wrapped(text, width, true);
             assert!(lines.split('\n').all(|line| line.chars().count() <= width), "{width}: {lines}");
             let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
             if width > 20 {
                 assert_eq!(words(&lines), words(text), "{width}");
             }
         }
-        assert_eq!(wrapped(text, 200), text);
-        assert_eq!(wrapped("  aa bb cc dd ee ff gg hh", 20), "  aa bb cc dd ee ff\n    gg hh");
+        assert_eq!(wrapped(text, 200, true), text);
+        assert_eq!(wrapped("  aa bb cc dd ee ff gg hh", 20, true), "  aa bb cc dd ee ff\n    gg hh");
+    }
+
+    #[test]
+    fn commands_and_the_paths_of_errors_stay_whole() {
+        let command = "resume: closecall campaign low-thw-overtake -n 200 --seed 1 --out results --resume";
+        assert_eq!(wrapped(command, 40, true), command);
+        let path = "/home/somebody/a/long/path/to/a/folder/scenario.toml";
+        let lines = wrapped(&format!("failed to read {path}: it is absent"), 30, false);
+        assert_eq!(lines, format!("failed to read\n  {path}:\n  it is absent"));
     }
 
     #[test]

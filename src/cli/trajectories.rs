@@ -9,6 +9,7 @@ use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticali
 use closecall_recorded::filters::smooth_file;
 use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
 use closecall_recorded::lane_change::{Criterion, FoundLaneChanges, find, listed_for, read_references, score};
+use closecall_recorded::openlabel::{Labels, label_file};
 use closecall_recorded::trajectory_data::{Layout, open};
 use closecall_report::json::{self, stamped};
 use closecall_report::run::film::film_lane_change;
@@ -24,7 +25,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format, LanesChoice, ReadArgs};
 use super::argument::Argument;
 use super::help::{examples, heading};
-use super::output::{command_line, out, outln, print_error, print_written, reading, warn, write_charts};
+use super::output::{command_line, outln, print_error, print_text, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
@@ -57,12 +58,12 @@ impl CriterionChoice {
 #[command(after_help = examples([
     "closecall traffic lane-changes traffic.csv",
     "closecall traffic lane-changes traffic.csv --lanes none --format json",
-    "closecall traffic lane-changes traffic.csv --criterion distance --reference known.csv",
+    "closecall traffic lane-changes traffic.csv --openlabel labels.json",
 ]))]
 pub(super) struct LaneChangesArgs {
     /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, floating car data of SUMO, a vehicle record
-    /// of Vissim, JSON of I-24 MOTION, an in-car log, or plain CSV as `closecall traffic record` writes
-    /// it. The file can be compressed by gzip
+    /// of Vissim, JSON of I-24 MOTION, OpenLABEL, OSI, an in-car log, or plain CSV as `closecall traffic
+    /// record` writes it. The file can be compressed by gzip
     #[arg(value_name = "TRAJECTORY_FILE")]
     file: PathBuf,
     #[command(flatten)]
@@ -76,6 +77,10 @@ pub(super) struct LaneChangesArgs {
     /// the columns recording_id, track_id, time_s, direction, clear
     #[arg(long, value_name = "FILE.csv", help_heading = heading::METHOD)]
     reference: Option<PathBuf>,
+    /// File for the vehicles and their lane changes as ASAM OpenLABEL 1.0.0, which every `traffic`
+    /// command reads
+    #[arg(long, value_name = "FILE.json", help_heading = heading::OUTPUT)]
+    openlabel: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     #[serde(skip)]
@@ -86,8 +91,8 @@ pub(super) struct LaneChangesArgs {
 #[derive(Debug, Args, Deserialize)]
 #[command(after_help = examples([
     "closecall traffic criticality traffic.csv",
-    "closecall traffic criticality traffic.csv --speed-limit-mps 27.8 --plot histograms",
     "closecall traffic criticality traffic.csv --record lane-change.rrd --track 3",
+    "closecall traffic criticality traffic.csv --openlabel labels.json",
 ]))]
 pub(super) struct CriticalityArgs {
     /// Trajectory file
@@ -115,6 +120,10 @@ pub(super) struct CriticalityArgs {
     /// Track whose lane change --record saves
     #[arg(long, value_name = "ID", requires = "record", help_heading = heading::OUTPUT)]
     track: Option<u64>,
+    /// File for the vehicles, their lane changes and the metrics as ASAM OpenLABEL 1.0.0, which every
+    /// `traffic` command reads
+    #[arg(long, value_name = "FILE.json", help_heading = heading::OUTPUT)]
+    openlabel: Option<PathBuf>,
     /// Folder for a histogram of each metric with its threshold: `thw_s.svg`, `dce_m.svg` and so on
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     plot: Option<PathBuf>,
@@ -176,7 +185,7 @@ impl Answer {
 fn print(format: Format, answer: &Answer) -> ExitCode {
     match format {
         Format::Json => outln!("{:#}", answer.value),
-        Format::Human => out!("{}", answer.text),
+        Format::Human => print_text(&answer.text),
     }
     answer.code()
 }
@@ -186,6 +195,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
 }
 
 pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliError> {
+    protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--openlabel", args.openlabel.as_deref())])?;
     let references = args.reference.as_deref().map(read_references).transpose()?;
     let mut tracks = reading(&args.file, || open(&args.file, args.read.options()))?;
     if args.criterion == CriterionChoice::Gradient && tracks.layout() != Layout::InCar {
@@ -220,6 +230,10 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
         warn(format_args!("{}: {reason}", args.file.display()));
     }
     let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
+    if let Some(path) = &args.openlabel {
+        reading(&args.file, || label_file(&args.file, args.read.options(), &Labels::LaneChanges(&changes), path))?;
+        print_written(path);
+    }
     let score = scored.as_ref().map_or_else(String::new, ScoreText::text);
     Ok(Answer {
         value: stamped(json::lane_changes(&changes, scored.as_ref()), None, None),
@@ -227,7 +241,7 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
             "{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped\n{basis}\n{}{score}",
             LaneChangesText(&changes)
         ),
-        is_in_doubt: tracks.is_coarse() || nothing.is_some(),
+        is_in_doubt: tracks.is_in_doubt() || nothing.is_some(),
     })
 }
 
@@ -237,7 +251,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 
 pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliError> {
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
-    protect(&inputs, &[("--record", args.record.as_deref())])?;
+    protect(&inputs, &[("--record", args.record.as_deref()), ("--openlabel", args.openlabel.as_deref())])?;
     let charts = args.plot.as_ref().map(|folder| CRITICALITY_CHARTS.map(|name| folder.join(name)));
     for chart in charts.iter().flatten() {
         protect(&inputs, &[("--plot", Some(chart))])?;
@@ -262,13 +276,18 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
         write_recording(path, &[film_lane_change(smoothed, chosen)?])?;
         print_written(path);
     }
+    if let Some(path) = &args.openlabel {
+        let labels = Labels::Criticality(&changes, &smoothed.markings);
+        reading(&args.file, || label_file(&args.file, args.read.options(), &labels, path))?;
+        print_written(path);
+    }
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &criticality_charts(&changes, speed_limit_mps)?)?;
     }
     Ok(Answer {
         value: stamped(serde_json::json!(changes), None, None),
         text: CriticalityText { file: &file, changes: &changes, counted }.to_string(),
-        is_in_doubt: file.is_coarse,
+        is_in_doubt: file.is_in_doubt,
     })
 }
 
@@ -302,6 +321,6 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
             None => to_toml(&fitted, &heading),
             Some(_) => FitText(&fitted).to_string(),
         },
-        is_in_doubt: data_sets.iter().any(|data| data.is_coarse),
+        is_in_doubt: data_sets.iter().any(|data| data.is_in_doubt),
     })
 }

@@ -100,6 +100,50 @@ fn the_summary_lists_every_page_once() {
     assert_eq!(listed, pages);
 }
 
+/// Returns the phrases of a text that a reader reads twice.
+fn heavy_phrases(markdown: &str, phrases: &[&'static str]) -> Vec<&'static str> {
+    let text = prose(markdown).join(" ");
+    let spaced = format!(" {} ", text.split_whitespace().collect::<Vec<_>>().join(" "));
+    phrases.iter().copied().filter(|phrase| spaced.contains(&format!(" {phrase} "))).collect()
+}
+
+#[test]
+fn guides_have_no_heavy_phrases() {
+    assert_eq!(heavy_phrases("a mixture,\nof which a tenth", &["of which", "that of"]), ["of which"]);
+    for path in documents() {
+        let is_in = |folder: &str| path.starts_with(Path::new(ROOT).join("docs").join(folder));
+        let phrases: &[&str] =
+            if is_in("how-to") || is_in("start") { &["of which", "that of", "those of"] } else { &["of which"] };
+        let found = heavy_phrases(&std::fs::read_to_string(&path).unwrap(), phrases);
+        assert!(found.is_empty(), "{}: {found:?}", path.display());
+    }
+}
+
+/// Returns the counts of a campaign's result in a text, such as `148 of 227 collisions`.
+fn counted_results(markdown: &str) -> Vec<String> {
+    let text = prose(markdown).join(" ");
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let is_number = |word: &str| word.trim_matches(',').replace(',', "").parse::<u64>().is_ok();
+    let is_result = |words: &&[&str]| {
+        let [share, of, all, what] = **words else { return false };
+        is_number(share)
+            && of == "of"
+            && is_number(all)
+            && (what.starts_with("collisions") || what.starts_with("encounters"))
+    };
+    words.windows(4).filter(is_result).map(|words| words.join(" ")).collect()
+}
+
+#[test]
+fn a_reference_page_states_no_results() {
+    assert_eq!(counted_results("it prevents 148 of 227 collisions. At 5 of 100 runs"), ["148 of 227 collisions."]);
+    let references = Path::new(ROOT).join("docs/reference");
+    for path in documents().into_iter().filter(|path| path.starts_with(&references)) {
+        let results = counted_results(&std::fs::read_to_string(&path).unwrap());
+        assert!(results.is_empty(), "{}: {results:?}: a result stands in docs/evidence", path.display());
+    }
+}
+
 /// Returns the first and the last cell of each row of a glossary that begins with the term of a
 /// paper.
 fn terms(text: &str) -> Vec<(String, String)> {

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use closecall_scenarios::criteria::Expression;
+
 use crate::support::{ROOT, folder};
 
 /// The files for GitHub, with the words that start the gate.
@@ -80,6 +82,32 @@ fn a_second_job_on_gitlab_builds_nothing_after_a_failed_gate() {
     assert_eq!(fs::read_to_string(builds).unwrap(), "built\n");
 }
 
+/// The files in which users read a gate, and copy it.
+const EXAMPLES: [&str; 5] = [
+    ".github/actions/campaign/action.yml",
+    "docs/how-to/ci/github.yml",
+    "docs/how-to/ci/gitlab.yml",
+    "docs/how-to/cluster/github.yml",
+    "docs/how-to/cluster/rayjob.yaml",
+];
+
+#[test]
+fn the_program_accepts_the_gates_that_the_ci_files_show() {
+    let mut gates = 0;
+    for path in EXAMPLES {
+        let text = text(path);
+        for rest in text.split("--gate ").skip(1) {
+            let quote = rest.chars().next().filter(|c| matches!(c, '\'' | '"'));
+            let quote = quote.unwrap_or_else(|| panic!("{path}: the gate is not quoted: {rest}"));
+            let gate = rest[1..].split(quote).next().unwrap_or_default();
+            assert!(gate.parse::<Expression>().is_ok(), "{path}: {gate}: {:?}", gate.parse::<Expression>());
+            gates += 1;
+        }
+    }
+    assert!(gates >= 3, "{gates}");
+    assert!("max(contacts) < 1".parse::<Expression>().is_err());
+}
+
 #[test]
 #[cfg(unix)]
 fn the_action_carries_a_quoted_gate() {
@@ -94,7 +122,7 @@ fn the_action_carries_a_quoted_gate() {
         .args(["-e", "-c", &format!("code=0\n{}", script.join("\n"))])
         .env("HOME", home.path())
         .envs([("SCENARIOS", "a b"), ("PRESET", "pr"), ("SEED", "1"), ("CONTROLLER", "exec:python3 my.py")])
-        .envs([("OPTIONS", "--gate 'max(contacts) < 1' --max-induced 0 '$(touch x)'"), ("OUT", "out")])
+        .envs([("OPTIONS", "--gate 'upper(induced) <= 0.03' --max-induced 0 '$(touch x)'"), ("OUT", "out")])
         .env("GITHUB_OUTPUT", home.path().join("output"))
         .output()
         .unwrap();
@@ -102,7 +130,7 @@ fn the_action_carries_a_quoted_gate() {
     let words = String::from_utf8(job.stdout).unwrap();
     assert!(words.starts_with("<campaign><a><b><--preset>"), "{words}");
     assert!(words.contains("<--controller><exec:python3 my.py>"), "{words}");
-    assert!(words.ends_with("<--gate><max(contacts) < 1><--max-induced><0><$(touch x)>"), "{words}");
+    assert!(words.ends_with("<--gate><upper(induced) <= 0.03><--max-induced><0><$(touch x)>"), "{words}");
 }
 
 #[test]

@@ -70,7 +70,17 @@ fn the_library_is_listed_and_works_from_anywhere() {
     assert!(faults.contains("lidar-dead\n  What does the system do"), "{faults}");
     let listing = stdout(&run_in(folder.path(), &["list", "paper"]), 0);
     assert!(listing.starts_with("paper-figure\n  Does the margin increase system"), "{listing}");
-    assert!(message(&run_in(folder.path(), &["list", "no-such"])).contains("no scenario has `no-such` in its name"));
+    assert_eq!(stdout(&run_in(folder.path(), &["list", "PAPER"]), 0), listing);
+    assert_eq!(stdout(&run_in(folder.path(), &["list", "Fault"]), 0), faults);
+    let headline = stdout(&run_in(folder.path(), &["list", "headline"]), 0);
+    for name in ["low-thw-overtake", "low-thw-overtake-as-recorded"] {
+        assert!(headline.lines().any(|line| line == name), "{headline}");
+    }
+    assert!(!headline.contains("paper-figure"), "{headline}");
+    assert!(
+        message(&run_in(folder.path(), &["list", "no-such"]))
+            .contains("no scenario has `no-such` in its name or as a tag")
+    );
     let run = json(&run_in(folder.path(), &["run", "paper-figure", "--format", "json"]), 0);
     assert_eq!(run["scenario"], "paper-figure");
     assert!(message(&run_in(folder.path(), &["run", "paper-figur"])).contains("did you mean `paper-figure`"));
@@ -180,6 +190,10 @@ fn a_misspelt_or_negative_value_is_explained() {
         (
             ["run", "paper-figure", "--sample", "1.5"],
             "'1.5' for '--sample <SAMPLE>': expected a whole number, 0 or more",
+        ),
+        (
+            ["run", "paper-figure", "--sample", "99999999999999999999999"],
+            "for '--sample <SAMPLE>': expected a whole number from 0 to 18446744073709551615",
         ),
         (
             ["run", "paper-figur", "--seed", "1"],

@@ -3,8 +3,9 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
+use closecall_testing::has_python;
 use serde_json::Value;
 
 use crate::native_controllers::{compile, lib, with_fault};
@@ -111,6 +112,44 @@ fn every_report_says_why_samples_failed_and_which_to_replay() {
     // A campaign that ends early says it, too.
     let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast"]), 5);
     assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");
+}
+
+/// Runs a program in a terminal with as many rows as the first argument says, and 40 columns.
+const IN_TERMINAL: &str = r#"
+import fcntl, os, pty, struct, sys, termios
+pid, terminal = pty.fork()
+if pid == 0:
+    fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", int(sys.argv[1]), 40, 0, 0))
+    os.execv(sys.argv[2], sys.argv[2:])
+text = b""
+try:
+    while part := os.read(terminal, 65536):
+        text += part
+except OSError:
+    pass
+os.waitpid(pid, 0)
+sys.stdout.buffer.write(text)
+"#;
+
+#[test]
+fn texts_of_studies_and_errors_are_wrapped_to_a_terminal_also_if_it_states_no_rows() {
+    if !has_python() {
+        return;
+    }
+    for arguments in [&["study", "exposure", "--counted", "20/5000"][..], &["run", "paper-figur"]] {
+        for rows in ["0", "24"] {
+            let mut command = Command::new("python3");
+            command.args(["-c", IN_TERMINAL, rows]).arg(program().get_program()).args(arguments);
+            let output = command.env("NO_COLOR", "1").env("TERM", "xterm").output().unwrap();
+            let text = stdout(&output, 0).replace('\r', "");
+            assert!(text.lines().count() > 2, "{arguments:?}: {text}");
+            for line in text.lines() {
+                let is_one_word = line.split_whitespace().filter(|word| word.chars().count() > 1).count() < 2;
+                let is_whole = is_one_word || line.contains("closecall ");
+                assert!(line.chars().count() <= 40 || is_whole, "{arguments:?}, {rows} rows: {line}");
+            }
+        }
+    }
 }
 
 #[test]

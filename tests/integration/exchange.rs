@@ -326,6 +326,35 @@ fn other_programs_read_the_osi_messages_of_a_run() {
 }
 
 #[test]
+fn a_run_as_osi_is_read_back_with_the_lane_changes_of_its_trajectory_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mcap, osi, csv] = ["drive.mcap", "drive.osi", "drive.csv"].map(|name| folder.path().join(name));
+    let scenario = "paper-figure --sensors ground-truth";
+    stdout(&run(&format!("run {scenario} --osi"), &mcap), 0);
+    stdout(&run(&format!("run {scenario} --osi"), &osi), 0);
+    stdout(&run(&format!("traffic record {scenario} -n 1 -o"), &csv), 0);
+    let changes = |path: &Path| -> serde_json::Value {
+        serde_json::from_str(&stdout(&run("traffic lane-changes --format json", path), 0)).unwrap()
+    };
+    let (of_csv, of_mcap) = (changes(&csv), changes(&mcap));
+    // The rear vehicle is the third actor.
+    let [change] = &of_mcap.as_array().unwrap()[..] else { panic!("{of_mcap}") };
+    let expected = &of_csv[0];
+    for key in ["direction", "from_lane", "to_lane", "complete"] {
+        assert_eq!(change[key], expected[key], "{key}");
+    }
+    for (key, tolerance) in [("crossing_s", 0.1), ("duration_s", 0.2), ("speed_mps", 0.1), ("lateral_shift_m", 0.05)] {
+        let difference = change[key].as_f64().unwrap() - expected[key].as_f64().unwrap();
+        assert!(difference.abs() <= tolerance, "{key}: {change} {expected}");
+    }
+    let [truth, tracks] = &traces(folder.path())[..] else { panic!() };
+    assert_eq!(changes(truth), of_mcap);
+    let output = run("traffic lane-changes", tracks);
+    assert_eq!(code(&output), 3);
+    assert!(message(&output).contains("no GroundTruth"), "{}", message(&output));
+}
+
+#[test]
 fn the_lanes_are_in_each_message_on_request() {
     let Some(python) = closecall_testing::python_with_exchange() else { return };
     let folder = tempfile::tempdir().unwrap();

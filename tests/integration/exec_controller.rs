@@ -126,6 +126,38 @@ fn a_command_that_cannot_be_started_or_parsed_is_an_error() {
     }
 }
 
+#[test]
+fn a_script_that_is_there_but_cannot_be_started_is_told_why() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = folder();
+    for (name, text, expected) in [
+        (
+            "crlf",
+            "#!/bin/sh\r\nexit 0\r\n",
+            "its line 1 names the interpreter `/bin/sh\\r`, which is not there: its lines end with CR LF",
+        ),
+        (
+            "moved",
+            "#! /opt/no-such/python3 -u\n",
+            "its line 1 names the interpreter `/opt/no-such/python3`, which is not there",
+        ),
+        ("escape", "#!/no/\u{1b}[31m\n", "names the interpreter `/no/\\u{1b}[31m`, which is not there"),
+        ("plain", "exit 0\n", "nor a script whose first line names its interpreter, such as `#!/bin/sh`"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let output = run_with(&format!("exec:{}", path.display()), name);
+        assert_eq!(code(&output), 3, "{name}: {}", stderr(&output));
+        // The frame may break a path.
+        let squeezed = |text: &str| text.replace(' ', "");
+        let shown = squeezed(&message(&output));
+        assert!(shown.contains(&squeezed(expected)), "{name}: {}", stderr(&output));
+        assert!(!shown.contains("Nosuchfile") && !shown.contains("Execformat"), "{name}: {}", stderr(&output));
+    }
+}
+
 /// Returns the results of a campaign by sample: the outcome without the keys that name the
 /// controller, or the error message.
 fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {

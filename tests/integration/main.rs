@@ -55,6 +55,7 @@ mod mask_rcnn;
 mod native_controllers;
 mod nothing_checked;
 mod odd_recordings;
+mod openlabel;
 mod openscenario;
 mod outside_perception;
 mod own_controller;

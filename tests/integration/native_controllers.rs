@@ -202,6 +202,20 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
 }
 
 #[test]
+fn a_run_and_a_campaign_say_the_same_about_a_library_that_ends_its_process() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    for (fault, expected) in FAULTS.iter().filter(|(fault, _)| ["segfault", "exit-3"].contains(fault)) {
+        let mut command = program();
+        command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", &library]);
+        let output = with_fault(command.env("FAULT_ALWAYS", "1"), Some(*fault));
+        assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
+        let text = message(&output);
+        assert!(text.contains(*expected) && !text.contains("before its first answer"), "{fault}: {text}");
+    }
+}
+
+#[test]
 fn the_header_and_the_examples_in_c_compile_without_warnings() {
     let check = |compiler: &str, arguments: &[&str]| {
         let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-fsyntax-only", "-I", "controllers/include"];

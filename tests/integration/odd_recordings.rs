@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use closecall_testing::data;
 use serde_json::Value;
 
-use crate::support::{closecall, folder, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, message, stderr, stdout};
 
 /// Exit code of wrong input.
 const WRONG_INPUT: i32 = 3;
@@ -30,7 +30,7 @@ fn lane_changes(file: &Path, options: &[&str]) -> (Vec<Value>, String) {
 fn refusal(file: &Path, options: &[&str]) -> String {
     let output = closecall(["traffic", "lane-changes", file.to_str().unwrap()].iter().chain(options));
     stdout(&output, WRONG_INPUT);
-    stderr(&output)
+    message(&output)
 }
 
 /// Writes the rows for which `keep` returns true, given their column `frame` and their line, and
@@ -126,6 +126,12 @@ fn traffic_against_the_axis_of_the_road_is_refused_by_the_direction() {
     let message = refusal(&reversed, &[]);
     assert!(message.contains("falls in the direction of travel") && message.contains("--reverse-s"), "{message}");
     assert_eq!(lane_changes(&reversed, &["--reverse-s"]).0.len(), whole);
+    let negative = changed(&clean, &folder.path().join("negative.csv"), |row| {
+        vec![("s_m", 1_000.0 - row("s_m")), ("speed_mps", -row("speed_mps"))]
+    });
+    let message = refusal(&negative, &[]);
+    assert!(message.contains("--reverse-s") && !message.contains("--drop-bad-rows"), "{message}");
+    assert_eq!(lane_changes(&negative, &["--reverse-s"]).0.len(), whole);
     let both = changed(&clean, &folder.path().join("both.csv"), |row| {
         let s_m = row("s_m");
         vec![("s_m", if row("track_id") % 2.0 == 0.0 { 1_000.0 - s_m } else { s_m })]
@@ -231,6 +237,72 @@ fn swapped_and_reused_numbers_make_no_lane_change() {
     }
 }
 
+/// Writes ten pairs of vehicles side by side, in lanes of `lane_m`. None of them changes lanes. At
+/// 10 s, `missing` frames of `step_s` are lost, and the two numbers of each pair are swapped.
+fn swapped_pairs(to: &Path, lane_m: f64, step_s: f64, missing: u32) -> PathBuf {
+    let mut text =
+        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    let (swap, last) = ((10.0 / step_s).round() as u32, (30.0 / step_s).round() as u32);
+    for frame in (0..last).filter(|frame| !(swap..swap + missing).contains(frame)) {
+        let time_s = step_s * f64::from(frame);
+        for vehicle in 0..20_u32 {
+            let track = if frame < swap { vehicle } else { vehicle ^ 1 };
+            let lane = 1 + vehicle % 2;
+            let s_m = 60.0 * f64::from(vehicle / 2) + 8.0 * f64::from(vehicle % 2) + 28.0 * time_s;
+            let d_m = lane_m * (f64::from(lane) - 0.5);
+            text += &format!("{track},{frame},{time_s:.2},{s_m:.3},{d_m:.3},{lane},28,0,4.5,1.8,car\n");
+        }
+    }
+    fs::write(to, text).unwrap();
+    to.to_owned()
+}
+
+#[test]
+fn numbers_swapped_across_a_gap_make_no_lane_change() {
+    let folder = folder();
+    for (lane_m, step_s, missing) in
+        [(3.5, 0.1, 4), (3.75, 0.1, 4), (3.0, 0.1, 2), (3.0, 0.04, 10), (3.0, 0.4, 0), (3.5, 0.4, 1), (3.0, 0.2, 2)]
+    {
+        let file = swapped_pairs(&folder.path().join("swapped.csv"), lane_m, step_s, missing);
+        let case = format!("lanes of {lane_m} m, {missing} frames of {step_s} s missing");
+        let output = closecall(["traffic", "lane-changes", file.to_str().unwrap(), "--format", "json"]);
+        assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap(), Value::Array(Vec::new()), "{case}");
+        assert!(stderr(&output).contains("20 jumps"), "{case}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn lane_changes_in_gaps_are_counted_and_no_success() {
+    let folder = folder();
+    let clean = three_vehicles(&folder.path().join("clean.csv"), Some(5.0));
+    assert_eq!(lane_changes(&clean, &[]).0.len(), 1);
+    // Of the three vehicles, the first one crosses the marking at 12.5 s, in frame 125.
+    let is_lost = |frame: u64, line: usize| line.is_multiple_of(3) && (119..131).contains(&frame);
+    let missing = thinned(&clean, &folder.path().join("missing.csv"), |frame, line| !is_lost(frame, line));
+    let text = fs::read_to_string(&clean).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let spoilt = |(line, row): (usize, &str)| {
+        if is_lost(line as u64 / 3, line) { row.replace(",car", ",car,1") } else { row.to_owned() }
+    };
+    let rows: Vec<String> = rows.lines().enumerate().map(spoilt).collect();
+    let bad = folder.path().join("bad.csv");
+    fs::write(&bad, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+    for command in ["lane-changes", "criticality", "statistics", "fit"] {
+        for (file, options) in [(&missing, &[][..]), (&bad, &["--drop-bad-rows"][..])] {
+            let words = ["traffic", command, file.to_str().unwrap()];
+            let output = closecall(words.iter().chain(options));
+            assert_eq!(code(&output), INCONCLUSIVE, "{command}: {}", stderr(&output));
+            let warning = "1 of 1 changes of the recorded lane lie in gaps";
+            assert!(stderr(&output).contains(warning), "{command}: {}", stderr(&output));
+            assert!(!stderr(&output).contains("no vehicle changes its recorded lane"), "{}", stderr(&output));
+        }
+    }
+    // A gap beside the lane change hides nothing.
+    let beside =
+        thinned(&clean, &folder.path().join("beside.csv"), |frame, line| line % 3 != 0 || !(20..31).contains(&frame));
+    assert_eq!(lane_changes(&beside, &[]).0.len(), 1);
+}
+
 #[test]
 fn lanes_against_the_lateral_position_are_refused_by_the_axis() {
     let Some(from_right) = odd("lanes_from_right.csv") else { return };
@@ -269,6 +341,26 @@ fn spreadsheets_of_other_countries_and_whole_numbers_as_floats_are_read() {
 }
 
 #[test]
+fn decimal_commas_without_semicolons_are_refused_by_that_reason() {
+    let folder = folder();
+    let text = fs::read_to_string(recorded(folder.path())).unwrap();
+    let with_commas = |line: &str, separator: &str, quote: &str| {
+        let fields: Vec<String> =
+            line.split(',').map(|field| format!("{quote}{}{quote}", field.replace('.', ","))).collect();
+        fields.join(separator)
+    };
+    let file = folder.path().join("commas.csv");
+    for (separator, quote) in [("\t", ""), (",", "\"")] {
+        let lines: Vec<String> = text.lines().map(|line| with_commas(line, separator, quote)).collect();
+        fs::write(&file, lines.join("\n") + "\n").unwrap();
+        for options in [&[][..], &["--drop-bad-rows"][..]] {
+            let message = refusal(&file, options);
+            assert!(message.contains("decimal comma") && !message.contains("drop-bad-rows"), "{message}");
+        }
+    }
+}
+
+#[test]
 fn a_whole_file_without_a_last_line_end_is_read_and_a_cut_one_is_not() {
     let folder = folder();
     let clean = recorded(folder.path());
@@ -289,7 +381,7 @@ fn files_of_other_programs_that_lack_something_are_refused_by_that_reason() {
         ("a.json", "[{\"timestamp\": [1.0], \"x_position\": [2.0]}]", "missing field `y_position`"),
         ("a.xosc", "<?xml version=\"1.0\"?>\n<OpenSCENARIO>\n</OpenSCENARIO>\n", "an OpenSCENARIO scenario"),
         ("a.xodr", "<?xml version=\"1.0\"?>\n<OpenDRIVE>\n</OpenDRIVE>\n", "an OpenDRIVE road network"),
-        ("a.osi", "\u{10}\0\0\0\u{1}\u{2}", "a trace of OSI messages"),
+        ("a.osi", "\u{10}\0\0\0\u{1}\u{2}", "the file is cut after 2 of its 16 bytes"),
         ("u.csv", "t\0r\0a\0c\0k\0_\0i\0d\0", "UTF-16"),
         ("a.xml", "<?xml version=\"1.0\"?>\n<!-- generated -->\n<fcd-export>\n</fcd-export>\n", "there are no rows"),
     ];

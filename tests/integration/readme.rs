@@ -88,7 +88,7 @@ fn lines(block: &str) -> Vec<Line> {
 fn without_wall_time(text: &str) -> Vec<String> {
     const SIMULATED: &str = " simulated seconds in ";
     let steady = |line: &str| match line.split_once(SIMULATED) {
-        Some((simulated, rest)) if rest.contains(" threads") => format!("{simulated}{SIMULATED}"),
+        Some((simulated, rest)) if rest.contains(" thread") => format!("{simulated}{SIMULATED}"),
         _ if line.trim_start().starts_with("\"wall_s\":") => "\"wall_s\":".to_owned(),
         _ => line.to_owned(),
     };

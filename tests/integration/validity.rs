@@ -117,7 +117,11 @@ fn each_check_finds_its_fault() {
         assert_eq!(findings(&summary.total()), [(expected, 6)], "{expected:?}");
         let judged = judged(&summary);
         assert_eq!((judged.verdict(), judged.decision), (Some(Verdict::Invalid), Decision::Invalid));
-        assert!(judged.reasons[0].contains(expected.finding()), "{:?}", judged.reasons);
+        let reason = &judged.reasons[0];
+        assert!(reason.contains(expected.finding()), "{reason}");
+        assert!(reason.contains("6 of 6 checked, first in sample 0 of low-thw-overtake with "), "{reason}");
+        let blames_controller = matches!(expected, Invariance::Repetition | Invariance::Threads);
+        assert_eq!(reason.contains("; the likely cause is "), blames_controller, "{reason}");
     }
 }
 

@@ -86,6 +86,7 @@ mod vehicle;
 pub mod metrics;
 pub mod statistics;
 pub mod suggest;
+pub mod words;
 
 pub use absent::{Absent, Measured};
 pub use actor::{ActorId, InvalidActorId};

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use closecall_scenarios::criteria::{Expression, FlagName};
+use closecall_traffic::words::counted;
 
 use super::evaluate::{Answer, Evaluation};
 use super::set::GateSource;
@@ -87,7 +88,7 @@ impl fmt::Display for GateResult {
         if let Some([low, high]) = interval_95 {
             write!(f, ", share {} to {} with 95 %", shown(low), shown(high))?;
         }
-        write!(f, ", {samples} samples")?;
+        write!(f, ", {}", counted(samples, "sample"))?;
         if let Some(why) = self.evaluation.undecided() {
             write!(f, "; {why}")?;
         }
@@ -175,9 +176,10 @@ impl fmt::Display for ExpectationResult {
         let least = percent(self.least_share);
         write!(
             f,
-            "{}: {} in {happened} of {samples} samples ({share}, at least {least} expected)",
+            "{}: {} in {happened} of {} ({share}, at least {least} expected)",
             self.scenario,
-            names.join(" and ")
+            names.join(" and "),
+            counted(samples, "sample")
         )
     }
 }

@@ -247,15 +247,6 @@ fn line(message: &impl serde::Serialize) -> Vec<u8> {
 /// Returns the failure of a sample whose process has ended. Its message does not depend on the
 /// samples before.
 fn failure(error: &ExecError) -> SampleFailure {
-    let wrote = |stderr: &str| if stderr.is_empty() { String::new() } else { format!("; it last wrote: {stderr}") };
-    let message = match error {
-        ExecError::Ended { status, stderr, .. } => {
-            // Whether the system keeps a memory dump depends on its settings.
-            let status = status.to_string().replace(" (core dumped)", "");
-            format!("the controller ended its process ({status}){}", wrote(stderr))
-        }
-        ExecError::Closed { stderr, .. } => format!("the controller closed the output of its process{}", wrote(stderr)),
-        other => format!("the controller failed: {other}"),
-    };
+    let message = error.end_of_isolated().unwrap_or_else(|| format!("the controller failed: {error}"));
     SampleFailure { kind: KIND.to_owned(), message }
 }

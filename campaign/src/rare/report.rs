@@ -3,6 +3,7 @@
 use std::fmt;
 
 use closecall_traffic::Parameters;
+use closecall_traffic::words::counted;
 use serde::Serialize;
 
 use super::estimate::{COVERAGE, Mean};
@@ -239,7 +240,7 @@ impl RareReport {
 
 impl fmt::Display for RareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}: {} by {}, {} runs", self.scenario, self.event, self.method, self.runs)?;
+        writeln!(f, "{}: {} by {}, {}", self.scenario, self.event, self.method, counted(self.runs, "run"))?;
         for Estimate { of, value, interval_95, .. } in &self.estimates {
             match interval_95 {
                 Some([low, high]) => writeln!(f, "  {of}: {value:.3e}, 95 % interval {low:.3e} to {high:.3e}")?,
@@ -273,7 +274,7 @@ impl fmt::Display for RareReport {
             )?;
         }
         if let Some(SearchDetails { starts, has_event }) = self.search {
-            let started = if starts == 1 { "one start".to_owned() } else { format!("{starts} starts") };
+            let started = counted(starts, "start");
             match has_event {
                 true => writeln!(f, "  found, after {started}; a search states no probability")?,
                 false => writeln!(
@@ -286,7 +287,7 @@ impl fmt::Display for RareReport {
         if let Some(error) = &self.first_error {
             writeln!(
                 f,
-                "  {} runs ended in an error, and count as runs without the event; the first: {}",
+                "  runs that ended in an error, and count as runs without the event: {}; the first: {}",
                 self.errors, error.message
             )?;
         }

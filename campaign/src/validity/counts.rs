@@ -37,6 +37,11 @@ impl Invariance {
         }
     }
 
+    /// Returns true if a controller that answers the same inputs in different ways breaks the check.
+    pub const fn is_of_repeatability(self) -> bool {
+        matches!(self, Self::Repetition | Self::Threads)
+    }
+
     /// Returns the meaning of a failure of the check, as a sentence.
     pub const fn finding(self) -> &'static str {
         match self {
@@ -63,6 +68,15 @@ pub struct ArmChecks {
     pub not_checked: Option<String>,
 }
 
+/// One run of a scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunOfScenario {
+    /// The sample.
+    pub sample: u64,
+    /// Index of the arm.
+    pub arm: usize,
+}
+
 /// The findings of the checks of a campaign.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CheckCounts {
@@ -74,26 +88,30 @@ pub struct CheckCounts {
     pub flips: u64,
     /// Number of failures of each check, in the order of [`Invariance::ALL`].
     pub counts: [u64; Invariance::ALL.len()],
+    /// The first run that each check refutes, in the same order. The total of all scenarios has
+    /// none: a run is one of a scenario.
+    pub firsts: [Option<RunOfScenario>; Invariance::ALL.len()],
 }
 
 impl CheckCounts {
     /// Adds the findings about one run. `collided` says whether the ego collided in that run.
-    pub fn push(&mut self, checks: &ArmChecks, collided: bool) {
+    pub fn push(&mut self, run: RunOfScenario, checks: &ArmChecks, collided: bool) {
         match checks.not_checked {
             Some(_) => self.not_checked += 1,
             None => self.runs += 1,
         }
         self.flips += u64::from(checks.collided_at_half_step.is_some_and(|halved| halved != collided));
-        for &check in &checks.broken {
-            self.count(check);
+        for ((count, first), kind) in self.counts.iter_mut().zip(&mut self.firsts).zip(Invariance::ALL) {
+            if checks.broken.contains(&kind) {
+                *count += 1;
+                *first = first.or(Some(run));
+            }
         }
     }
 
-    /// Counts a failure of a check.
-    pub fn count(&mut self, check: Invariance) {
-        for (count, kind) in self.counts.iter_mut().zip(Invariance::ALL) {
-            *count += u64::from(kind == check);
-        }
+    /// Returns the first run that a check refutes; `None` if there is none.
+    pub fn first(&self, check: Invariance) -> Option<RunOfScenario> {
+        Invariance::ALL.into_iter().zip(self.firsts).find(|(kind, _)| *kind == check)?.1
     }
 
     /// Returns the checks that failed, each with the number of its failures.

@@ -26,6 +26,6 @@ mod mirror;
 mod plan;
 mod probe;
 
-pub use counts::{ArmChecks, CheckCounts, Invariance};
+pub use counts::{ArmChecks, CheckCounts, Invariance, RunOfScenario};
 pub use plan::{CheckPlan, CheckPlanError};
 pub(crate) use probe::CheckedRun;

@@ -6,8 +6,8 @@ use closecall_traffic::Time;
 
 use super::smooth::{SmoothedTrack, SmoothedTrajectoryData, smooth, smooth_track};
 use crate::trajectory_data::{
-    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, Tracks, TrajectoryFileError,
-    TrajectoryFileProblem, count_flaws, open_streaming, read_with,
+    FlawCounts, Layout, MarkingObserver, QualityInspector, ReadOptions, Tracks, TrajectoryFileError, count_flaws,
+    open_streaming, read_with,
 };
 
 /// Number of track points among which overlaps are searched: 25 MiB.
@@ -22,8 +22,8 @@ pub struct SmoothedFile {
     pub flaws: FlawCounts,
     /// Time between two recorded frames.
     pub period: Time,
-    /// Whether the frames are too far apart for every lane change to be found.
-    pub is_coarse: bool,
+    /// Whether a warning says that lane changes may be missing.
+    pub is_in_doubt: bool,
     /// What a reader of results has to know of the file.
     pub warnings: Vec<String>,
 }
@@ -36,23 +36,14 @@ pub struct SmoothedFile {
 /// # Errors
 /// [`TrajectoryFileError`] with file, line, column and allowed values.
 pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, TrajectoryFileError> {
-    let needs_all_rows = |problem: &TrajectoryFileProblem| {
-        matches!(
-            problem,
-            TrajectoryFileProblem::NotByVehicle { .. }
-                | TrajectoryFileProblem::NotByTime { .. }
-                | TrajectoryFileProblem::TooManyOpen { .. }
-                | TrajectoryFileProblem::SplitPiece { .. }
-        )
-    };
     match open_streaming(path, options).and_then(smooth_stream) {
         Ok(Some(file)) => return Ok(file),
-        Err(error) if !needs_all_rows(&error.problem) => return Err(error),
+        Err(error) if !error.problem.needs_all_rows() => return Err(error),
         Ok(None) | Err(_) => {}
     }
     let data = read_with(path, options)?;
     let (flaws, warnings) = (count_flaws(&data), data.warnings());
-    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, is_coarse: data.is_coarse, warnings })
+    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, is_in_doubt: data.is_in_doubt, warnings })
 }
 
 /// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
@@ -76,6 +67,6 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     let markings = if file.states_markings() { file.markings().clone() } else { markings.finish() };
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
     let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
-    let (flaws, period, is_coarse) = (inspector.count_flaws(), file.period(), file.is_coarse());
-    Ok(Some(SmoothedFile { data, flaws, period, is_coarse, warnings }))
+    let (flaws, period, is_in_doubt) = (inspector.count_flaws(), file.period(), file.is_in_doubt());
+    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, warnings }))
 }

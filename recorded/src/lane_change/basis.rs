@@ -17,6 +17,8 @@ pub struct DetectionBasis {
     markings: LaneMarkings,
     recorded_lanes: BTreeSet<u8>,
     recorded_crossings: u64,
+    /// Changes of the recorded lane while the rows of a vehicle are missing.
+    hidden_crossings: u64,
     /// Frames in which both distances to the markings were measured.
     measured_frames: u64,
     is_measured: bool,
@@ -31,6 +33,7 @@ impl DetectionBasis {
             markings: markings.clone(),
             recorded_lanes: BTreeSet::new(),
             recorded_crossings: 0,
+            hidden_crossings: 0,
             measured_frames: 0,
             is_measured: false,
         }
@@ -46,6 +49,11 @@ impl DetectionBasis {
         self.measured_frames += seen.count() as u64;
     }
 
+    /// States how often a vehicle changes its recorded lane while its rows are missing.
+    pub(super) fn set_hidden_crossings(&mut self, hidden_crossings: u64) {
+        self.hidden_crossings = hidden_crossings;
+    }
+
     /// Returns true if lane positions come from the recorded lanes alone, and none of them is
     /// known.
     fn has_no_marking(&self) -> bool {
@@ -55,7 +63,8 @@ impl DetectionBasis {
     /// Returns true if lane changes are searched by the recorded lanes, and no vehicle changes its
     /// recorded lane.
     pub fn lacks_recorded_crossings(&self) -> bool {
-        (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable) && self.recorded_crossings == 0
+        let by_lane = (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
+        by_lane && self.recorded_crossings + self.hidden_crossings == 0
     }
 
     /// Returns why vehicles change their recorded lanes although no lane change was found, of `found`

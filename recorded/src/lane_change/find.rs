@@ -32,6 +32,7 @@ pub fn find(tracks: &mut Tracks<'_>, criterion: Criterion) -> Result<FoundLaneCh
         result.lane_changes.extend(detector.detect(criterion, &track.trajectory, &track.markings));
         result.spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
     }
+    result.basis.set_hidden_crossings(tracks.continuity().hidden_crossings);
     result.lane_changes.sort_by(|a, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
     Ok(result)
 }

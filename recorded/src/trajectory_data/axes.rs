@@ -30,6 +30,13 @@ const MISPLACED_M: f64 = 0.5;
 const WARNED_SHARE: f64 = 0.05;
 const REFUSED_SHARE: f64 = 0.2;
 
+/// Distance to the left of its carriageway beyond which a vehicle is on another road (m): more than a
+/// narrow shoulder beside the median. An assumption with a plausible range of 1 to 3 m.
+const OUTSIDE_LEFT_M: f64 = 2.0;
+/// The same to the right (m): more than a merging lane of 3.75 m and a shoulder of 3 m. An assumption
+/// with a plausible range of 7 to 10 m.
+const OUTSIDE_RIGHT_M: f64 = 8.0;
+
 /// Directions of the file that differ from the documented ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisOptions {
@@ -137,6 +144,25 @@ pub(super) fn check_order(rows: &[Row], markings: Option<&LaneMarkings>) -> Resu
     let lanes = [first.0, last.0];
     let apart_m = last.1 - first.1;
     Err(ReadError::of_file(TrajectoryFileProblem::LanesAgainstPosition { lanes, apart_m, is_mirrored }))
+}
+
+/// Rejects rows in which many vehicles are far beside their carriageway, in either lane at its edges.
+pub(super) fn check_carriageways(rows: &[Row], markings: &LaneMarkings) -> Result<(), ReadError> {
+    for road in markings.carriageways() {
+        let Some(right_m) = markings.right_edge_m(Lane(road.last)) else { continue };
+        let (mut outside, mut all) = (0_usize, 0_usize);
+        for row in rows.iter().filter(|row| road.holds(row.lane)) {
+            let is_outside = row.d_m > road.left_m + OUTSIDE_LEFT_M || row.d_m < right_m - OUTSIDE_RIGHT_M;
+            outside += usize::from(is_outside);
+            all += 1;
+        }
+        let share = outside as f64 / all.max(1) as f64;
+        if all >= LEAST_ROWS && share > REFUSED_SHARE {
+            let (lanes, percent) = ([road.first, road.last], 100.0 * share);
+            return Err(ReadError::of_file(TrajectoryFileProblem::BesideCarriageway { lanes, percent }));
+        }
+    }
+    Ok(())
 }
 
 /// Rejects rows in which many vehicles are not between the markings of their lane. Returns a warning

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use closecall_traffic::Time;
 
 use super::assemble::{Step, assemble_track, step};
-use super::continuity::{Continuity, FrameClock, bridge, is_jump};
+use super::continuity::{Continuity, FrameClock, bridge, compared_until, hides_crossing, is_jump};
 use super::data::RecordedTrack;
 use super::error::TrajectoryFileProblem;
 use super::order::{Order, TimeOrder, VehicleOrder};
@@ -30,6 +30,9 @@ pub(super) struct TrackBuilder {
     open: BTreeMap<(u64, Time), Vec<Row>>,
     open_rows: usize,
     max_open_rows: usize,
+    /// The last rows of complete tracks, by vehicle and origin: of the latest track alone if the rows
+    /// arrive by vehicle, and of tracks that end shortly before the latest row if they arrive by time.
+    ends: BTreeMap<(u64, Time), Row>,
     /// Number of pieces completed so far, by vehicle number.
     pieces: BTreeMap<u64, u64>,
     ready: VecDeque<RecordedTrack>,
@@ -53,6 +56,7 @@ impl TrackBuilder {
             open: BTreeMap::new(),
             open_rows: 0,
             max_open_rows: usize::MAX,
+            ends: BTreeMap::new(),
             pieces: BTreeMap::new(),
             ready: VecDeque::new(),
             continuity: Continuity::default(),
@@ -88,12 +92,14 @@ impl TrackBuilder {
             }
         }
         let rows = self.open.entry(key).or_default();
+        let mut begins_after_gap = rows.is_empty();
         if let Some(before) = rows.last() {
             let step = step(before, &row, self.clock)?;
             let missing = if step == Step::Gap { bridge(before, &row, self.clock) } else { Some(Vec::new()) };
             let is_jump = is_jump(before, &row);
             match missing {
                 Some(missing) if !is_jump => {
+                    self.continuity.recorded_crossings += u64::from(before.lane != row.lane);
                     self.continuity.bridged_gaps += u64::from(!missing.is_empty());
                     self.continuity.bridged_frames += missing.len() as u64;
                     self.open_rows += missing.len();
@@ -102,10 +108,14 @@ impl TrackBuilder {
                 missing => {
                     // Beyond a long gap, the number may well belong to another vehicle.
                     self.continuity.jumps += u64::from(missing.is_some());
+                    begins_after_gap = missing.is_none();
                     let complete = std::mem::take(rows);
                     self.close(&complete)?;
                 }
             }
+        }
+        if begins_after_gap && let Some(end) = self.ends.get(&(row.vehicle_id, row.origin)) {
+            self.continuity.hidden_crossings += u64::from(hides_crossing(end, &row));
         }
         self.open_rows += 1;
         if self.open_rows > self.max_open_rows {
@@ -146,13 +156,18 @@ impl TrackBuilder {
         let clock = self.clock;
         let is_over = |rows: &Vec<Row>| rows.last().is_none_or(|row| clock.bridged_until(row.time) < now);
         let over: Vec<_> = self.open.iter().filter(|(_, rows)| is_over(rows)).map(|(key, _)| *key).collect();
+        self.ends.retain(|_, end| compared_until(end.time) >= now);
         over.into_iter().try_for_each(|key| self.open.remove(&key).map_or(Ok(()), |rows| self.close(&rows)))
     }
 
     /// Completes one track from its rows.
     fn close(&mut self, rows: &[Row]) -> Result<(), ReadError> {
         self.open_rows = self.open_rows.saturating_sub(rows.len());
-        let Some(first) = rows.first() else { return Ok(()) };
+        let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
+        if matches!(self.order, OrderCheck::Vehicle(_)) {
+            self.ends.clear();
+        }
+        self.ends.insert((last.vehicle_id, last.origin), *last);
         let pieces = self.pieces.entry(first.number).or_default();
         let piece = *pieces;
         *pieces += 1;

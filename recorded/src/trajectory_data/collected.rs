@@ -8,7 +8,7 @@
 //!   I-24 MOTION ───────────────┘
 //! ```
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
 use closecall_traffic::{Time, VehicleClass};
 
@@ -34,6 +34,13 @@ const SHORTEST_STEP: Time = Time::from_ms(1);
 const JUMP_M: f64 = 1.5;
 /// Lateral speed of such a jump (m/s): twice that of the fastest lane changes.
 const JUMP_MPS: f64 = 4.0;
+/// Lateral reach above which a vehicle changes lanes (m): half a lane, and above the swaying of two
+/// drivers.
+const LANE_CHANGE_M: f64 = 1.75;
+/// Largest number of vehicles that are tried as references: of ten drivers on a section, one or two
+/// change lanes.
+const MAX_REFERENCES: usize = 20;
+
 /// Number of lane changes by jumps that may have another cause.
 const FEW_JUMPS: u64 = 0;
 
@@ -256,6 +263,9 @@ fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
 }
 
 /// Infers the road, if positions lie in a plane.
+///
+/// If no row says who changes lanes, the vehicle whose path is the reference line may do so. Most
+/// vehicles then seem to move to the other side, and another path becomes the reference line.
 fn infer_road(
     rows: &[CollectedRow],
     order: &[usize],
@@ -264,17 +274,60 @@ fn infer_road(
     if !rows.iter().any(|row| matches!(row.position, Position::Plane { .. })) {
         return Ok(None);
     }
-    let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
-        for &index in order {
-            let row = &rows[index];
-            if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
-                let vehicle = u64::from(row.vehicle);
-                visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
+    let infer = |changing: &BTreeSet<u64>| {
+        let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
+            for &index in order {
+                let row = &rows[index];
+                if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
+                    let vehicle = u64::from(row.vehicle);
+                    let changes_lane = changes_lane || changing.contains(&vehicle);
+                    visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
+                }
             }
+            Ok::<(), ReadError>(())
+        })?;
+        road.map_err(ReadError::of_file)
+    };
+    let mut changing = BTreeSet::new();
+    let mut road = infer(&changing)?;
+    let is_silent =
+        |position: &Position| matches!(position, Position::Plane { changes_lane: false, named_lane: None, .. });
+    if rows.iter().all(|row| is_silent(&row.position)) {
+        for _ in 0..MAX_REFERENCES {
+            let before = changing.len();
+            changing.extend(changing_references(&road, rows, order));
+            if changing.len() == before {
+                break;
+            }
+            road = infer(&changing)?;
         }
-        Ok::<(), ReadError>(())
-    })?;
-    road.map(Some).map_err(ReadError::of_file)
+    }
+    Ok(Some(road))
+}
+
+/// Returns the vehicle of the reference line of each direction in which most vehicles seem to change
+/// lanes.
+fn changing_references(road: &InferredRoad, rows: &[CollectedRow], order: &[usize]) -> Vec<u64> {
+    let mut reaches_m: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for of_vehicle in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
+        let mut direction = None;
+        let (mut left_m, mut right_m) = (f64::NEG_INFINITY, f64::INFINITY);
+        for &index in of_vehicle {
+            let Position::Plane { point, heading_rad, .. } = rows[index].position else { continue };
+            direction = direction.or_else(|| road.direction(heading_rad));
+            let Some(placed) = direction.and_then(|direction| road.place(direction, point, None)) else { continue };
+            (left_m, right_m) = (left_m.max(placed.d_m), right_m.min(placed.d_m));
+        }
+        if let Some(direction) = direction {
+            reaches_m.entry(direction).or_default().push(left_m - right_m);
+        }
+    }
+    let changing = reaches_m.into_iter().filter_map(|(direction, mut reaches_m)| {
+        let middle = reaches_m.len() / 2;
+        let (_, usual_m, _) = reaches_m.select_nth_unstable_by(middle, f64::total_cmp);
+        road.reference(direction).filter(|_| *usual_m > LANE_CHANGE_M)
+    });
+    changing.collect()
 }
 
 fn is_lane_jump(before: &Row, row: &Row) -> bool {

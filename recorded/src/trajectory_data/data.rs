@@ -58,8 +58,8 @@ pub struct TrajectoryData {
     /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from
     /// a file.
     pub hash: String,
-    /// Whether the frames are too far apart for every lane change to be found.
-    pub is_coarse: bool,
+    /// Whether a warning says that lane changes may be missing.
+    pub is_in_doubt: bool,
     /// Unknown names of vehicle classes in the file.
     pub unknown_classes: Vec<UnknownClass>,
     /// What the reader of the file notes on its content.
@@ -97,7 +97,7 @@ impl TrajectoryData {
             lanes: LaneReliability::default(),
             trajectories,
             hash: String::new(),
-            is_coarse: false,
+            is_in_doubt: false,
             unknown_classes: Vec::new(),
             notes: Vec::new(),
             continuity: Continuity::default(),

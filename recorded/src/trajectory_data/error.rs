@@ -88,6 +88,12 @@ pub enum TrajectoryFileProblem {
         "the last line does not end, and its last field is shorter than the one before: the file may be cut there; if it is whole, end the line"
     )]
     CutLine,
+    /// Carriage returns alone end the lines.
+    #[error(
+        "its lines end with carriage returns alone, but line feeds are needed: save it again with the line ends of Unix or Windows \
+         (`tr '\\r' '\\n'`)"
+    )]
+    CarriageReturns,
     /// A line exceeds the permitted length.
     #[error("the line is longer than {allowed} bytes")]
     LineTooLong {
@@ -145,6 +151,22 @@ pub enum TrajectoryFileProblem {
         value: String,
         /// Description of the allowed values.
         allowed: String,
+    },
+    /// A number has a decimal comma.
+    #[error(
+        "is `{value}`, which has a decimal comma: decimal points are needed, or semicolons between the columns and decimal commas"
+    )]
+    DecimalComma {
+        /// Text found in the field.
+        value: String,
+    },
+    /// A speed is negative.
+    #[error(
+        "is `{speed_mps}`, but a number from 0 to 150 is needed: a negative speed is against the direction of travel"
+    )]
+    NegativeSpeed {
+        /// The speed (m/s).
+        speed_mps: f64,
     },
     /// A vehicle has two rows for the same frame.
     #[error(
@@ -258,6 +280,12 @@ pub enum TrajectoryFileProblem {
         /// The names in the file.
         names: String,
     },
+    /// No vehicle is in a lane, and lanes are needed.
+    #[error("{place}: the lanes have to be estimated from the positions of the traffic")]
+    NoLanes {
+        /// What states no lane.
+        place: String,
+    },
     /// The road cannot be derived from the traffic, because no vehicle moves.
     #[error("no vehicle moves, so that the road cannot be told from the traffic")]
     NothingMoves,
@@ -339,6 +367,19 @@ pub enum TrajectoryFileProblem {
         /// Share of these rows (%).
         percent: f64,
     },
+    /// Vehicles are not between the markings of their carriageway.
+    #[error(
+        "in {percent:.0} % of the rows of lanes {} to {}, as they are numbered from the left, a vehicle is not between the markings \
+         of its carriageway: the driving directions contradict the markings, as in a file that is mirrored or of traffic that drives on \
+         the left, or the lateral position and the markings have other origins",
+        lanes[0], lanes[1]
+    )]
+    BesideCarriageway {
+        /// The leftmost and the rightmost lane of the carriageway.
+        lanes: [u8; 2],
+        /// Share of these rows (%).
+        percent: f64,
+    },
     /// Columns that the reader only checks contradict the lateral position.
     #[error(
         "`{columns}` contradict `d_m`: in {percent:.0} % of {compared}, they say left where `d_m` says right, or the reverse; \
@@ -383,6 +424,19 @@ pub enum TrajectoryFileProblem {
         /// Mean duration of a piece (s).
         piece_s: f64,
     },
+    /// Vehicles move, but their speeds say that they hardly do.
+    #[error(
+        "the positions of {too_low} of {all} moving vehicles, such as vehicle {first}, advance further than their speeds make: are \
+         the speeds missing or 0, or in another unit?"
+    )]
+    SpeedsTooLow {
+        /// Number of vehicles with such speeds.
+        too_low: usize,
+        /// Number of moving vehicles.
+        all: usize,
+        /// Number of the first of them.
+        first: u64,
+    },
     /// Values are implausible for road traffic, which points to mixed-up units or columns.
     #[error("{quantity} is {actual}, but {allowed} is plausible: are units or columns mixed up?")]
     Implausible {
@@ -392,6 +446,33 @@ pub enum TrajectoryFileProblem {
         actual: String,
         /// Range of plausible values.
         allowed: &'static str,
+    },
+    /// Vehicles of highD drive against the driving direction that the metadata states.
+    #[error(
+        "in {percent:.0} % of the rows with drivingDirection {direction} in {file}, `xVelocity` is not towards {towards}: the driving \
+         directions are swapped, x is mirrored, or `xVelocity` has no sign or the wrong one"
+    )]
+    AgainstDrivingDirection {
+        /// The driving direction.
+        direction: u8,
+        /// What it means.
+        towards: &'static str,
+        /// Share of these rows (%).
+        percent: f64,
+        /// Name of the metadata file.
+        file: String,
+    },
+    /// Most rows of a file cannot be used.
+    #[error(
+        "{first}; {bad} of {rows} rows cannot be used: the file is not what its layout states, and no rows can be left out"
+    )]
+    MostRows {
+        /// Problem with the first of them.
+        first: Box<TrajectoryFileProblem>,
+        /// Number of rows that cannot be used.
+        bad: u64,
+        /// Number of rows that were read.
+        rows: u64,
     },
     /// A file contains rows of several data sets.
     #[error("is `{actual}`, but `{first}` is needed as in the first row: one data set for each file")]
@@ -411,6 +492,8 @@ impl TrajectoryFileProblem {
             Self::ColumnCount { .. }
                 | Self::OpenQuote
                 | Self::Value { .. }
+                | Self::DecimalComma { .. }
+                | Self::NegativeSpeed { .. }
                 | Self::DuplicateRow { .. }
                 | Self::UnevenTime { .. }
                 | Self::TimeBackwards { .. }
@@ -421,12 +504,23 @@ impl TrajectoryFileProblem {
         )
     }
 
+    /// Returns `true` if the file can be read as a whole only: its rows are in no order that allows
+    /// to read it piece by piece.
+    pub(crate) fn needs_all_rows(&self) -> bool {
+        matches!(
+            self,
+            Self::NotByVehicle { .. } | Self::NotByTime { .. } | Self::TooManyOpen { .. } | Self::SplitPiece { .. }
+        )
+    }
+
     /// Returns the category of a problem with a row, under which such rows are counted.
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::ColumnCount { .. } | Self::CutLine => "cut rows",
             Self::OpenQuote | Self::NotText => "rows that are no text",
-            Self::Value { .. } => "values that are not allowed",
+            Self::Value { .. } | Self::DecimalComma { .. } | Self::NegativeSpeed { .. } => {
+                "values that are not allowed"
+            }
             Self::DuplicateRow { .. } => "duplicated rows",
             Self::UnevenTime { .. } | Self::OffClock { .. } => "times off the clock",
             Self::TimeBackwards { .. } => "times that go back",

@@ -46,7 +46,7 @@ impl Bounds {
     }
 
     /// Describes the range for an error message; `kind` is "a number", for example.
-    fn describe(self, kind: &str) -> String {
+    pub(super) fn describe(self, kind: &str) -> String {
         let Self { low, high, low_is_allowed } = self;
         if low_is_allowed {
             format!("{kind} from {low} to {high}")
@@ -69,7 +69,7 @@ pub(super) fn number(text: &str, column: &'static str, bounds: Bounds) -> Result
     let value = if text.contains(',') { without_separators(text).parse() } else { text.parse() };
     match value {
         Ok(value) if bounds.contains(value) => Ok(value),
-        _ => Err(FieldError::at(column, wrong_value(text, bounds.describe("a number")))),
+        _ => Err(FieldError::at(column, wrong_number(text, bounds.describe("a number")))),
     }
 }
 
@@ -85,17 +85,28 @@ pub(super) fn integer(text: &str, column: &'static str, (low, high): (i64, i64))
     let whole = text_of_number.split_once('.').filter(|(_, digits)| digits.bytes().all(|digit| digit == b'0'));
     match whole.map_or(&text_of_number[..], |(whole, _)| whole).parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
-        _ => Err(FieldError::at(column, wrong_value(text, format!("a whole number from {low} to {high}")))),
+        _ => Err(FieldError::at(column, wrong_number(text, format!("a whole number from {low} to {high}")))),
+    }
+}
+
+/// Creates the problem of a field that does not hold an allowed number.
+fn wrong_number(text: &str, allowed: String) -> TrajectoryFileProblem {
+    let is_number = |text: &str| text.parse::<f64>().is_ok_and(f64::is_finite);
+    match text.split_once(',') {
+        Some((whole, decimals)) if is_number(&format!("{whole}.{decimals}")) => {
+            TrajectoryFileProblem::DecimalComma { value: text.chars().take(MAX_SHOWN_CHARS).collect() }
+        }
+        _ => wrong_value(text, allowed),
     }
 }
 
 /// Removes the thousands separators from a number such as `1,163,368`. Leaves misplaced commas in
-/// the text, so that parsing fails.
+/// the text, so that parsing fails, and so do decimal commas such as in `0,125`.
 fn without_separators(text: &str) -> String {
     let whole = text.split_once('.').map_or(text, |(whole, _)| whole);
     let mut groups = whole.trim_start_matches('-').split(',');
-    let first_is_short = groups.next().is_some_and(|group| (1..=3).contains(&group.len()));
-    if first_is_short && groups.all(|group| group.len() == 3) { text.replace(',', "") } else { text.to_owned() }
+    let first_fits = groups.next().is_some_and(|group| (1..=3).contains(&group.len()) && !group.starts_with('0'));
+    if first_fits && groups.all(|group| group.len() == 3) { text.replace(',', "") } else { text.to_owned() }
 }
 
 #[cfg(test)]
@@ -108,6 +119,20 @@ mod tests {
         assert_eq!(number("-1,000.5", "Local_X", Bounds::closed(-1e6, 1e6)).unwrap(), -1000.5);
         for wrong in ["1,15", "1156,000", ",156", "1,,156"] {
             assert!(integer(wrong, "Total_Frames", (0, 9_999_999)).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn decimal_commas_are_named() {
+        for text in ["0,1", "-1,25", "0,125", "16,4", "1156,000"] {
+            let problem = number(text, "d_m", Bounds::closed(-1e3, 1e3)).unwrap_err().problem;
+            assert!(matches!(problem, TrajectoryFileProblem::DecimalComma { .. }), "{text}: {problem}");
+        }
+        let problem = integer("1,0", "frame", (0, 9)).unwrap_err().problem;
+        assert!(matches!(problem, TrajectoryFileProblem::DecimalComma { .. }), "{problem}");
+        for text in ["1,,2", "a,b", "1,2,3"] {
+            let problem = number(text, "d_m", Bounds::closed(-1e3, 1e3)).unwrap_err().problem;
+            assert!(matches!(problem, TrajectoryFileProblem::Value { .. }), "{text}: {problem}");
         }
     }
 

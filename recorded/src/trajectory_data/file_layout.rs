@@ -26,6 +26,11 @@ pub enum Layout {
     Vissim,
     /// Trajectories of I-24 MOTION in JSON.
     I24,
+    /// ASAM OpenLABEL.
+    #[serde(rename = "openlabel")]
+    OpenLabel,
+    /// Messages of ASAM OSI.
+    Osi,
 }
 
 impl Layout {
@@ -42,6 +47,8 @@ impl Layout {
             Self::Sumo => "sumo",
             Self::Vissim => "vissim",
             Self::I24 => "i24",
+            Self::OpenLabel => "openlabel",
+            Self::Osi => "osi",
         }
     }
 }

@@ -53,6 +53,19 @@ const DIMENSION_M: Bounds = Bounds::above(0.0, 60.0);
 /// Distance by which the upper carriageway is shifted to the right of the lower one (m).
 const SEPARATION_M: f64 = 1_000.0;
 
+/// Share of the rows of a driving direction above which vehicles do not drive in it (-): single rows
+/// may be damaged. An assumption with a plausible range of 0.2 to 0.9.
+const AGAINST_SHARE: f64 = 0.5;
+/// Least number of rows against a driving direction that tell something about the file.
+const LEAST_AGAINST: u64 = 10;
+
+/// The rows of one driving direction, and the rows with velocities against it.
+#[derive(Clone, Copy, Debug, Default)]
+struct DirectionRows {
+    all: u64,
+    against: u64,
+}
+
 /// Position of a vehicle in the road frame.
 struct RoadPosition {
     s_m: f64,
@@ -68,6 +81,8 @@ pub(super) struct HighdColumns {
     /// Name of the file that describes the vehicles, for error messages.
     meta_file: String,
     unknown_classes: UnknownClasses,
+    /// The rows of the lower and of the upper carriageway.
+    directions: [DirectionRows; 2],
 }
 
 impl HighdColumns {
@@ -88,7 +103,19 @@ impl HighdColumns {
             *index = header.require(name, "highD")?;
         }
         let Meta { data, vehicles, file, unknown_classes } = meta;
-        Ok(Self { columns, data, vehicles, meta_file: file, unknown_classes })
+        Ok(Self { columns, data, vehicles, meta_file: file, unknown_classes, directions: Default::default() })
+    }
+
+    /// Rejects a file whose velocities contradict the driving directions in its metadata.
+    fn check_directions(&self) -> Result<(), TrajectoryFileProblem> {
+        for (rows, (direction, towards)) in self.directions.iter().zip([(2, "+x"), (1, "-x")]) {
+            let share = rows.against as f64 / rows.all.max(1) as f64;
+            if rows.against >= LEAST_AGAINST && share > AGAINST_SHARE {
+                let (percent, file) = (100.0 * share, self.meta_file.clone());
+                return Err(TrajectoryFileProblem::AgainstDrivingDirection { direction, towards, percent, file });
+            }
+        }
+        Ok(())
     }
 
     /// Returns the lane markings of both carriageways in the road frame.
@@ -183,7 +210,10 @@ impl TextLayout for HighdColumns {
         let y_m = real(y, "y", allowed::LATERAL_M)? + 0.5 * width_m;
         let forward = if is_upper { -1.0 } else { 1.0 };
         let speed_mps = forward * real(velocity, "xVelocity", VELOCITY_MPS)?;
+        let direction = &mut self.directions[usize::from(is_upper)];
+        direction.all += 1;
         if !SPEED_MPS.contains(speed_mps) {
+            direction.against += 1;
             let towards = if is_upper { "-x" } else { "+x" };
             let needed = format!("a velocity towards {towards}, as the drivingDirection in {} says,", self.meta_file);
             return Err(FieldError::at("xVelocity", wrong_value(text(velocity), needed)));
@@ -211,6 +241,7 @@ impl TextLayout for HighdColumns {
     }
 
     fn end(&mut self) -> Result<(), FieldError> {
+        self.check_directions()?;
         check_row_counts(&mut self.vehicles, &self.meta_file)
     }
 }

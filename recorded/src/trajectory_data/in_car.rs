@@ -41,7 +41,7 @@ use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, optional_number};
 use super::file_layout::Layout;
 use super::header::Header;
-use super::plain::{allowed, class_named};
+use super::plain::{allowed, class_named, to_microseconds};
 use super::rows::Fields;
 use super::source::{Clock, FileInfo, Row};
 use super::text_layout::TextLayout;
@@ -175,7 +175,8 @@ impl TextLayout for InCarColumns {
             "" => None,
             text => Some(integer(text, "lane_id", allowed::LANES)?.unsigned_abs() as u8),
         };
-        let (frame, time) = self.clock.frame_at(Time::from_s(real(time, "time_s", allowed::TIME_S)?))?;
+        let (frame, time) =
+            self.clock.frame_at(to_microseconds(Time::from_s(real(time, "time_s", allowed::TIME_S)?)))?;
         let counted = self.lane.count(d_m, marking_distances);
         self.lane.correct(mapped);
         self.speed_mps = speed_mps.or(self.speed_mps);

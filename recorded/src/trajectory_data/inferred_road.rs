@@ -20,7 +20,9 @@
 //! **Weaving.** The reference line contains the weaving and the errors of one vehicle. If rows name
 //! lanes, the line is smoothed first. Along the road, the median departure of all vehicles that keep
 //! their lanes from the median position of their lane then shows the weaving, and it is subtracted.
-//! Where fewer than ten vehicles show it, or rows name no lanes, a decimetre or two remain.
+//! Where fewer than ten vehicles show it, or rows name no lanes, a decimetre or two remain. If rows name
+//! no lanes and most vehicles move to one side of a reference line by more than half a lane, its vehicle
+//! changes lanes, and another path is taken.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -81,6 +83,11 @@ const SMOOTHED_M: f64 = 60.0;
 /// Least number of vehicles that show the weaving in a section: the mean of ten drivers with a
 /// standard deviation of 0.3 m is accurate to a decimetre.
 const LEAST_DRIVERS: usize = 10;
+/// Share of a lane by which most vehicles move to one side of a path whose vehicle leaves its lane (-):
+/// weaving stays below it.
+const LEAVES_LANE: f64 = 0.5;
+/// Largest number of times that reference lines are chosen, because their vehicles leave their lanes.
+const MOST_CHOICES: usize = 8;
 /// Number of times that lanes and weaving are estimated in turns.
 const TURNS: usize = 5;
 
@@ -110,6 +117,8 @@ pub(super) struct Placed {
 #[derive(Clone, Debug)]
 struct Direction {
     heading_rad: f64,
+    /// The vehicle whose path is the reference line.
+    reference: Option<u64>,
     line: ReferenceLine,
     /// Number of lanes to the left of the reference line's own lane.
     left: i64,
@@ -185,8 +194,8 @@ struct DrivenPath {
 }
 
 impl InferredRoad {
-    /// Infers the road from the rows that `each_row` visits. It is called twice: first for the
-    /// reference lines, then for the lanes beside them. The rows of a vehicle have to follow one
+    /// Infers the road from the rows that `each_row` visits. It is called several times: for the
+    /// reference lines, and for the lanes beside them. The rows of a vehicle have to follow one
     /// another.
     ///
     /// # Errors
@@ -194,39 +203,22 @@ impl InferredRoad {
     pub(super) fn of<E>(
         mut each_row: impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
     ) -> Result<Result<Self, TrajectoryFileProblem>, E> {
-        let mut paths: Vec<(bool, f64, DrivenPath)> = Vec::new();
-        let mut current = DrivenPath::default();
-        let (mut width_sum_m, mut widths) = (0.0, 0_u32);
         let mut changing: BTreeSet<u64> = BTreeSet::new();
-        each_row(&mut |pose| {
-            if let Some(metres) = pose.lane_width_m {
-                width_sum_m += metres;
-                widths = widths.saturating_add(1);
+        let (mut paths, mut lane_width_m) = best_paths(&mut each_row, &mut changing)?;
+        for _ in 1..MOST_CHOICES {
+            let leaving = leaving_their_lanes(&mut each_row, &paths, lane_width_m)?;
+            if leaving.is_empty() {
+                break;
             }
-            if current.vehicle != Some(pose.vehicle) {
-                keep_best_path(&mut paths, std::mem::take(&mut current));
-                let (vehicle, heading_rad) = (Some(pose.vehicle), pose.heading_rad);
-                current = DrivenPath { vehicle, heading_rad, ..DrivenPath::default() };
-            }
-            current.changes_lanes |= pose.changes_lane;
-            current.names_lanes |= pose.named_lane.is_some();
-            if pose.changes_lane {
-                changing.insert(pose.vehicle);
-            }
-            let point = pose.point;
-            let is_far = |last: &Point| maths::hypot(point.0 - last.0, point.1 - last.1) >= SPACING_M;
-            if current.points.last().is_none_or(is_far) && current.points.len() < MAX_POINTS {
-                current.points.push(point);
-            }
-        })?;
-        keep_best_path(&mut paths, current);
-        let lane_width_m = if widths > 0 { width_sum_m / f64::from(widths) } else { FALLBACK_LANE_WIDTH_M };
+            changing.extend(leaving);
+            (paths, lane_width_m) = best_paths(&mut each_row, &mut changing)?;
+        }
         let directions = paths.into_iter().filter_map(|(_, _, path)| {
             let points = if path.names_lanes { smoothed(&path.points) } else { path.points };
             let line = ReferenceLine::through(points.into_iter());
             line.length_m()?;
             let heading_rad = path.heading_rad;
-            Some(Direction::along(line, heading_rad))
+            Some(Direction { reference: path.vehicle, ..Direction::along(line, heading_rad) })
         });
         let mut road = Self { lane_width_m, directions: directions.collect(), astray: 0.0 };
         if road.directions.is_empty() {
@@ -305,6 +297,11 @@ impl InferredRoad {
         Ok(())
     }
 
+    /// Returns the vehicle whose path is the reference line of a direction.
+    pub(super) fn reference(&self, direction: usize) -> Option<u64> {
+        self.directions.get(direction)?.reference
+    }
+
     /// Returns what a reader of results has to know of the road.
     pub(super) fn warning(&self) -> Option<String> {
         (self.astray > WARNED_SHARE).then(|| {
@@ -363,7 +360,8 @@ impl Direction {
     /// Creates a direction of a single lane.
     fn along(line: ReferenceLine, heading_rad: f64) -> Self {
         let (named, weaving_m, edges_m) = (BTreeMap::new(), Vec::new(), Vec::new());
-        Self { heading_rad, line, left: 0, lanes: 1, named, weaving_m, edges_m, first_lane: 0, shift_m: 0.0 }
+        let (reference, first_lane, shift_m) = (None, 0, 0.0);
+        Self { heading_rad, reference, line, left: 0, lanes: 1, named, weaving_m, edges_m, first_lane, shift_m }
     }
 
     /// Sets the edges of the lanes, and the weaving of the reference line, from the named lanes.
@@ -491,12 +489,96 @@ fn middle_of(section: i64) -> f64 {
     (section as f64 + 0.5) * SECTION_M
 }
 
+/// Whether the vehicle of a path stays in its lane, the length of the path (m), and the path.
+type RatedPath = (bool, f64, DrivenPath);
+
+/// Returns the best path of each direction, and the mean lane width that the rows state, or else the
+/// usual one (m). `changing` holds vehicles that change lanes; those whose rows say so are added.
+fn best_paths<E>(
+    each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
+    changing: &mut BTreeSet<u64>,
+) -> Result<(Vec<RatedPath>, f64), E> {
+    let mut paths: Vec<RatedPath> = Vec::new();
+    let mut current = DrivenPath::default();
+    let (mut width_sum_m, mut widths) = (0.0, 0_u32);
+    each_row(&mut |pose| {
+        if let Some(metres) = pose.lane_width_m {
+            width_sum_m += metres;
+            widths = widths.saturating_add(1);
+        }
+        if current.vehicle != Some(pose.vehicle) {
+            keep_best_path(&mut paths, std::mem::take(&mut current));
+            let (vehicle, heading_rad) = (Some(pose.vehicle), pose.heading_rad);
+            current = DrivenPath { vehicle, heading_rad, ..DrivenPath::default() };
+        }
+        if pose.changes_lane {
+            changing.insert(pose.vehicle);
+        }
+        current.changes_lanes |= changing.contains(&pose.vehicle);
+        current.names_lanes |= pose.named_lane.is_some();
+        let point = pose.point;
+        let is_far = |last: &Point| maths::hypot(point.0 - last.0, point.1 - last.1) >= SPACING_M;
+        if current.points.last().is_none_or(is_far) && current.points.len() < MAX_POINTS {
+            current.points.push(point);
+        }
+    })?;
+    keep_best_path(&mut paths, current);
+    let lane_width_m = if widths > 0 { width_sum_m / f64::from(widths) } else { FALLBACK_LANE_WIDTH_M };
+    Ok((paths, lane_width_m))
+}
+
+/// Returns the vehicles of `paths` that leave their lanes although no row says so: from section to
+/// section, most vehicles move to the other side of the path.
+fn leaving_their_lanes<E>(
+    each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
+    paths: &[RatedPath],
+    lane_width_m: f64,
+) -> Result<Vec<u64>, E> {
+    if !paths.iter().any(|(stays, _, path)| *stays && !path.names_lanes) {
+        return Ok(Vec::new());
+    }
+    let line = |path: &DrivenPath| ReferenceLine::through(path.points.iter().copied());
+    let lines: Vec<(f64, ReferenceLine)> = paths.iter().map(|(_, _, path)| (path.heading_rad, line(path))).collect();
+    // For each path, the movements of vehicles to its left since the section before (m), by section.
+    let mut movements_m: Vec<BTreeMap<i64, Vec<f64>>> = vec![BTreeMap::new(); lines.len()];
+    // Vehicle, path, section, and the lateral position at its start (m).
+    let mut latest: Option<(u64, usize, i64, f64)> = None;
+    each_row(&mut |pose| {
+        let before = latest.filter(|(vehicle, ..)| *vehicle == pose.vehicle);
+        let agrees = |(heading_rad, _): &(f64, ReferenceLine)| maths::cos(pose.heading_rad - heading_rad);
+        let nearest =
+            || lines.iter().map(agrees).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index);
+        let Some(index) = before.map(|(_, index, ..)| index).or_else(nearest) else { return };
+        let projection = lines[index].1.project(pose.point);
+        let here = section(projection.s_m);
+        if let Some((_, _, section_before, d_m)) = before {
+            if section_before == here {
+                return;
+            }
+            if section_before + 1 == here {
+                movements_m[index].entry(here).or_default().push(projection.d_m - d_m);
+            }
+        }
+        latest = Some((pose.vehicle, index, here, projection.d_m));
+    })?;
+    let leaves = |movements_m: BTreeMap<i64, Vec<f64>>| {
+        let (mut moved_m, mut least_m, mut most_m) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for values in movements_m.into_values().filter(|values| values.len() >= LEAST_DRIVERS) {
+            moved_m += median(values);
+            (least_m, most_m) = (least_m.min(moved_m), most_m.max(moved_m));
+        }
+        most_m - least_m > LEAVES_LANE * lane_width_m
+    };
+    let judged = paths.iter().zip(movements_m).filter(|((stays, _, path), _)| *stays && !path.names_lanes);
+    Ok(judged.filter_map(|((_, _, path), movements_m)| path.vehicle.filter(|_| leaves(movements_m))).collect())
+}
+
 /// Keeps the best path of each direction. A path without a lane change is better than a path with
 /// one, and a longer path is better than a shorter path.
-fn keep_best_path(paths: &mut Vec<(bool, f64, DrivenPath)>, path: DrivenPath) {
+fn keep_best_path(paths: &mut Vec<RatedPath>, path: DrivenPath) {
     let Some(length_m) = ReferenceLine::through(path.points.iter().copied()).length_m() else { return };
     let stays = !path.changes_lanes;
-    let same = |kept: &&mut (bool, f64, DrivenPath)| maths::cos(kept.2.heading_rad - path.heading_rad) > 0.0;
+    let same = |kept: &&mut RatedPath| maths::cos(kept.2.heading_rad - path.heading_rad) > 0.0;
     match paths.iter_mut().find(same) {
         Some(kept) if (stays, length_m) > (kept.0, kept.1) => *kept = (stays, length_m, path),
         Some(_) => {}

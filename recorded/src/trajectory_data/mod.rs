@@ -18,6 +18,8 @@
 //! | SUMO | floating car data, as XML or a table | `sumo`, `collected` |
 //! | Vissim | vehicle record (`.fzp`) | `vissim`, `collected` |
 //! | I-24 MOTION | JSON in feet | `i24`, `collected` |
+//! | OpenLABEL | JSON with cuboids in frames; [`label_file`](crate::openlabel::label_file) writes it | `openlabel`, `openlabel_text` |
+//! | OSI | `GroundTruth` messages in a trace file or in MCAP | `osi`, `osi_messages` |
 //! | in-car | log of one vehicle that sees the lane markings; [`write_in_car`] writes it | `in_car` |
 //!
 //! # What the readers do
@@ -36,8 +38,8 @@
 //!   The reader tells them apart by the time of frame 0. If their clocks overlap, it shifts one
 //!   behind the other: their vehicles never meet. (Files longer than [`WINDOW_ROWS`] rows are not
 //!   shifted, because their time spans are unknown before the end of the file.)
-//! - NGSIM times are in milliseconds. If they count from 1970, the reader counts them from the
-//!   first instant instead.
+//! - NGSIM times are in milliseconds, all others in seconds. If times count from 1970, the reader
+//!   counts them from the first instant instead.
 //! - Finite differences between neighbouring frames supply the quantities that a layout lacks:
 //!   lateral speed, lateral acceleration, and the acceleration if its field is empty.
 //! - A vehicle class that the reader does not know counts as the nearest known class, and the
@@ -75,13 +77,18 @@ mod i24;
 mod in_car;
 mod inferred_road;
 mod input;
+mod json_input;
 mod lanelets;
 mod layout;
 mod markings;
 mod ngsim;
 mod open;
+mod openlabel;
+mod openlabel_text;
 mod order;
 mod orientation;
+mod osi;
+mod osi_messages;
 mod parquet;
 mod plain;
 mod plausible;
@@ -110,11 +117,13 @@ pub use data::{MarkingDistances, RecordedTrack, TrajectoryData, refuse_duplicate
 pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
 pub use file_layout::Layout;
 pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings, MarkingObserver};
+pub(crate) use open::open_whole;
 pub use open::{input_files, open, open_from, open_streaming, read, read_from, read_with};
 pub use order::{STREAM_ROWS, WINDOW_ROWS};
 pub use quality::{Flaw, FlawCounts, FlawLocation, Flaws, QualityInspector, count_flaws};
 pub use skipped_rows::{SkippedRows, SkippedRowsByReason};
 pub use tracks::{BadRows, LayoutChoice, ReadOptions, Tracks};
+pub(crate) use write::check_finite;
 pub use write::write_trajectories;
 pub use write_in_car::{
     BusFrame, InCarFrame, InCarLog, TrueLaneChange, ground_truth_path, write_ground_truth, write_in_car,

@@ -11,12 +11,13 @@ use super::file_set::FileSet;
 use super::header::Header;
 use super::input::{Digest, open_file, with_path};
 use super::order::{STREAM_ROWS, WINDOW_ROWS};
+use super::osi_messages::Messages;
 use super::parquet::{self, ParquetText};
 use super::rows::io_problem;
 use super::source::{ReadError, RowSource};
 use super::text::{TextSource, read_first_line};
 use super::tracks::{ReadOptions, Tracks};
-use super::{i24, sumo, vissim};
+use super::{i24, openlabel, osi, sumo, vissim};
 
 /// The first bytes of unsupported archives and compressed files, with a description of each.
 const ARCHIVES: [(&[u8], &str); 5] = [
@@ -28,11 +29,10 @@ const ARCHIVES: [(&[u8], &str); 5] = [
 ];
 
 /// The first bytes of formats of other programs, with a description of each.
-const FOREIGN: [(&[u8], &str); 4] = [
-    (b"\x89MCAP", "an MCAP file, such as a trace of OSI messages"),
+const FOREIGN: [(&[u8], &str); 3] = [
     (b"\x89HDF", "an HDF5 file"),
     (b"[", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`)"),
-    (b"{", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`), such as OpenLABEL"),
+    (b"{", "JSON without the fields of I-24 MOTION (`x_position`, `y_position`, `timestamp`), and without `openlabel`"),
 ];
 
 /// The first bytes of Vissim's vehicle records.
@@ -55,9 +55,11 @@ const FOREIGN_ROOTS: [(&[u8], &str); 4] = [
     (b"<net ", "a road network of SUMO"),
 ];
 
-/// Ends of the names of files without a beginning by which they are recognised, with a description of
-/// each.
-const FOREIGN_NAMES: [(&str, &str); 1] = [("osi", "a trace of OSI messages")];
+/// The first bytes of an MCAP file.
+const MCAP: &[u8] = b"\x89MCAP";
+
+/// End of the names of OSI's trace files, which have no beginning by which they are recognised.
+const OSI_TRACE: &str = "osi";
 
 /// Size of the buffer for the text of a Parquet file (bytes).
 const PARQUET_BUFFER_BYTES: usize = 1 << 16;
@@ -81,6 +83,14 @@ pub fn open_streaming(path: &Path, options: ReadOptions) -> Result<Tracks<'stati
     open_window(path, options, STREAM_ROWS)
 }
 
+/// Works like [`open`], but holds all rows, which may be in any order.
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
+pub(crate) fn open_whole(path: &Path, options: ReadOptions) -> Result<Tracks<'static>, TrajectoryFileError> {
+    open_window(path, options, usize::MAX)
+}
+
 /// Reads a whole trajectory file, with its rows in any order.
 ///
 /// # Errors
@@ -94,7 +104,7 @@ pub fn read(path: &Path) -> Result<TrajectoryData, TrajectoryFileError> {
 /// # Errors
 /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
 pub fn read_with(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
-    open_window(path, options, usize::MAX)?.collect_all()
+    open_whole(path, options)?.collect_all()
 }
 
 /// Reads trajectory data that consists of one file from any byte source. `path` appears in errors
@@ -119,19 +129,23 @@ pub fn open_from<'a>(
 ) -> Result<Tracks<'a>, TrajectoryFileError> {
     let digest = Digest::default();
     let input = digest.input(source).map_err(|error| with_path(path, error))?;
-    let source = reader_for(input, &options).map_err(|error| with_path(path, named_format(error, path)))?;
+    let source = if is_trace(path) { trace(input, &options) } else { reader_for(input, &options) };
+    let source = source.map_err(|error| with_path(path, error))?;
     Tracks::new((path, digest), source, options, window)
 }
 
-/// Names the format of a file that is no text, if the name of the file tells it.
-fn named_format(error: ReadError, path: &Path) -> ReadError {
-    let ends_with = |end: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(end));
-    match FOREIGN_NAMES.iter().find(|(end, _)| ends_with(end)) {
-        Some((_, kind)) if matches!(error.problem, TrajectoryFileProblem::Binary) => {
-            ReadError::of_file(TrajectoryFileProblem::Foreign { kind })
-        }
-        _ => error,
-    }
+/// Returns true if `path` has the name of a trace file of OSI, compressed or not.
+fn is_trace(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    name.rsplit_once('.').is_some_and(|(_, end)| end == OSI_TRACE)
+}
+
+/// Reads a trace file of OSI.
+fn trace<'a>(input: Box<dyn BufRead + 'a>, options: &ReadOptions) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+    let source = osi::read(Messages::Trace(input), options.lanes)?;
+    check_choice(source.as_ref(), options)?;
+    Ok(source)
 }
 
 /// Returns the files that are read for `path`: several for a highD or exiD data set.
@@ -184,7 +198,8 @@ fn reader_for<'a>(
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
     let is_i24 = [I24].iter().chain(&I24_START).any(|word| text.windows(word.len()).any(|window| window == *word));
-    if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning) && !is_i24) {
+    let is_read_json = is_i24 || openlabel::is_openlabel(text);
+    if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning) && !is_read_json) {
         return Err(ReadError::of_file(TrajectoryFileProblem::Foreign { kind }));
     }
     let holds = |word: &[u8]| text.windows(word.len()).any(|window| window == word);
@@ -199,10 +214,14 @@ fn reader_for<'a>(
         text_source(rows, options)?
     } else if text.starts_with(b"<") && holds(SUMO) && !holds(COMMONROAD) {
         Box::new(sumo::read_xml(input)?)
+    } else if text.starts_with(MCAP) {
+        osi::read(Messages::of_mcap(input), options.lanes)?
     } else if text.starts_with(b"<") {
         Box::new(CommonRoadSource::new(input)?)
     } else if VISSIM.iter().any(|start| text.starts_with(start)) {
         Box::new(vissim::read(input)?)
+    } else if openlabel::is_openlabel(text) {
+        openlabel::read(input, options.lanes)?
     } else if text.starts_with(b"[") || text.starts_with(b"{") {
         Box::new(i24::read(input)?)
     } else {

@@ -46,16 +46,22 @@ pub(super) mod allowed {
     pub(in super::super) const TRACKS: (i64, i64) = (0, 9_000_000_000_000_000);
     pub(in super::super) const FRAMES: (i64, i64) = (0, 1_000_000_000);
     pub(in super::super) const LANES: (i64, i64) = (0, 255);
-    pub(in super::super) const TIME_S: Bounds = Bounds::closed(0.0, 1e7);
+    /// Times from the start of a file, or Unix times until the year 2100.
+    pub(in super::super) const TIME_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
     pub(in super::super) const POSITION_M: Bounds = Bounds::closed(-1e6, 1e6);
     pub(in super::super) const LATERAL_M: Bounds = Bounds::closed(-1e3, 1e3);
     pub(in super::super) const SPEED_MPS: Bounds = Bounds::closed(0.0, 150.0);
+    /// Speeds along an axis that may point against the direction of travel.
+    pub(in super::super) const SIGNED_SPEED_MPS: Bounds = Bounds::closed(-150.0, 150.0);
     pub(in super::super) const ACCELERATION_MPS2: Bounds = Bounds::closed(-1e3, 1e3);
     pub(in super::super) const HEADING_RAD: Bounds = Bounds::closed(-3.2, 3.2);
     pub(in super::super) const PLANE_M: Bounds = Bounds::closed(-1e7, 1e7);
     pub(in super::super) const LENGTH_M: Bounds = Bounds::above(0.0, 60.0);
     pub(in super::super) const WIDTH_M: Bounds = Bounds::above(0.0, 10.0);
 }
+
+/// Time that counts from 1970 instead of from the start of a file: 10⁷ s, about four months.
+const LONG_TIME: Time = Time::from_ms(10_000_000_000);
 
 /// The column indices of the plain layout's quantities.
 pub(super) struct PlainColumns {
@@ -78,6 +84,8 @@ pub(super) struct PlainColumns {
     x: Option<usize>,
     y: Option<usize>,
     orientation: Orientation,
+    /// `true` if speeds may be negative, because the position along the road is reversed.
+    is_reversed: bool,
     unknown_classes: UnknownClasses,
 }
 
@@ -109,6 +117,7 @@ impl PlainColumns {
             x: header.find("x_m"),
             y: header.find("y_m"),
             orientation: Orientation::default(),
+            is_reversed: false,
             unknown_classes: UnknownClasses::default(),
         })
     }
@@ -131,6 +140,10 @@ impl TextLayout for PlainColumns {
         self.orientation.check(is_mirrored)
     }
 
+    fn expect_reversed(&mut self) {
+        self.is_reversed = true;
+    }
+
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
@@ -144,18 +157,21 @@ impl TextLayout for PlainColumns {
         let vehicle = stated_vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::TRACKS))?;
         let acceleration = fields.get(line, self.acceleration);
         let class = fields.get(line, self.class);
+        let signed_speed_mps = speed_mps(fields.get(line, self.speed), self.is_reversed)?;
         let row = Row {
             number: track.unsigned_abs(),
             origin: Time::ZERO,
             vehicle_id: vehicle.unsigned_abs(),
             frame: whole(self.frame, "frame", allowed::FRAMES)?,
-            time: Time::from_s(real(self.time, "time_s", allowed::TIME_S)?),
+            time: to_microseconds(Time::from_s(real(self.time, "time_s", allowed::TIME_S)?)),
             clock: Clock::Continuous,
             s_m: real(self.s, "s_m", allowed::POSITION_M)?,
             d_m: -real(self.d, "d_m", allowed::LATERAL_M)?,
             lane: whole(self.lane, "lane_id", allowed::LANES)?.unsigned_abs() as u8,
-            speed_mps: real(self.speed, "speed_mps", allowed::SPEED_MPS)?,
-            acceleration_mps2: optional_number(acceleration, "accel_mps2", allowed::ACCELERATION_MPS2)?,
+            speed_mps: signed_speed_mps.abs(),
+            // Beside a negative speed, the sign of the acceleration is unknown: the speeds give it.
+            acceleration_mps2: optional_number(acceleration, "accel_mps2", allowed::ACCELERATION_MPS2)?
+                .filter(|_| signed_speed_mps >= 0.0),
             length_m: real(self.length, "length_m", allowed::LENGTH_M)?,
             width_m: real(self.width, "width_m", allowed::WIDTH_M)?,
             class: self.unknown_classes.resolve(class_named(class), class, "vehicle_class")?,
@@ -164,6 +180,24 @@ impl TextLayout for PlainColumns {
         };
         self.orientation.add(row.number, Stated { s_m: row.s_m, d_m: -row.d_m, heading_rad, point });
         Ok(Some(row))
+    }
+}
+
+/// Rounds a time to microseconds: as a number, a Unix time is accurate to a quarter of one.
+pub(super) fn to_microseconds(time: Time) -> Time {
+    const NS_PER_US: i64 = 1_000;
+    if time < LONG_TIME { time } else { Time::from_ns((time.ns() + NS_PER_US / 2) / NS_PER_US * NS_PER_US) }
+}
+
+/// Parses a speed (m/s), which may be negative if the position along the road is reversed.
+fn speed_mps(text: &str, is_reversed: bool) -> Result<f64, FieldError> {
+    let column = "speed_mps";
+    match number(text, column, allowed::SIGNED_SPEED_MPS) {
+        Ok(speed_mps) if speed_mps < 0.0 && !is_reversed => {
+            Err(FieldError::at(column, TrajectoryFileProblem::NegativeSpeed { speed_mps }))
+        }
+        Ok(speed_mps) => Ok(speed_mps),
+        Err(_) => number(text, column, allowed::SPEED_MPS),
     }
 }
 

@@ -8,13 +8,14 @@
 //! | median length of cars | 2 to 12 m | feet instead of metres and the reverse, swapped length and width |
 //! | median width of cars | 1 to 3 m | the same |
 //! | vehicles whose position falls as they drive | below 5 % | a reversed axis, the other carriageway in the same file |
+//! | vehicles that advance by more than 1.6 times what their recorded speeds make | at most 20 % | a column of zeros |
 //! | median of (distance between two frames) / (speed · time) | 0.6 to 1.6; 0.8 to 1.25 in simulations | km/h, mph or ft/s instead of m/s (3.6, 2.2, 3.3), a wrong frame rate, swapped s and d, traffic that drives backwards |
 
 use std::collections::BTreeMap;
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::continuity::FrameClock;
+use super::continuity::{FrameClock, is_jump};
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
 use super::source::{ReadError, Row};
@@ -31,6 +32,12 @@ const AGAINST_STEPS: f64 = 0.5;
 /// Share of vehicles against the road above which the file is refused (-): an error of numbers may
 /// make a vehicle jump back once. An assumption with a plausible range of 0.01 to 0.1.
 const AGAINST_VEHICLES: f64 = 0.05;
+
+/// Distance of a vehicle as a share of what its speeds make, above which its speeds are too low (-).
+const TOO_FAR: f64 = 1.6;
+/// Share of the moving vehicles with too low speeds above which the file is refused (-). In the windows
+/// of US-101, no vehicle is above 1.03. An assumption with a plausible range of 0.05 to 0.5.
+const TOO_LOW_VEHICLES: f64 = 0.2;
 
 /// One step of a vehicle between two frames.
 struct RoadStep {
@@ -57,9 +64,14 @@ pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(
         check_median(widths, plausible)?;
     }
     let steps = steps(rows, clock);
-    if steps.len() < MIN_STEPS {
-        return Ok(());
+    if steps.len() >= MIN_STEPS {
+        check_steps(steps, layout)?;
     }
+    check_speeds(rows, clock)
+}
+
+/// Rejects steps of moving vehicles that contradict the recorded speeds.
+fn check_steps(steps: Vec<RoadStep>, layout: Layout) -> Result<(), ReadError> {
     check_direction(&steps)?;
     let steps = steps.into_iter().map(|step| (step.ratio, step.line)).collect();
     let quantity = "the median distance between two frames, as a share of what the recorded speed makes,";
@@ -86,6 +98,59 @@ fn check_direction(steps: &[RoadStep]) -> Result<(), ReadError> {
         Some(&(first, line)) if against.len() as f64 > AGAINST_VEHICLES * vehicles.len() as f64 => {
             let (against, all) = (against.len(), vehicles.len());
             Err(ReadError::new(line, TrajectoryFileProblem::AgainstTheRoad { against, all, first }))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The movement of a vehicle over all its steps between two frames.
+#[derive(Clone, Copy, Debug, Default)]
+struct Travel {
+    steps: usize,
+    time_s: f64,
+    /// Distance by the positions (m).
+    distance_m: f64,
+    /// Distance by the recorded speeds (m).
+    by_speed_m: f64,
+    /// Line of the last row.
+    line: u64,
+}
+
+impl Travel {
+    fn is_moving(&self) -> bool {
+        self.steps >= MIN_STEPS && self.distance_m > MIN_SPEED_MPS * self.time_s
+    }
+}
+
+/// Rejects vehicles whose positions move although their recorded speeds say that they hardly do.
+/// Position noise of vehicles at rest cancels out over their steps.
+fn check_speeds(rows: &[Row], clock: FrameClock) -> Result<(), ReadError> {
+    let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
+    let mut travels: BTreeMap<(u64, Time), Travel> = BTreeMap::new();
+    for row in rows {
+        let vehicle = (row.number, row.origin);
+        let Some(before) = latest.insert(vehicle, row) else { continue };
+        let time_s = (row.time - before.time).s();
+        if row.frame == before.frame + clock.frames && time_s > 0.0 && !is_jump(before, row) {
+            let travel = travels.entry(vehicle).or_default();
+            travel.steps += 1;
+            travel.time_s += time_s;
+            travel.distance_m += row.s_m - before.s_m;
+            travel.by_speed_m += 0.5 * (row.speed_mps + before.speed_mps) * time_s;
+            travel.line = row.line;
+        }
+    }
+    let moving: Vec<(u64, Travel)> = travels
+        .into_iter()
+        .filter(|(_, travel)| travel.is_moving())
+        .map(|((number, _), travel)| (number, travel))
+        .collect();
+    let is_too_low = |travel: &Travel| travel.distance_m > TOO_FAR * travel.by_speed_m;
+    let too_low = moving.iter().filter(|(_, travel)| is_too_low(travel)).count();
+    match moving.iter().find(|(_, travel)| is_too_low(travel)) {
+        Some(&(first, Travel { line, .. })) if too_low as f64 > TOO_LOW_VEHICLES * moving.len() as f64 => {
+            let all = moving.len();
+            Err(ReadError::new(line, TrajectoryFileProblem::SpeedsTooLow { too_low, all, first }))
         }
         _ => Ok(()),
     }

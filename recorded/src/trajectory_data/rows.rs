@@ -55,6 +55,9 @@ impl<R: BufRead> Lines<R> {
             if self.buffer.contains(&0) {
                 return Err((self.number, TrajectoryFileProblem::Binary));
             }
+            if self.number == 1 && has_carriage_returns(&self.buffer) {
+                return Err((self.number, TrajectoryFileProblem::CarriageReturns));
+            }
             if self.buffer.len() as u64 > MAX_LINE_BYTES {
                 return Err((self.number, TrajectoryFileProblem::LineTooLong { allowed: MAX_LINE_BYTES }));
             }
@@ -74,6 +77,14 @@ impl<R: BufRead> Lines<R> {
     pub(super) fn is_unterminated(&self) -> bool {
         self.buffer.last().is_some_and(|byte| *byte != b'\n')
     }
+}
+
+/// Returns true if the first line, up to a line feed, holds several lines of text that carriage returns
+/// alone end.
+fn has_carriage_returns(line: &[u8]) -> bool {
+    // The end of a long line may be cut within a character.
+    let is_text = std::str::from_utf8(line).map_or_else(|error| error.error_len().is_none(), |_| true);
+    is_text && line.trim_ascii_end().contains(&b'\r')
 }
 
 /// Returns true if a file begins like text in UTF-16: with its byte order mark, or with a letter and a
@@ -222,6 +233,15 @@ mod tests {
         assert_eq!(lines.next().unwrap(), Some((1, "a")));
         assert_eq!(lines.next().unwrap(), Some((4, "b")));
         assert_eq!(lines.next().unwrap(), None);
+    }
+
+    #[test]
+    fn lines_that_end_with_carriage_returns_alone_are_named() {
+        let long = "track_id,frame\r".to_owned() + &"1,2\r".repeat(10_000);
+        for text in ["a,b\r1,2\r", long.as_str()] {
+            assert!(matches!(Lines::new(text.as_bytes()).next(), Err((1, TrajectoryFileProblem::CarriageReturns))));
+        }
+        assert_eq!(Lines::new("a,b\r\n1,2\r\n".as_bytes()).next().unwrap(), Some((1, "a,b")));
     }
 
     #[test]

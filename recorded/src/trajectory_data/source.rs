@@ -90,6 +90,10 @@ pub(super) trait RowSource {
         Ok(())
     }
 
+    /// States that the position along the road falls in the direction of travel, so that speeds may be
+    /// negative. It is called before the first row.
+    fn expect_reversed(&mut self) {}
+
     /// Returns the next row in the order of the file, or `None` at its end.
     ///
     /// # Errors

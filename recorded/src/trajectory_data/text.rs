@@ -124,6 +124,10 @@ impl<R: BufRead> RowSource for TextSource<R> {
         self.format.columns.check_sides(is_mirrored).map_err(ReadError::of_file)
     }
 
+    fn expect_reversed(&mut self) {
+        self.format.columns.expect_reversed();
+    }
+
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         let Self { lines, format, fields, name, first, usual_last_field, location } = self;
         loop {

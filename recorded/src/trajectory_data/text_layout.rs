@@ -40,6 +40,10 @@ pub(super) trait TextLayout {
         Ok(())
     }
 
+    /// States that the position along the road falls in the direction of travel, so that speeds may be
+    /// negative. It is called before the first row.
+    fn expect_reversed(&mut self) {}
+
     /// Checks, at the end of the file, that nothing is missing.
     ///
     /// # Errors

@@ -41,6 +41,9 @@ const SHRED_S: f64 = 2.0;
 /// at 5 Hz. In a window of US-101, frames of 0.3 s show all 21 lane changes, frames of 0.4 s 18 to 21.
 const LONGEST_PERIOD: Time = Time::from_ms(300);
 
+/// Smallest number of unusable rows that can be most of a file: fewer rows are damaged ones.
+const LEAST_BAD_ROWS: u64 = 20;
+
 /// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
@@ -75,6 +78,10 @@ pub enum LayoutChoice {
     Vissim,
     /// Trajectories of I-24 MOTION.
     I24,
+    /// ASAM OpenLABEL.
+    OpenLabel,
+    /// Messages of ASAM OSI.
+    Osi,
 }
 
 impl LayoutChoice {
@@ -89,6 +96,8 @@ impl LayoutChoice {
             Self::Sumo => "sumo",
             Self::Vissim => "vissim",
             Self::I24 => "i24",
+            Self::OpenLabel => "openlabel",
+            Self::Osi => "osi",
         }
     }
 
@@ -103,6 +112,8 @@ impl LayoutChoice {
             Layout::Sumo => Self::Sumo,
             Layout::Vissim => Self::Vissim,
             Layout::I24 => Self::I24,
+            Layout::OpenLabel => Self::OpenLabel,
+            Layout::Osi => Self::Osi,
         };
         choice == self
     }
@@ -147,10 +158,13 @@ impl<'a> Tracks<'a> {
     /// Reads the first `window` rows, or all rows if the file is not longer.
     pub(super) fn new(
         (path, digest): (&Path, Digest),
-        source: Box<dyn RowSource + 'a>,
+        mut source: Box<dyn RowSource + 'a>,
         options: ReadOptions,
         window: usize,
     ) -> Result<Self, TrajectoryFileError> {
+        if options.axes.reverse_s {
+            source.expect_reversed();
+        }
         let builder = TrackBuilder::for_sorted(FrameClock::every_frame(ngsim::PERIOD), Time::ZERO);
         let mut tracks = Self {
             path: path.to_owned(),
@@ -197,6 +211,11 @@ impl<'a> Tracks<'a> {
         !self.is_simulated && self.period > LONGEST_PERIOD
     }
 
+    /// Returns `true` if the file is of a simulation, in which a lane change may take a single step.
+    pub fn is_simulated(&self) -> bool {
+        self.is_simulated
+    }
+
     /// Returns the lane markings that the file states, or else those derived from the tracks among
     /// the first [`WINDOW_ROWS`] rows.
     pub fn markings(&self) -> &LaneMarkings {
@@ -219,9 +238,19 @@ impl<'a> Tracks<'a> {
         self.rows
     }
 
-    /// Returns how the rows so far became tracks.
+    /// Returns how the rows so far became tracks. If no lane is taken as recorded or estimated, none is
+    /// changed.
     pub fn continuity(&self) -> Continuity {
-        self.builder.continuity()
+        let continuity = self.builder.continuity();
+        match self.lanes() {
+            LaneReliability::Unreliable => Continuity { recorded_crossings: 0, hidden_crossings: 0, ..continuity },
+            LaneReliability::Reliable | LaneReliability::Estimated => continuity,
+        }
+    }
+
+    /// Returns `true` if a warning on the rows so far says that lane changes may be missing.
+    pub fn is_in_doubt(&self) -> bool {
+        self.is_coarse() || self.continuity().hides_lane_changes()
     }
 
     /// Returns the rows skipped so far.
@@ -291,7 +320,7 @@ impl<'a> Tracks<'a> {
             data.markings = markings;
         }
         let (hash, continuity) = (self.hash(), self.continuity());
-        let (notes, lanes, is_coarse) = (self.notes(), self.lanes(), self.is_coarse());
+        let (notes, lanes, is_in_doubt) = (self.notes(), self.lanes(), self.is_in_doubt());
         if let Some(estimated) = self.estimated_markings() {
             data.markings = estimated;
         }
@@ -301,7 +330,7 @@ impl<'a> Tracks<'a> {
             continuity,
             notes,
             lanes,
-            is_coarse,
+            is_in_doubt,
             unknown_classes: self.unknown_classes().to_vec(),
             ..data
         })
@@ -387,14 +416,16 @@ impl<'a> Tracks<'a> {
             if rows.len() >= MAX_ROWS {
                 return Err(ReadError::of_file(TrajectoryFileProblem::TooManyRows { allowed: MAX_ROWS }));
             }
-            match self.next_row()? {
-                Some(row) => rows.push(row),
-                None => {
+            match self.next_row() {
+                Ok(Some(row)) => rows.push(row),
+                Ok(None) => {
                     self.ended = true;
                     break;
                 }
+                Err(error) => return Err(self.judged(error, rows.len())),
             }
         }
+        self.check_skipped()?;
         if rows.is_empty() {
             return Err(self.dropped.take_first().unwrap_or(ReadError::of_file(TrajectoryFileProblem::Empty)));
         }
@@ -409,11 +440,15 @@ impl<'a> Tracks<'a> {
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         plausible::check(beginning, layout, clock)?;
         // Other readers derive the lanes from the positions, so that only an option can part them.
-        let states_lanes = matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd);
+        let states_lanes =
+            matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);
         if states_lanes || self.axis_options != AxisOptions::default() {
             axes::check_order(beginning, stated.as_ref())?;
         }
         self.source.check_sides(self.axis_options.mirror_d)?;
+        if let (Layout::Highd, Some(markings)) = (layout, &stated) {
+            axes::check_carriageways(beginning, markings)?;
+        }
         if let (Layout::Highd, LaneReliability::Reliable, Some(markings)) = (layout, self.lanes, &stated) {
             self.axis_warning = axes::check_markings(beginning, markings)?;
         }
@@ -447,8 +482,41 @@ impl<'a> Tracks<'a> {
         Ok(())
     }
 
+    /// Returns `error`, or the problem of the whole file that it belongs to, as the further rows show.
+    /// `used` rows before it can be used.
+    fn judged(&mut self, error: ReadError, used: usize) -> ReadError {
+        if !error.affects_one_row() {
+            return error;
+        }
+        let (mut rows, mut bad) = (used as u64 + 1, 1);
+        while rows < WINDOW_ROWS as u64 {
+            match self.source.next_row() {
+                Ok(Some(_)) => rows += 1,
+                Err(other) if other.affects_one_row() => {
+                    rows += 1;
+                    bad += 1;
+                }
+                Err(ReadError { problem: problem @ TrajectoryFileProblem::AgainstDrivingDirection { .. }, .. }) => {
+                    return ReadError { problem, ..error };
+                }
+                Ok(None) | Err(_) => break,
+            }
+        }
+        if is_most(bad, rows) { of_most_rows(error, bad, rows) } else { error }
+    }
+
+    /// Rejects a file if most of its rows so far were skipped.
+    fn check_skipped(&mut self) -> Result<(), ReadError> {
+        let bad = self.dropped.count();
+        if !is_most(bad, self.rows) {
+            return Ok(());
+        }
+        self.dropped.take_first().map_or(Ok(()), |first| Err(of_most_rows(first, bad, self.rows)))
+    }
+
     /// Completes all tracks, and checks that they are tracks and not shreds of them.
     fn finish(&mut self) -> Result<(), ReadError> {
+        self.check_skipped()?;
         self.builder.finish()?;
         let Continuity { vehicles, pieces, .. } = self.continuity();
         let piece_s = self.rows as f64 * self.period.s() / pieces as f64;
@@ -470,6 +538,17 @@ impl Iterator for Tracks<'_> {
     fn next(&mut self) -> Option<Self::Item> {
         self.next_track().transpose()
     }
+}
+
+/// Returns true if `bad` rows are more than half of all `rows`, and no damage of single rows.
+fn is_most(bad: u64, rows: u64) -> bool {
+    bad >= LEAST_BAD_ROWS && 2 * bad > rows
+}
+
+/// Returns the error of a file of `rows` rows with `bad` ones, the first of which has the `first` error.
+fn of_most_rows(first: ReadError, bad: u64, rows: u64) -> ReadError {
+    let ReadError { line, column, problem } = first;
+    ReadError { line, column, problem: TrajectoryFileProblem::MostRows { first: Box::new(problem), bad, rows } }
 }
 
 /// Returns the warning for frames that are too far apart.

@@ -13,7 +13,8 @@
 //! and km/h. Two sets of columns give a position:
 //!
 //! - `COORDFRONT` and `COORDREAR` (or these with `X` and `Y`): the middle of the front and of the
-//!   rear in a plane. The road is inferred from the traffic; see `inferred_road`.
+//!   rear in a plane. The road is inferred from the traffic; see `inferred_road`. If `LANE\LINK\NO`
+//!   and `LANE\INDEX` are there as well, they name the lane of the vehicle.
 //! - `LANE\LINK\NO`, `LANE\INDEX`, `POS`: the distance of the front from the start of a link, and a
 //!   lane, counted from the right. `POSLAT` is the position across the lane, from 0 to 1. That it
 //!   grows to the left is an assumption, which lane changes confirm or refute: a vehicle moves
@@ -124,6 +125,8 @@ struct Columns {
     number: usize,
     speed: usize,
     place: Place,
+    /// Link and index of the lane, which names lanes in a plane.
+    lane: Option<(usize, usize)>,
     acceleration: Option<usize>,
     length: Option<usize>,
     width: Option<usize>,
@@ -148,6 +151,7 @@ impl Columns {
             number: need("NO")?,
             speed: need("SPEED")?,
             place,
+            lane: header.find(r"LANE\LINK\NO").zip(header.find(r"LANE\INDEX")),
             acceleration: header.find("ACCELERATION"),
             length: header.find("LENGTH"),
             width: header.find("WIDTH"),
@@ -175,6 +179,8 @@ struct Reader {
     lanes: BTreeMap<u32, u8>,
     /// Link, lane and position across the lane in the latest row of each vehicle.
     latest: BTreeMap<u32, (u32, u8, f64)>,
+    /// `true` if rows with positions in a plane name lanes.
+    names_lanes: bool,
     /// Steps across the road at all lane changes (lanes), if the position across the lane grows to the
     /// left, and if it grows to the right.
     steps: [f64; 2],
@@ -213,6 +219,7 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
         unknown_classes: UnknownClasses::default(),
         lanes: BTreeMap::new(),
         latest: BTreeMap::new(),
+        names_lanes: false,
         steps: [0.0; 2],
     };
     each_row(&mut lines, (Separator::Semicolon, width), |(number, split)| {
@@ -225,7 +232,8 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
 impl Reader {
     fn row(&mut self, line: &str, fields: &Fields, line_number: u64) -> Result<CollectedRow, FieldError> {
         let text = |index: usize| fields.get(line, index);
-        let Columns { time, number: vehicle, speed, place, acceleration, length, width, vehicle_type } = self.columns;
+        let Columns { time, number: vehicle, speed, place, lane, acceleration, length, width, vehicle_type } =
+            self.columns;
         let real = |index: usize, name: &'static str, factor: f64, bounds: Bounds| {
             let value = factor * number(text(index), name, Bounds::closed(f64::MIN, f64::MAX))?;
             if bounds.contains(value) {
@@ -265,6 +273,8 @@ impl Reader {
                 in_plane(front, (plane(rear_x, "COORDREARX")?, plane(rear_y, "COORDREARY")?))?
             }
         };
+        let lane = lane.map(|(link, index)| (text(link), text(index)));
+        let position = self.in_named_lane(position, lane, text(vehicle));
         let acceleration_mps2 = acceleration
             .map(|index| real(index, "ACCELERATION", acceleration_unit, allowed::ACCELERATION_MPS2))
             .transpose()?;
@@ -279,6 +289,20 @@ impl Reader {
             class,
             line: line_number,
         })
+    }
+
+    /// Adds the lane that a row names to a position in a plane. Texts that name no lane are left out.
+    fn in_named_lane(&mut self, position: Position, lane: Option<(&str, &str)>, vehicle: &str) -> Position {
+        let lane = lane.and_then(|(link, index)| Some((link.parse::<u32>().ok()?, index.parse::<u8>().ok()?)));
+        let (Position::Plane { point, heading_rad, .. }, Some((link, index))) = (position, lane) else {
+            return position;
+        };
+        self.names_lanes = true;
+        let vehicle = self.collected.vehicle(vehicle);
+        let before = self.latest.insert(vehicle, (link, index, 0.0));
+        let changes_lane = before.is_some_and(|(last_link, last_index, _)| last_link == link && last_index != index);
+        let named_lane = Some((u64::from(link) << u8::BITS) | u64::from(index));
+        Position::Plane { point, heading_rad, changes_lane, named_lane }
     }
 
     /// Adds the step of a lane change to the two sums of steps.
@@ -309,7 +333,7 @@ impl Reader {
         if matches!(self.columns.place, Place::Link { .. }) && self.columns.length.is_none() {
             notes.push("the file states no lengths of vehicles: each has the typical size of its class".to_owned());
         }
-        if !matches!(self.columns.place, Place::Link { .. }) {
+        if !matches!(self.columns.place, Place::Link { .. }) && !self.names_lanes {
             notes.push(format!("the file states no lanes: lanes of {DEFAULT_LANE_WIDTH_M} m are assumed"));
         }
         let (by_link, markings) = self.roads()?;

@@ -73,7 +73,11 @@ fn frame(track: &Trajectory, point: &TrajectoryPoint, period: Time) -> Result<i6
     Ok(frame as i64)
 }
 
-fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Result<(), WriteError> {
+/// Checks the numbers of a point and the size of its vehicle.
+///
+/// # Errors
+/// A number is not finite.
+pub(crate) fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Result<(), WriteError> {
     let quantities = [
         ("the position along the road", point.s_m),
         ("the lateral position", point.d_m),

@@ -6,8 +6,8 @@ use std::path::Path;
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::{LaneReliability, detect};
 use closecall_recorded::trajectory_data::{
-    AxisOptions, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read, read_from,
-    read_with,
+    AxisOptions, BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read,
+    read_from, read_with,
 };
 use closecall_traffic::{Lane, Side, Time, maths};
 
@@ -206,6 +206,67 @@ fn lane_numbers_of_highd_that_do_not_fit_its_markings_are_refused() {
         let options = ReadOptions { lanes: LaneReliability::Unreliable, ..ReadOptions::default() };
         assert!(read_with(folder.path(), options).is_ok());
     }
+}
+
+#[test]
+fn highd_traffic_beside_its_carriageway_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    // The driving directions follow the mirrored x, so that the vehicles keep to the other side of the
+    // median, as in traffic on the left.
+    rewrite_rows(folder.path(), |fields| {
+        let (x_m, length_m): (f64, f64) = (fields[2].parse().unwrap(), fields[4].parse().unwrap());
+        fields[2] = format!("{:.2}", 400.0 - x_m - length_m);
+        fields[6] = format!("{}", -fields[6].parse::<f64>().unwrap());
+        fields[8] = format!("{}", -fields[8].parse::<f64>().unwrap());
+    });
+    let meta = "id,numFrames,class,drivingDirection\n1,30,Car,2\n2,30,Truck,1\n";
+    std::fs::write(folder.path().join("07_tracksMeta.csv"), meta).unwrap();
+    for lanes in [LaneReliability::Reliable, LaneReliability::Unreliable] {
+        let error = read_with(folder.path(), ReadOptions { lanes, ..ReadOptions::default() }).unwrap_err();
+        let is_beside = matches!(error.problem, TrajectoryFileProblem::BesideCarriageway { .. });
+        assert!(is_beside && error.to_string().contains("drives on the left"), "{error}");
+    }
+}
+
+#[test]
+fn driving_directions_of_highd_against_its_velocities_are_refused_as_a_whole() {
+    let skip = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
+    let swap_directions = |folder: &Path| {
+        let path = folder.join("07_tracksMeta.csv");
+        let text = std::fs::read_to_string(&path).unwrap().replace("Car,1", "Car,3").replace("Truck,2", "Truck,1");
+        std::fs::write(path, text.replace("Car,3", "Car,2")).unwrap();
+    };
+    let mirror_x = |folder: &Path| {
+        rewrite_rows(folder, |fields| {
+            let (x_m, length_m): (f64, f64) = (fields[2].parse().unwrap(), fields[4].parse().unwrap());
+            fields[2] = format!("{:.2}", 400.0 - x_m - length_m);
+            fields[6] = format!("{}", -fields[6].parse::<f64>().unwrap());
+        });
+    };
+    let without_sign =
+        |folder: &Path| rewrite_rows(folder, |fields| fields[6] = fields[6].trim_start_matches('-').to_owned());
+    let cases: [&dyn Fn(&Path); 3] = [&swap_directions, &mirror_x, &without_sign];
+    for change in cases {
+        let folder = tempfile::tempdir().unwrap();
+        write_both_ways(folder.path());
+        change(folder.path());
+        for options in [ReadOptions::default(), skip] {
+            let error = read_with(folder.path(), options).unwrap_err();
+            let is_whole = matches!(error.problem, TrajectoryFileProblem::AgainstDrivingDirection { .. });
+            assert!(is_whole && error.to_string().contains("07_tracksMeta.csv"), "{error}");
+        }
+    }
+    // A single wrong row is left out.
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    rewrite_rows(folder.path(), |fields| {
+        if fields[0] == "7" && fields[1] == "2" {
+            fields[6] = "-25.0".to_owned();
+        }
+    });
+    assert!(read(folder.path()).unwrap_err().problem.affects_one_row());
+    assert!(read_with(folder.path(), skip).is_ok());
 }
 
 #[test]

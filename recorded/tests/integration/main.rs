@@ -12,6 +12,7 @@ mod malformed;
 mod malformed_layouts;
 mod malformed_rows;
 mod ngsim_us101;
+mod osi;
 mod other_programs;
 mod own_trajectory_files;
 mod robustness;

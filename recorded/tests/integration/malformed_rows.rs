@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use closecall_recorded::trajectory_data::{BadRows, ReadOptions, TrajectoryFileError, open_from};
+use closecall_recorded::trajectory_data::{AxisOptions, BadRows, ReadOptions, TrajectoryFileError, open_from};
 
 use crate::support::{PLAIN_HEADER, assert_mentions, read_text};
 
@@ -55,6 +55,48 @@ fn mixed_up_units_and_columns_are_detected() {
 }
 
 #[test]
+fn negative_speeds_of_a_reversed_axis_are_turned_on_request() {
+    let speed_mps = |at: &[f64; 6]| 25.0 + 0.5 * at[0];
+    let clean = drive(|at| at[3] = speed_mps(at));
+    let reversed = drive(|at| {
+        at[1] = 500.0 - at[1];
+        at[3] = -speed_mps(at);
+    });
+    let error = read_text(reversed.as_bytes()).unwrap_err();
+    assert_mentions(&error, &["line 2", "`speed_mps`", "is `-25`", "0 to 150", "40 of 40 rows"], "negative speeds");
+    let axes = AxisOptions { reverse_s: true, ..AxisOptions::default() };
+    let options = ReadOptions { axes, ..ReadOptions::default() };
+    let turned = open_from(reversed.as_bytes(), Path::new("made-up.csv"), options, usize::MAX).unwrap();
+    let [turned, clean] = [turned.collect_all().unwrap(), read_text(clean.as_bytes()).unwrap()];
+    for (turned, clean) in turned.trajectories[0].points.iter().zip(&clean.trajectories[0].points) {
+        assert_eq!((turned.speed_mps, turned.d_m), (clean.speed_mps, clean.d_m));
+        assert!((turned.s_m + 500.0 - clean.s_m).abs() < 0.002 && (turned.acceleration_mps2 - 0.5).abs() < 0.05);
+    }
+}
+
+#[test]
+fn unix_times_count_from_the_first_row() {
+    let unix = drive(|at| at[0] += 1_600_000_000.0);
+    let [unix, clean] = [unix, drive(|_| {})].map(|text| read_text(text.as_bytes()).unwrap());
+    assert_eq!((unix.period, unix.trajectories), (clean.period, clean.trajectories));
+}
+
+#[test]
+fn speeds_of_zero_of_moving_vehicles_are_detected() {
+    let speeds = ["line", "1 of 1 moving vehicles", "speeds"];
+    for speed_mps in [0.0, 2.5] {
+        let error = read_text(drive(|at| at[3] = speed_mps).as_bytes()).unwrap_err();
+        assert_mentions(&error, &speeds, "speeds without motion");
+    }
+    // Position noise at rest is no motion.
+    let at_rest = drive(|at| {
+        at[1] = 50.0 + if (10.0 * at[0]).round() % 2.0 == 0.0 { 0.8 } else { 0.0 };
+        at[3] = 0.0;
+    });
+    assert!(read_text(at_rest.as_bytes()).is_ok());
+}
+
+#[test]
 fn windows_line_ends_and_a_byte_order_mark_do_not_change_the_data() {
     let text = drive(|_| {});
     let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
@@ -97,6 +139,30 @@ fn bad_rows_are_skipped_and_counted_on_request() {
         [("cut rows", 1, Some(21)), ("duplicated rows", 1, Some(6)), ("values that are not allowed", 1, Some(10))];
     assert_eq!(dropped, expected);
     assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "by default a bad row ends the reading");
+}
+
+#[test]
+fn a_file_of_bad_rows_is_refused_as_a_whole() {
+    let text = drive(|_| {});
+    let spoilt = |bad: usize| {
+        let spoil = |(index, line): (usize, &str)| {
+            if (1..=bad).contains(&index) { line.replace(",25.000,", ",fast,") } else { line.to_owned() }
+        };
+        text.lines().enumerate().map(spoil).collect::<Vec<_>>().join("\n") + "\n"
+    };
+    let read_all = |text: &str, bad_rows: BadRows, window: usize| {
+        let options = ReadOptions { bad_rows, ..ReadOptions::default() };
+        open_from(text.as_bytes(), Path::new("made-up.csv"), options, window).and_then(|tracks| tracks.collect_all())
+    };
+    for (bad_rows, window) in [(BadRows::Reject, usize::MAX), (BadRows::Skip, usize::MAX), (BadRows::Skip, 5)] {
+        let error = read_all(&spoilt(30), bad_rows, window).unwrap_err();
+        assert_mentions(&error, &["line 2", "`speed_mps`", "is `fast`", "30 of", "rows cannot be used"], "30");
+        assert!(!error.problem.affects_one_row(), "{error}");
+    }
+    assert!(read_all(&spoilt(30), BadRows::Reject, 5).is_err());
+    let error = read_all(&spoilt(12), BadRows::Reject, usize::MAX).unwrap_err();
+    assert!(error.problem.affects_one_row(), "{error}");
+    assert!(read_all(&spoilt(12), BadRows::Skip, usize::MAX).is_ok());
 }
 
 /// Creates a file with more rows than the window. `vehicle_and_frame` gives vehicle and frame (from

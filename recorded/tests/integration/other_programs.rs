@@ -281,6 +281,36 @@ fn traffic_without_a_road_is_refused_with_the_reason() {
     assert_mentions(&error, &["does not follow a road", "roundabouts"], "a roundabout");
 }
 
+#[test]
+fn without_lanes_the_longest_path_of_a_lane_changer_is_no_reference_line() {
+    let mut text = "<fcd-export>\n".to_owned();
+    for time_s in times_s() {
+        writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
+        for number in 0..14_u32 {
+            // The fastest vehicle has the longest path, and is the only one that changes lanes.
+            let is_changing = number == 13;
+            let (start_m, speed_mps) = if is_changing { (0.0, 33.0) } else { (5.0 * f64::from(number), 25.0) };
+            let lane = if is_changing {
+                let tau = ((time_s - 4.0) / 4.0).clamp(0.0, 1.0);
+                2.0 - tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau)
+            } else {
+                f64::from(number % 3)
+            };
+            let (x_m, y_m) = (start_m + speed_mps * time_s, -VISSIM_LANE_M * (lane + 0.5));
+            writeln!(
+                text,
+                "<vehicle id=\"{number}\" x=\"{x_m:.3}\" y=\"{y_m:.3}\" angle=\"90.0\" type=\"car\" speed=\"{speed_mps:.2}\"/>"
+            )
+            .unwrap();
+        }
+        text += "</timestep>\n";
+    }
+    text += "</fcd-export>\n";
+    let changes = detect(&smooth(&read_text(text.as_bytes()).unwrap()));
+    let found: Vec<(u64, Side)> = changes.iter().map(|change| (change.track_id, change.direction)).collect();
+    assert_eq!(found, [(13, Side::Left)]);
+}
+
 fn vissim(columns: &str, row: impl Fn(&Drive, f64) -> String) -> String {
     let mut text = format!(
         "$VISSION\n* File: made-up\n*\n* POS: Position [m]\n* SPEED: Speed [km/h]\n*\n$VEHICLE:SIMSEC;NO;{columns}\n"
@@ -336,6 +366,27 @@ fn vehicle_records_of_vissim_are_read_by_links_and_by_coordinates() {
         assert_eq!((change.track_id, change.direction), (2, Side::Left));
         assert!((change.crossing_s - 6.0).abs() < 0.2, "{}", change.crossing_s);
     }
+}
+
+#[test]
+fn lanes_of_vissim_beside_coordinates_are_the_recorded_lanes() {
+    let text =
+        vissim(r"LANE\LINK\NO;LANE\INDEX;SPEED;COORDFRONTX;COORDFRONTY;COORDREARX;COORDREARY", |drive, time_s| {
+            let (front_m, y_m, _) = drive.at(time_s, false);
+            // The file names the new lane half a second after the vehicle has crossed the marking.
+            let (_, _, index) = drive.at(time_s - 0.5, false);
+            let link = if front_m < 150.0 { 1 } else { 2 };
+            let (rear_m, speed_kmh) = (front_m - 5.0, 3.6 * drive.speed_mps);
+            format!("{link};{};{speed_kmh:.3};{front_m:.3};{y_m:.3};{rear_m:.3};{y_m:.3}", index + 1)
+        });
+    let data = read_text(text.as_bytes()).unwrap();
+    let lanes: Vec<(u8, u8)> =
+        data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect();
+    assert_eq!(lanes, [(1, 1), (3, 2), (3, 3), (2, 2)]);
+    let points = &data.trajectories[1].points;
+    let change = points.windows(2).position(|pair| pair[0].lane != pair[1].lane);
+    assert!(change.is_some_and(|frame| (64..=65).contains(&frame)), "{change:?}");
+    assert!(!data.notes.iter().any(|note| note.contains("states no lanes")), "{:?}", data.notes);
 }
 
 #[test]
@@ -441,7 +492,10 @@ fn malformed_json_is_refused() {
         (good.replacen("1669122000.04", "1669121000.04", 1), vec!["trajectory 1", "`timestamp`", "after 1669122000"]),
         (good.replacen("1669122000.04", "NaN", 1), vec!["line 1", "I-24 MOTION"]),
         (good.chars().take(9_000).collect(), vec!["I-24 MOTION", "EOF"]),
-        ("{\"openlabel\": {\"metadata\": {}}}".to_owned(), vec!["JSON without the fields of I-24 MOTION", "OpenLABEL"]),
+        (
+            "{\"label\": {\"metadata\": {}}}".to_owned(),
+            vec!["JSON without the fields of I-24 MOTION", "without `openlabel`"],
+        ),
         ("[1, 2]".to_owned(), vec!["JSON without the fields"]),
     ] {
         let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(200)]);

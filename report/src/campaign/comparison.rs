@@ -5,6 +5,7 @@ use std::fmt;
 use closecall_campaign::baseline::{BaselineComparison, ScenarioBaselineComparison};
 use closecall_campaign::compare::{Means, ScenarioComparison};
 use closecall_campaign::margins::MarginRegression;
+use closecall_traffic::words::counted;
 
 /// Largest number of samples that a list in a text names.
 const MAX_LISTED: usize = 12;
@@ -28,8 +29,10 @@ impl fmt::Display for ComparisonText<'_> {
         for scenario in self.scenarios {
             writeln!(
                 f,
-                "{}: {} samples, {} the same to the last bit",
-                scenario.scenario, scenario.samples, scenario.same
+                "{}: {}, {} the same to the last bit",
+                scenario.scenario,
+                counted(scenario.samples, "sample"),
+                scenario.same
             )?;
             write_list(f, "newly failing", &scenario.newly_failing)?;
             write_list(f, "fixed", &scenario.fixed)?;

@@ -5,6 +5,7 @@ use std::fmt;
 use closecall_campaign::coverage::{BinHits, CoverageResult};
 use closecall_campaign::verdict::Judgement;
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 /// Largest number of holes that a text names.
@@ -39,8 +40,7 @@ pub(super) fn line(result: &CoverageResult) -> String {
     let (covered, all) = (result.covered, result.bins.len());
     let outside = match result.outside {
         0 => String::new(),
-        1 => ", 1 sample in none".to_owned(),
-        outside => format!(", {outside} samples in none"),
+        outside => format!(", {} in none", counted(outside, "sample")),
     };
     let holes: Vec<String> = result.holes().map(|hole| hole_text(result, hole)).collect();
     let named = holes.iter().take(NAMED_HOLES).cloned().collect::<Vec<_>>().join("; ");

@@ -24,6 +24,8 @@ use closecall_campaign::probability::Answer;
 use closecall_campaign::summary::Counts;
 use closecall_campaign::verdict::{Judgement, Verdict};
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
@@ -77,13 +79,13 @@ fn cases(judged: &Judgement) -> Vec<Case> {
                 Answer::Above => Status::Failed,
                 Answer::Open => Status::Error,
             },
-            message: format!("between {} and {}", finding.lower_bound, finding.upper_bound),
+            message: format!("{}; required: at most {}", finding.bounds(), percent(finding.max)),
         });
     }
     if let Some(gate) = judged.flaky {
         cases.push(Case {
             suite: CAMPAIGN_SUITE.to_owned(),
-            name: format!("at most {} flaky samples", gate.max),
+            name: format!("at most {}", counted(gate.max, "flaky sample")),
             status: match (gate.is_met(), is_measured) {
                 (true, _) => Status::Passed,
                 (false, false) => Status::Failed,

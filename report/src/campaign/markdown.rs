@@ -8,7 +8,7 @@ use super::findings::Findings;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use super::recordings::card_beside;
 use super::text::{goals, imposed, not_prevented};
-use super::words::{reasons, sentence};
+use super::words::{reasons_below, sentence};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
@@ -31,8 +31,9 @@ pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteE
 
 /// Returns the summary.
 pub fn markdown(findings: &Findings<'_>) -> String {
-    let mut text = format!("## Closecall: {}\n\n", plain(&sentence(findings.judged, findings.files.len())));
-    for reason in &reasons(findings.judged) {
+    let sentence = sentence(findings.judged, findings.files.len());
+    let mut text = format!("## Closecall: {}\n\n", plain(&sentence));
+    for reason in &reasons_below(findings.judged, &sentence) {
         text.push_str(&format!("- {}\n", plain(reason)));
     }
     for (still, recording) in findings.worst_stills() {

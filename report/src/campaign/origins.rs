@@ -13,6 +13,7 @@ use closecall_campaign::summary::{Counts, Summary};
 use closecall_studies::engagement::Engagement;
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::input;
+use closecall_traffic::words::counted;
 use maud::{Markup, PreEscaped, html};
 use serde::{Deserialize, Serialize};
 
@@ -188,7 +189,8 @@ fn engaged_sentence(all: &Engagement) -> String {
     };
     let before = all.before_braking;
     format!(
-        "the system engages in {engaged} of {samples} samples ({share:.0} %), in {before} before the lead vehicle brakes{rest}"
+        "the system engages in {engaged} of {} ({share:.0} %), in {before} before the lead vehicle brakes{rest}",
+        counted(samples, "sample")
     )
 }
 
@@ -206,8 +208,8 @@ pub(super) fn section(findings: &Findings<'_>) -> Markup {
     html! {
         h2 { "Recorded encounters" }
         p {
-            (origins.files.len()) @if origins.files.len() == 1 { " trajectory file has " } @else { " trajectory files have " }
-            (changes) " lane changes, of which " (origins.approaches) " overtake a vehicle. "
+            (counted(origins.files.len(), "trajectory file")) @if origins.files.len() == 1 { " has " } @else { " have " }
+            (counted(changes, "lane change")) ". Of these, " (origins.approaches) " overtake a vehicle. "
             (origins.encounters.len()) " of them became scenarios. " (origins.choice)
         }
         @if let Some(all) = origins.engagement() { p { "Over all encounters " (engaged_sentence(&all)) "." } }

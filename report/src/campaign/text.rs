@@ -9,10 +9,11 @@ use closecall_campaign::probability::percent;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::outcome::IMPOSED_BRAKING_MPS2;
+use closecall_traffic::words::counted;
 
 use super::overview::{ErrorGroup, Overview};
 use super::pareto::ParetoText;
-use super::words::{reasons, sentence};
+use super::words::{reasons_below, sentence};
 
 /// Width of the names of the arms in the output, at least.
 const NAME_WIDTH: usize = 5;
@@ -25,7 +26,7 @@ impl fmt::Display for CountsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let summary = self.0;
         for (name, counts) in &summary.scenarios {
-            writeln!(f, "{name}: {} samples", counts.samples)?;
+            writeln!(f, "{name}: {}", counted(counts.samples, "sample"))?;
             write_scenario(f, summary, counts)?;
         }
         if summary.inference == Inference::Sequential {
@@ -76,8 +77,9 @@ pub struct VerdictText<'a> {
 
 impl fmt::Display for VerdictText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", sentence(self.judged, self.scenarios))?;
-        reasons(self.judged).iter().try_for_each(|reason| writeln!(f, "  {reason}"))
+        let sentence = sentence(self.judged, self.scenarios);
+        writeln!(f, "{sentence}")?;
+        reasons_below(self.judged, &sentence).iter().try_for_each(|reason| writeln!(f, "  {reason}"))
     }
 }
 
@@ -127,13 +129,13 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
     }
     let checks = &counts.checks;
     if checks.not_checked > 0 {
-        writeln!(f, "  not checked: {} runs, because a check took too long", checks.not_checked)?;
+        writeln!(f, "  not checked: {}, because a check took too long", counted(checks.not_checked, "run"))?;
     }
     if let Some(rate) = checks.flip_rate() {
         writeln!(
             f,
-            "  checked: {} runs, {} flipped at half the time step ({})",
-            checks.runs,
+            "  checked: {}, {} flipped at half the time step ({})",
+            counted(checks.runs, "run"),
             checks.flips,
             percent(rate)
         )?;
@@ -155,7 +157,7 @@ pub(super) fn not_prevented(counts: &Counts) -> Option<String> {
 pub(super) fn goals(counts: &Counts) -> Option<String> {
     let all: u64 = counts.goals.iter().map(|(_, times)| times).sum();
     let texts: Vec<String> = counts.goals.iter().map(|(goal, times)| format!("{} in {times}", goal.text())).collect();
-    (all > 0).then(|| format!("goal (2 s of headway) in {all} encounters: {}", texts.join(", ")))
+    (all > 0).then(|| format!("goal (2 s of headway) in {}: {}", counted(all, "encounter"), texts.join(", ")))
 }
 
 /// Returns in how many samples each arm makes the vehicle behind brake hard; `None` if none does.
@@ -200,7 +202,8 @@ fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Count
 
 fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference: Inference) -> fmt::Result {
     let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
-    write!(f, "  {name} {:>6} collisions  {rate:>7}", arm.collisions)?;
+    let noun = if arm.collisions == 1 { "collision" } else { "collisions" };
+    write!(f, "  {name} {:>6} {noun:<10}  {rate:>7}", arm.collisions)?;
     if let Some([low, high]) = arm.interval_95(inference) {
         write!(f, "  (95 %: {:.1} to {:.1} %)", 100.0 * low, 100.0 * high)?;
     }
@@ -208,7 +211,7 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
         write!(f, "  delta-v up to {:.1} m/s", arm.max_delta_v_mps)?;
     }
     if arm.touches > 0 {
-        write!(f, "  {} {}", arm.touches, if arm.touches == 1 { "touch" } else { "touches" })?;
+        write!(f, "  {}", counted(arm.touches, "touch"))?;
     }
     if arm.engagements > 0 {
         write!(f, "  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach)?;
@@ -218,7 +221,7 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
     }
     write!(f, "  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps)?;
     if arm.errors > 0 {
-        write!(f, "  {} ERRORS", arm.errors)?;
+        write!(f, "  {}", counted(arm.errors, "ERROR").to_uppercase())?;
     }
     if arm.flaky > 0 {
         write!(f, "  {} FLAKY", arm.flaky)?;

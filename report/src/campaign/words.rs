@@ -11,7 +11,8 @@
 use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::criteria::{Aggregate, Comparison, Operator, Quantity, Side};
-use closecall_traffic::statistics::format::percent;
+use closecall_traffic::statistics::format::{DIGITS, percent, significant};
+use closecall_traffic::words::counted;
 
 use crate::units::unit_of;
 
@@ -38,16 +39,19 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
         Decision::Fail => because(Standing::Fail, "miss").or_else(first_reason),
         Decision::Inconclusive => because(Standing::Inconclusive, "do not decide").or_else(first_reason),
         Decision::Pass => {
-            let met = judged.gates.iter().filter(|gate| gate.standing() == Standing::Pass).count();
+            let of_probability = judged.probabilities.iter().map(|(_, finding)| finding.standing());
+            let standings: Vec<Standing> =
+                judged.gates.iter().map(GateResult::standing).chain(of_probability).collect();
+            let met = standings.iter().filter(|standing| **standing == Standing::Pass).count();
             let all = if scenarios == 1 {
                 "the scenario meets".to_owned()
             } else {
                 format!("all {scenarios} scenarios meet")
             };
-            let unchecked = judged.gates.iter().filter(|gate| gate.standing() == Standing::NotChecked).count();
+            let unchecked = standings.iter().filter(|standing| **standing == Standing::NotChecked).count();
             Some(match unchecked {
-                0 => format!("{word}: {all} what is required, {met} of {} gates", judged.gates.len()),
-                _ => format!("{word}: {met} of {} gates are met, {unchecked} not checked", judged.gates.len()),
+                0 => format!("{word}: {all} what is required, {met} of {} gates", standings.len()),
+                _ => format!("{word}: {met} of {} gates are met, {unchecked} not checked", standings.len()),
             })
         }
         Decision::NotJudged | Decision::Overridden | Decision::SampleError | Decision::Invalid => first_reason(),
@@ -78,6 +82,11 @@ fn scenarios_of(judged: &Judgement, standing: Standing) -> Vec<(String, Vec<Stri
             && !names[index].1.contains(mark)
         {
             names[index].1.push(mark.clone());
+        }
+    }
+    for (name, _) in judged.probabilities.iter().filter(|(_, finding)| finding.standing() == standing) {
+        if !names.iter().any(|(scenario, _)| scenario == name) {
+            names.push((name.clone(), Vec::new()));
         }
     }
     names
@@ -134,10 +143,11 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
         }
         _ => None,
     };
-    let shown = |value: f64| match (is_share, unit) {
-        (true, _) => percent(value),
-        (false, Some(unit)) => format!("{} {unit}", number(value)),
-        (false, None) => number(value),
+    let with_unit = |number: String| unit.map_or_else(|| number.clone(), |unit| format!("{number} {unit}"));
+    let bound = if is_share { percent(expression.bound) } else { with_unit(number(expression.bound)) };
+    let shown = |value: f64| match is_share {
+        true => percent(value),
+        false => with_unit(measured(value, expression.bound)),
     };
     let sides = match expression.operator {
         Operator::AtLeast => "at least",
@@ -147,14 +157,14 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
     let interval = interval_95
         .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
     let is = match (expression.aggregate, value) {
-        (_, None) => format!("has no value ({samples} samples)"),
-        (Aggregate::Lower, Some(bound)) => format!("{}, one-sided lower 95 % bound {}", estimate(), shown(bound)),
-        (Aggregate::Upper, Some(bound)) => format!("{}, one-sided upper 95 % bound {}", estimate(), shown(bound)),
+        (_, None) => format!("has no value ({})", counted(samples, "sample")),
+        (Aggregate::Lower, Some(value)) => format!("{}, one-sided lower 95 % bound {}", estimate(), shown(value)),
+        (Aggregate::Upper, Some(value)) => format!("{}, one-sided upper 95 % bound {}", estimate(), shown(value)),
         (Aggregate::Share, Some(_)) => format!("{}{interval}", estimate()),
-        (_, Some(value)) => format!("{} ({samples} samples{interval})", shown(value)),
+        (_, Some(value)) => format!("{} ({}{interval})", shown(value), counted(samples, "sample")),
     };
     let open = gate.evaluation.undecided().map_or_else(String::new, |why| format!(" ({why})"));
-    format!("{subject}{condition}: {is}{open}; required: {sides} {}", shown(expression.bound))
+    format!("{subject}{condition}: {is}{open}; required: {sides} {bound}")
 }
 
 /// Returns the judged quantity in words, and whether it is a share.
@@ -189,6 +199,17 @@ fn flag_words(quantity: &Quantity) -> String {
     }
 }
 
+/// Most significant digits of a measured value (-): as many as an `f64` in a table of results has.
+const MOST_DIGITS: i32 = 9;
+
+/// Returns a measured value with three significant digits, or with as many as tell it from the
+/// bound: 10.004 beside 10.
+fn measured(value: f64, bound: f64) -> String {
+    let is_told = |text: &String| value.total_cmp(&bound).is_eq() || *text != significant(bound, MOST_DIGITS);
+    let mut texts = (DIGITS..=MOST_DIGITS).map(|digits| significant(value, digits));
+    texts.find(is_told).unwrap_or_else(|| value.to_string())
+}
+
 /// Returns a number with as many digits as tell it apart, and no more than four.
 fn number(value: f64) -> String {
     let text = format!("{value:.4}");
@@ -197,7 +218,8 @@ fn number(value: f64) -> String {
 }
 
 /// Returns the reasons of a verdict in the order in which they are read: reasons that are not met
-/// or open, further remarks, and met ones. Gates are in plain words.
+/// or open, further remarks, and met ones. If errors or findings decide, they come first. Gates are
+/// in plain words.
 pub(crate) fn reasons(judged: &Judgement) -> Vec<String> {
     let texts: Vec<String> = judged.gates.iter().map(ToString::to_string).collect();
     let others = judged.reasons.iter().filter(|reason| !texts.contains(reason)).cloned();
@@ -205,12 +227,30 @@ pub(crate) fn reasons(judged: &Judgement) -> Vec<String> {
         let gates = worst_first(judged).into_iter();
         gates.filter(move |gate| (gate.standing() <= Standing::NotChecked) == is_met).map(gate_line)
     };
-    lines(false).chain(others).chain(lines(true)).collect()
+    match judged.decision {
+        Decision::SampleError | Decision::Invalid => others.chain(lines(false)).chain(lines(true)).collect(),
+        _ => lines(false).chain(others).chain(lines(true)).collect(),
+    }
+}
+
+/// Returns true if a reason is what the sentence of the verdict says.
+pub(crate) fn is_said(judged: &Judgement, sentence: &str, reason: &str) -> bool {
+    let told = sentence.strip_prefix(judged.word()).and_then(|rest| rest.strip_prefix(": "));
+    sentence == reason || told == Some(reason)
+}
+
+/// Returns the reasons that stand below the sentence of the verdict: all but the one that it says.
+pub(crate) fn reasons_below(judged: &Judgement, sentence: &str) -> Vec<String> {
+    let mut reasons = reasons(judged);
+    reasons.retain(|reason| !is_said(judged, sentence, reason));
+    reasons
 }
 
 #[cfg(test)]
 mod tests {
     use closecall_campaign::gate::OpenReason;
+    use closecall_campaign::ledger::{ArmCounts, Inference};
+    use closecall_campaign::probability::ProbabilityGate;
 
     use super::*;
 
@@ -264,6 +304,48 @@ mod tests {
             lines[3].starts_with("met: b: MIS-2: share of the samples in which a collision is induced: 18 of 60 (30 %), one-sided upper 95 % bound 2 %; required: at most 3 %"),
             "{lines:?}"
         );
+    }
+
+    #[test]
+    fn causes_of_errors_come_before_open_gates_and_no_sentence_stands_twice() {
+        let open = gate("a", "upper(induced) <= 0.03", None, 0.9, Answer::Open(OpenReason::TooFewSamples));
+        let mut judgement = judged(Decision::SampleError, vec![open]);
+        let told = ["2 samples ended in an error", "a: 2 × exec (controller), first in sample 0: no such file"];
+        judgement.reasons.splice(0..0, told.map(str::to_owned));
+        let headline = sentence(&judgement, 1);
+        assert_eq!(headline, "ERROR: 2 samples ended in an error");
+        assert_eq!(reasons(&judgement)[..2], told);
+        let below = reasons_below(&judgement, &headline);
+        assert_eq!((below[0].as_str(), below[1].as_str()), (told[1], "a note"));
+        assert!(below[2].starts_with("open: a: "), "{below:?}");
+        judgement.decision = Decision::Overridden;
+        judgement.reasons = vec!["OVERRIDDEN: a: a setting".to_owned()];
+        assert_eq!(reasons_below(&judgement, &sentence(&judgement, 1)).len(), 1, "only the gate is left");
+    }
+
+    #[test]
+    fn a_gate_on_the_probability_is_a_gate_of_the_sentence() {
+        let gate = ProbabilityGate::new(0.01, 0.95).unwrap();
+        let counts = |collisions| ArmCounts { outcomes: 300, collisions, ..ArmCounts::default() };
+        for (collisions, decision, expected) in [
+            (0, Decision::Pass, "PASS: the scenario meets what is required, 1 of 1 gates"),
+            (1, Decision::Inconclusive, "INCONCLUSIVE: the scenario does not decide a gate: a"),
+            (30, Decision::Fail, "FAIL: the scenario misses a gate: a"),
+        ] {
+            let mut judgement = judged(decision, Vec::new());
+            let finding = gate.judge(&counts(collisions), 1, Inference::FixedSamples);
+            judgement.probabilities = vec![("a".to_owned(), finding)];
+            assert_eq!(sentence(&judgement, 1), expected);
+        }
+    }
+
+    #[test]
+    fn a_measured_value_has_three_digits_unless_they_hide_that_it_misses_its_bound() {
+        let jerk = gate("a", "max(max_jerk_mps3) <= 10", None, 31.0825, Answer::Missed);
+        assert!(gate_words(&jerk).contains(": 31.1 m/s³ (60 samples"), "{}", gate_words(&jerk));
+        let texts = [(10.004, 10.0), (9.9996, 10.0), (10.0, 10.0), (0.123_456, 1.0)]
+            .map(|(value, bound)| measured(value, bound));
+        assert_eq!(texts, ["10.004", "9.9996", "10", "0.123"]);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use serde_json::{Value, json};
 
 use closecall_studies::perception::recorded::{RecordedStudy, TruthFigures, VehicleGroup};
+use closecall_traffic::words::counted;
 
 use super::number;
 use crate::json::stamped;
@@ -73,10 +74,10 @@ impl Display for RecordedReport {
         let RecordedStudy { lidars, duration_s, has_map, tracks, confirmed_lives_s, truth } = &self.study;
         writeln!(f, "{}: the chain of {} on {duration_s:.2} s of recorded scans", self.recording, self.scenario)?;
         for of in lidars {
-            write!(f, "  {}: {} scans, {} points", of.name, of.scans, of.points)?;
+            write!(f, "  {}: {}, {}", of.name, counted(of.scans, "scan"), counted(of.points, "point"))?;
             match of.outside {
                 0 => writeln!(f)?,
-                outside => writeln!(f, ", of which {outside} outside of the field of view are left out")?,
+                outside => writeln!(f, "; left out, because they are outside of the field of view: {outside}")?,
             }
         }
         writeln!(f, "  camera: none; a box has the class of its shape")?;

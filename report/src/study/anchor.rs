@@ -5,6 +5,7 @@ use std::io;
 
 use closecall_studies::anchor::{Anchor, LEAST_COLLISIONS, Paired, Quantity, Row};
 use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
+use closecall_traffic::words::counted;
 
 use super::aligned::{error_lines, write_rows};
 use crate::charts::{ScatterPoint, scatter};
@@ -64,8 +65,9 @@ fn moved(variation: &str, change: [f64; 2]) -> String {
 impl Display for AnchorText<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let anchor = self.0;
-        let (scenario, arms, samples) = (&anchor.scenario, anchor.controllers.join(" and "), anchor.samples);
-        writeln!(f, "{scenario}: {arms}, {samples} samples of each row, seed {}\n", anchor.seed)?;
+        let (scenario, arms, samples) =
+            (&anchor.scenario, anchor.controllers.join(" and "), counted(anchor.samples, "sample"));
+        writeln!(f, "{scenario}: {arms}, {samples} of each row, seed {}\n", anchor.seed)?;
         let rows = |head: &str, rows: &[Row]| {
             let head = std::iter::once(head.to_owned()).chain(HEADS.map(str::to_owned)).collect::<Vec<_>>();
             let row = |row: &Row| std::iter::once(name(row)).chain(cells(row)).collect::<Vec<_>>();

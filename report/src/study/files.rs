@@ -7,6 +7,7 @@ use closecall_campaign::frontier::Frontier;
 use closecall_campaign::sensitivity::{FactorKind, RunErrors, Sensitivity};
 use closecall_studies::anchor::{Anchor, Quantity, Row};
 use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::words::counted;
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
@@ -180,8 +181,8 @@ fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
 
 fn anchor_page(anchor: &Anchor, charts: &Charts) -> Markup {
     let title = "Emergency braking against crash records";
-    let (arms, samples) = (anchor.controllers.join(" and "), anchor.samples);
-    let about = format!("{}: {arms}, {samples} samples of each row, seed {}", anchor.scenario, anchor.seed);
+    let (arms, samples) = (anchor.controllers.join(" and "), counted(anchor.samples, "sample"));
+    let about = format!("{}: {arms}, {samples} of each row, seed {}", anchor.scenario, anchor.seed);
     let rows = |head: &str, rows: &[Row]| {
         let heads: Vec<&str> = std::iter::once(head).chain(ANCHOR_HEADS).collect();
         table(
@@ -209,8 +210,8 @@ fn anchor_page(anchor: &Anchor, charts: &Charts) -> Markup {
 
 fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
     let title = format!("Frontier: {}", frontier.scenario);
-    let (controllers, samples) = (frontier.controllers.join(" and "), frontier.samples);
-    let about = format!("Controllers {controllers}, {samples} samples for each combination, seed {}", frontier.seed);
+    let (controllers, samples) = (frontier.controllers.join(" and "), counted(frontier.samples, "sample"));
+    let about = format!("Controllers {controllers}, {samples} for each combination, seed {}", frontier.seed);
     let keys: Vec<&str> = frontier.keys.iter().map(|key| short(key)).collect();
     let heads: Vec<&str> = [""].into_iter().chain(keys).chain(HEADS).collect();
     let body = html! {

@@ -5,6 +5,7 @@ use std::io;
 
 use closecall_campaign::frontier::{Frontier, Point};
 use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
+use closecall_traffic::words::counted;
 
 use super::aligned::{error_lines, share, write_rows};
 use crate::charts::{ScatterPoint, scatter};
@@ -44,8 +45,9 @@ impl Display for FrontierText<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let frontier = self.0;
         let (scenario, samples, seed) = (&frontier.scenario, frontier.samples, frontier.seed);
-        let (points, controllers) = (frontier.points.len(), frontier.controllers.join(" and "));
-        writeln!(f, "{scenario}: {points} combinations, {samples} samples each, {controllers}, seed {seed}\n")?;
+        let (points, controllers) = (counted(frontier.points.len(), "combination"), frontier.controllers.join(" and "));
+        let samples = counted(samples, "sample");
+        writeln!(f, "{scenario}: {points}, {samples} each, {controllers}, seed {seed}\n")?;
         let keys = frontier.keys.iter().map(|key| short(key).to_owned());
         let mut rows =
             vec![std::iter::once(String::new()).chain(keys).chain(HEADS.map(str::to_owned)).collect::<Vec<_>>()];

@@ -7,6 +7,7 @@ use closecall_recorded::criticality::{Counted, CriticalLaneChange, MetricResult,
 use closecall_recorded::filters::SmoothedFile;
 use closecall_recorded::lane_change::{LaneChange, Score};
 use closecall_traffic::Side;
+use closecall_traffic::words;
 
 /// Lane changes as a table, with their number.
 #[derive(Clone, Copy, Debug)]
@@ -27,8 +28,8 @@ impl fmt::Display for LaneChangesText<'_> {
         let double = changes.iter().filter(|change| change.double).count();
         writeln!(
             f,
-            "{} lane changes, {complete} of them complete, {overlapping} overlapping, {double} of them parts of double ones",
-            changes.len()
+            "{}, {complete} of them complete, {overlapping} overlapping, {double} of them parts of double ones",
+            words::counted(changes.len(), "lane change")
         )?;
         Ok(())
     }
@@ -72,15 +73,15 @@ impl fmt::Display for CriticalityText<'_> {
         let quality = file.flaws;
         writeln!(
             f,
-            "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
+            "{}: {} of {}, {} every {}; {}, {}, {}",
             file.data.name,
-            quality.tracks,
-            quality.vehicles,
-            quality.instants,
+            words::counted(quality.tracks, "track"),
+            words::counted(quality.vehicles, "vehicle"),
+            words::counted(quality.instants, "instant"),
             file.period,
-            quality.gaps,
-            quality.jumps,
-            quality.overlaps,
+            words::counted(quality.gaps, "gap"),
+            words::counted(quality.jumps, "jump"),
+            words::counted(quality.overlaps, "overlap"),
         )?;
         for change in changes {
             writeln!(f, "{}", line(&change.lane_change))?;

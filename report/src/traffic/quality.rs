@@ -3,6 +3,7 @@
 use std::fmt;
 
 use closecall_recorded::trajectory_data::{QualityInspector, Tracks};
+use closecall_traffic::words::counted;
 
 /// The flaws of a trajectory file as text for human readers.
 pub struct QualityText<'a> {
@@ -19,11 +20,11 @@ impl fmt::Display for QualityText<'_> {
         writeln!(f, "{} ({})", tracks.name(), tracks.layout().name())?;
         writeln!(
             f,
-            "  {} rows; {} tracks of {} vehicles, {} instants every {:.3} s",
-            tracks.rows(),
-            quality.tracks,
-            quality.vehicles,
-            quality.instants,
+            "  {}; {} of {}, {} every {:.3} s",
+            counted(tracks.rows(), "row"),
+            counted(quality.tracks, "track"),
+            counted(quality.vehicles, "vehicle"),
+            counted(quality.instants, "instant"),
             tracks.period().s()
         )?;
         for (name, flaw) in inspector.flaws().named() {

@@ -4,6 +4,7 @@
 use std::fmt;
 
 use closecall_recorded::robustness::{CriterionCounts, ReferenceKind, Robustness, Setup};
+use closecall_traffic::words::counted;
 
 use super::trajectory_charts::{Band, ChartError, Legend, Line, LineChart, Mark};
 
@@ -23,7 +24,8 @@ impl fmt::Display for RobustnessText<'_> {
             ReferenceKind::LateralShift => "lateral shift",
         };
         let Setup { repetitions, seed, .. } = study.setup;
-        writeln!(f, "{} lane changes, by {reference}; each criterion without noise and offset:", study.reference)?;
+        let changes = counted(study.reference, "lane change");
+        writeln!(f, "{changes}, by {reference}; each criterion without noise and offset:")?;
         for ((criterion, count), confirmed) in study.criteria.iter().zip(&study.undisturbed).zip(&study.confirmed) {
             writeln!(f, "  {:<9} finds {count}; {confirmed} of them are among these", criterion.name())?;
         }

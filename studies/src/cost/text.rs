@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Cost, ScenarioCost};
+use closecall_traffic::words::counted;
 
 /// The cost as text for readers.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +27,7 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, cost: &ScenarioCost) -> fmt::Resul
         0 => String::new(),
         timed => format!(", time lost in {timed} of them"),
     };
-    writeln!(f, " {}: {} samples{timed}", cost.scenario, cost.samples)?;
+    writeln!(f, " {}: {}{timed}", cost.scenario, counted(cost.samples, "sample"))?;
 
     for arm in &cost.arms {
         let smallest = |values: Option<[f64; 3]>| {

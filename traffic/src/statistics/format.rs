@@ -1,27 +1,48 @@
-//! The printed form of probabilities and shares.
+//! The printed form of probabilities, shares and measured values.
 
 use crate::maths;
 
-/// Significant digits of a printed share.
-const DIGITS: i32 = 3;
+/// Significant digits of a printed value, unless its reader needs more.
+pub const DIGITS: i32 = 3;
+/// Most decimals of a printed value.
+const MOST_DECIMALS: i32 = 9;
+
+/// Returns a value with at most so many significant digits and without trailing zeros. The digits
+/// before the point are never cut: 31.0825 is `31.1` with three, 0.4 is `0.4`, 3290.62 is `3291`.
+pub fn significant(value: f64, digits: i32) -> String {
+    let size = value.abs();
+    if !(size > 0.0) || !value.is_finite() {
+        return if size > 0.0 || value.is_nan() { value.to_string() } else { "0".to_owned() };
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small number, not below 0 by the clamp"
+    )]
+    let decimals = (digits - 1 - maths::log10(size).floor() as i32).clamp(0, MOST_DECIMALS) as usize;
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
 
 /// Returns a share in percent, with three significant digits and without trailing zeros: 0.00994 is
 /// `0.994 %`.
 pub fn percent(share: f64) -> String {
-    let value = 100.0 * share;
-    if !(value > 0.0) || !value.is_finite() {
-        return format!("{value} %");
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number, above 0 by the clamp")]
-    let decimals = (DIGITS - 1 - maths::log10(value).floor() as i32).clamp(0, 9) as usize;
-    let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    format!("{text} %")
+    format!("{} %", significant(100.0 * share, DIGITS))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_have_the_digits_that_they_deserve() {
+        let texts = [1_600.0, -555.4548, 3_290.624_8, 0.4, 31.0825, -0.012_345, 9.996, 0.0, -0.0, 1e-12];
+        let expected = ["1600", "-555", "3291", "0.4", "31.1", "-0.0123", "10", "0", "0", "0"];
+        assert_eq!(texts.map(|value| significant(value, DIGITS)), expected);
+        assert_eq!(significant(10.004, 5), "10.004");
+        assert_eq!([f64::NAN, f64::NEG_INFINITY].map(|value| significant(value, DIGITS)), ["NaN", "-inf"]);
+    }
 
     #[test]
     fn percentages_have_three_digits() {

@@ -48,6 +48,7 @@ impl World for SimulatedWorld {
             state.crashes += 1;
             return Err(ExecError::Start {
                 program: "closecall".to_owned(),
+                reason: None,
                 source: io::ErrorKind::OutOfMemory.into(),
             });
         }

@@ -1,6 +1,7 @@
 //! Everything that a repetition of the campaign needs, and the sources of the sampled values.
 
 use closecall_scenarios::parameters::Provenance;
+use closecall_traffic::words::counted;
 use maud::{Markup, html};
 
 use super::page::{table, text_heads};
@@ -47,7 +48,7 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     let sampling = manifest.sampling;
     let sensors = manifest.sensors.map_or_else(|| "those of the scenario".to_owned(), |mode| mode.name().to_owned());
     entries.push(("seed", sampling.seed.to_string()));
-    entries.push(("design", format!("{}, {} samples asked for", sampling.design, sampling.samples)));
+    entries.push(("design", format!("{}, {} asked for", sampling.design, counted(sampling.samples, "sample"))));
     entries.push(("sensors", sensors));
     let is_object = manifest.sensors.is_none_or(|mode| mode == closecall_sensors::SensorMode::Object);
     if let (true, Ok(fit)) = (is_object, closecall_sensors::RearFit::shipped()) {

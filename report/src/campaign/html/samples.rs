@@ -113,7 +113,7 @@ pub(super) fn errors(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Ma
                 td { (failure.kind) }
                 (number(failure.samples))
                 (number(failure.first_sample))
-                td { code { (failure.first_message) } }
+                td { code { (failure.first_message) } @if failure.others { " and other messages" } }
                 td { code { (replay_failure(findings, &scenario.name, failure)) } }
             }
         }

@@ -16,6 +16,7 @@ use crate::charts;
 use crate::charts::style::{arm_colour, css, fate_colour};
 use crate::units::labelled;
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
 
 /// Returns the section of one scenario.
 pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> io::Result<Markup> {
@@ -139,7 +140,10 @@ fn margins(scenario: &ScenarioOverview) -> io::Result<Markup> {
 /// Returns how many samples of each arm lack the margin.
 fn absent(arms: &[String], bins: &[MarginBins]) -> String {
     let absent = arms.iter().zip(bins).filter(|(_, bins)| bins.absent > 0);
-    absent.map(|(arm, bins)| format!("{arm}: {} samples without", bins.absent)).collect::<Vec<_>>().join("; ")
+    absent
+        .map(|(arm, bins)| format!("{arm}: {} without", counted(bins.absent, "sample")))
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 fn sampled_values(scenario: &ScenarioOverview) -> io::Result<Markup> {

@@ -4,9 +4,10 @@ use maud::{Markup, html};
 
 use super::page::{table, text_heads};
 use crate::campaign::findings::Findings;
-use crate::campaign::words::{gate_words, sentence, worst_first};
+use crate::campaign::words::{gate_words, is_said, sentence, worst_first};
 use closecall_campaign::gate::{GateResult, Standing};
 use closecall_campaign::verdict::Verdict;
+use closecall_traffic::words::counted;
 
 const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     match verdict {
@@ -24,19 +25,21 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     let (judged, sampling) = (findings.judged, findings.manifest.sampling);
     let samples = findings.summary.total().samples;
     let gates: Vec<String> = judged.gates.iter().map(ToString::to_string).collect();
+    let sentence = sentence(judged, findings.files.len());
+    let is_below = |reason: &&String| !gates.contains(reason) && !is_said(judged, &sentence, reason);
     html! {
         header.(verdict_class(judged.verdict())) {
             p.verdict { (judged.word()) }
             div {
-                h1 { (sentence(judged, findings.files.len())) }
+                h1 { (sentence) }
                 @if let Some(line) = headline(findings) { p.headline { (line) } }
                 p.what {
                     (findings.scenario_names()) ": " (findings.summary.controllers.join(" against ")) ", "
-                    (samples) @if samples == 1 { " sample, " } @else { " samples, " }
+                    (counted(samples, "sample")) ", "
                     (sampling.design.to_string()) " design, seed " (sampling.seed)
                     @if let Some(part) = findings.manifest.partition { ", part " (part.to_string()) }
                 }
-                ul { @for reason in judged.reasons.iter().filter(|reason| !gates.contains(reason)) { li { (reason) } } }
+                ul { @for reason in judged.reasons.iter().filter(is_below) { li { (reason) } } }
                 p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
             }
         }

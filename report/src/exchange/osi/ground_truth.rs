@@ -2,14 +2,15 @@
 
 use std::f64::consts::{PI, TAU};
 
+use closecall_recorded::osi::{
+    self as messages, BaseMoving, BoundaryPoint, Dimension3d, EnvironmentalConditions, GroundTruth, Identifier,
+    InterfaceVersion, LaneBoundary, LaneBoundaryClassification, LaneClassification, LightState, MovingObject,
+    MovingObjectClassification, Orientation3d, TimeOfDay, Timestamp, Vector3d, VehicleAttributes,
+    VehicleClassification,
+};
 use closecall_scenarios::Scenario;
 use closecall_traffic::{Environment, Indicator, Lane, Light, Road, Time, Vehicle, VehicleClass, VehicleState, maths};
 
-use super::messages::{
-    self, BaseMoving, BoundaryPoint, Dimension3d, EnvironmentalConditions, GroundTruth, Identifier, InterfaceVersion,
-    LaneBoundary, LaneBoundaryClassification, LaneClassification, LightState, MovingObject, MovingObjectClassification,
-    Orientation3d, TimeOfDay, Timestamp, Vector3d, VehicleAttributes, VehicleClassification,
-};
 use super::recorder::Step;
 
 /// The version of the messages.
@@ -188,6 +189,7 @@ fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<m
                 right_adjacent_lane_id: beside(closecall_traffic::Side::Right),
                 right_lane_boundary_id: vec![boundary_id(number)],
                 left_lane_boundary_id: vec![boundary_id(number - 1)],
+                lane_pairing: Vec::new(),
             }),
         }
     });

@@ -11,7 +11,6 @@
 //! errors of two values depend on each other.
 
 mod ground_truth;
-mod messages;
 mod recorder;
 mod sensor_data;
 mod write;

@@ -1,13 +1,13 @@
 //! `SensorData`: the tracks that the ego perceives, with the accuracy of each value.
 
+use closecall_recorded::osi::{
+    BaseMoving, CandidateMovingObject, DetectedItemHeader, DetectedMovingObject, Dimension3d, MountingPosition,
+    SensorData, Vector3d,
+};
 use closecall_scenarios::Scenario;
 use closecall_traffic::{Source, Track, TrackStatus, VehicleClass};
 
 use super::ground_truth::{WHEEL_RADIUS_M, base, classification, identifier, orientation, timestamp, vector, version};
-use super::messages::{
-    BaseMoving, CandidateMovingObject, DetectedItemHeader, DetectedMovingObject, Dimension3d, MountingPosition,
-    SensorData, Vector3d,
-};
 use super::recorder::Step;
 
 /// Number of the virtual sensor whose frame the tracks have: the ego's vehicle frame.

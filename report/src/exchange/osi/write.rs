@@ -5,20 +5,17 @@ use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
+use closecall_recorded::osi::{DESCRIPTORS, MapAsamOpenDrive};
 use closecall_traffic::atomic::{WriteError, write_file};
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
 use prost::Message;
 
 use super::ground_truth::{VERSION, ground_truth};
-use super::messages::MapAsamOpenDrive;
 use super::recorder::OsiRecorder;
 use super::sensor_data::sensor_data;
 use crate::date::today;
 use crate::exchange::road::UsedRoad;
-
-/// The compiled `osi3.proto`, for a reader without a definition of its own.
-const DESCRIPTORS: &[u8] = include_bytes!("osi3.desc");
 
 /// A channel: its message type, its topic, and the short form of the type in names of files.
 struct Channel {

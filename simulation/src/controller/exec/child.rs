@@ -5,7 +5,7 @@
 //! answers, one drains standard error. Full pipes in both directions can therefore not block both
 //! sides. The threads end with the process, whose pipes then close.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, Command, Stdio};
@@ -20,6 +20,7 @@ use super::error::{ExecError, is_long};
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::processes::{self, Entry};
 use super::settings::ExecSettings;
+use super::start;
 
 /// Interval at which the memory of the process is checked while its answer is awaited.
 const MEMORY_CHECK_INTERVAL: Duration = Duration::from_millis(20);
@@ -78,12 +79,17 @@ impl Child {
         let invalid_command = || ExecError::Command { command: settings.command.clone() };
         let words = settings.words().ok_or_else(invalid_command)?;
         let (program, arguments) = words.split_first().ok_or_else(invalid_command)?;
-        let start_error = |source| ExecError::Start { program: program.clone(), source };
-        let mut command = match folder {
+        let path = match folder {
             // A path is relative to the folder. A bare name is looked for in PATH.
-            Some(folder) if program.contains('/') => Command::new(folder.join(program)),
-            _ => Command::new(program),
+            Some(folder) if program.contains('/') => folder.join(program),
+            _ => PathBuf::from(program),
         };
+        let start_error = |source: io::Error| ExecError::Start {
+            program: program.clone(),
+            reason: start::reason(&path, &source),
+            source,
+        };
+        let mut command = Command::new(&path);
         if let Some(folder) = folder {
             command.current_dir(folder);
         }

@@ -141,10 +141,19 @@ impl ExecController {
     }
 }
 
+impl ExecController {
+    fn failure(&self, error: &ExecError, time: Time) -> ControllerError {
+        // The process of a library or an FMU repeats the time.
+        let end = if self.repeats_time { error.end_of_isolated() } else { None };
+        let reason = end.unwrap_or_else(|| error.to_string());
+        if error.is_late() { ControllerError::Late { reason, time } } else { ControllerError::Own { reason, time } }
+    }
+}
+
 impl EgoController for ExecController {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         input.check_finite()?;
-        let answer = self.request(input).map_err(|error| failure(&error, input.time))?;
+        let answer = self.request(input).map_err(|error| self.failure(&error, input.time))?;
         Ok(EgoCommand {
             acceleration_mps2: answer.acceleration_mps2,
             state: answer.state,
@@ -154,11 +163,6 @@ impl EgoController for ExecController {
     }
 
     fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
-        self.child.as_mut().map_or(Ok(()), Child::finish).map_err(|error| failure(&error, time))
+        self.child.as_mut().map_or(Ok(()), Child::finish).map_err(|error| self.failure(&error, time))
     }
-}
-
-fn failure(error: &ExecError, time: Time) -> ControllerError {
-    let reason = error.to_string();
-    if error.is_late() { ControllerError::Late { reason, time } } else { ControllerError::Own { reason, time } }
 }

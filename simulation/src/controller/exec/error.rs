@@ -16,10 +16,12 @@ pub enum ExecError {
         command: String,
     },
     /// The process could not be started.
-    #[error("`{program}` could not be started: {source}")]
+    #[error("`{program}` could not be started: {}", reason.clone().unwrap_or_else(|| source.to_string()))]
     Start {
         /// The program.
         program: String,
+        /// Why a program that is there cannot be started, if that is the case.
+        reason: Option<String>,
         /// The system's reason.
         source: io::Error,
     },
@@ -134,6 +136,23 @@ impl ExecError {
     /// Returns true if the wall clock caused the error.
     pub const fn is_late(&self) -> bool {
         matches!(self, Self::Late { .. } | Self::Hangs { .. })
+    }
+
+    /// Returns how a library or another controller ended the process in which it runs; `None` if it
+    /// did not. The message does not depend on what the process did before: it is the same whether
+    /// the process answers each step or runs whole samples.
+    pub fn end_of_isolated(&self) -> Option<String> {
+        match self {
+            Self::Ended { status, stderr, .. } => {
+                // Whether the system keeps a memory dump depends on its settings.
+                let status = status.to_string().replace(" (core dumped)", "");
+                Some(format!("the controller ended its process ({status}){}", last_lines(stderr)))
+            }
+            Self::Closed { stderr, .. } => {
+                Some(format!("the controller closed the output of its process{}", last_lines(stderr)))
+            }
+            _ => None,
+        }
     }
 }
 

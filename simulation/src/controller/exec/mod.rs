@@ -54,6 +54,7 @@ mod lines;
 mod processes;
 mod protocol;
 mod settings;
+mod start;
 
 pub use child::Child;
 pub(crate) use controller::START_TIMEOUT;

@@ -1,0 +1,402 @@
+//! ASAM OpenLABEL 1.0.0: vehicles as cuboids in the frames of a JSON file.
+//!
+//! (ASAM OpenLABEL 1.0.0, 2021.) [`label_file`](crate::openlabel::label_file) writes such files.
+//!
+//! ```text
+//!   frames.N.objects.ID: cuboid in `closecall-road`, number `lane`  ─▶ positions on the road ─▶ rows
+//!                        cuboid in another `scene_cs`               ─▶ positions in a plane ─▶ inferred road ─▶ rows
+//!   frames.N.frame_properties.timestamp, or a frame rate            ─▶ time
+//!   objects.ID.type                                                 ─▶ vehicle class
+//! ```
+//!
+//! - A cuboid is x, y, z, three angles, length, width, height, or has a quaternion in place of the
+//!   angles. x of the vehicle points forward.
+//! - The time of a frame is its timestamp in seconds. Without one, `frame_rate` (Hz) of `metadata` or
+//!   of a stream gives it.
+//! - Files of other programs state no lanes, so that these have to be estimated. Speeds that no number
+//!   `speed_mps` states are derived from the positions.
+//! - A file that lacks one of these is refused, with the place where it is missing.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::BufRead;
+
+use closecall_traffic::{Lane, Time, VehicleClass, maths};
+
+use super::class_names::{UnknownClass, UnknownClasses};
+use super::collected::{Collected, CollectedRow, Facts, Position};
+use super::data::MarkingDistances;
+use super::error::TrajectoryFileProblem;
+use super::fields::Bounds;
+use super::file_layout::Layout;
+use super::json_input::JsonInput;
+use super::markings::LaneMarkings;
+use super::openlabel_text::{LabelledRow, Metadata, OpenLabelText, Timestamp};
+use super::plain::allowed;
+use super::rows::io_problem;
+use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
+use crate::lane_change::LaneReliability;
+use crate::openlabel::names;
+
+const FORMAT: &str = "OpenLABEL file";
+
+/// Allowed time between two frames (s), as of CommonRoad.
+const PERIOD_S: Bounds = Bounds::closed(0.001, 100.0);
+/// Allowed frame rate (Hz).
+const RATE_HZ: Bounds = Bounds::closed(0.01, 1_000.0);
+const SPEED_MPS: Bounds = Bounds::closed(-150.0, 150.0);
+const ANGLE_RAD: Bounds = Bounds::closed(-100.0, 100.0);
+
+fn refused(reason: String) -> ReadError {
+    ReadError::of_file(TrajectoryFileProblem::Unreadable { format: FORMAT, reason })
+}
+
+/// Returns true if a JSON file with this beginning is of OpenLABEL, or of VCD.
+pub(super) fn is_openlabel(start: &[u8]) -> bool {
+    let Some(text) = start.strip_prefix(b"{") else { return false };
+    let text = text.trim_ascii_start();
+    text.starts_with(b"\"openlabel\"") || text.starts_with(b"\"vcd\"")
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// The JSON is damaged, or lacks what trajectory data needs.
+pub(super) fn read<'a>(input: impl BufRead + 'a, lanes: LaneReliability) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+    let (input, lines) = JsonInput::new(input).map_err(|error| ReadError::of_file(io_problem(error)))?;
+    let mut json = serde_json::Deserializer::from_reader(input);
+    let text = OpenLabelText::read(lines, &mut json).and_then(|text| json.end().map(|()| text));
+    let text = text.map_err(|error| {
+        let line = u64::try_from(error.line()).unwrap_or(u64::MAX);
+        let reason = error.to_string();
+        ReadError::new(line, TrajectoryFileProblem::Unreadable { format: FORMAT, reason })
+    })?;
+    check_version(&text)?;
+    check_rows(&text)?;
+    let systems: BTreeSet<Option<&str>> = text.rows.iter().map(|row| text.system_of(row)).collect();
+    if systems.len() == 1 && systems.contains(&Some(names::ROAD)) {
+        return Ok(Box::new(on_road(text)?));
+    }
+    for system in systems {
+        check_system(&text, system)?;
+    }
+    if lanes == LaneReliability::Reliable {
+        let at = text.rows.first().map(|row| path_of(&text, row)).unwrap_or_default();
+        let place = format!("`{at}` has no number `{}` in `{}`", names::LANE, names::ROAD);
+        return Err(ReadError::of_file(TrajectoryFileProblem::NoLanes { place }));
+    }
+    in_plane(text)
+}
+
+/// Refuses other versions.
+fn check_version(text: &OpenLabelText) -> Result<(), ReadError> {
+    if let Some(version) = &text.vcd_version {
+        let version = if version.is_empty() { "an unknown version".to_owned() } else { format!("version {version}") };
+        return Err(refused(format!(
+            "`vcd`: this is VCD ({version}), the predecessor of OpenLABEL, which is not read; the Python package `vcd` converts it to OpenLABEL {}",
+            names::SCHEMA_VERSION
+        )));
+    }
+    if !text.is_openlabel {
+        return Err(refused("the root has no `openlabel`".to_owned()));
+    }
+    match text.metadata.as_ref().and_then(|metadata| metadata.schema_version.as_deref()) {
+        Some(names::SCHEMA_VERSION) => Ok(()),
+        Some(other) => {
+            let reason =
+                format!("`openlabel.metadata.schema_version` is `{other}`, but `{}` is needed", names::SCHEMA_VERSION);
+            Err(refused(reason))
+        }
+        None => Err(refused("`openlabel.metadata.schema_version` is missing".to_owned())),
+    }
+}
+
+/// Refuses a file without a vehicle in a frame, and says what it has instead.
+fn check_rows(text: &OpenLabelText) -> Result<(), ReadError> {
+    if !text.rows.is_empty() {
+        return Ok(());
+    }
+    let needed = "a `cuboid` of each vehicle in each frame, with its position in metres, is needed";
+    let reason = match (&text.pixels, &text.static_cuboid) {
+        (Some(path), _) => format!("`{path}` is in pixels, but {needed}"),
+        (None, Some(path)) => format!("`{path}` belongs to no frame, but {needed} (`openlabel.frames`)"),
+        (None, None) if text.frames == 0 && text.objects.is_empty() => {
+            format!("`openlabel.objects` and `openlabel.frames` are missing or empty, but {needed}")
+        }
+        (None, None) if text.frames == 0 => format!("`openlabel.frames` is missing or empty, but {needed}"),
+        (None, None) => format!("no object of `openlabel.frames` has a `cuboid`, but {needed}"),
+    };
+    Err(refused(reason))
+}
+
+/// Refuses positions whose axes are unknown, or move.
+fn check_system(text: &OpenLabelText, system: Option<&str>) -> Result<(), ReadError> {
+    let row = text.rows.iter().find(|row| text.system_of(row) == system);
+    let path = row.map(|row| format!("`{}.cuboid.0`", path_of(text, row))).unwrap_or_default();
+    let scene = format!("a coordinate system of the type `{}`, which does not move, is needed", names::SCENE);
+    let Some(name) = system else {
+        return Err(refused(format!("{path} names no `coordinate_system`: {scene}")));
+    };
+    match text.systems.get(name).map(String::as_str) {
+        _ if name == names::ROAD => Err(refused(format!(
+            "{path} is in `{name}`, and other cuboids are in another coordinate system: one is needed for all"
+        ))),
+        Some(names::SCENE) => Ok(()),
+        Some(kind) => Err(refused(format!("{path} is in `{name}`, which has the type `{kind}`: {scene}"))),
+        None => Err(refused(format!("{path} is in `{name}`, which `openlabel.coordinate_systems` lacks: {scene}"))),
+    }
+}
+
+/// Returns the path of the data of a vehicle in a frame.
+fn path_of(text: &OpenLabelText, row: &LabelledRow) -> String {
+    let uid = text.objects.get(row.object as usize).map_or("", |object| object.uid.as_str());
+    format!("openlabel.frames.{}.objects.{uid}.object_data", row.frame)
+}
+
+/// The times of frames.
+struct Times<'t> {
+    timestamps: &'t BTreeMap<i64, Timestamp>,
+    /// Time between two frames (s), if a frame rate is stated.
+    period_s: Option<f64>,
+}
+
+impl<'t> Times<'t> {
+    fn new(text: &'t OpenLabelText) -> Result<Self, ReadError> {
+        let metadata = text.metadata.as_ref();
+        let of_period = metadata.and_then(|metadata| metadata.frame_period_s);
+        if let Some(period_s) = of_period.filter(|period_s| !PERIOD_S.contains(*period_s)) {
+            return Err(refused(format!(
+                "`openlabel.metadata.frame_period_s` is {period_s}, but 0.001 to 100 s is needed"
+            )));
+        }
+        let rate_hz = metadata.and_then(|metadata| metadata.frame_rate).or(text.stream_rate);
+        if let Some(rate_hz) = rate_hz.filter(|rate_hz| !RATE_HZ.contains(*rate_hz)) {
+            return Err(refused(format!("`frame_rate` is {rate_hz}, but 0.01 to 1000 Hz is needed")));
+        }
+        Ok(Self { timestamps: &text.timestamps, period_s: of_period.or(rate_hz.map(|rate_hz| 1.0 / rate_hz)) })
+    }
+
+    /// Returns the time of a frame.
+    fn at(&self, frame: i64) -> Result<Time, ReadError> {
+        let path = || format!("`openlabel.frames.{frame}.frame_properties.timestamp`");
+        let seconds = match (self.timestamps.get(&frame), self.period_s) {
+            (Some(Timestamp::Seconds(seconds)), _) => Some(*seconds),
+            (Some(Timestamp::Text(text)), period_s) => {
+                text.trim().parse().ok().or(period_s.map(|period_s| frame as f64 * period_s))
+            }
+            (None, period_s) => period_s.map(|period_s| frame as f64 * period_s),
+        };
+        match seconds {
+            Some(seconds) if EPOCH_S.contains(seconds) => Ok(Time::from_s(seconds)),
+            Some(seconds) => Err(refused(format!("{} is {seconds}, but a time in seconds is needed", path()))),
+            None => Err(refused(format!(
+                "{} is missing or no number: the time of each frame in seconds is needed, or `frame_rate` (Hz) in `openlabel.metadata` \
+                 or in the `stream_properties` of a stream",
+                path()
+            ))),
+        }
+    }
+}
+
+/// Seconds since the start of the recording, or since 1970 up to the year 2100.
+const EPOCH_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
+
+/// Returns the class that the type of an object names.
+fn class_of(kind: &str, unknown: &mut UnknownClasses) -> VehicleClass {
+    // The type may be an address, such as that of a term of an ontology.
+    let term = kind.rsplit(['#', '/', ':']).next().unwrap_or(kind);
+    let known = VehicleClass::ALL.into_iter().find(|class| {
+        names::vehicle_type(*class).eq_ignore_ascii_case(term) || class.name().eq_ignore_ascii_case(term)
+    });
+    known.unwrap_or_else(|| unknown.nearest_of(term))
+}
+
+/// Checks a number of a vehicle in a frame.
+fn checked(path: &str, name: &str, value: f64, bounds: Bounds) -> Result<f64, ReadError> {
+    if bounds.contains(value) {
+        return Ok(value);
+    }
+    Err(refused(format!("{name} of `{path}` is {value}, but {} is needed", bounds.describe("a number"))))
+}
+
+/// Checks a whole number of a vehicle or a lane.
+fn whole(path: &str, name: &str, value: f64, high: f64) -> Result<u64, ReadError> {
+    let bounds = Bounds::closed(0.0, high);
+    if bounds.contains(value) && value.fract() == 0.0 {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number in bounds")]
+        return Ok(value as u64);
+    }
+    Err(refused(format!("{name} of `{path}` is {value}, but {} is needed", bounds.describe("a whole number"))))
+}
+
+/// Returns the lane with a number.
+fn lane_number(path: &str, value: f64) -> Result<u8, ReadError> {
+    whole(path, names::LANE, value, f64::from(u8::MAX)).map(|lane| u8::try_from(lane).unwrap_or(u8::MAX))
+}
+
+/// Rows on the recorded road, in the order of their frames.
+struct RoadSource {
+    rows: std::vec::IntoIter<Row>,
+    info: FileInfo,
+    unknown_classes: UnknownClasses,
+    notes: Vec<String>,
+}
+
+impl RowSource for RoadSource {
+    fn info(&self) -> FileInfo {
+        self.info.clone()
+    }
+
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
+        Ok(self.rows.next())
+    }
+}
+
+/// Returns the numbers of tracks: the names of the objects if all are numbers, else their order.
+fn numbers(text: &OpenLabelText, notes: &mut Vec<String>) -> Vec<u64> {
+    let number = |uid: &str| uid.parse().ok().filter(|number| (0..=allowed::TRACKS.1.unsigned_abs()).contains(number));
+    let stated: Option<Vec<u64>> = text.objects.iter().map(|object| number(&object.uid)).collect();
+    let distinct = stated.as_ref().map(|numbers| numbers.iter().collect::<BTreeSet<_>>().len());
+    if let Some(stated) = stated.filter(|numbers| distinct == Some(numbers.len())) {
+        return stated;
+    }
+    notes.push("the names of objects are not numbers: they are numbered in their order".to_owned());
+    (1..=text.objects.len() as u64).collect()
+}
+
+/// Returns the rows of a file that states positions and lanes on the road.
+fn on_road(mut text: OpenLabelText) -> Result<RoadSource, ReadError> {
+    let mut rows = std::mem::take(&mut text.rows);
+    rows.sort_by_key(|row| (row.frame, row.object));
+    let mut notes = Vec::new();
+    let numbers = numbers(&text, &mut notes);
+    let mut unknown_classes = UnknownClasses::default();
+    let classes: Vec<VehicleClass> =
+        text.objects.iter().map(|object| class_of(&object.kind, &mut unknown_classes)).collect();
+    let times = Times::new(&text)?;
+    let metadata = text.metadata.as_ref();
+    let is_simulated = metadata.is_some_and(|metadata| metadata.simulated);
+    let clock = if is_simulated { Clock::Simulated } else { Clock::Continuous };
+    let row = |row: LabelledRow| {
+        let path = path_of(&text, &row);
+        let (object, number) = (&text.objects[row.object as usize], numbers[row.object as usize]);
+        let need = |name: &str, value: Option<f64>| {
+            value.ok_or_else(|| {
+                refused(format!("`{path}.num` has no `{name}`, which cuboids in `{}` need", names::ROAD))
+            })
+        };
+        let speed_mps = checked(&path, names::SPEED, need(names::SPEED, row.speed_mps)?, SPEED_MPS)?;
+        let lane = lane_number(&path, need(names::LANE, row.lane)?)?;
+        let acceleration = row.acceleration_mps2;
+        let acceleration =
+            acceleration.map(|mps2| checked(&path, names::ACCELERATION, mps2, allowed::ACCELERATION_MPS2));
+        let time = match row.time_s {
+            Some(time_s) => Time::from_s(checked(&path, names::TIME, time_s, EPOCH_S)?),
+            None => times.at(row.frame)?,
+        };
+        let in_object = || format!("openlabel.objects.{}.object_data", object.uid);
+        let stated =
+            object.vehicle_id.map(|vehicle| whole(&in_object(), names::VEHICLE, vehicle, allowed::TRACKS.1 as f64));
+        let vehicle_id = stated.transpose()?.unwrap_or(number);
+        Ok(Row {
+            number,
+            origin: Time::ZERO,
+            vehicle_id,
+            frame: row.frame,
+            time,
+            clock,
+            s_m: checked(&path, "x of the cuboid", row.x_m, allowed::POSITION_M)?,
+            d_m: checked(&path, "y of the cuboid", row.y_m, LATERAL_M)?,
+            lane,
+            speed_mps,
+            acceleration_mps2: acceleration.transpose()?,
+            length_m: checked(&path, "the length of the cuboid", row.length_m, allowed::LENGTH_M)?,
+            width_m: checked(&path, "the width of the cuboid", row.width_m, allowed::WIDTH_M)?,
+            class: classes[row.object as usize],
+            marking_distances: MarkingDistances::default(),
+            line: row.line,
+        })
+    };
+    let rows: Vec<Row> = rows.into_iter().map(row).collect::<Result<_, ReadError>>()?;
+    let info = FileInfo {
+        layout: Layout::OpenLabel,
+        name: metadata.and_then(|metadata: &Metadata| metadata.name.clone()),
+        period: times.period_s.map(Time::from_s),
+        markings: markings(&text.right_edges_m)?,
+    };
+    Ok(RoadSource { rows: rows.into_iter(), info, unknown_classes, notes })
+}
+
+/// Lateral positions of several roads beside each other, 1 km apart (m).
+const LATERAL_M: Bounds = Bounds::closed(-1e5, 1e5);
+
+/// Returns the markings that the contexts state, if there are some.
+fn markings(right_edges_m: &[(f64, f64)]) -> Result<Option<LaneMarkings>, ReadError> {
+    let edge = |&(lane, edge_m): &(f64, f64)| {
+        let path = "openlabel.contexts";
+        let lane = Lane(lane_number(path, lane)?);
+        Ok((lane, checked(path, names::RIGHT_EDGE, edge_m, LATERAL_M)?))
+    };
+    let edges = right_edges_m.iter().map(edge).collect::<Result<Vec<_>, ReadError>>()?;
+    Ok((!edges.is_empty()).then(|| LaneMarkings::from_right_edges(edges)))
+}
+
+/// Returns the rows of a file that states positions in a plane, and no lanes.
+fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+    let mut rows = std::mem::take(&mut text.rows);
+    rows.sort_by_key(|row| (row.object, row.frame));
+    let mut unknown_classes = UnknownClasses::default();
+    let classes: Vec<VehicleClass> =
+        text.objects.iter().map(|object| class_of(&object.kind, &mut unknown_classes)).collect();
+    let times = Times::new(&text)?;
+    let mut collected = Collected::default();
+    for of_object in rows.chunk_by(|a, b| a.object == b.object) {
+        let instants: Vec<Time> = of_object.iter().map(|row| times.at(row.frame)).collect::<Result<_, _>>()?;
+        for (k, row) in of_object.iter().enumerate() {
+            let path = path_of(&text, row);
+            let in_plane = |name, value| checked(&path, name, value, allowed::PLANE_M);
+            let point = (in_plane("x of the cuboid", row.x_m)?, in_plane("y of the cuboid", row.y_m)?);
+            let heading_rad = checked(&path, "the yaw angle of the cuboid", row.yaw_rad, ANGLE_RAD)?;
+            let derived = || {
+                let (before, after) = (k.saturating_sub(1), (k + 1).min(of_object.len() - 1));
+                let span_s = (instants[after] - instants[before]).s();
+                let (from, to) = (&of_object[before], &of_object[after]);
+                let along_m =
+                    (to.x_m - from.x_m) * maths::cos(heading_rad) + (to.y_m - from.y_m) * maths::sin(heading_rad);
+                if span_s > 0.0 { along_m / span_s } else { 0.0 }
+            };
+            let speed_mps = row.speed_mps.unwrap_or_else(derived);
+            let acceleration = row.acceleration_mps2;
+            let acceleration =
+                acceleration.map(|mps2| checked(&path, names::ACCELERATION, mps2, allowed::ACCELERATION_MPS2));
+            let vehicle = collected.vehicle(&text.objects[row.object as usize].uid);
+            collected.push(Ok(CollectedRow {
+                vehicle,
+                time: instants[k],
+                position: Position::Plane { point, heading_rad, changes_lane: false, named_lane: None },
+                speed_mps: checked(&path, "the speed", speed_mps, SPEED_MPS)?,
+                acceleration_mps2: acceleration.transpose()?,
+                length_m: checked(&path, "the length of the cuboid", row.length_m, allowed::LENGTH_M)?,
+                width_m: checked(&path, "the width of the cuboid", row.width_m, allowed::WIDTH_M)?,
+                class: classes[row.object as usize],
+                line: row.line,
+            }))?;
+        }
+    }
+    let is_simulated = text.metadata.as_ref().is_some_and(|metadata| metadata.simulated);
+    Ok(Box::new(collected.into_source(Facts {
+        layout: Layout::OpenLabel,
+        clock: if is_simulated { Clock::Simulated } else { Clock::Continuous },
+        lane_width_m: None,
+        markings: None,
+        notes: Vec::new(),
+        unknown_classes,
+    })?))
+}

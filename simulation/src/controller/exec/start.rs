@@ -1,0 +1,46 @@
+//! Why a program that is there cannot be started. The system answers "No such file or directory" if
+//! the *interpreter* of a script is absent, and "Exec format error" if a script names none.
+
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+use closecall_traffic::input;
+use rustix::io::Errno;
+
+/// Longest beginning of a program that is read: the system reads no more of the first line of a
+/// script (bytes; `BINPRM_BUF_SIZE` of Linux).
+const MOST_BYTES: u64 = 256;
+
+/// Returns why the program at a path cannot be started, in words, or `None` if the error of the
+/// system says it.
+pub(super) fn reason(path: &Path, error: &io::Error) -> Option<String> {
+    let is_absent = error.kind() == ErrorKind::NotFound;
+    let has_other_format = error.raw_os_error() == Some(Errno::NOEXEC.raw_os_error());
+    // A bare name is looked for in PATH.
+    if !(is_absent || has_other_format) || path.components().count() < 2 || !path.is_file() {
+        return None;
+    }
+    let mut beginning = Vec::new();
+    input::open(path).ok()?.take(MOST_BYTES).read_to_end(&mut beginning).ok()?;
+    let line = beginning.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    match line.strip_prefix(b"#!") {
+        Some(rest) if is_absent => absent_interpreter(&String::from_utf8_lossy(rest)),
+        Some(_) => None,
+        None if is_absent => Some("it is there, but the loader that it names is not: is it built for another system?".to_owned()),
+        None => Some(
+            "it is neither a program for this machine nor a script whose first line names its interpreter, such as `#!/bin/sh`"
+                .to_owned(),
+        ),
+    }
+}
+
+/// Returns what is wrong with the interpreter that the first line of a script names after `#!`, or
+/// `None` if it is there.
+fn absent_interpreter(line: &str) -> Option<String> {
+    let interpreter = line.trim_matches([' ', '\t']).split([' ', '\t']).next().unwrap_or_default();
+    if Path::new(interpreter).exists() {
+        return None;
+    }
+    let lines = if interpreter.ends_with('\r') { ": its lines end with CR LF, and LF is needed" } else { "" };
+    Some(format!("its line 1 names the interpreter `{}`, which is not there{lines}", interpreter.escape_debug()))
+}
