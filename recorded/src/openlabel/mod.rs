@@ -13,7 +13,7 @@
 //!
 //! - What changes from frame to frame stands in `frames`, because a cuboid belongs to a frame. What a
 //!   vehicle, a lane change or a lane has once stands in `objects`, `actions` and `contexts`.
-//! - Positions are in the coordinate system [`names::ROAD`]: x along the road, y to the left of the
+//! - Positions are in the coordinate system `closecall-road`: x along the road, y to the left of the
 //!   left edge of lane 1, z up, in metres. The recorded road is straight in it.
 //! - OpenLABEL needs the height of a cuboid, which no layout states: it is the typical height of the
 //!   vehicle class.
