@@ -166,6 +166,18 @@ impl Judgement {
         }
     }
 
+    /// Adds a remark that decides nothing. It comes last, so that it is never the sentence of the
+    /// verdict.
+    pub fn add_remark(&mut self, remark: String) {
+        self.reasons.push(remark);
+    }
+
+    /// Returns true if a gate, the check of a requirement, or a gate on the probability of a
+    /// collision was judged.
+    pub fn has_gates(&self) -> bool {
+        self.verdict().is_some() && !(self.gates.is_empty() && self.probabilities.is_empty())
+    }
+
     /// Returns the word for reports; a measurement has no verdict.
     pub fn word(&self) -> &'static str {
         self.verdict().map_or("measured, not judged", Verdict::word)

@@ -1,4 +1,4 @@
-//! Advice for the user after an error or a result without a verdict. The libraries state the
+//! Advice for the user after an error, a result without a verdict, or a verdict on a known seed. The libraries state the
 //! problem, and only this program has the options that help.
 
 use std::fmt::Display;
@@ -6,8 +6,10 @@ use std::fmt::Display;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
 use closecall_campaign::gate::AssemblyError;
+use closecall_campaign::manifest::Manifest;
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::saved::SavedError;
+use closecall_campaign::session;
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_report::campaign::ReportError;
 use closecall_sensors::camera::ClassifierError;
@@ -92,6 +94,21 @@ pub(super) fn after_verdict(judged: &Judgement) -> &'static str {
     } else {
         ""
     }
+}
+
+/// Returns the remark of a verdict on a controller from outside whose samples were known before the
+/// run: the controller may have been tuned on them. `None` for a controller of this program, and for
+/// a campaign without a gate. `can_draw` says whether the command could have drawn a seed: the parts
+/// of a campaign need the same one.
+pub(super) fn known_seed(judged: &Judgement, manifest: &Manifest, can_draw: bool) -> Option<String> {
+    let is_from_outside = manifest.arms.last().is_some_and(|tested| tested.built_in().is_none());
+    let remedy = match (can_draw, session::is_active()) {
+        (false, _) => "",
+        (true, false) => "; `--judge-seed secret` draws one",
+        (true, true) => "; `judge_seed=\"secret\"` draws one",
+    };
+    (is_from_outside && judged.has_gates())
+        .then(|| format!("the seed was known before the run: a controller could recognise its samples{remedy}"))
 }
 
 /// Returns the option that gives the missing input of a net effect.

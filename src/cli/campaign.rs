@@ -39,7 +39,7 @@ use serde_json::Value;
 
 use super::CliError;
 use super::actions::command_for;
-use super::advice::after_verdict;
+use super::advice::{after_verdict, known_seed};
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::argument::Argument;
 use super::arms::{ComparisonArgs, ControllerArgs, tuned};
@@ -284,6 +284,8 @@ pub(super) struct Planned<'a> {
     pub(super) time_budget: Option<Duration>,
     /// Whether the seed was drawn for this campaign.
     pub(super) has_drawn_seed: bool,
+    /// Whether the command can draw the seed.
+    pub(super) can_draw_seed: bool,
 }
 
 /// The files of a command in the folder of a campaign beside the results.
@@ -425,6 +427,7 @@ pub(super) fn run_campaign(args: &CampaignArgs, tell: &mut dyn FnMut(&Conclusion
         until_certain: args.plan.until_certain,
         time_budget: args.plan.time_budget(),
         has_drawn_seed: args.draws_seed(),
+        can_draw_seed: args.partition.is_none(),
     };
     carry_out(&planned, &mut Alone, tell)
 }
@@ -556,6 +559,11 @@ pub(super) fn carry_out(
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let mut judged = tally.judgement();
     judged.add_invalid(watch.finish());
+    if !planned.has_drawn_seed
+        && let Some(remark) = known_seed(&judged, &manifest, planned.can_draw_seed)
+    {
+        judged.add_remark(remark);
+    }
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
     tell(&Conclusion::Judged(Judged {
         report: &report,

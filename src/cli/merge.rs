@@ -14,7 +14,7 @@ use closecall_report::json;
 
 use super::CliError;
 use super::actions::command_for;
-use super::advice::after_verdict;
+use super::advice::{after_verdict, known_seed};
 use super::args::Format;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
@@ -84,7 +84,10 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     }
     let saved = SavedCampaign::of(merged.folder.clone())?;
     let tally = Tally::of(&saved, &works, &gates)?;
-    let judged = tally.judgement();
+    let mut judged = tally.judgement();
+    if let Some(remark) = known_seed(&judged, saved.manifest(), false) {
+        judged.add_remark(remark);
+    }
     let report =
         CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged, command_for };
     match args.format {

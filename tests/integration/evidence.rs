@@ -356,6 +356,56 @@ fn a_secret_seed_is_drawn_stated_and_resumed() {
 }
 
 #[test]
+fn a_verdict_on_a_controller_from_outside_says_that_its_seed_was_known() {
+    const REMARK: &str = "the seed was known before the run: a controller could recognise its samples";
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let out = folder.path().join("out");
+    let path = library("overtake-without-brake");
+    let small = ["-n", "2", "--sensors", "ground-truth", "--no-validity-checks"];
+    let outside = ["--controller", "exec:python3 examples/acc_controller.py", "--controller-timeout-ms", "60000"];
+    let limit = ["--max-collisions", "2"];
+    let run = |more: &[&str]| {
+        let output = campaign(&path, &[&small[..], more].concat());
+        assert!([0, 1, 4, 7].contains(&code(&output)), "{more:?}: {}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    for seed in [&[][..], &["--seed", "5"], &["--judge-seed", "5"]] {
+        let text = run(&[&outside[..], &limit, seed].concat());
+        assert!(text.contains(&format!("\n  {REMARK}; `--judge-seed secret` draws one\n")), "{seed:?}: {text}");
+    }
+    let kept = ["--seed", "5", "--record", "worst:0", "--format", "json", "--out", out.to_str().unwrap()];
+    let json: serde_json::Value = serde_json::from_str(&run(&[&outside[..], &limit, &kept].concat())).unwrap();
+    assert!(json["reasons"].to_string().contains(REMARK), "{json}");
+    for name in ["report.html", "summary.md", "junit.xml"] {
+        assert!(std::fs::read_to_string(out.join(name)).unwrap().contains(REMARK), "{name}");
+    }
+    // A part has the seed of the others, and the merged campaign knows it, too.
+    let parts = ["1/2", "2/2"].map(|part| folder.path().join(part.replace('/', "-")).display().to_string());
+    for (part, folder) in ["1/2", "2/2"].into_iter().zip(&parts) {
+        let text =
+            run(&[&outside[..], &limit, &["--partition", part, "--record", "worst:0", "--out", folder]].concat());
+        assert!(text.contains(&format!("\n  {REMARK}\n")), "{text}");
+    }
+    let merged = folder.path().join("merged");
+    let merge = ["tool", "merge", &parts[0], &parts[1], "--record", "worst:0", "--out", merged.to_str().unwrap()];
+    let output = closecall(merge.iter().chain(&limit));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains(&format!("\n  {REMARK}\n")), "{text} {}", stderr(&output));
+    for silent in [
+        &["--judge-seed", "secret", limit[0], limit[1], outside[0], outside[1], outside[2], outside[3]][..],
+        &["--no-gate", outside[0], outside[1], outside[2], outside[3]],
+        &["--controller", "acc", limit[0], limit[1]],
+        &["--arms", "acc,mis", limit[0], limit[1]],
+    ] {
+        let text = run(silent);
+        assert!(!text.contains("the seed was known"), "{silent:?}: {text}");
+    }
+}
+
+#[test]
 fn a_twin_finds_what_the_system_induces_where_nothing_happens() {
     let path = library("rear-vehicle-is-followed-without-brake");
     let args = ["-n", "400", "--seed", "46", "--paired", "--sensors", "object"];
