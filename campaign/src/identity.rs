@@ -57,8 +57,14 @@ impl<'a, Names: Iterator<Item = &'a str> + Clone> Identity<'_, Names> {
         if there != scenario {
             return Err(format!("sample {sample} of `{scenario}` has an outcome of `{there}`"));
         }
-        if (*other, *number) != (seed, sample) {
-            return Err(format!("sample {sample} is sample {number} of the seed {other}, not of {seed}"));
+        if *other != seed {
+            let of_sample = if *number == sample { String::new() } else { format!("sample {number} of ") };
+            return Err(format!(
+                "sample {sample} has an outcome of {of_sample}the seed {other}, and the campaign has the seed {seed}"
+            ));
+        }
+        if *number != sample {
+            return Err(format!("sample {sample} has the outcome of sample {number}"));
         }
         if outcome.controller != arm.controller {
             let (there, here) = (&outcome.controller, &arm.controller);

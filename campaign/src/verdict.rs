@@ -132,7 +132,7 @@ impl Decision {
 pub struct Judgement {
     /// The finding that decides, which the exit code follows.
     pub decision: Decision,
-    /// Every reason for it, in sentences.
+    /// Every reason for it, in sentences. The reasons that decide come first, then remarks.
     pub reasons: Vec<String>,
     /// Every gate and every check of a requirement, with its answer.
     pub gates: Vec<GateResult>,
@@ -282,7 +282,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let decision = if judge.is_measurement() {
         // Errors, and a simulator that cannot be believed, spoil a measurement, too.
         let spoils = |decision: &Decision| matches!(decision, Decision::SampleError | Decision::Invalid);
-        Decision::first_of(&findings.decisions).filter(spoils).unwrap_or(Decision::Measured)
+        Decision::first_of(&findings.decisions()).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
             let missing = match gates.is_empty() {
@@ -291,13 +291,12 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
             };
             findings.add(Decision::NotJudged, missing.to_owned());
         }
-        Decision::first_of(&findings.decisions).unwrap_or(Decision::Pass)
+        Decision::first_of(&findings.decisions()).unwrap_or(Decision::Pass)
     };
-    // Last: it decides nothing, and the first reason that is no gate is the sentence of the
-    // verdict.
     judge_extrapolation(judge, &mut findings);
     let coverage = judge.coverage().map(|(name, results)| (name.to_owned(), results)).collect();
-    Judgement { decision, reasons: findings.reasons, gates, requirements, expectations, probabilities, coverage, flaky }
+    let reasons = findings.into_reasons(decision);
+    Judgement { decision, reasons, gates, requirements, expectations, probabilities, coverage, flaky }
 }
 
 /// Returns the subjects of the gates that somebody set and that no scenario decides: there is no
@@ -493,21 +492,38 @@ fn judge_probabilities(summary: &Summary, judge: &Judge, findings: &mut Findings
     probabilities
 }
 
+/// A reason, or a remark that decides nothing.
+struct Reason {
+    /// What it decides.
+    decision: Option<Decision>,
+    text: String,
+}
+
 /// Reasons and what they decide, as they are found.
 #[derive(Default)]
 struct Findings {
-    reasons: Vec<String>,
-    decisions: Vec<Decision>,
+    reasons: Vec<Reason>,
 }
 
 impl Findings {
-    fn note(&mut self, reason: String) {
-        self.reasons.push(reason);
+    fn note(&mut self, remark: String) {
+        self.reasons.push(Reason { decision: None, text: remark });
     }
 
     fn add(&mut self, decision: Decision, reason: String) {
-        self.decisions.push(decision);
-        self.reasons.push(reason);
+        self.reasons.push(Reason { decision: Some(decision), text: reason });
+    }
+
+    fn decisions(&self) -> Vec<Decision> {
+        self.reasons.iter().filter_map(|reason| reason.decision).collect()
+    }
+
+    /// Returns the reasons in words. The reasons that led to the decision come first: the first that
+    /// is no gate is the sentence of the verdict.
+    fn into_reasons(self, decided: Decision) -> Vec<String> {
+        let decides = |reason: &Reason| reason.decision == Some(decided);
+        let (decisive, others): (Vec<Reason>, Vec<Reason>) = self.reasons.into_iter().partition(decides);
+        decisive.into_iter().chain(others).map(|reason| reason.text).collect()
     }
 }
 

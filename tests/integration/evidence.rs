@@ -184,6 +184,15 @@ fn a_weakened_check_gives_overridden_and_exit_code_4() {
     assert_eq!(json(&run(weaker, "json"), 4)["verdict"], "OVERRIDDEN");
     let junit = std::fs::read_to_string(out.join("junit.xml")).unwrap();
     assert!(junit.contains("OVERRIDDEN: overtake-without-brake") && junit.contains("errors=\"1\""), "{junit}");
+    // A remark is not the sentence of the verdict.
+    let path = library("overtake-without-brake");
+    let unchecked = ["-n", "80", "--sensors", "object", "--paired", "--set", weaker, "--no-validity-checks"];
+    let text = stdout(&campaign(&path, &unchecked), 4);
+    assert!(
+        text.contains("\nOVERRIDDEN: overtake-without-brake: a setting weakened")
+            && text.contains("\n  the validity of the simulator was not checked"),
+        "{text}"
+    );
     // What is saved knows it, too.
     let parts = ["1/2", "2/2"].map(|part| {
         let folder = folder.path().join(part.replace('/', "-"));

@@ -62,10 +62,20 @@ fn a_record_that_is_not_that_of_its_sample_is_refused_by_every_reader() {
     let kept = lines(&out);
     let arms = |line: &str| serde_json::from_str::<Value>(&line[17..]).unwrap()["arms"].clone();
     let outcome = |record: &mut Value, key: &str, value: Value| record["arms"][0]["result"]["Ok"][key] = value;
-    let wrong: [(String, &str); 5] = [
+    let wrong: [(String, &str); 6] = [
         // The results of two samples are swapped: each line is whole, and has its checksum.
-        (changed(&kept[3], |record| record["arms"] = arms(&kept[4])), "sample 3 is sample 4 of the seed 0"),
-        (changed(&kept[3], |record| outcome(record, "seed", 7.into())), "sample 3 is sample 3 of the seed 7, not of 0"),
+        (changed(&kept[3], |record| record["arms"] = arms(&kept[4])), "sample 3 has the outcome of sample 4"),
+        (
+            changed(&kept[3], |record| outcome(record, "seed", 7.into())),
+            "sample 3 has an outcome of the seed 7, and the campaign has the seed 0",
+        ),
+        (
+            changed(&kept[3], |record| {
+                outcome(record, "seed", 7.into());
+                outcome(record, "sample", 4.into());
+            }),
+            "sample 3 has an outcome of sample 4 of the seed 7, and the campaign has the seed 0",
+        ),
         (changed(&kept[3], |record| outcome(record, "scenario", "another".into())), "has an outcome of `another`"),
         (changed(&kept[3], |record| outcome(record, "controller", "acc".into())), "an outcome of the controller `acc`"),
         (

@@ -21,12 +21,33 @@ fn availability(unavailable: u64, engaged: u64) -> Findings {
 fn a_system_that_is_not_available_in_most_samples_is_not_tested_whether_it_engages_or_not() {
     for engaged in [0, 1, 10] {
         let findings = availability(6, engaged);
-        assert_eq!(findings.decisions, [Decision::NotJudged], "{engaged} engagements");
-        assert!(findings.reasons[0].contains("in 6 of 10 samples, more than 50 %"), "{}", findings.reasons[0]);
+        assert_eq!(findings.decisions(), [Decision::NotJudged], "{engaged} engagements");
+        let reason = &findings.reasons[0].text;
+        assert!(reason.contains("in 6 of 10 samples, more than 50 %"), "{reason}");
     }
     let half = availability(5, 0);
-    assert!(half.decisions.is_empty() && half.reasons[0].contains("in 5 of 10 samples"), "{:?}", half.reasons);
+    let reason = &half.reasons[0].text;
+    assert!(half.decisions().is_empty() && reason.contains("in 5 of 10 samples"), "{reason}");
     assert!(availability(0, 0).reasons.is_empty());
+}
+
+#[test]
+fn the_reasons_that_decide_come_before_remarks_and_lesser_reasons() {
+    let findings = || {
+        let mut findings = Findings::default();
+        findings.note("the validity of the simulator was not checked".to_owned());
+        findings.add(Decision::NotJudged, "the system never acted".to_owned());
+        findings.add(Decision::Overridden, "a setting".to_owned());
+        findings.note("flaky".to_owned());
+        findings.add(Decision::Overridden, "another setting".to_owned());
+        findings
+    };
+    assert_eq!(findings().into_reasons(Decision::Overridden)[..2], ["a setting", "another setting"]);
+    let judged = findings().into_reasons(Decision::NotJudged);
+    assert_eq!(judged[..2], ["the system never acted", "the validity of the simulator was not checked"]);
+    assert_eq!(judged.len(), 5);
+    let measured = findings().into_reasons(Decision::Measured);
+    assert_eq!(measured[0], "the validity of the simulator was not checked", "nothing decides a measurement");
 }
 
 #[test]

@@ -31,9 +31,8 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     };
     let first_reason = || {
         let is_of_gate = |reason: &&String| judged.gates.iter().any(|gate| gate.to_string() == **reason);
-        let decides = |reason: &&String| !is_of_gate(reason) && !reason.starts_with(AS_EXPECTED);
         let told = |reason: &String| reason.strip_prefix(&format!("{word}: ")).unwrap_or(reason).to_owned();
-        judged.reasons.iter().find(decides).map(|reason| format!("{word}: {}", told(reason)))
+        judged.reasons.iter().find(|reason| !is_of_gate(reason)).map(|reason| format!("{word}: {}", told(reason)))
     };
     let told = match judged.decision {
         Decision::Fail => because(Standing::Fail, "miss").or_else(first_reason),
@@ -59,9 +58,6 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     };
     told.unwrap_or_else(|| word.to_owned())
 }
-
-/// The beginning of a sentence about an expectation that is met.
-const AS_EXPECTED: &str = "happened as expected: ";
 
 /// Returns a verb as one scenario has it.
 fn singular(verb: &str) -> String {

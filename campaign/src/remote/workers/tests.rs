@@ -138,7 +138,7 @@ fn disguised(block: u64, bytes: Vec<u8>) -> Vec<(u64, Vec<u8>)> {
 fn an_answer_that_is_not_that_of_the_block_is_an_error() {
     let cases: [([u64; 2], Change, &str); 8] = [
         ([3, 4], unchanged, "they are of another configuration"),
-        ([3, 4], disguised, "is sample 28 of the seed 4, not of 3"),
+        ([3, 4], disguised, "sample 28 has an outcome of the seed 4, and the campaign has the seed 3"),
         // The answer lacks its last sample.
         ([3, 3], |id, bytes| vec![(id, lines(&bytes)[..2].concat())], "there are 1 instead of"),
         ([3, 3], |id, _| vec![(id, Vec::new())], "the answer has no header"),
