@@ -2,10 +2,12 @@
 //!
 //! ```text
 //!  closecall-results            the last campaign of this working folder
-//!  closecall-results.previous   the one before it
+//!  closecall-results.previous   the last finished one before it
 //! ```
 //!
-//! A new campaign takes the place of the last one, whose folder becomes the previous one. A folder
+//! A new campaign takes the place of the last one, whose folder becomes the previous one. A campaign
+//! that has not come to its end becomes the previous one only if no finished one would make way for
+//! it: otherwise it is replaced itself. A folder
 //! is moved or removed only if its manifest says that a campaign has made it here on its own
 //! account, and if it holds only files of a campaign. Everything else at one of the two paths is
 //! refused and stays: a file, a symbolic link, a folder with other files, the folder of a campaign
@@ -31,7 +33,7 @@ use crate::manifest::Manifest;
 
 /// The folder of the last campaign, in the working folder.
 pub const RESULTS: &str = "closecall-results";
-/// The folder of the campaign before it.
+/// The folder of the last finished campaign before it.
 pub const PREVIOUS: &str = "closecall-results.previous";
 
 /// Number of attempts to take a folder while other campaigns begin and end in it.
@@ -60,6 +62,15 @@ pub struct Moved {
     pub has_removed: bool,
 }
 
+/// Results of a campaign that has not come to its end, in the way of a new one. They are removed.
+#[derive(Clone, Copy, Debug)]
+pub struct Unfinished<'a> {
+    /// The folder in which they are.
+    pub path: &'a Path,
+    /// The folder of the finished results that they do not displace.
+    pub previous: &'a Path,
+}
+
 /// The state of a path for results.
 enum Place {
     /// Nothing.
@@ -82,13 +93,14 @@ struct Kept {
 }
 
 /// Creates the folder of the results in `folder`, the working folder, for the campaign of
-/// `manifest`. Earlier results become the previous ones.
+/// `manifest`. Earlier results become the previous ones. Unfinished results that would displace
+/// finished ones are removed instead. `announce` is told of them before.
 ///
 /// # Errors
 /// [`FolderError::Foreign`] if something is at one of the two paths that no campaign has put there,
 /// [`FolderError::Busy`] if another campaign runs there, other [`FolderError`]s if a folder cannot
 /// be read or written.
-pub fn take(folder: &Path, manifest: &Manifest) -> Result<Taken, FolderError> {
+pub fn take(folder: &Path, manifest: &Manifest, announce: impl Fn(Unfinished<'_>)) -> Result<Taken, FolderError> {
     let [path, previous] = [RESULTS, PREVIOUS].map(|name| folder.join(name));
     let mut moved = None;
     let mut taken = Err(FolderError::Busy { path: path.clone(), holder: "several start at the same time".to_owned() });
@@ -96,7 +108,7 @@ pub fn take(folder: &Path, manifest: &Manifest) -> Result<Taken, FolderError> {
         if let Place::Results(_) = inspect(&path, true)? {
             // An obstacle, even a lock, is found before anything is written.
             inspect(&previous, true)?;
-            moved = set_aside(&path, &previous)?.or(moved);
+            moved = set_aside(&path, &previous, &announce)?.or(moved);
         }
         taken = Folder::lock(&path, manifest, false);
         // Another campaign has begun and ended here since the path was free.
@@ -133,10 +145,16 @@ pub fn check_inputs(folder: &Path, inputs: &[PathBuf]) -> Result<(), FolderError
     Ok(())
 }
 
-/// Makes the results at `path` the previous ones. Returns `None` if there are none.
-fn set_aside(path: &Path, previous: &Path) -> Result<Option<Moved>, FolderError> {
+/// Makes the results at `path` the previous ones, or removes them if they are unfinished and would
+/// displace finished ones. Returns `None` if nothing is moved.
+fn set_aside(path: &Path, previous: &Path, announce: impl Fn(Unfinished<'_>)) -> Result<Option<Moved>, FolderError> {
     let lock = Lock::acquire(path)?;
     let Place::Results(kept) = inspect(path, true)? else { return Ok(None) };
+    if !kept.is_finished && matches!(inspect(previous, true)?, Place::Results(Kept { is_finished: true, .. })) {
+        announce(Unfinished { path, previous });
+        remove_results(path)?;
+        return Ok(None);
+    }
     let has_removed = remove(previous)?;
     fs::rename(path, previous).map_err(|source| WriteError::new(previous, source))?;
     drop(lock);
@@ -163,17 +181,24 @@ fn remove(path: &Path) -> Result<bool, FolderError> {
         Place::Results(_) => {
             let _lock = Lock::acquire(path)?;
             inspect(path, true)?;
-            let recordings = path.join(RECORDINGS);
-            if recordings.try_exists().map_err(fail(&recordings))? {
-                remove_files(&recordings, |_| true)?;
-                fs::remove_dir(&recordings).map_err(fail(&recordings))?;
-            }
-            remove_files(path, |name| name != MANIFEST)?;
-            remove_files(path, |_| true)?;
+            remove_results(path)?;
+            return Ok(true);
         }
     }
     fs::remove_dir(path).map_err(fail(path))?;
     Ok(true)
+}
+
+/// Removes a folder of results, whose lock is held.
+fn remove_results(path: &Path) -> Result<(), FolderError> {
+    let recordings = path.join(RECORDINGS);
+    if recordings.try_exists().map_err(|source| WriteError::new(&recordings, source))? {
+        remove_files(&recordings, |_| true)?;
+        fs::remove_dir(&recordings).map_err(|source| WriteError::new(&recordings, source))?;
+    }
+    remove_files(path, |name| name != MANIFEST)?;
+    remove_files(path, |_| true)?;
+    Ok(fs::remove_dir(path).map_err(|source| WriteError::new(path, source))?)
 }
 
 /// Removes the files of a folder whose names are chosen. A folder within it is not removed.

@@ -13,7 +13,7 @@ use closecall_campaign::execution::Campaign;
 use closecall_campaign::folder::{Folder, FolderError, LockedFolder, REPORT};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::rare::RareManifest;
-use closecall_campaign::results::{Moved, RESULTS, check_inputs, resume, take};
+use closecall_campaign::results::{Moved, RESULTS, Unfinished, check_inputs, resume, take};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
 use closecall_report::campaign::{RecordedSample, Written};
@@ -45,7 +45,8 @@ const OPEN: &str = if cfg!(target_os = "macos") {
 pub(super) struct ResultsArgs {
     /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and
     /// recordings. It must be new or empty [default: closecall-results, which replaces the last
-    /// results there; these become closecall-results.previous]
+    /// results there; these become closecall-results.previous, unless they are unfinished and it holds
+    /// finished ones]
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Keep no results, only print them
@@ -213,7 +214,13 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
     if is_resumed {
         return resume(working_folder, manifest);
     }
-    let taken = take(working_folder, manifest)?;
+    let taken = take(working_folder, manifest, |Unfinished { path, previous }| {
+        print_error(format_args!(
+            "the campaign in {} has not come to its end: it is replaced, and {} keeps the last finished results\n",
+            path.display(),
+            previous.display()
+        ));
+    })?;
     if let Some(Moved { to, interrupted, has_removed }) = taken.moved {
         let removed = if has_removed { ", in place of older ones" } else { "" };
         print_error(format_args!("the last results are now in {}{removed}\n", to.display()));

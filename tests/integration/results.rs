@@ -377,6 +377,49 @@ fn an_interrupted_campaign_is_resumed_or_becomes_the_previous_results_and_says_s
 }
 
 #[test]
+fn an_unfinished_campaign_does_not_displace_finished_results() {
+    let folder = folder();
+    let (results, previous) = (folder.path().join(RESULTS), folder.path().join(PREVIOUS));
+    stdout(&sized(folder.path(), "4", &[]), 0);
+    stdout(&sized(folder.path(), "5", &[]), 0);
+    // It displaces nothing when it starts: the results that it moves are finished.
+    let mut child = start(folder.path(), &[]);
+    let started = Instant::now();
+    let has_begun =
+        || fs::read_to_string(results.join("manifest.json")).is_ok_and(|manifest| manifest.contains("10000000"));
+    while !has_begun() {
+        assert!(started.elapsed() < Duration::from_secs(300), "the campaign hangs");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!((samples(&results), samples(&previous)), (10_000_000, 5));
+    let kept = content(&previous);
+    let output = sized(folder.path(), "6", &["--record", "worst:1"]);
+    stdout(&output, 0);
+    let said = "the campaign in closecall-results has not come to its end: it is replaced, and \
+                closecall-results.previous keeps the last finished results";
+    assert!(message(&output).contains(said), "{}", stderr(&output));
+    assert!(!message(&output).contains("the last results are now in"), "{}", stderr(&output));
+    assert_eq!(samples(&results), 6);
+    assert!(content(&previous) == kept, "the finished results are as they were");
+    // Its recordings are removed with it.
+    fs::remove_file(results.join("report.html")).unwrap();
+    stdout(&sized(folder.path(), "7", &[]), 0);
+    assert_eq!((samples(&results), samples(&previous)), (7, 5));
+    // An unfinished one is kept as long as there is nothing better, and makes way for a finished one.
+    fs::remove_file(results.join("report.html")).unwrap();
+    fs::remove_file(previous.join("report.html")).unwrap();
+    let output = sized(folder.path(), "8", &[]);
+    stdout(&output, 0);
+    assert!(message(&output).contains("in place of older ones"), "{}", stderr(&output));
+    assert_eq!((samples(&results), samples(&previous)), (8, 7));
+    stdout(&sized(folder.path(), "9", &[]), 0);
+    assert_eq!((samples(&results), samples(&previous)), (9, 8));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
 fn a_resumed_campaign_ends_in_the_bytes_of_an_undisturbed_one() {
     let folder = folder();
     let whole = ["campaign", "low-thw-overtake", "-n", "300", "--no-gate", "--sensors", "ground-truth"];
