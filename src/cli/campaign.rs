@@ -47,6 +47,7 @@ use super::backend::{check_backend, check_networks};
 use super::check::expand;
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
+use super::file_sizes::check_file_sizes;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::keywords::needs;
@@ -518,6 +519,9 @@ pub(super) fn carry_out(
     check_networks(plan.crop_networks(), plan.mask_rcnn_cameras())?;
     let replaceable = planned.results.place() == Place::Default;
     let (mut campaign, manifest) = (plan.campaign(), Manifest { replaceable, ..plan.manifest(session::arguments())? });
+    if let Some(folder) = planned.results.folder() {
+        check_file_sizes(&campaign, folder, planned.until_certain || planned.time_budget.is_some())?;
+    }
     campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;
     let mut results = Results::start(planned.results, &mut campaign, &manifest)?;
     // Other machines run the files that were shipped at the start.

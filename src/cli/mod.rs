@@ -22,6 +22,7 @@ mod error;
 mod explore;
 mod export;
 mod fidelity;
+mod file_sizes;
 mod gates;
 mod generate;
 mod groups;

@@ -82,14 +82,19 @@ impl ResultsArgs {
 
     /// Returns the seed of the campaign that is to be resumed, if there is one.
     pub(super) fn resumed_seed(&self) -> Option<u64> {
-        let folder = match Some(self.place()).filter(|_| self.resume)? {
-            Place::Named(path) => path,
-            Place::Default => Path::new(RESULTS),
-            Place::Nowhere => return None,
-        };
+        let folder = self.folder().filter(|_| self.resume)?;
         let rare = || RareManifest::read(folder).map(|manifest| manifest.campaign);
         let manifest = SavedCampaign::open(folder).ok().map(|saved| saved.manifest().clone()).or_else(rare);
         manifest.map(|manifest| manifest.sampling.seed)
+    }
+
+    /// Returns the folder of the results; `None` if they are not kept.
+    pub(super) fn folder(&self) -> Option<&Path> {
+        match self.place() {
+            Place::Named(path) => Some(path),
+            Place::Default => Some(Path::new(RESULTS)),
+            Place::Nowhere => None,
+        }
     }
 
     /// Returns the place of the results.

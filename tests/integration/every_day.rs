@@ -288,16 +288,30 @@ fn what_cannot_end_well_is_refused_before_any_sample_runs() {
         assert!(message(&output).contains(&format!("RUST_MIN_STACK={bytes}: expected 1048576 to 1073741824 bytes")));
     }
     stdout(&program().env("RUST_MIN_STACK", "4194304").arg("list").output().unwrap(), 0);
-    // A limit of the size of files.
+    // A limit of the size of files: of nothing, and of what a smaller campaign needs.
     let out = at("limited");
-    let words = format!(
-        "ulimit -f 0; exec {} campaign low-thw-overtake -n 1000000 --out {}",
-        program().get_program().display(),
-        out.display()
-    );
-    let output = std::process::Command::new("bash").args(["-c", &words]).output().unwrap();
-    assert_eq!(code(&output), 6, "{}", stderr(&output));
-    assert!(message(&output).contains("File too large"), "{}", stderr(&output));
+    let limited = |blocks: &str, words: &[&str]| {
+        let script = format!("ulimit -f {blocks}; exec \"$@\"");
+        let mut command = std::process::Command::new("bash");
+        command.current_dir(folder.path()).env("XDG_STATE_HOME", env!("CARGO_TARGET_TMPDIR"));
+        command.args(["-c", &script, "bash", env!("CARGO_BIN_EXE_closecall")]).args(words).output().unwrap()
+    };
+    let campaign = ["campaign", "low-thw-overtake", "--no-gate", "--sensors", "ground-truth", "-n"];
+    for (blocks, bytes) in [("0", "0"), ("20000", "20480000")] {
+        for place in [&["--out", out.to_str().unwrap()][..], &[]] {
+            let output = limited(blocks, &[&campaign[..], &["1000000", "--arms", "acc,mis"], place].concat());
+            assert_eq!(code(&output), 6, "{}", stderr(&output));
+            let expected = [
+                format!("no file may have more than {bytes} bytes (`ulimit -f`)"),
+                "the journal of 1000000 samples with 2 controllers needs at least 2400000000".to_owned(),
+            ];
+            assert!(expected.iter().all(|said| message(&output).contains(said.as_str())), "{}", stderr(&output));
+        }
+    }
+    assert!(!out.exists() && !at("closecall-results").exists(), "nothing was begun");
+    // What fits runs, and so does what writes nothing.
+    stdout(&limited("20000", &[&campaign[..], &["2"]].concat()), 0);
+    stdout(&limited("0", &[&campaign[..], &["2", "--no-out"]].concat()), 0);
     // The recordings have no place.
     let output = closecall(["campaign", "low-thw-overtake", "-n", "1000000", "--no-out", "--record", "worst:1"]);
     assert_eq!(code(&output), 2, "{}", stderr(&output));
