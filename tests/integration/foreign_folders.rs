@@ -206,6 +206,46 @@ fn no_input_that_is_a_named_pipe_hangs() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_step_summary_that_is_a_named_pipe_costs_a_warning_and_no_time() {
+    let place = folder();
+    let pipe = place.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let out = place.path().join("out");
+    let small = ["campaign", "overtake-without-brake", "-n", "2", "--no-gate", "--sensors", "ground-truth"];
+    let run = |more: &[&str]| {
+        within_a_minute(program().args(small).args(more).env("GITHUB_STEP_SUMMARY", &pipe).env("RERUN", "off"))
+    };
+    let kept = ["--out", out.to_str().unwrap()];
+    let runs = [
+        (&["--no-out"][..], 0),
+        (&["--no-out", "--strict-artifacts"], 6),
+        (&kept[..], 0),
+        (&["--resume", "--strict-artifacts", kept[0], kept[1]], 6),
+    ];
+    for has_reader in [false, true] {
+        drop(fs::remove_dir_all(&out));
+        for (more, expected) in runs {
+            // A pipe that somebody reads could be opened, and may be read at any pace.
+            let reader =
+                has_reader.then(|| Command::new("cat").arg(&pipe).stdout(std::process::Stdio::null()).spawn().unwrap());
+            let output = run(more);
+            assert!(stdout(&output, expected).contains("measured, not judged"), "{more:?}: {}", stderr(&output));
+            let warning = "warning: the summary for the CI server (GITHUB_STEP_SUMMARY) is missing: failed to write";
+            assert!(message(&output).contains(warning), "{more:?}: {}", stderr(&output));
+            assert!(message(&output).contains("it is a named pipe, and no file"), "{more:?}: {}", stderr(&output));
+            if let Some(mut reader) = reader {
+                let _ = reader.kill();
+                reader.wait().unwrap();
+            }
+        }
+        for file in ["summary.md", "junit.xml", "report.html"] {
+            assert!(out.join(file).is_file(), "{file}");
+        }
+    }
+}
+
 #[test]
 fn a_controller_that_changes_during_the_campaign_makes_it_invalid() {
     let place = folder();
