@@ -8,7 +8,7 @@ use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_recorded::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile};
-use closecall_simulation::trajectories::{InCarRecorder, TrafficRecorder, recorded_actor};
+use closecall_simulation::trajectories::{EndedAtCollisions, InCarRecorder, TrafficRecorder, recorded_actor};
 use closecall_simulation::{Observer, RunKey};
 use closecall_traffic::words::counted;
 
@@ -67,11 +67,14 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     check_ending(&args.output)?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
-    let recording = recorder.finish(&file.config().name);
+    let EndedAtCollisions { data: recording, collided } = recorder.finish_at_collisions(&file.config().name);
     let (tracks, instants) =
         (recording.trajectories.len(), recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>());
     write_trajectories(&recording, &args.output)?;
     outln!("{}, {}", counted(tracks, "vehicle"), counted(instants, "instant"));
+    if collided > 0 {
+        outln!("{} in a collision: the track ends before it", counted(collided, "vehicle"));
+    }
     print_written(&args.output);
     Ok(ExitCode::Pass)
 }

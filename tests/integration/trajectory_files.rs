@@ -1,6 +1,7 @@
 //! The commands that turn trajectory files into lane changes, metrics and distributions: on
 //! recorded traffic, and on trajectory files that the simulation wrote.
 
+use std::collections::BTreeMap;
 use std::fs;
 
 use closecall_testing::data;
@@ -42,6 +43,38 @@ fn a_trajectory_file_of_the_simulation_gives_its_lane_changes_metrics_and_distri
     let fitted = folder.path().join("fitted.toml");
     stdout(&closecall(["traffic", "fit", csv, "-o", fitted.to_str().unwrap()]), 0);
     assert!(fs::read_to_string(fitted).unwrap().contains("lane-change-duration-s"));
+}
+
+#[test]
+fn traffic_that_collides_is_read_as_it_was_written() {
+    let folder = folder();
+    let csv = folder.path().join("crashes.csv");
+    let csv = csv.to_str().unwrap();
+    let record = ["traffic", "record", "low-thw-overtake", "-n", "40", "--seed", "1", "--controller", "acc"];
+    let printed = stdout(&closecall(record.iter().chain(&["--sensors", "ground-truth", "-o", csv])), 0);
+    let said = printed.lines().find(|line| line.contains("in a collision: the track ends before it")).unwrap();
+    let collided: usize = said.split(' ').next().unwrap().parse().unwrap();
+    // The other vehicles of a run go on, as nothing has happened to them.
+    let mut ends: BTreeMap<u64, f64> = BTreeMap::new();
+    for line in fs::read_to_string(csv).unwrap().lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let [time_s, speed_mps, acceleration_mps2] = [4, 8, 9].map(|column| fields[column].parse::<f64>().unwrap());
+        assert!(acceleration_mps2.abs() < 15.0 && speed_mps >= 0.0, "{line}");
+        ends.insert(fields[1].parse().unwrap(), time_s);
+    }
+    // Track numbers follow the runs, and each run has as many vehicles as the scenario has actors.
+    let text = fs::read_to_string(library("low-thw-overtake")).unwrap();
+    let actors = text.lines().filter(|line| line.trim() == "[[actor]]").count() as u64;
+    let run_of = |track: u64| (track - 1) / actors;
+    let last_of = |run: u64| {
+        let of_run = ends.iter().filter(|(track, _)| run_of(**track) == run);
+        of_run.map(|(_, end_s)| *end_s).fold(0.0, f64::max)
+    };
+    let shortened = ends.iter().filter(|(track, end_s)| **end_s < last_of(run_of(**track))).count();
+    assert!(collided >= 2 && (1..=collided).contains(&shortened), "{collided} {shortened}");
+    stdout(&closecall(["traffic", "inspect", csv]), 0);
+    let changes = json(&closecall(["traffic", "lane-changes", csv, "--format", "json"]), 0);
+    assert!(!changes.as_array().unwrap().is_empty());
 }
 
 #[test]

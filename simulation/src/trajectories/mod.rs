@@ -5,5 +5,5 @@ mod recorder;
 mod trace;
 
 pub use in_car::{InCarRecorder, recorded_actor};
-pub use recorder::TrafficRecorder;
+pub use recorder::{EndedAtCollisions, TrafficRecorder};
 pub use trace::{TraceRecorder, TraceRow};
