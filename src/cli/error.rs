@@ -268,6 +268,9 @@ fn remedy(problem: &TrajectoryFileProblem) -> String {
         TrajectoryFileProblem::LanesBesideMarkings { .. } => {
             format!("; {} `none` takes no lane as recorded, {mirror_d} turns the position", Argument("lanes"))
         }
+        TrajectoryFileProblem::LaneSpacing { .. } => {
+            format!("; {} `none` takes no lane as recorded", Argument("lanes"))
+        }
         TrajectoryFileProblem::NoLanes { .. } => format!("; {} `none` estimates them", Argument("lanes")),
         TrajectoryFileProblem::SidesContradict { .. } => format!(
             "; {mirror_d} turns the position (with {from_right}, if the lanes are counted from the right, too), or leave these \

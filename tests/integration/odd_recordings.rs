@@ -161,6 +161,24 @@ fn a_heading_or_a_position_in_the_plane_against_the_lateral_position_is_refused(
     assert!(refusal(&plane, &[]).contains("`x_m, y_m` contradict"));
 }
 
+#[test]
+fn lateral_positions_in_feet_are_refused_by_that_reason() {
+    let folder = folder();
+    let clean = recorded(folder.path());
+    let in_feet = changed(&clean, &folder.path().join("feet.csv"), |row| vec![("d_m", row("d_m") / 0.3048)]);
+    for command in ["inspect", "lane-changes", "criticality", "fit"] {
+        let fitted = folder.path().join("fitted.toml");
+        let more = if command == "fit" { vec!["-o", fitted.to_str().unwrap()] } else { Vec::new() };
+        let output = closecall(["traffic", command, in_feet.to_str().unwrap()].into_iter().chain(more));
+        stdout(&output, WRONG_INPUT);
+        let message = message(&output);
+        let said = ["lanes 1 and 2", "`d_m` in feet", "feet.csv", "--lanes `none`"];
+        assert!(said.iter().all(|said| message.contains(said)), "{command}: {message}");
+    }
+    let mended = changed(&in_feet, &folder.path().join("mended.csv"), |row| vec![("d_m", row("d_m") * 0.3048)]);
+    assert_eq!(lane_changes(&mended, &[]).0.len(), lane_changes(&clean, &[]).0.len());
+}
+
 /// Writes three vehicles at 30 m/s, of which the first one moves to the left by 3.75 m within
 /// `duration_s`, if that is given.
 fn three_vehicles(to: &Path, duration_s: Option<f64>) -> PathBuf {

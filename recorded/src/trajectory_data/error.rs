@@ -5,6 +5,7 @@ use std::io;
 use std::path::PathBuf;
 
 use super::file_layout::Layout;
+use super::markings::LANE_WIDTHS_M;
 
 /// An error while reading a trajectory file. None of the file's data is used.
 #[derive(Debug, thiserror::Error)]
@@ -355,6 +356,19 @@ pub enum TrajectoryFileProblem {
         /// Whether the positions have the sign of the other side, too.
         is_mirrored: bool,
     },
+    /// The middles of neighbouring lanes are further apart than lanes are wide, or closer.
+    #[error(
+        "the middles of lanes {} and {} are {per_lane_m:.1} m apart for each lane, by `d_m` and `lane_id`, and {}",
+        lanes[0], lanes[1], suspected_unit(*is_too_wide)
+    )]
+    LaneSpacing {
+        /// The first two such lanes.
+        lanes: [u8; 2],
+        /// Distance of their middles, divided by the difference of their numbers (m).
+        per_lane_m: f64,
+        /// Whether the lanes are too far apart, and not too close.
+        is_too_wide: bool,
+    },
     /// Vehicles are not between the markings of their lanes.
     #[error(
         "in {percent:.0} % of the rows of lanes {} to {}, as they are numbered from the left, a vehicle is not between the \
@@ -528,6 +542,15 @@ impl TrajectoryFileProblem {
             _ => "other",
         }
     }
+}
+
+/// Returns the likely cause of lanes that are too far apart, or too close.
+fn suspected_unit(is_too_wide: bool) -> String {
+    let cause = match is_too_wide {
+        true => "is `d_m` in feet, of which each has 0.3048 m?",
+        false => "is `d_m` the distance from the middle of each lane, or converted to metres twice?",
+    };
+    format!("lanes are {} to {} m wide: {cause}", LANE_WIDTHS_M.start(), LANE_WIDTHS_M.end())
 }
 
 /// An error while writing a trajectory file. A file that existed before at the same path is left

@@ -78,6 +78,7 @@ mod in_car;
 mod inferred_road;
 mod input;
 mod json_input;
+mod lane_spacing;
 mod lanelets;
 mod layout;
 mod markings;

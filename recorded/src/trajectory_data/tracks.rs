@@ -14,6 +14,7 @@ use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::estimated_lanes::EstimatedLanes;
 use super::file_layout::Layout;
 use super::input::Digest;
+use super::lane_spacing;
 use super::markings::LaneMarkings;
 use super::ngsim;
 use super::order::{WINDOW_ROWS, order_of};
@@ -446,6 +447,10 @@ impl<'a> Tracks<'a> {
             axes::check_order(beginning, stated.as_ref())?;
         }
         self.source.check_sides(self.axis_options.mirror_d)?;
+        // The other layouts state their units, or derive the lanes from the positions.
+        if layout == Layout::Plain && self.lanes == LaneReliability::Reliable {
+            lane_spacing::check(beginning)?;
+        }
         if let (Layout::Highd, Some(markings)) = (layout, &stated) {
             axes::check_carriageways(beginning, markings)?;
         }

@@ -1,0 +1,152 @@
+//! Whether the lateral positions are metres across the road, by the distance between the middles of
+//! the recorded lanes.
+//!
+//! ```text
+//!   lane 1 ──●───────●──   middles of the recorded lanes: the median position of their rows
+//!            ↕ 2.5 to 5.5 m in metres, 8 to 18 m in feet, 0.8 to 1.7 m if metres are divided twice
+//!   lane 2 ────●────●───
+//! ```
+//!
+//! Lanes are 2.5 m (at roadworks) to 5.5 m (ramps) wide, as `markings` states. The lanes of US
+//! interstates are 12 ft, 3.66 m (AASHTO, *A Policy on Design Standards: Interstate System*). A
+//! single pair of lanes may be odd, as a ramp beyond a verge is. The lanes are refused if most pairs
+//! are.
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::statistics::quantiles::median;
+
+use super::error::TrajectoryFileProblem;
+use super::markings::CARRIAGEWAY_GAP_M;
+use super::source::{ReadError, Row};
+
+/// Least number of rows of a lane whose position is judged.
+const LEAST_ROWS: usize = 10;
+/// Largest distance between the middles of two neighbouring lanes (m): above the widest lane, 5.5 m,
+/// and below the narrowest in feet, 8.2.
+const MOST_M: f64 = 6.0;
+/// Least distance between them (m). If all vehicles change lanes at a constant rate, it is half a lane,
+/// 1.5 m or more. Lanes of 3.75 m that are converted from feet although they are metres have 1.14.
+const LEAST_M: f64 = 1.4;
+
+/// The middle of a recorded lane.
+struct Middle {
+    lane: u8,
+    d_m: f64,
+}
+
+/// The distance between the middles of two lanes without a recorded lane between them.
+struct Spacing {
+    lanes: [u8; 2],
+    /// Distance for each lane (m).
+    per_lane_m: f64,
+}
+
+impl Spacing {
+    /// Returns the spacing of two lanes. Lanes between them may have no vehicle. `None` if a number is
+    /// left out and a strip without vehicles is there: the lanes belong to two carriageways.
+    fn of(first: &Middle, last: &Middle) -> Option<Self> {
+        let (count, apart_m) = (last.lane - first.lane, (first.d_m - last.d_m).abs());
+        let is_one_road = count == 1 || apart_m < CARRIAGEWAY_GAP_M;
+        is_one_road.then(|| Self { lanes: [first.lane, last.lane], per_lane_m: apart_m / f64::from(count) })
+    }
+
+    /// Returns true if the lanes are too far apart, or else too close.
+    fn is_odd(&self, is_too_wide: bool) -> bool {
+        if is_too_wide { self.per_lane_m > MOST_M } else { self.per_lane_m < LEAST_M }
+    }
+}
+
+/// Rejects rows in which the middles of most neighbouring lanes are too far apart, or too close.
+pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
+    let mut lanes: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
+    for row in rows.iter().filter(|row| row.lane > 0) {
+        lanes.entry(row.lane).or_default().push(row.d_m);
+    }
+    let judged = lanes.into_iter().filter(|(_, positions)| positions.len() >= LEAST_ROWS);
+    let middles: Vec<Middle> = judged.map(|(lane, positions)| Middle { lane, d_m: median(positions) }).collect();
+    let spacings: Vec<Spacing> = middles.windows(2).filter_map(|pair| Spacing::of(&pair[0], &pair[1])).collect();
+    for is_too_wide in [true, false] {
+        let odd: Vec<&Spacing> = spacings.iter().filter(|spacing| spacing.is_odd(is_too_wide)).collect();
+        if let Some(first) = odd.first().filter(|_| 2 * odd.len() > spacings.len()) {
+            let Spacing { lanes, per_lane_m } = **first;
+            return Err(ReadError::of_file(TrajectoryFileProblem::LaneSpacing { lanes, per_lane_m, is_too_wide }));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+    use std::path::Path;
+
+    use crate::lane_change::LaneReliability;
+    use crate::trajectory_data::{ReadOptions, TrajectoryFileProblem, open_from};
+
+    /// Metres of a foot.
+    const FOOT_M: f64 = 0.3048;
+
+    /// Reads a file with a vehicle in each of these lanes, at these positions to the right.
+    fn read(lanes: &[(u8, f64)], reliability: LaneReliability) -> Result<usize, TrajectoryFileProblem> {
+        let mut text =
+            "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+        for (track, (lane, d_m)) in lanes.iter().enumerate() {
+            for frame in 0..20 {
+                let (time_s, s_m) = (0.1 * f64::from(frame), 3.0 * f64::from(frame));
+                writeln!(text, "{track},{frame},{time_s:.1},{s_m},{d_m},{lane},30,0,4.5,1.8,car").unwrap();
+            }
+        }
+        let options = ReadOptions { lanes: reliability, ..ReadOptions::default() };
+        let tracks = open_from(text.as_bytes(), Path::new("a.csv"), options, usize::MAX);
+        let data = tracks.and_then(|tracks| tracks.collect_all()).map_err(|error| error.problem)?;
+        Ok(data.trajectories.len())
+    }
+
+    /// The middles of lanes of `width` that are numbered from 1.
+    fn lanes(width: f64, count: u8) -> Vec<(u8, f64)> {
+        (1..=count).map(|lane| (lane, width * (f64::from(lane) - 0.5))).collect()
+    }
+
+    fn problem(lanes: &[(u8, f64)]) -> Option<String> {
+        read(lanes, LaneReliability::Reliable).err().map(|problem| problem.to_string())
+    }
+
+    #[test]
+    fn positions_in_feet_are_refused_by_that_reason_and_widths_of_roads_are_not() {
+        for width_m in [2.5, 2.75, 3.25, 3.66, 3.75, 4.2, 5.5] {
+            for count in [2, 3, 5] {
+                assert_eq!(problem(&lanes(width_m, count)), None, "{width_m} m");
+                let in_feet = problem(&lanes(width_m / FOOT_M, count)).unwrap();
+                assert!(in_feet.contains("in feet") && in_feet.contains("lanes 1 and 2"), "{in_feet}");
+            }
+        }
+        for width_m in [2.75, 3.75, 4.2] {
+            let twice = problem(&lanes(width_m * FOOT_M, 3)).unwrap();
+            assert!(twice.contains("converted to metres twice"), "{twice}");
+        }
+        let of_each_lane = problem(&[(1, 0.1), (2, 0.0), (3, -0.1)]).unwrap();
+        assert!(of_each_lane.contains("from the middle of each lane"), "{of_each_lane}");
+    }
+
+    #[test]
+    fn ramps_empty_lanes_and_other_carriageways_are_no_feet() {
+        // A ramp beyond a verge, beside three lanes and beside two.
+        assert_eq!(problem(&[(1, 1.8), (2, 5.4), (3, 9.0), (4, 25.0)]), None);
+        assert_eq!(problem(&[(1, 1.8), (2, 5.4), (3, 21.0)]), None);
+        // Lanes without vehicles, one and two of them.
+        assert_eq!(problem(&[(1, 1.875), (3, 9.375)]), None);
+        assert_eq!(problem(&[(1, 1.875), (4, 13.125)]), None);
+        // A second carriageway, whose first number is left out, or which continues the count.
+        assert_eq!(problem(&[(1, 1.8), (2, 5.4), (4, 25.0), (5, 28.6)]), None);
+        assert_eq!(problem(&[(1, 1.8), (3, 25.0)]), None);
+        assert_eq!(problem(&[(1, 1.8), (2, 5.4), (3, 25.0), (4, 28.6)]), None);
+        // One lane says nothing.
+        assert_eq!(problem(&[(2, 17.0)]), None);
+    }
+
+    #[test]
+    fn lanes_that_do_not_count_are_not_judged() {
+        assert!(read(&lanes(3.75 / FOOT_M, 3), LaneReliability::Unreliable).is_ok());
+    }
+}
