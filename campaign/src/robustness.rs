@@ -16,6 +16,23 @@ pub enum RobustnessError {
     /// The references of the files differ.
     #[error("in-car logs and recorded traffic have different references: study them separately")]
     Mixed,
+    /// Two files have the same content: their lane changes would count twice.
+    #[error("{} and {} have the same content", first.display(), second.display())]
+    SameContent {
+        /// The first of them.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+    },
+}
+
+/// The study of one file.
+struct FileStudy {
+    study: Study,
+    /// What a reader of results has to know of the file.
+    warnings: Vec<String>,
+    /// BLAKE3 hash of the file.
+    hash: String,
 }
 
 /// Studies trajectory files, and calls `warn` with what a reader of the results has to know of them.
@@ -30,14 +47,17 @@ pub fn robustness(
     setup: &Setup,
     mut warn: impl FnMut(&Path, &str),
 ) -> Result<Option<(Vec<Robustness>, Robustness)>, RobustnessError> {
-    let mut studies = Vec::new();
+    let mut studies: Vec<FileStudy> = Vec::new();
     for path in files {
-        let (study, warnings) = study_of(path, options)?;
-        warnings.iter().for_each(|warning| warn(path, warning));
-        studies.push(study);
+        let of_file = study_of(path, options)?;
+        of_file.warnings.iter().for_each(|warning| warn(path, warning));
+        if let Some(earlier) = studies.iter().position(|earlier| earlier.hash == of_file.hash) {
+            return Err(RobustnessError::SameContent { first: files[earlier].clone(), second: path.clone() });
+        }
+        studies.push(of_file);
     }
     let (mut each, mut all): (Vec<Robustness>, Option<Robustness>) = (Vec::new(), None);
-    for study in &studies {
+    for FileStudy { study, .. } in &studies {
         let cases = Study::cases(setup);
         // The results are in the order of the cases for any number of threads.
         let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
@@ -52,14 +72,14 @@ pub fn robustness(
     Ok(all.map(|all| (each, all)))
 }
 
-/// Returns the study of one file, and what a reader of results has to know of the file.
-fn study_of(path: &Path, options: ReadOptions) -> Result<(Study, Vec<String>), TrajectoryFileError> {
+/// Reads one file.
+fn study_of(path: &Path, options: ReadOptions) -> Result<FileStudy, TrajectoryFileError> {
     let mut tracks = open(path, options)?;
     let mut measured: Vec<Measured> = Vec::new();
     while let Some(track) = tracks.next_track()? {
         measured.push((track.trajectory, track.markings));
     }
     measured.sort_by_key(|(track, _)| track.track_id);
-    let warnings = tracks.warnings();
-    Ok((Study::with_lanes(options.lanes, measured, tracks.markings()), warnings))
+    let study = Study::with_lanes(options.lanes, measured, tracks.markings());
+    Ok(FileStudy { study, warnings: tracks.warnings(), hash: tracks.hash() })
 }

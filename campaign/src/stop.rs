@@ -97,7 +97,8 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     let (number, unit_s) =
         units.iter().find_map(|(unit, s)| text.strip_suffix(unit).map(|number| (number, *s))).unwrap_or((text, 1.0));
     let time = number.parse().ok().filter(|value: &f64| *value > 0.0);
-    time.and_then(|value| Duration::try_from_secs_f64(value * unit_s).ok())
+    // A time below half a nanosecond is none.
+    time.and_then(|value| Duration::try_from_secs_f64(value * unit_s).ok().filter(|time| !time.is_zero()))
         .ok_or_else(|| format!("`{text}` is not a time above 0 such as 90s, 15m or 8h"))
 }
 
@@ -135,7 +136,7 @@ mod tests {
         assert_eq!(duration("90"), Ok(Duration::from_secs(90)));
         assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
         assert_eq!(duration("2h"), Ok(Duration::from_secs(7_200)));
-        for text in ["", "0s", "-1m", "nan", "inf", "1d", "m", "1e300h"] {
+        for text in ["", "0s", "-1m", "nan", "inf", "1d", "m", "1e300h", "1e-30s"] {
             assert!(duration(text).is_err(), "{text}");
         }
     }

@@ -1,5 +1,6 @@
 //! Arguments that several commands share.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -109,6 +110,23 @@ impl FilesArgs {
         let data_sets = self.files.iter().map(|path| read_noting(path, options)).collect::<Result<Vec<_>, _>>()?;
         refuse_duplicates(&self.files, &data_sets).map_err(|message| CliError::Usage { message })?;
         Ok(data_sets)
+    }
+}
+
+/// The files that a command takes together, by the hash of their content.
+#[derive(Debug, Default)]
+pub(super) struct ReadFiles(BTreeMap<String, PathBuf>);
+
+impl ReadFiles {
+    /// Notes a file. Refuses a file whose content was read before: what it holds would count twice.
+    pub(super) fn note(&mut self, path: &Path, hash: &str) -> Result<(), CliError> {
+        match self.0.insert(hash.to_owned(), path.to_owned()) {
+            Some(first) => {
+                let (first, second) = (first.display(), path.display());
+                Err(CliError::usage(format!("{first} and {second} have the same content")))
+            }
+            None => Ok(()),
+        }
     }
 }
 

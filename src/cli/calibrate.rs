@@ -8,11 +8,12 @@ use closecall_report::{calibration, json::stamped};
 use closecall_simulation::calibration::{FollowingModel, calibrate_watched};
 use closecall_traffic::atomic::write_file;
 
+use super::CliError;
+use super::args::{Format, ReadFiles};
 use super::help::{examples, heading};
 use super::output::{outln, print_text};
 use super::progress::watched;
 use super::protect::protect;
-use super::{CliError, args::Format};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic calibrate`.
@@ -48,6 +49,8 @@ enum Model {
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
     protect(&args.files, &[("--out", args.output.as_deref())])?;
     let data = read(&args.files)?;
+    let mut files = ReadFiles::default();
+    data.files.iter().try_for_each(|file| files.note(&file.path, &file.blake3))?;
     let model = match args.model {
         Model::Idm => FollowingModel::Idm,
         Model::Wiedemann99 => FollowingModel::Wiedemann99,

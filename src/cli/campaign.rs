@@ -213,9 +213,12 @@ impl CampaignArgs {
 
     fn workers(&self) -> Result<Workers, CliError> {
         let timeout_s = self.sample_timeout_s.map_or(SAMPLE_TIMEOUT_S, |time| time.0);
-        let sample_timeout = Duration::try_from_secs_f64(timeout_s).map_err(|_| {
-            CliError::usage(format!("{} {timeout_s}: the time is too long", Argument("sample-timeout-s")))
-        })?;
+        let usage =
+            |why| CliError::usage(format!("{} {timeout_s}: the time is too {why}", Argument("sample-timeout-s")));
+        let sample_timeout = Duration::try_from_secs_f64(timeout_s).map_err(|_| usage("long"))?;
+        if sample_timeout.is_zero() {
+            return Err(usage("short"));
+        }
         Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs.map(|jobs| jobs.0)) })
     }
 
@@ -337,6 +340,13 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
     let has_gate = args.gates.max_probability.is_some();
     needs(("until-certain", args.plan.until_certain), ("max-probability", has_gate))?;
     needs(("partition", args.partition.is_some()), ("out", out.is_some()))?;
+    if args.plan.switches_checks_off() && args.gates.max_flip_rate.is_some() {
+        return Err(CliError::usage(format!(
+            "{} limits what the validity checks find, and {} switches them off",
+            Argument("max-flip-rate"),
+            Argument("no-validity-checks")
+        )));
+    }
     if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place() == Place::Nowhere {
         return Err(CliError::usage(format!(
             "{}: the recordings are kept in a folder of results: name one with {}",

@@ -25,7 +25,7 @@ use serde_json::json;
 use super::CliError;
 use super::actions::command_for;
 use super::advice::to_provide;
-use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs, read_noting};
+use super::args::{Format, ReadArgs, ReadFiles, SavedSampleArgs, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_text, print_written};
 use super::protect::{of_campaign, protect};
@@ -217,8 +217,10 @@ pub(super) struct ExposureArgs {
 pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
     let rule = EventRule { braking_mps2: args.braking_mps2 };
     let mut observed = args.counted.map(Counted::observed);
+    let mut files = ReadFiles::default();
     for path in &args.files {
         let data = read_noting(path, args.read.options())?;
+        files.note(path, &data.hash)?;
         observe(&smooth(&data), rule, observed.get_or_insert_default());
     }
     let saved = args.campaign.as_deref().map(SavedCampaign::open).transpose()?;

@@ -99,6 +99,9 @@ struct Chosen {
 }
 
 pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
+    if args.value_sets != 1 && !args.forms.is_empty() && !args.forms.contains(&FormChoice::Logical) {
+        return Err(CliError::usage("--value-sets is of the logical form, and --form names others only"));
+    }
     let chosen = if args.source.is_dir() { of_folder(args)? } else { of_file(args)? };
     let forms = match args.forms.as_slice() {
         [] => Form::OPENSCENARIO.to_vec(),
@@ -146,6 +149,11 @@ fn of_file(args: &ExportArgs) -> Result<Chosen, CliError> {
 fn of_folder(args: &ExportArgs) -> Result<Chosen, CliError> {
     if args.seed.is_some() || args.sensors.is_some() {
         return Err(CliError::usage("a campaign has its own seed and sensors: leave out --seed and --sensors"));
+    }
+    if args.controller.is_named() {
+        return Err(CliError::usage(
+            "a campaign has its own controllers: --arm names one of them, and not --controller",
+        ));
     }
     let saved = args.trust.open(&args.source)?;
     saved.folder().check_journal()?;

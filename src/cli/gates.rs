@@ -71,7 +71,7 @@ pub(super) struct GateArgs {
     /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at
     /// half the time step [default: 0.05]
     #[arg(long, value_name = "SHARE", help_heading = heading::GATES)]
-    max_flip_rate: Option<Share>,
+    pub(super) max_flip_rate: Option<Share>,
     /// Fail if more than K samples are flaky: they crashed or hung, and have an outcome only
     /// because of --retry-crashed [default: any number; 0 with --preset]
     #[arg(long, value_name = "K", help_heading = heading::GATES)]

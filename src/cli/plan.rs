@@ -136,6 +136,11 @@ impl PlanArgs {
         self.no_validity_checks || self.check_share.is_some() || self.check_at_most.is_some()
     }
 
+    /// Returns true if the validity of the simulator is checked in no sample.
+    pub(super) const fn switches_checks_off(&self) -> bool {
+        self.no_validity_checks
+    }
+
     /// Returns true if a preset requests a baseline.
     pub(super) fn wants_pairs(&self) -> bool {
         self.preset.is_some()

@@ -13,7 +13,7 @@ use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
 use super::args::SetArgs;
-use super::arms::{ArmArgs, ComparisonArgs, arm};
+use super::arms::{ArmArgs, ComparisonArgs};
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
@@ -91,6 +91,11 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if !args.comparison.arms.is_empty() {
         return Err(CliError::usage("a campaign has its own arms, and all are drawn: --arms cannot change them"));
     }
+    if args.arm.controller.is_named() || args.arm.sensors.is_some() {
+        return Err(CliError::usage(
+            "a campaign has its own controllers and sensors: --controller and --sensors cannot change them",
+        ));
+    }
     let Some(sample) = args.number.or(args.sample) else {
         return Err(CliError::usage(
             "a campaign has many samples: name one, as `closecall plot DIR SAMPLE -o FILE.svg`",
@@ -104,7 +109,8 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     let mut arms = saved.arms()?;
     saved.folder().check_journal()?;
     if args.comparison.paired && arms.len() < 2 {
-        arms.insert(0, arm(&ControllerChoice::ACC, args.arm.sensors));
+        let sensors = arms.first().and_then(|tested| tested.sensors);
+        arms.insert(0, Arm { controller: ControllerChoice::ACC.factory(), sensors });
     }
     films(&scenario, key, &arms)
 }

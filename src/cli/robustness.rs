@@ -78,6 +78,6 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
 pub(super) fn refused(error: RobustnessError) -> CliError {
     match error {
         RobustnessError::TrajectoryData(source) => CliError::TrajectoryData(source),
-        RobustnessError::Mixed => CliError::Usage { message: error.to_string() },
+        RobustnessError::Mixed | RobustnessError::SameContent { .. } => CliError::Usage { message: error.to_string() },
     }
 }

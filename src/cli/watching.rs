@@ -38,7 +38,7 @@ pub(super) struct WatchingArgs {
     )]
     samples: u64,
     /// End after this many rounds [default: go on until Ctrl-C]
-    #[arg(long, value_name = "N", help_heading = heading::WATCH)]
+    #[arg(long, value_name = "N", value_parser = count, help_heading = heading::WATCH)]
     rounds: Option<u64>,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::WATCH)]

@@ -43,6 +43,11 @@ fn a_calibration_gives_a_member_that_a_campaign_takes() {
     let campaign = json(&closecall(args.iter().copied().chain(["--ensemble", &at("member.toml")])), 0);
     assert!(campaign["scenarios"]["rear-follower-stays@calibrated-idm"].is_object());
     let table = stdout(&closecall(["traffic", "calibrate", &at("pairs.csv")]), 0);
+    // Its pairs would count twice.
+    std::fs::copy(at("pairs.csv"), at("again.csv")).unwrap();
+    let twice = closecall(["traffic", "calibrate", &at("pairs.csv"), &at("again.csv")]);
+    assert_eq!(code(&twice), 2);
+    assert!(message(&twice).contains("have the same content"), "{}", message(&twice));
     assert!(table.contains("pooled set, calibration pairs") && table.contains("literature:"), "{table}");
 }
 

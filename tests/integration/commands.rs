@@ -395,6 +395,8 @@ fn a_watched_check_runs_a_few_samples_of_the_file() {
         &["check", "absent", "--watch", "--rounds", "1"][..],
         &["check", "mine", "mine", "--watch", "--rounds", "1"],
         &["check", "mine", "--watch", "--format", "json"],
+        // No round would check nothing.
+        &["check", "mine", "--watch", "--rounds", "0"],
         // A check without --watch runs no sample.
         &["check", "mine", "-n", "2"],
         &["check", "mine", "--controller", "acc"],

@@ -170,6 +170,11 @@ fn a_scenario_without_parameters_has_no_values_and_no_distributions() {
 fn options_that_belong_to_the_other_kind_of_source_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("case");
+    for wrong in ["paper-figure --form closed-loop --value-sets 3", "paper-figure --form commonroad --value-sets 2"] {
+        let output = run(&format!("tool export {wrong} -o"), &out);
+        assert_eq!(code(&output), 2, "{wrong}: {}", message(&output));
+        assert!(message(&output).contains("--value-sets is of the logical form"), "{wrong}: {}", message(&output));
+    }
     let output = run("tool export paper-figure --arm acc -o", &out);
     assert_eq!(code(&output), 2);
     assert!(message(&output).contains("belong to a campaign"), "{}", message(&output));

@@ -164,8 +164,13 @@ fn a_scenario_and_a_sample_of_a_campaign_give_the_same_figure() {
     let again = file("again.svg");
     stdout(&closecall(["plot", &out, "0", "-o", &again]), 0);
     assert_eq!(std::fs::read(&svg).unwrap(), std::fs::read(&again).unwrap());
-    for wrong in [["plot", &out, "-o", &png].to_vec(), ["plot", &out, "7", "-o", &png].to_vec()] {
-        assert_eq!(code(&closecall(wrong)), 2);
+    for wrong in [
+        &["-o", &png][..],
+        &["7", "-o", &png],
+        &["0", "-o", &png, "--controller", "acc"],
+        &["0", "-o", &png, "--sensors", "full"],
+    ] {
+        assert_eq!(code(&closecall(["plot", &out].iter().chain(wrong))), 2, "{wrong:?}");
     }
     let pdf = file("figure.pdf");
     stdout(&closecall(["plot", scenario.to_str().unwrap(), "--paired", "--width-mm", "180", "-o", &pdf]), 0);

@@ -7,7 +7,7 @@ use std::fs;
 use closecall_testing::data;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, message, stderr, stdout};
 
 #[test]
 fn a_trajectory_file_of_the_simulation_gives_its_lane_changes_metrics_and_distributions() {
@@ -75,6 +75,23 @@ fn traffic_that_collides_is_read_as_it_was_written() {
     stdout(&closecall(["traffic", "inspect", csv]), 0);
     let changes = json(&closecall(["traffic", "lane-changes", csv, "--format", "json"]), 0);
     assert!(!changes.as_array().unwrap().is_empty());
+}
+
+#[test]
+fn a_file_that_is_given_twice_does_not_count_twice() {
+    let folder = folder();
+    let [csv, copy] = ["own.csv", "copy.csv"].map(|name| folder.path().join(name).display().to_string());
+    let record = ["traffic", "record", "overtake-without-brake", "-n", "2", "--sensors", "ground-truth", "-o", &csv];
+    stdout(&closecall(record), 0);
+    fs::copy(&csv, &copy).unwrap();
+    let commands = [["traffic", "statistics"], ["traffic", "fit"], ["traffic", "robustness"], ["study", "exposure"]];
+    for command in commands {
+        for again in [&csv, &copy] {
+            let output = closecall(command.iter().copied().chain([csv.as_str(), again]));
+            assert_eq!(code(&output), 2, "{command:?}: {}", stderr(&output));
+            assert!(message(&output).contains("have the same content"), "{command:?}: {}", stderr(&output));
+        }
+    }
 }
 
 #[test]
