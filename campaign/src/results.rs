@@ -5,9 +5,9 @@
 //!  closecall-results.previous   the last finished one before it
 //! ```
 //!
-//! A new campaign takes the place of the last one, whose folder becomes the previous one. A campaign
-//! that has not come to its end becomes the previous one only if no finished one would make way for
-//! it: otherwise it is replaced itself. A folder
+//! A new campaign takes the place of the last one, whose folder becomes the previous one. A
+//! campaign that has not come to its end becomes the previous one only if no finished one would
+//! make way for it: otherwise it is replaced itself. A folder
 //! is moved or removed only if its manifest says that a campaign has made it here on its own
 //! account, and if it holds only files of a campaign. Everything else at one of the two paths is
 //! refused and stays: a file, a symbolic link, a folder with other files, the folder of a campaign

@@ -518,8 +518,8 @@ impl Findings {
         self.reasons.iter().filter_map(|reason| reason.decision).collect()
     }
 
-    /// Returns the reasons in words. The reasons that led to the decision come first: the first that
-    /// is no gate is the sentence of the verdict.
+    /// Returns the reasons in words. The reasons that led to the decision come first: the first
+    /// that is no gate is the sentence of the verdict.
     fn into_reasons(self, decided: Decision) -> Vec<String> {
         let decides = |reason: &Reason| reason.decision == Some(decided);
         let (decisive, others): (Vec<Reason>, Vec<Reason>) = self.reasons.into_iter().partition(decides);

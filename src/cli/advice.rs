@@ -1,5 +1,5 @@
-//! Advice for the user after an error, a result without a verdict, or a verdict on a known seed. The libraries state the
-//! problem, and only this program has the options that help.
+//! Advice for the user after an error, a result without a verdict, or a verdict on a known seed.
+//! The libraries state the problem, and only this program has the options that help.
 
 use std::fmt::Display;
 
@@ -96,10 +96,10 @@ pub(super) fn after_verdict(judged: &Judgement) -> &'static str {
     }
 }
 
-/// Returns the remark of a verdict on a controller from outside whose samples were known before the
-/// run: the controller may have been tuned on them. `None` for a controller of this program, and for
-/// a campaign without a gate. `can_draw` says whether the command could have drawn a seed: the parts
-/// of a campaign need the same one.
+/// Returns the remark of a verdict on a controller from outside whose samples were known before
+/// the run: the controller may have been tuned on them. `None` for a controller of this program,
+/// and for a campaign without a gate. `can_draw` says whether the command could have drawn a seed:
+/// the parts of a campaign need the same one.
 pub(super) fn known_seed(judged: &Judgement, manifest: &Manifest, can_draw: bool) -> Option<String> {
     let is_from_outside = manifest.arms.last().is_some_and(|tested| tested.built_in().is_none());
     let remedy = match (can_draw, session::is_active()) {

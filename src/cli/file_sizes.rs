@@ -1,5 +1,6 @@
-//! The limit of the size of a file (`RLIMIT_FSIZE`, which `ulimit -f` sets). A campaign whose journal
-//! cannot have its size is refused before the first sample runs, and not in the middle of them.
+//! The limit of the size of a file (`RLIMIT_FSIZE`, which `ulimit -f` sets). A campaign whose
+//! journal cannot have its size is refused before the first sample runs, and not in the middle of
+//! them.
 //!
 //! The estimate is a lower one: a campaign that it refuses cannot come to its end. A campaign that
 //! it lets run may still meet the limit, and then ends as on a full disk.
@@ -15,9 +16,9 @@ use rustix::process::{Resource, getrlimit};
 
 use super::CliError;
 
-/// Bytes of the journal that one sample takes with one controller, at least. In `low-thw-overtake` it
-/// takes 1,620 on average (docs/how-to/cluster.md). That three quarters of it suffice for a scenario
-/// with few parameters is an assumption.
+/// Bytes of the journal that one sample takes with one controller, at least. In `low-thw-overtake`
+/// it takes 1,620 on average (docs/how-to/cluster.md). That three quarters of it suffice for a
+/// scenario with few parameters is an assumption.
 const JOURNAL_BYTES: u64 = 1_200;
 /// Bytes of the report of a campaign, at least. The report of 100 pairs of `low-thw-overtake` has
 /// 225,142. That half of it suffices for every campaign is an assumption.

@@ -407,7 +407,8 @@ fn an_unfinished_campaign_does_not_displace_finished_results() {
     fs::remove_file(results.join("report.html")).unwrap();
     stdout(&sized(folder.path(), "7", &[]), 0);
     assert_eq!((samples(&results), samples(&previous)), (7, 5));
-    // An unfinished one is kept as long as there is nothing better, and makes way for a finished one.
+    // An unfinished one is kept as long as there is nothing better, and makes way for a finished
+    // one.
     fs::remove_file(results.join("report.html")).unwrap();
     fs::remove_file(previous.join("report.html")).unwrap();
     let output = sized(folder.path(), "8", &[]);

@@ -3,14 +3,14 @@
 //!
 //! ```text
 //!   lane 1 ──●───────●──   middles of the recorded lanes: the median position of their rows
-//!            ↕ 2.5 to 5.5 m in metres, 8 to 18 m in feet, 0.8 to 1.7 m if metres are divided twice
+//!            ↕ 2.5 to 5.5 in metres, 8 to 18 in feet, 0.8 to 1.7 if metres are converted twice
 //!   lane 2 ────●────●───
 //! ```
 //!
 //! Lanes are 2.5 m (at roadworks) to 5.5 m (ramps) wide, as `markings` states. The lanes of US
 //! interstates are 12 ft, 3.66 m (AASHTO, *A Policy on Design Standards: Interstate System*). A
-//! single pair of lanes may be odd, as a ramp beyond a verge is. The lanes are refused if most pairs
-//! are.
+//! single pair of lanes may be odd, as a ramp beyond a verge is. The lanes are refused if most
+//! pairs are.
 
 use std::collections::BTreeMap;
 
@@ -22,11 +22,12 @@ use super::source::{ReadError, Row};
 
 /// Least number of rows of a lane whose position is judged.
 const LEAST_ROWS: usize = 10;
-/// Largest distance between the middles of two neighbouring lanes (m): above the widest lane, 5.5 m,
-/// and below the narrowest in feet, 8.2.
+/// Largest distance between the middles of two neighbouring lanes (m): above the widest lane,
+/// 5.5 m, and below the narrowest in feet, 8.2.
 const MOST_M: f64 = 6.0;
-/// Least distance between them (m). If all vehicles change lanes at a constant rate, it is half a lane,
-/// 1.5 m or more. Lanes of 3.75 m that are converted from feet although they are metres have 1.14.
+/// Least distance between them (m). If all vehicles change lanes at a constant rate, it is half a
+/// lane, 1.5 m or more. Lanes of 3.75 m that are converted from feet although they are metres have
+/// 1.14.
 const LEAST_M: f64 = 1.4;
 
 /// The middle of a recorded lane.
@@ -43,8 +44,8 @@ struct Spacing {
 }
 
 impl Spacing {
-    /// Returns the spacing of two lanes. Lanes between them may have no vehicle. `None` if a number is
-    /// left out and a strip without vehicles is there: the lanes belong to two carriageways.
+    /// Returns the spacing of two lanes. Lanes between them may have no vehicle. `None` if a number
+    /// is left out and a strip without vehicles is there: the lanes belong to two carriageways.
     fn of(first: &Middle, last: &Middle) -> Option<Self> {
         let (count, apart_m) = (last.lane - first.lane, (first.d_m - last.d_m).abs());
         let is_one_road = count == 1 || apart_m < CARRIAGEWAY_GAP_M;

@@ -54,8 +54,8 @@ impl TrafficRecorder {
         TrajectoryData::new(name, CONTROL_STEP, self.trajectories)
     }
 
-    /// Returns the same data set, in which the trajectory of a vehicle that collides ends before its
-    /// first collision.
+    /// Returns the same data set, in which the trajectory of a vehicle that collides ends before
+    /// its first collision.
     pub fn finish_at_collisions(mut self, name: &str) -> EndedAtCollisions {
         let mut collided = 0;
         for (trajectory, before) in self.trajectories.iter_mut().zip(&self.points_before_collision) {
