@@ -1,14 +1,17 @@
 //! Runs a campaign from its first sample to its last, or resumes one that was interrupted.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
+use super::ahead::{self, AheadFile, EarlySample, SampleKey};
+use super::earlier_failures::EarlierFailures;
+use super::folder::{AHEAD, FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
 use super::host::{Refusal, refusal};
 use super::ledger::Inference;
 use super::partition::Partition;
-use super::record::Record;
+use super::record::{ArmRecord, Record};
 use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
 use super::stop::StopFlag;
@@ -19,12 +22,13 @@ use super::workers::{Finished, SampleRunner, Workers};
 use closecall_traffic::atomic::WriteError;
 use closecall_traffic::words::{counted, was};
 
+pub use super::ahead::Ahead;
 pub use super::stop::End;
 
 pub use super::campaign_error::CampaignError;
 
 /// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order
-/// of their numbers.
+/// of their numbers. [`Campaign::run_first`] runs some of them before their turn.
 #[derive(Clone)]
 pub struct Campaign {
     /// The scenarios with their samples and arms.
@@ -99,8 +103,23 @@ pub struct NextRecord<'a> {
     pub record: &'a Record,
     /// True if the sample has just been run, false if the record was read from the journal.
     pub is_new: bool,
+    /// True if [`Campaign::run_first`] has passed the record on before.
+    pub is_early: bool,
     /// The wall times of the sample; 0 if the record was read from the journal.
     pub spent: SpentTime,
+}
+
+impl<'a> NextRecord<'a> {
+    /// Returns a record that was read from the journal, or from the file of samples that wait.
+    fn read(work: usize, record: &'a Record) -> Self {
+        Self { work, record, is_new: false, is_early: false, spent: SpentTime::default() }
+    }
+
+    /// Returns the record of a sample that has just been run.
+    fn finished(work: usize, finished: &'a Finished) -> Self {
+        let spent = SpentTime { runs_s: finished.wall_s.iter().sum(), checks_s: finished.check_s };
+        Self { work, record: &finished.record, is_new: true, is_early: false, spent }
+    }
 }
 
 impl Campaign {
@@ -167,8 +186,117 @@ impl Campaign {
         self.works.iter().all(|work| work.samples(self.partition).next().is_none())
     }
 
-    /// Runs the samples that the folder's journal does not hold yet; all samples if there is no
-    /// folder.
+    /// Runs samples before their turn: those that failed in an earlier campaign, in the order of
+    /// the plan, up to 10,000 of them. Samples that the folder's journal holds do not run again,
+    /// nor do those that an interrupted campaign has run before their turn.
+    ///
+    /// `on_record` receives every record, those of the interrupted campaign first. If it breaks,
+    /// the campaign ends after that record: [`Self::run_after`] then runs no sample.
+    ///
+    /// Returns the results. They wait for their turn, so that the journal has the order of the
+    /// plan.
+    ///
+    /// # Errors
+    /// [`CampaignError`] if the folder cannot be read or written, or no threads can be started.
+    pub fn run_first(
+        &self,
+        folder: Option<&LockedFolder>,
+        first: &EarlierFailures,
+        mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
+    ) -> Result<Ahead, CampaignError> {
+        let path = folder.map(|folder| folder.folder.file(AHEAD));
+        let kept = match &path {
+            Some(path) => ahead::read(path, |record| self.place_of(record))
+                .map_err(|source| FolderError::Read { path: path.clone(), source })?,
+            None => ahead::Kept::default(),
+        };
+        let ahead::Kept { mut ahead, bytes } = kept;
+        let mut wanted = self.planned_of(first);
+        let looks = !wanted.is_empty() || ahead.waiting().next().is_some();
+        if let Some(folder) = folder.filter(|folder| looks && folder.journal_path().exists()) {
+            for record in folder.folder.records()?.map_while(Result::ok) {
+                if let Some((work, sample)) = key_of(self, &record) {
+                    wanted.remove(&SampleKey { work, sample });
+                    ahead.take(SampleKey { work, sample });
+                }
+            }
+        }
+        let is_retried = |record: &Record| self.retry_errors && record.arms.iter().any(ArmRecord::is_incomplete);
+        ahead.retain(|_, record| !is_retried(record));
+        wanted.retain(|key| !ahead.contains(*key));
+        let mut ends = |key: &SampleKey, record: &Record| on_record(NextRecord::read(key.work, record)).is_break();
+        let is_over = ahead.entries().any(|(key, early)| ends(key, &early.finished.record));
+        if is_over {
+            ahead.is_over = true;
+            return Ok(ahead);
+        }
+        let mut file = match path.as_deref().filter(|_| !wanted.is_empty()).map(|path| AheadFile::open(path, bytes)) {
+            Some(Err(_)) if self.goes_on_without_folder => None,
+            file => file.transpose()?,
+        };
+        for (number, work) in self.works.iter().enumerate() {
+            let samples = wanted.iter().filter(|key| key.work == number).map(|key| key.sample);
+            let samples: Vec<u64> = samples.take(ahead.room()).collect();
+            if samples.is_empty() {
+                continue;
+            }
+            self.run_samples((number, work), samples.into_iter(), |finished| {
+                // Without its line, the sample runs again if the campaign is interrupted.
+                match file.as_mut().map_or(Ok(()), |file| file.append(&finished)) {
+                    Err(_) if self.goes_on_without_folder => file = None,
+                    written => written?,
+                }
+                ahead.is_over = on_record(NextRecord::finished(number, &finished)).is_break();
+                let key = SampleKey { work: number, sample: finished.record.sample };
+                ahead.insert(key, EarlySample { finished, is_new: true });
+                Ok(if ahead.is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+            })?;
+            if ahead.is_over || self.stop.is_set() {
+                break;
+            }
+        }
+        Ok(ahead)
+    }
+
+    /// Returns the samples of the campaign that failed in an earlier one.
+    fn planned_of(&self, first: &EarlierFailures) -> BTreeSet<SampleKey> {
+        let mut planned = BTreeSet::new();
+        for (index, work) in self.works.iter().enumerate() {
+            let failing = first.of(&work.file.config().name).iter().copied();
+            let keys = failing.map(|sample| SampleKey { work: index, sample });
+            planned.extend(keys.filter(|key| self.has(*key)));
+        }
+        planned
+    }
+
+    /// Returns true if the campaign has this sample.
+    fn has(&self, key: SampleKey) -> bool {
+        let is_in_part = self.partition.is_none_or(|part| part.contains(key.sample));
+        is_in_part && self.works.get(key.work).is_some_and(|work| key.sample < work.count())
+    }
+
+    /// Returns the place of a record that belongs to a sample of the campaign; `None` for another
+    /// record.
+    fn place_of(&self, record: &Record) -> Option<SampleKey> {
+        let (work, sample) = key_of(self, record)?;
+        let key = Some(SampleKey { work, sample }).filter(|key| self.has(*key))?;
+        self.works[work].identity().check(record, sample).ok().map(|()| key)
+    }
+
+    /// Does the same as [`Self::run_after`] without samples that have run before their turn.
+    ///
+    /// # Errors
+    /// As [`Self::run_after`].
+    pub fn run(
+        &self,
+        folder: Option<&LockedFolder>,
+        on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
+    ) -> Result<ResumeReport, CampaignError> {
+        self.run_after(folder, &mut Ahead::default(), on_record)
+    }
+
+    /// Runs the samples that neither the folder's journal nor `ahead` holds; all samples if there
+    /// is no folder and `ahead` is empty. A sample of `ahead` is taken out when its turn has come.
     ///
     /// `on_record` receives every record in the order of the plan, the records of the journal
     /// first. If it breaks, the scenario or the campaign ends after that record.
@@ -180,22 +308,22 @@ impl Campaign {
     ///
     /// # Errors
     /// [`CampaignError`] if the folder cannot be read or written, or no threads can be started.
-    pub fn run(
+    pub fn run_after(
         &self,
         folder: Option<&LockedFolder>,
+        ahead: &mut Ahead,
         mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<ResumeReport, CampaignError> {
         let Repair { damaged, retried, doubled, added } =
             folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
         let mut report = ResumeReport { torn: None, damaged, retried, doubled, added, lost: None };
-        if let Some(folder) = folder.filter(|folder| self.stop.is_set() && folder.journal_path().exists()) {
+        let runs_nothing = self.stop.is_set() || ahead.is_over;
+        if let Some(folder) = folder.filter(|folder| runs_nothing && folder.journal_path().exists()) {
             // Damaged lines may be left: the journal is read, but not opened for appending, which
             // would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
                 let Some((work, _)) = key_of(self, &record) else { break };
-                if on_record(NextRecord { work, record: &record, is_new: false, spent: SpentTime::default() })
-                    .is_break()
-                {
+                if on_record(NextRecord::read(work, &record)).is_break() {
                     break;
                 }
             }
@@ -203,29 +331,33 @@ impl Campaign {
         }
         let mut position = Position { work: 0, done: 0, total: 0, is_over: false };
         let mut kept = KeptFiles { files: None, may_be_lost: self.goes_on_without_folder, lost: None };
-        match folder.map(|folder| self.resume(folder, &mut position, &mut on_record)).transpose() {
+        match folder.map(|folder| self.resume(folder, &mut position, ahead, &mut on_record)).transpose() {
             Ok(files) => kept.files = files,
             // All records of the journal have been read before the files are opened for appending.
             Err(FolderError::Write(error)) if kept.may_be_lost => kept.lost = Some(error),
             Err(error) => return Err(error.into()),
         }
         report.torn = kept.files.as_mut().and_then(|files| files.torn.take());
-        if !position.is_over {
-            self.run_from(position, &mut kept, &mut on_record)?;
-        }
+        let runs = !position.is_over && !ahead.is_over;
+        let is_complete = runs && self.run_from(position, &mut kept, ahead, &mut on_record)?;
         kept.write(|files| {
             files.journal.sync()?;
             files.wall_times.flush()
         })?;
+        if let Some(folder) = folder.filter(|_| is_complete) {
+            kept.write(|_| folder.folder.remove(AHEAD))?;
+        }
         report.lost = kept.lost;
         Ok(report)
     }
 
-    /// Passes on the records of the journal, and moves `position` behind the last one.
+    /// Passes on the records of the journal, and moves `position` behind the last one. A sample of
+    /// the journal waits no longer.
     fn resume(
         &self,
         folder: &LockedFolder,
         position: &mut Position,
+        ahead: &mut Ahead,
         on_record: &mut impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<ResumedFiles, FolderError> {
         let mut samples = self.works.first().map(|work| work.samples(self.partition));
@@ -245,8 +377,8 @@ impl Campaign {
                         work.identity().check(record, sample)?;
                         position.done += 1;
                         position.total += 1;
-                        let next =
-                            NextRecord { work: position.work, record, is_new: false, spent: SpentTime::default() };
+                        let waited = ahead.take(SampleKey { work: position.work, sample }).is_some();
+                        let next = NextRecord { is_early: waited, ..NextRecord::read(position.work, record) };
                         let end = on_record(next).break_value();
                         position.is_over = end == Some(End::Campaign);
                         if end == Some(End::Scenario) {
@@ -264,30 +396,42 @@ impl Campaign {
         })
     }
 
+    /// Runs the samples from `start` on, and passes on each of them in its turn, those of `ahead`
+    /// included. Returns true if nothing has ended the campaign before its last sample.
     fn run_from(
         &self,
         start: Position,
         kept: &mut KeptFiles,
+        ahead: &mut Ahead,
         on_record: &mut impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
-    ) -> Result<(), CampaignError> {
-        let (mut index, mut is_over) = (start.total, false);
+    ) -> Result<bool, CampaignError> {
+        let mut passing = Passing { kept, on_record, index: start.total, is_over: false };
         for (number, work) in self.works.iter().enumerate().skip(start.work) {
             let done = if number == start.work { start.done } else { 0 };
-            let samples = work.samples(self.partition).skip(done);
+            let waiting = ahead.numbers(number);
+            let mut turns = work.samples(self.partition).skip(done).peekable();
+            let samples = work.samples(self.partition).skip(done).filter(|sample| !waiting.contains(sample));
+            let key = |sample| SampleKey { work: number, sample };
+            let mut has_ended = false;
             self.run_samples((number, work), samples, |finished: Finished| {
-                kept.write(|files| append(files, index, &finished))?;
-                index += 1;
-                let spent = SpentTime { runs_s: finished.wall_s.iter().sum(), checks_s: finished.check_s };
-                let next = NextRecord { work: number, record: &finished.record, is_new: true, spent };
-                let end = on_record(next).break_value();
-                is_over = end == Some(End::Campaign);
-                Ok(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+                while let Some(turn) = turns.next_if(|turn| *turn != finished.record.sample) {
+                    has_ended = passing.pass_waiting(key(turn), ahead)?;
+                    if has_ended {
+                        return Ok(ControlFlow::Break(()));
+                    }
+                }
+                turns.next();
+                has_ended = passing.pass_on(&finished, NextRecord::finished(number, &finished))?;
+                Ok(if has_ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
-            if is_over || self.stop.is_set() {
-                break;
+            while !has_ended && let Some(turn) = turns.next_if(|turn| waiting.contains(turn)) {
+                has_ended = passing.pass_waiting(key(turn), ahead)?;
+            }
+            if passing.is_over || self.stop.is_set() {
+                return Ok(false);
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Runs samples of one scenario, which is given with its index, on this machine or on others.
@@ -329,6 +473,36 @@ impl KeptFiles {
         }
         (self.files, self.lost) = (None, Some(error));
         Ok(())
+    }
+}
+
+/// Passes finished samples on: to the files, and to the caller.
+struct Passing<'a, F> {
+    kept: &'a mut KeptFiles,
+    on_record: &'a mut F,
+    /// Index of the next record in the journal.
+    index: u64,
+    /// True if the caller has ended the campaign.
+    is_over: bool,
+}
+
+impl<F: FnMut(NextRecord<'_>) -> ControlFlow<End>> Passing<'_, F> {
+    /// Passes a sample on, whose turn it is. Returns true if the caller ends the scenario or the
+    /// campaign after it.
+    fn pass_on(&mut self, finished: &Finished, next: NextRecord<'_>) -> Result<bool, CampaignError> {
+        let index = self.index;
+        self.kept.write(|files| append(files, index, finished))?;
+        self.index += 1;
+        let end = (self.on_record)(next).break_value();
+        self.is_over = end == Some(End::Campaign);
+        Ok(end.is_some())
+    }
+
+    /// Does the same for a sample that waits; nothing if it does not.
+    fn pass_waiting(&mut self, key: SampleKey, ahead: &mut Ahead) -> Result<bool, CampaignError> {
+        let Some(EarlySample { finished, is_new }) = ahead.take(key) else { return Ok(false) };
+        let next = NextRecord { is_new, is_early: true, ..NextRecord::finished(key.work, &finished) };
+        self.pass_on(&finished, next)
     }
 }
 

@@ -4,6 +4,7 @@
 //! ```text
 //!  manifest.json      how the campaign was made: everything that a replay needs
 //!  journal.jsonl      one record per sample, appended as results arrive (see the module `journal`)
+//!  ahead.jsonl        while a campaign runs: samples that wait for their turn (see the module `ahead`)
 //!  wall-times.jsonl   wall time of each sample; apart from the journal, since it differs from run to run
 //!  lock               locked while a campaign runs
 //!  outcomes.parquet   made from the journal; byte-identical for any number of threads, parts and resumptions
@@ -38,6 +39,7 @@ pub use crate::folder_error::{FolderError, listed};
 /// The file of a campaign's folder that says how the campaign was made.
 pub const MANIFEST: &str = "manifest.json";
 pub(crate) const JOURNAL: &str = "journal.jsonl";
+pub(crate) const AHEAD: &str = "ahead.jsonl";
 pub(crate) const WALL_TIMES: &str = "wall-times.jsonl";
 
 /// The report for human readers, in a campaign's folder.
@@ -50,9 +52,10 @@ pub const RECORDINGS: &str = "recordings";
 pub const RECORDINGS_PAGE: &str = "index.html";
 
 /// All files of a campaign's folder, without its recordings.
-pub(crate) const FILES: [&str; 13] = [
+pub(crate) const FILES: [&str; 14] = [
     MANIFEST,
     JOURNAL,
+    AHEAD,
     WALL_TIMES,
     LOCK,
     "outcomes.parquet",
@@ -198,13 +201,16 @@ impl Folder {
 
     /// Removes the journal and the wall times, if there are any.
     pub(crate) fn remove_journal(&self) -> Result<(), WriteError> {
-        for path in [JOURNAL, WALL_TIMES].map(|name| self.file(name)) {
-            match fs::remove_file(&path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => return Err(WriteError::new(&path, error)),
-                _ => (),
-            }
+        [JOURNAL, AHEAD, WALL_TIMES].iter().try_for_each(|name| self.remove(name))
+    }
+
+    /// Removes a file, if there is one of this name.
+    pub(crate) fn remove(&self, name: &str) -> Result<(), WriteError> {
+        let path = self.file(name);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(WriteError::new(&path, error)),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn write_manifest(&self, manifest: &Manifest) -> Result<(), WriteError> {

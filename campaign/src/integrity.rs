@@ -19,7 +19,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::action::{Action, CommandFor, Resume};
-use crate::folder::{DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST, WALL_TIMES};
+use crate::folder::{AHEAD, DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST, WALL_TIMES};
 use crate::journal::{self, Entry};
 use crate::lock::LOCK;
 use crate::manifest::Manifest;
@@ -63,7 +63,7 @@ impl Integrity {
             }
         };
         integrity.resumption = resumption(folder, &manifest, command_for);
-        for name in [JOURNAL, WALL_TIMES, LOCK] {
+        for name in [JOURNAL, AHEAD, WALL_TIMES, LOCK] {
             if let Some(kind) = kind_of_no_file(&folder.file(name)) {
                 let repair = format!("remove it, then {}", integrity.resumption);
                 integrity.add(name, None, format!("it is {kind}, and no file"), repair);

@@ -17,6 +17,7 @@
 //! end in a collision, not the frequency of collisions on a road.
 
 pub mod action;
+mod ahead;
 pub mod arguments;
 pub mod arm_pairs;
 pub mod attribution;
@@ -26,6 +27,7 @@ pub mod compare;
 pub mod controller_watch;
 pub mod coverage;
 pub mod drift;
+pub mod earlier_failures;
 pub mod end_rule;
 pub mod ensemble;
 pub mod execution;

@@ -137,6 +137,16 @@ impl Plan {
         Ok(())
     }
 
+    /// Returns how the samples are drawn.
+    pub const fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Returns the names of the scenarios.
+    pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
+        self.scenarios.iter().map(|file| file.config().name.as_str())
+    }
+
     /// Returns the campaign, ready to run.
     pub fn campaign(&self) -> Campaign {
         let controllers = ControllerChoice::factories(&self.controllers, None);

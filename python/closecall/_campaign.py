@@ -116,6 +116,7 @@ class CampaignOptions(TypedDict, total=False):
     fail_fast: bool
     max_errors: int | None
     retry_errors: bool
+    failures_first: str | None
     strict_artifacts: bool
     record: str | None
     no_gate: bool

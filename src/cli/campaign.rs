@@ -9,10 +9,11 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use closecall_campaign::arguments::{Jobs, Positive, Retries, parsed, parsed_option};
 use closecall_campaign::controller_watch::ControllerWatch;
+use closecall_campaign::earlier_failures::{EarlierError, EarlierFailures};
 use closecall_campaign::end_rule::{EndMonitor, EndedEarly};
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
 use closecall_campaign::folder::Folder;
-use closecall_campaign::gate::GateSet;
+use closecall_campaign::gate::{GateSet, Judge};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::{Plan, check_mis};
@@ -135,6 +136,10 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     #[serde(rename = "..end")]
     end: EndArgs,
+    /// Run the samples first that failed in an earlier campaign with the same seed and design: its
+    /// folder, or the file of `closecall baseline save`. No result depends on the order
+    #[arg(long, value_name = "DIR|FILE", conflicts_with = "time_budget", help_heading = heading::EXECUTION)]
+    failures_first: Option<PathBuf>,
     #[command(flatten)]
     #[serde(rename = "..ensemble")]
     ensemble: EnsembleArgs,
@@ -257,6 +262,23 @@ impl CampaignArgs {
         Ok((run.collect(), controllers))
     }
 
+    /// Returns the samples that failed in an earlier campaign and are to run first, and says how
+    /// many there are.
+    fn failures_first(&self, plan: &Plan) -> Result<EarlierFailures, CliError> {
+        let Some(path) = &self.failures_first else { return Ok(EarlierFailures::default()) };
+        let refused = |error| match error {
+            EarlierError::Folder(error) => CliError::Folder(error),
+            other => CliError::usage(format!("{}: {other}", Argument("failures-first"))),
+        };
+        let failures = EarlierFailures::read(path)?;
+        failures.check(plan.sampling(), plan.names()).map_err(refused)?;
+        let number: usize = plan.names().map(|name| failures.of(name).len()).sum();
+        let samples = counted(number as u64, "sample");
+        let run = if number == 1 { "runs" } else { "run" };
+        print_error(format_args!("{samples} that failed in {} {run} first\n", path.display()));
+        Ok(failures)
+    }
+
     /// Returns the plan of what runs.
     fn plan(&self, files: Vec<ScenarioFile>, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let ensemble = self.ensemble.apply(files)?;
@@ -286,6 +308,8 @@ pub(super) struct Planned<'a> {
     pub(super) until_certain: bool,
     /// The wall time after which they stop.
     pub(super) time_budget: Option<Duration>,
+    /// The samples that run before the others.
+    pub(super) first: EarlierFailures,
     /// Whether the seed was drawn for this campaign.
     pub(super) has_drawn_seed: bool,
     /// Whether the command can draw the seed.
@@ -347,6 +371,13 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
             Argument("no-validity-checks")
         )));
     }
+    if args.failures_first.is_some() && args.draws_seed() && !args.results.is_resumed() {
+        return Err(CliError::usage(format!(
+            "{} needs the seed of the earlier campaign, and this one draws its own: name it with {}",
+            Argument("failures-first"),
+            Argument("seed")
+        )));
+    }
     if args.record.is_some_and(|selection| !selection.is_empty()) && args.results.place() == Place::Nowhere {
         return Err(CliError::usage(format!(
             "{}: the recordings are kept in a folder of results: name one with {}",
@@ -378,6 +409,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         (args.record.is_some(), "--record"),
         (args.retry_crashed.is_some(), "--retry-crashed"),
         (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
+        (args.failures_first.is_some(), "--failures-first"),
         (args.gates.names_criterion()?, "a gate other than --max-probability"),
         (args.artifacts.is_named(), "--strict-artifacts"),
     ];
@@ -427,8 +459,9 @@ pub(super) fn run_campaign(args: &CampaignArgs, tell: &mut dyn FnMut(&Conclusion
     let is_paired = controllers.len() > 1;
     let mut gates = args.gates.gates(is_paired, args.design.plain(), args.plan.preset_gates(is_paired))?;
     gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
+    let plan = args.plan(files, controllers)?;
     let planned = Planned {
-        plan: &args.plan(files, controllers)?,
+        plan: &plan,
         gates: &gates,
         results: &args.results,
         artifacts: args.artifacts,
@@ -437,6 +470,7 @@ pub(super) fn run_campaign(args: &CampaignArgs, tell: &mut dyn FnMut(&Conclusion
         ray: args.ray.as_deref(),
         until_certain: args.plan.until_certain,
         time_budget: args.plan.time_budget(),
+        first: args.failures_first(&plan)?,
         has_drawn_seed: args.draws_seed(),
         can_draw_seed: args.partition.is_none(),
     };
@@ -549,7 +583,12 @@ pub(super) fn carry_out(
         scenarios: campaign.works.len(),
     };
     let mut progress = Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
-    let resumption = campaign.run(results.locked.as_ref(), |next| {
+    let locked = results.locked.as_ref();
+    let mut ahead = campaign.run_first(locked, &planned.first, |next| {
+        watch.look();
+        progress.push_first(next)
+    })?;
+    let resumption = campaign.run_after(locked, &mut ahead, |next| {
         watch.look();
         progress.push(next)
     })?;
@@ -560,6 +599,8 @@ pub(super) fn carry_out(
         session::received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule))
     {
         let kept = results.locked.as_ref().map(|locked| locked.folder.path());
+        // Samples that still wait for their turn are done, too.
+        ahead.waiting().for_each(|record| progress.tally.summary.push(record));
         tell(&Conclusion::Early(ending.ended(&campaign, &progress.tally.summary, kept)));
         let code = ending.exit_code();
         return Ok(results.into_lost().map_or(code, |error| {
@@ -607,6 +648,11 @@ struct Progress {
     /// only.
     counts: Option<Vec<u64>>,
     tally: Tally,
+    /// The evidence of all samples that are done; `None` if none has run before its turn, so that
+    /// the tally has it.
+    early: Option<Judge>,
+    /// Number of samples of each scenario that are done.
+    done: Vec<u64>,
     stop: StopMonitor,
     end: EndMonitor,
     bar: ProgressBar,
@@ -627,14 +673,16 @@ impl Progress {
                 print_error(format_args!("{name}: {count} of the {requested} requested samples differ, and are run\n"));
             }
         }
-        let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
+        let names: Vec<String> = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
         let tally = Tally::new(campaign, gates);
         let counts = campaign.partition.is_none().then(|| campaign.works.iter().map(|work| work.count()).collect());
         Self {
+            done: vec![0; names.len()],
             names,
             counts,
             tally,
+            early: None,
             stop,
             end,
             spent: SpentTime::default(),
@@ -645,8 +693,27 @@ impl Progress {
         }
     }
 
+    /// Counts a sample that has run before its turn. The tally gets it when its turn has come.
+    fn push_first(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
+        let judge = &self.tally.judge;
+        // No sample has had its turn yet, so the judge of the tally has no evidence.
+        self.early.get_or_insert_with(|| judge.clone());
+        self.advance(next);
+        self.watch(next)
+    }
+
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
         self.tally.push(next.record);
+        if !next.is_early {
+            self.advance(next);
+            self.watch(next)?;
+        }
+        let tested = self.tally.summary.tested(&self.names[next.work]);
+        tested.map_or(ControlFlow::Continue(()), |tested| self.stop.observe(next.work, tested))
+    }
+
+    /// Shows that a sample is done.
+    fn advance(&mut self, next: NextRecord<'_>) {
         self.bar.inc(1);
         session::report(self.bar.position(), self.bar.length().unwrap_or_default());
         self.spent += next.spent;
@@ -655,23 +722,26 @@ impl Progress {
             self.simulated_s += outcomes.map(|outcome| outcome.duration.s()).sum::<f64>();
         } else {
             self.resumed += 1;
-            // Records read from the journal say nothing about how long the rest will take.
+            // Records read from a file say nothing about how long the rest will take.
             self.bar.reset_eta();
         }
-        if next.is_new {
-            self.end.observe(next.record)?;
-            let (name, judge) = (&self.names[next.work], &self.tally.judge);
-            let count = self.counts.as_ref().map(|counts| counts[next.work]);
-            self.end.observe_gate(|| {
-                let lost = judge.lost(name, count?.saturating_sub(next.record.sample + 1))?;
-                Some((name.clone(), lost))
-            })?;
-        } else {
+    }
+
+    /// Applies the rule by which the campaign ends early to a sample that is done.
+    fn watch(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
+        self.done[next.work] += 1;
+        if let Some(early) = &mut self.early {
+            early.push(next.record);
+        }
+        if !next.is_new {
             // The campaign went on after it.
             self.end.count(next.record);
+            return ControlFlow::Continue(());
         }
-        let tested = self.tally.summary.tested(&self.names[next.work]);
-        tested.map_or(ControlFlow::Continue(()), |tested| self.stop.observe(next.work, tested))
+        self.end.observe(next.record)?;
+        let (name, judge) = (&self.names[next.work], self.early.as_ref().unwrap_or(&self.tally.judge));
+        let rest = self.counts.as_ref().map(|counts| counts[next.work].saturating_sub(self.done[next.work]));
+        self.end.observe_gate(|| Some((name.clone(), judge.lost(name, rest?)?)))
     }
 }
 

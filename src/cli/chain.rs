@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::arguments::count;
+use closecall_campaign::earlier_failures::EarlierFailures;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
@@ -170,6 +171,7 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
         ray: None,
         until_certain: false,
         time_budget: None,
+        first: EarlierFailures::default(),
         has_drawn_seed: false,
         can_draw_seed: false,
     };

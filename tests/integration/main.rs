@@ -36,6 +36,7 @@ mod exit_codes;
 mod explorer;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod failing_calls;
+mod failures_first;
 mod faulty_controllers;
 mod fidelity;
 mod fitted;
