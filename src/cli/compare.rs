@@ -11,6 +11,7 @@ use closecall_report::json::{self, stamped};
 
 use super::CliError;
 use super::args::Format;
+use super::compare_search::{Folders, SearchArgs};
 use super::help::{examples, heading};
 use super::output::{outln, print_text};
 use crate::exit_code::ExitCode;
@@ -19,13 +20,13 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall compare before after",
-    "closecall compare before after --max-newly-failing 2",
-    "closecall compare before after --tolerance 0.1 --format json",
+    "closecall compare before after --max-newly-failing 2 --tolerance 0.1",
+    "closecall compare before after --search --out regression",
 ]))]
 pub(super) struct CompareArgs {
     /// Folder of the earlier campaign
     baseline: PathBuf,
-    /// Folder of the campaign to be judged; it must have the same samples
+    /// Folder of the campaign to be judged; it must have the same samples, except with --search
     dir: PathBuf,
     /// Largest number of newly failing samples that does not count as a regression
     #[arg(long, default_value_t = 0, value_name = "K", help_heading = heading::GATES)]
@@ -33,12 +34,17 @@ pub(super) struct CompareArgs {
     /// Share (0 to 1) by which a quantile of a margin may fall
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, help_heading = heading::GATES)]
     tolerance: f64,
+    #[command(flatten)]
+    search: SearchArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
     format: Format,
 }
 
 pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
+    if args.search.is_asked()? {
+        return args.search.run(Folders { earlier: &args.baseline, later: &args.dir }, args.format);
+    }
     let (baseline, current) = (Folder::open(&args.baseline), Folder::open(&args.dir));
     let (baseline_manifest, current_manifest) = (baseline.manifest()?, current.manifest()?);
     let differences = baseline_manifest.differences(&current_manifest);

@@ -15,6 +15,7 @@ mod chain;
 mod check;
 mod command;
 mod compare;
+mod compare_search;
 mod drift;
 mod ending;
 mod ensemble;

@@ -127,6 +127,11 @@ pub(super) struct Rare<'a> {
 }
 
 impl RareArgs {
+    /// Returns the options that name an event and leave the rest to the defaults.
+    pub(super) fn of(event: EventExpression) -> Self {
+        Self { event: Some(event), ..Self::default() }
+    }
+
     /// Returns true if the options name an event.
     pub(super) const fn is_named(&self) -> bool {
         self.event.is_some()

@@ -23,6 +23,11 @@ pub(super) struct TrustArgs {
 }
 
 impl TrustArgs {
+    /// Returns true if the option is named.
+    pub(super) const fn is_named(self) -> bool {
+        self.trust_folder
+    }
+
     /// Opens the folder of a campaign.
     pub(super) fn open(self, dir: &Path) -> Result<SavedCampaign, CliError> {
         let mut saved = SavedCampaign::open(dir)?;

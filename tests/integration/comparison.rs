@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use closecall_campaign::folder::Folder;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, message, stderr, stdout};
 
 fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
     let scenario = library("low-thw-overtake");
@@ -102,4 +102,52 @@ fn campaigns_with_different_samples_are_not_compared() {
         assert!(stderr(&refused).contains(named), "{}", stderr(&refused));
     }
     assert_eq!(code(&compare(&first, &folder.path().join("nothing"), &[])), 6);
+}
+
+#[test]
+fn a_search_beyond_the_samples_of_two_campaigns_finds_a_regression_and_writes_its_smallest_case() {
+    let folder = folder();
+    let few = |name: &str, controller: &str| {
+        let words = ["-n", "2", "--sensors", "object", "--controller", controller];
+        campaign(folder.path().join(name), &words)
+    };
+    let (before, after) = (few("before", "acc"), few("after", "gap-1.6"));
+    let (out, same) = (folder.path().join("found"), folder.path().join("same"));
+    let search = ["--search", "--seed", "7", "--out", out.to_str().unwrap()];
+    let text = stdout(&compare(&before, &after, &search), 1);
+    assert!(text.contains("no vehicle collides in it with acc"), "{text}");
+    let case = out.join("low-thw-overtake-found.toml");
+    let run = |controller: &str| stdout(&closecall(["run", case.to_str().unwrap(), "--controller", controller]), 0);
+    assert!(run("gap-1.6").contains("COLLISION") && !run("acc").contains("COLLISION"), "{text}");
+    // It is the search of a campaign with both arms.
+    let words = "campaign low-thw-overtake --arms acc,gap-1.6 --sensors object --design search --event induced --seed 7";
+    stdout(&closecall(words.split_whitespace().chain(["--out", same.to_str().unwrap()])), 1);
+    let journal = |folder: &Path| std::fs::read(folder.join("rare-journal.jsonl")).unwrap();
+    assert!(journal(&out) == journal(&same));
+    // Cut off and resumed, it has the same journal.
+    let whole = journal(&out);
+    std::fs::write(out.join("rare-journal.jsonl"), &whole[..whole.len() / 2]).unwrap();
+    stdout(&compare(&before, &after, &[&search[..], &["--resume"]].concat()), 1);
+    assert!(journal(&out) == whole);
+}
+
+#[test]
+fn a_search_between_campaigns_that_leave_nothing_to_search_is_refused() {
+    let folder = folder();
+    let few = |name: &str, words: &[&str]| campaign(folder.path().join(name), &[&["-n", "2"], words].concat());
+    let acc = few("acc", &["--controller", "acc"]);
+    let set = few("set", &["--controller", "gap-1.6", "--set", "brake-mps2=6"]);
+    let refused = |other: &Path, words: &[&str]| {
+        let output = compare(&acc, other, words);
+        assert_eq!(code(&output), 2, "{words:?}: {}", stderr(&output));
+        message(&output)
+    };
+    let said = refused(&acc, &["--search"]);
+    assert!(said.contains("both campaigns tested `acc`") && said.contains("under another name"), "{said}");
+    let said = refused(&set, &["--search"]);
+    assert!(said.contains("no scenario with the same text"), "{said}");
+    refused(&set, &["--search", "--tolerance", "0.1"]);
+    for words in [&["-n", "5"][..], &["--seed", "5"], &["--out", "x"], &["--trust-folder"]] {
+        assert!(refused(&set, words).contains("--search"), "{words:?}");
+    }
 }
