@@ -109,6 +109,11 @@ fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
         let case = json(&closecall(["minimize", dir, &number, "--out", name, "--format", "json"]), 0);
         let off = case["minimized"]["off_nominal"].as_array().unwrap().len();
         assert!(off <= 3 || case["minimized"]["why_more_than_three"].is_string(), "{case:#}");
+        // No parameter of this scenario is correlated: the distances add like the sides of a box.
+        let offsets = case["minimized"]["off_nominal"].as_array().unwrap().iter();
+        let squares: f64 = offsets.map(|offset| offset["distance_sd"].as_f64().unwrap().powi(2)).sum();
+        let distance_sd = case["minimized"]["distance_sd"].as_f64().unwrap();
+        assert!((distance_sd - squares.sqrt()).abs() < 1e-6 && (distance_sd > 0.0) == (off > 0), "{case:#}");
         let run = |file: &str| number_of_collisions(&json(&closecall(["run", file, "--format", "json"]), 0));
         assert!(run(name) > 0, "{name}");
         let twin = case["files"]["twin"].as_str().unwrap();

@@ -134,7 +134,7 @@ fn a_search_beyond_the_samples_of_two_campaigns_finds_a_regression_and_writes_it
 #[test]
 fn a_search_between_campaigns_that_leave_nothing_to_search_is_refused() {
     let folder = folder();
-    let few = |name: &str, words: &[&str]| campaign(folder.path().join(name), &[&["-n", "2"], words].concat());
+    let few = |name: &str, words: &[&str]| campaign(folder.path().join(name), &[&["-n", "2"][..], words].concat());
     let acc = few("acc", &["--controller", "acc"]);
     let set = few("set", &["--controller", "gap-1.6", "--set", "brake-mps2=6"]);
     let refused = |other: &Path, words: &[&str]| {

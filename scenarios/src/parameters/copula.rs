@@ -87,6 +87,17 @@ impl Copula {
             numbers[*index] = normal.cdf(mixed).min(1.0 - f64::EPSILON / 2.0);
         }
     }
+
+    /// Makes coupled standard normal numbers of all parameters, which are in the order of the names,
+    /// independent of each other: what [`Self::couple`] does, backwards.
+    pub(super) fn uncouple(&self, normals: &mut [f64]) {
+        let mut independent: Vec<f64> = Vec::with_capacity(self.rows.len());
+        for (place, (index, row)) in self.rows.iter().enumerate() {
+            let explained: f64 = row[..place].iter().zip(&independent).map(|(weight, z)| weight * z).sum();
+            independent.push((normals[*index] - explained) / row[place]);
+            normals[*index] = independent[place];
+        }
+    }
 }
 
 fn check(

@@ -5,7 +5,7 @@ use closecall_traffic::statistics::normal::TruncatedStandardNormal;
 use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{ParameterName, Value};
 
-use super::{ParameterSpace, ParametersConfig};
+use super::{ParameterSpace, ParametersConfig, SpaceEntry};
 use crate::sampling::{Design, unit_point};
 use closecall_recorded::criticality::spearman;
 
@@ -109,6 +109,37 @@ fn independent_standard_normal_numbers_give_the_distribution_of_independent_samp
             }
         }
     }
+}
+
+#[test]
+fn the_distance_to_the_nominal_values_is_the_length_of_the_point_in_normal_space() {
+    let spaces = [coupled("a = 0.6, c = -0.4").unwrap(), parsed(INDEPENDENT).unwrap()];
+    for space in &spaces {
+        assert!(space.distance_sd(&space.nominal()).unwrap() < 1e-9);
+        let numbers: Vec<&SpaceEntry> = space.varying().map(|(_, entry)| entry).collect();
+        // A label has no place of its own in normal space: it stays at its nominal value.
+        let is_number = |entry: &SpaceEntry| entry.distribution.labels().is_empty();
+        for point in [[0.5, -1.0, 2.0, 0.25], [-2.5, 0.0, 0.1, 3.0]] {
+            let normals: Vec<f64> =
+                numbers.iter().zip(point).map(|(entry, z)| if is_number(entry) { z } else { 0.0 }).collect();
+            let mut values = space.at_normals(&normals);
+            for (name, entry) in space.varying().filter(|(_, entry)| !is_number(entry)) {
+                values.insert(name.clone(), entry.distribution.nominal());
+            }
+            let (ours, expected) = (space.distance_sd(&values).unwrap(), normals.iter().map(|z| z * z).sum::<f64>());
+            assert!((ours - expected.sqrt()).abs() < 1e-4, "{ours} instead of {}", expected.sqrt());
+        }
+    }
+}
+
+#[test]
+fn a_value_outside_a_distribution_has_no_distance() {
+    let space = parsed(INDEPENDENT).unwrap();
+    let mut values = space.nominal();
+    let (name, entry) = space.varying().find(|(_, entry)| entry.distribution.bounds().is_some()).unwrap();
+    let [low, high] = entry.distribution.bounds().unwrap();
+    values.insert(name.clone(), Value::Number(high + (high - low)));
+    assert_eq!(space.distance_sd(&values), None);
 }
 
 #[test]

@@ -223,6 +223,25 @@ impl Distribution {
         }
     }
 
+    /// Returns how far a value is from the nominal one (standard deviations, with sign): the standard
+    /// normal number with the same cumulative probability. The nominal label is at 0, and any other
+    /// label at the number nearest to 0 that gives it. Returns `None` for a value that the
+    /// distribution never takes, and at a bound, which is infinitely far.
+    pub fn distance_sd(&self, value: &Value) -> Option<f64> {
+        if *value == self.nominal() {
+            return Some(0.0);
+        }
+        let probability = match value {
+            Value::Number(number) => self.cdf(*number)?,
+            Value::Label(label) => {
+                let [low, high] = self.interval_of(label)?;
+                HALF.clamp(low, high)
+            }
+        };
+        let normal = TruncatedStandardNormal::new(f64::NEG_INFINITY, f64::INFINITY)?;
+        (probability > 0.0 && probability < 1.0).then(|| normal.quantile(probability))
+    }
+
     /// Returns the numbers u whose quantile is this label; `None` if it is none of the distribution's.
     pub(crate) fn interval_of(&self, label: &str) -> Option<[f64; 2]> {
         let index = self.labels().iter().position(|one| one == label)?;

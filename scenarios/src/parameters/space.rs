@@ -158,6 +158,17 @@ impl ParameterSpace {
         self.values(self.entries.values().map(number).collect())
     }
 
+    /// Returns the distance of these values to the nominal ones in standard normal space (standard
+    /// deviations). Of correlated parameters, a value that the others make likely adds little.
+    /// Returns `None` if a parameter has no value, or one that its distribution never takes, and at
+    /// a bound of a distribution, which is infinitely far.
+    pub fn distance_sd(&self, values: &Parameters) -> Option<f64> {
+        let number = |(name, entry): (&ParameterName, &SpaceEntry)| entry.distribution.distance_sd(values.get(name)?);
+        let mut normals = self.entries.iter().map(number).collect::<Option<Vec<f64>>>()?;
+        self.copula.uncouple(&mut normals);
+        Some(normals.iter().map(|z| z * z).sum::<f64>().sqrt())
+    }
+
     /// Returns the nominal values, then variations of them with one parameter at one of its bounds
     /// or labels.
     ///

@@ -30,6 +30,9 @@ pub struct Offset {
     pub nominal: String,
     /// The value in words, in the units of a reader.
     pub words: String,
+    /// How far the value is from the nominal one, with sign (standard deviations); `None` of a value
+    /// that the distribution never takes.
+    pub distance_sd: Option<f64>,
 }
 
 /// The smallest failing case near a sample.
@@ -52,6 +55,9 @@ pub struct Minimized {
     pub sensors: String,
     /// The parameters that are off their nominal values.
     pub off_nominal: Vec<Offset>,
+    /// Distance of the smallest case to the nominal case in standard normal space (standard
+    /// deviations); `None` if a parameter has a value that its distribution never takes.
+    pub distance_sd: Option<f64>,
     /// Number of the sample's parameters that were off their nominal values.
     pub sampled_off_nominal: usize,
     /// Why there are more than three parameters; `None` if there are not.
@@ -110,6 +116,7 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
         reference: case.reference.as_ref().map(|arm| arm.controller.name().to_owned()),
         sensors: case.sensors().name().to_owned(),
         off_nominal,
+        distance_sd: case.file.space().distance_sd(&values),
         sampled_off_nominal: trial.differing.len(),
         why_more_than_three,
         settings: settings.iter().map(ToString::to_string).collect(),
@@ -140,6 +147,7 @@ fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Optio
         sampled: trial.sampled.get(name)?.to_string(),
         nominal: nominal.to_string(),
         words: words::value(name.as_str(), value, nominal, trial.step(name)),
+        distance_sd: trial.case.file.space().get(name)?.distribution.distance_sd(value),
     })
 }
 

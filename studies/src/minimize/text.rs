@@ -32,7 +32,11 @@ impl fmt::Display for MinimizedText<'_> {
             minimized.sampled_off_nominal,
         )?;
         for offset in &minimized.off_nominal {
-            writeln!(f, "  {} (sample: {})", offset.words, offset.sampled)?;
+            let distance = offset.distance_sd.map(|sd| format!(", {:.2} standard deviations off", sd.abs()));
+            writeln!(f, "  {}{} (sample: {})", offset.words, distance.unwrap_or_default(), offset.sampled)?;
+        }
+        if let Some(distance_sd) = minimized.distance_sd {
+            writeln!(f, "  together {distance_sd:.2} standard deviations from the nominal case")?;
         }
         if let Some(why) = &minimized.why_more_than_three {
             writeln!(f, "  {why}")?;
