@@ -113,6 +113,7 @@ impl SearchArgs {
             args: &RareArgs::of(event),
             budget: self.samples,
             gate: None,
+            ray: None,
             folder: self.out.as_deref(),
             resume: self.resume,
             format,

@@ -9,12 +9,14 @@ use std::sync::Arc;
 use clap::Args;
 use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::arguments::positive;
+use closecall_campaign::execution::CampaignError;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::rare::{
     Goal, Method, Nearest, Nearness, RareError, RareFolder, RareManifest, RarePlan, RareReport,
 };
+use closecall_campaign::remote::connect_points;
 use closecall_campaign::runner::Work;
 use closecall_campaign::session;
 use closecall_report::json::stamped;
@@ -118,6 +120,8 @@ pub(super) struct Rare<'a> {
     /// Largest number of runs of each scenario.
     pub(super) budget: Option<u64>,
     pub(super) gate: Option<ProbabilityGate>,
+    /// The cluster that runs the runs, if this machine does not.
+    pub(super) ray: Option<&'a str>,
     /// The folder for the results, if they are kept.
     pub(super) folder: Option<&'a Path>,
     pub(super) resume: bool,
@@ -174,7 +178,6 @@ impl Rare<'_> {
             budget: self.budget.unwrap_or(if self.method == Method::Search { SEARCH_BUDGET } else { BUDGET }),
             value: if nearness.expression().second.is_some() { 2 } else { 0 },
         };
-        let rare = RarePlan { method: self.method, nearness, goal, workers: campaign.workers };
         let manifest = RareManifest {
             method: self.method,
             event: nearness.expression().to_string(),
@@ -183,6 +186,8 @@ impl Rare<'_> {
             budget: goal.budget,
             campaign: plan.manifest(session::arguments())?,
         };
+        let remote = connect_points(self.ray, &manifest.campaign).map_err(CampaignError::from)?;
+        let rare = RarePlan { method: self.method, nearness, goal, workers: campaign.workers, remote };
         let folder = self.folder.map(|path| RareFolder::lock(path, &manifest, self.resume)).transpose()?;
         let mut journal = folder.as_ref().map(RareFolder::journal).transpose()?;
         let mut stop = campaign.stop.clone();
@@ -190,7 +195,7 @@ impl Rare<'_> {
         let bar = progress_bar(goal.budget.saturating_mul(campaign.works.len() as u64));
         let _heartbeat = heartbeat(&bar);
         let mut reports = Vec::new();
-        for work in &campaign.works {
+        for work in campaign.works.iter().enumerate() {
             match rare.run(work, journal.as_mut(), &stop, &mut || bar.inc(1)) {
                 Ok(report) => reports.push(report),
                 Err(RareError::Stopped) => return Ok(self.stopped(&bar)),

@@ -114,9 +114,12 @@ fn the_design_coverage_fills_holes_and_its_weights_give_back_the_probability() {
     });
     let merged = place.path().join("merged");
     let words = ["tool", "merge", parts[0].to_str().unwrap(), parts[1].to_str().unwrap(), "--no-gate", "--out"];
-    closecall(words.into_iter().chain([merged.to_str().unwrap()]));
-    let journal = |folder: &Path| fs::read(folder.join("outcomes.parquet")).unwrap();
-    assert!(journal(&out) == journal(&merged));
+    let out_of_merge = [merged.to_str().unwrap(), "--format", "json"];
+    let whole = json(&closecall(words.into_iter().chain(out_of_merge)), 0);
+    let table = |folder: &Path| fs::read(folder.join("outcomes.parquet")).unwrap();
+    assert!(table(&out) == table(&merged));
+    // Weights and rates are those of the whole campaign, to the bit.
+    assert_eq!(item(&whole, "gap"), gap);
 }
 
 #[test]

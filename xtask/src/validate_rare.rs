@@ -165,14 +165,14 @@ fn of_scenario(method: Method, repetitions: u64) -> Result<Total, Box<dyn std::e
     let arms = vec![Arm { controller: BuiltIn::Acc.factory(), sensors: None }];
     let goal = Goal { relative_width: WIDTH, budget: 2_000_000, value: 0 };
     let nearness = Nearness::new("collision".parse()?, None)?;
-    let plan = RarePlan { method, nearness, goal, workers: Workers::default() };
+    let plan = RarePlan { method, nearness, goal, workers: Workers::default(), remote: None };
     let mut total = Total::default();
     for seed in 0..repetitions {
         let sampling = Sampling { seed, design: Design::Random, samples: 1 };
         let (file, arms) = (file.clone(), arms.clone());
         let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::off(), retry_crashed: 0 });
         let report =
-            plan.run(&work, None, &StopFlag::default(), &mut || {}).map_err(|error: RareError| error.to_string())?;
+            plan.run((0, &work), None, &StopFlag::default(), &mut || {}).map_err(|error: RareError| error.to_string())?;
         let interval = report.main().and_then(|estimate| Some((estimate.value, estimate.interval_95?)));
         total.push(OF_FIXTURE, report.runs, interval);
     }

@@ -254,7 +254,7 @@ impl RareJournal {
     ///
     /// # Errors
     /// [`WriteError`] if it cannot be written completely.
-    pub(super) fn append(&mut self, record: &RareRecord) -> Result<(), RareError> {
+    pub(super) fn append(&mut self, record: &RareRecord) -> Result<(), WriteError> {
         let fail = |source| WriteError::new(&self.path, source);
         let line = line(record).map_err(fail)?;
         self.file.write_all(&line).map_err(|source| WriteError::new(&self.path, source))?;

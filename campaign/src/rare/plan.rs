@@ -7,6 +7,7 @@ use super::importance::{Goal, importance};
 use super::journal::RareJournal;
 use super::method::Method;
 use super::nearness::Nearness;
+use super::points::PointRunner;
 use super::problem::Seed;
 use super::report::RareReport;
 use super::runs::Runs;
@@ -17,7 +18,7 @@ use crate::stop::StopFlag;
 use crate::workers::Workers;
 
 /// How a rare event is sampled.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct RarePlan {
     /// The method.
     pub method: Method,
@@ -27,17 +28,19 @@ pub struct RarePlan {
     pub goal: Goal,
     /// The number of worker threads, and the time limit of a run.
     pub workers: Workers,
+    /// The runner of the runs, if the threads of this process do not run them.
+    pub remote: Option<Arc<dyn PointRunner>>,
 }
 
 impl RarePlan {
-    /// Samples the events of a scenario. The runs of `journal` are not run again. `on_run` is
+    /// Samples the events of a scenario, which is given with its index in the campaign. The runs of `journal` are not run again. `on_run` is
     /// called after each run.
     ///
     /// # Errors
     /// [`RareError`] if there is no result. The campaign can go on from its journal.
     pub fn run(
         &self,
-        work: &Arc<Work>,
+        (index, work): (usize, &Arc<Work>),
         journal: Option<&mut RareJournal>,
         stop: &StopFlag,
         on_run: &mut dyn FnMut(),
@@ -48,11 +51,11 @@ impl RarePlan {
             return Err(RareError::NothingVaries { scenario: file.config().name.clone() });
         }
         let mut runs = Runs {
-            file,
-            arms: &work.arms,
-            seed,
+            work,
+            index,
             nearness: self.nearness,
             workers: self.workers,
+            remote: self.remote.as_deref(),
             stop,
             journal,
             on_run,

@@ -2,62 +2,28 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-use closecall_scenarios::ScenarioFile;
-use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
-use closecall_traffic::Check;
 
 use super::error::RareError;
 use super::journal::{RareJournal, RareRecord};
 use super::nearness::Nearness;
+use super::points::{PointRunner, PointSamples};
 use super::problem::{Point, Response, Simulator};
 use super::report::Nearest;
-use crate::record::{ArmRecord, Record, SampleFailure};
-use crate::runner::{ArmRun, OnOutcome, guarded, run_guarded};
+use crate::campaign_error::CampaignError;
+use crate::record::{Record, SampleFailure};
+use crate::runner::Work;
 use crate::stop::StopFlag;
-use crate::workers::{Samples, Workers};
-
-/// Points of a scenario, ready to run. The number of a sample is the index of its point.
-struct PointSamples {
-    file: ScenarioFile,
-    arms: Vec<Arm>,
-    seed: u64,
-    points: Vec<Point>,
-}
-
-impl Samples for PointSamples {
-    fn scenario(&self) -> &str {
-        &self.file.config().name
-    }
-
-    fn arms(&self) -> &[Arm] {
-        &self.arms
-    }
-
-    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
-        let (arm, started) = (&self.arms[arm], Instant::now());
-        let result = usize::try_from(sample).ok().and_then(|index| self.points.get(index)).map_or_else(
-            || Err(SampleError::Panic { message: "there is no such point".to_owned() }),
-            |point| {
-                let parameters = self.file.space().at_normals(&point.normals);
-                let scenario = guarded(|| self.file.config().check(&parameters).map_err(SampleError::Scenario))?;
-                let key = RunKey { seed: self.seed, sample: point.noise };
-                run_guarded(&scenario, key, arm, &mut NoObserver)
-            },
-        );
-        let record = ArmRecord::new(arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
-        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
-    }
-}
+use crate::workers::{Finished, Workers};
 
 /// The runs of one scenario: first the runs of a journal, then new runs.
 pub(super) struct Runs<'a> {
-    pub(super) file: &'a ScenarioFile,
-    pub(super) arms: &'a [Arm],
-    pub(super) seed: u64,
+    /// The scenario with its arms, and its index in the campaign.
+    pub(super) work: &'a Arc<Work>,
+    pub(super) index: usize,
     pub(super) nearness: Nearness,
     pub(super) workers: Workers,
+    /// The runner of the points, if the threads of this process do not run them.
+    pub(super) remote: Option<&'a dyn PointRunner>,
     pub(super) stop: &'a StopFlag,
     pub(super) journal: Option<&'a mut RareJournal>,
     /// Called after each run.
@@ -86,7 +52,7 @@ impl Runs<'_> {
             let distance_sd = point.distance_sd();
             let rank = self.nearest.partition_point(|other| other.distance_sd <= distance_sd);
             if rank < SHOWN {
-                let parameters = self.file.space().at_normals(&point.normals);
+                let parameters = self.work.file.space().at_normals(&point.normals);
                 let nearest = Nearest { distance_sd, noise: point.noise, events: response.events, parameters };
                 self.nearest.insert(rank, nearest);
                 self.nearest.truncate(SHOWN);
@@ -99,7 +65,7 @@ impl Runs<'_> {
     fn kept(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
         let mut responses = Vec::new();
         for point in points {
-            let scenario = &self.file.config().name;
+            let scenario = &self.work.file.config().name;
             let record = match self.journal.as_mut() {
                 Some(journal) => journal.next(scenario, self.done, point)?,
                 None => None,
@@ -112,11 +78,11 @@ impl Runs<'_> {
         Ok(responses)
     }
 
-    fn push(&mut self, point: &Point, record: &Record) -> Result<Response, RareError> {
+    fn push(&mut self, point: &Point, record: &Record) -> Result<Response, CampaignError> {
         let response = self.nearness.response(record);
         let failure = record.arms.iter().find_map(|arm| arm.result.as_ref().err()).cloned();
         if let Some(journal) = self.journal.as_mut() {
-            let scenario = self.file.config().name.clone();
+            let scenario = self.work.file.config().name.clone();
             let (run, failure) = (self.done, failure.clone());
             journal.append(&RareRecord { scenario, run, point: point.into(), response: response.into(), failure })?;
         }
@@ -131,19 +97,20 @@ impl Simulator for Runs<'_> {
     fn run(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
         let mut responses = self.kept(points)?;
         let new = &points[responses.len()..];
-        let samples = Arc::new(PointSamples {
-            file: self.file.clone(),
-            arms: self.arms.to_vec(),
-            seed: self.seed,
-            points: new.to_vec(),
-        });
-        let (workers, stop) = (self.workers, self.stop);
+        let (index, work, workers, remote, stop) = (self.index, self.work, self.workers, self.remote, self.stop);
         let mut number = 0;
-        workers.run_samples(&samples, 0..new.len() as u64, stop, |finished| {
+        let mut on_finished = |finished: Finished| {
             responses.push(self.push(&new[number], &finished.record)?);
             number += 1;
-            Ok::<_, RareError>(ControlFlow::Continue(()))
-        })?;
+            Ok::<_, CampaignError>(ControlFlow::Continue(()))
+        };
+        match remote {
+            Some(remote) => remote.run_points((index, work), new, stop, &mut on_finished)?,
+            None => {
+                let samples = Arc::new(PointSamples::of(work, new));
+                workers.run_samples(&samples, 0..new.len() as u64, stop, on_finished)?;
+            }
+        }
         if responses.len() < points.len() { Err(RareError::Stopped) } else { Ok(responses) }
     }
 }

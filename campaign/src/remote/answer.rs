@@ -5,11 +5,15 @@
 //!  one line of the journal for each sample, with its checksum
 //! ```
 
+use closecall_scenarios::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
+use super::content::Content;
 use crate::journal;
+use crate::rare::Point;
+use crate::record::Record;
 use crate::runner::Work;
-use crate::workers::Finished;
+use crate::workers::{Finished, Samples};
 
 /// The first line of an answer.
 #[derive(Serialize, Deserialize)]
@@ -45,11 +49,11 @@ pub(super) struct Expected<'a> {
     pub(super) version: &'a str,
     pub(super) configuration: &'a str,
     pub(super) work: &'a Work,
-    pub(super) samples: &'a [u64],
+    pub(super) content: &'a Content,
 }
 
 impl Expected<'_> {
-    /// Returns the results of a block in the order of its samples. Returns the fault if a sample is
+    /// Returns the results of a block in the order of its samples or points. Returns the fault if a sample is
     /// missing, or if one is of another campaign.
     pub(super) fn decode(&self, bytes: &[u8]) -> Result<Vec<Finished>, String> {
         let mut lines = bytes.split_inclusive(|byte| *byte == b'\n');
@@ -64,15 +68,35 @@ impl Expected<'_> {
         }
         let records = lines.map(journal::parse).collect::<Result<Vec<_>, _>>()?;
         let counts = [records.len(), header.wall_s.len(), header.check_s.len()];
-        if counts != [self.samples.len(); 3] {
-            return Err(format!("there are {} instead of {}", records.len(), self.samples.len()));
+        if counts != [self.content.len(); 3] {
+            return Err(format!("there are {} instead of {}", records.len(), self.content.len()));
         }
         let mut results = Vec::with_capacity(records.len());
         let times = header.wall_s.into_iter().zip(header.check_s);
-        for ((record, (wall_s, check_s)), &sample) in records.into_iter().zip(times).zip(self.samples) {
-            self.work.identity().check(&record, sample)?;
+        for (index, (record, (wall_s, check_s))) in records.into_iter().zip(times).enumerate() {
+            match self.content {
+                Content::Samples(samples) => self.work.identity().check(&record, samples[index])?,
+                Content::Points(points) => check_point(self.work, &record, index, &points[index])?,
+            }
             results.push(Finished { record, wall_s, check_s });
         }
         Ok(results)
+    }
+}
+
+/// Checks that a record belongs to the point with this index.
+fn check_point(work: &Work, record: &Record, index: usize, point: &Point) -> Result<(), String> {
+    let names = work.arms.iter().map(|arm| arm.controller.name());
+    let is_run = record.arms.iter().map(|arm| arm.controller.as_str()).eq(names);
+    if record.scenario != work.scenario() || record.sample != index as u64 || !is_run {
+        return Err(format!("there is another run in the place of point {index}"));
+    }
+    let parameters = work.file.space().at_normals(&point.normals);
+    let is_of_point = |outcome: &Outcome| {
+        (outcome.seed, outcome.sample) == (work.sampling.seed, point.noise) && outcome.parameters == parameters
+    };
+    match record.arms.iter().filter_map(|arm| arm.result.as_ref().ok()).all(is_of_point) {
+        true => Ok(()),
+        false => Err(format!("the run of point {index} has another seed or other values")),
     }
 }

@@ -12,6 +12,7 @@ use closecall_sensors::set_inference_backend;
 use tempfile::TempDir;
 
 use super::answer;
+use super::content::Content;
 use super::error::RemoteError;
 use super::shipment::Shipment;
 use crate::campaign_error::WorkersError;
@@ -19,6 +20,7 @@ use crate::folder::FolderError;
 use crate::host::{Refusal, refusal};
 use crate::manifest::{Manifest, version};
 use crate::plan::Plan;
+use crate::rare::{Point, PointSamples};
 use crate::runner::Work;
 use crate::saved::works;
 use crate::saved_error::SavedError;
@@ -89,23 +91,42 @@ impl BlockRunner {
         Ok(Self { works, workers: plan.workers, pool, version: here, configuration, _folder: folder })
     }
 
-    /// Runs samples of the scenario with index `work` in one thread, and returns their records.
+    /// Runs a block of the scenario with index `work` in one thread, and returns its records.
+    /// `numbers` are those with which the block was submitted.
     ///
     /// # Errors
-    /// [`RemoteError`] if there is no such scenario or sample, or no thread can be started.
-    pub fn run(&self, work: usize, samples: &[u64]) -> Result<Vec<u8>, RemoteError> {
-        let Some(scenario_work) =
-            self.works.get(work).filter(|work| samples.iter().all(|&sample| sample < work.count()))
-        else {
+    /// [`RemoteError`] if there is no such scenario, sample or point, or no thread can be started.
+    pub fn run(&self, work: usize, numbers: &[u64]) -> Result<Vec<u8>, RemoteError> {
+        let (Some(scenario_work), Some(content)) = (self.works.get(work), Content::read(numbers)) else {
             return Err(RemoteError::NoBlock { work });
         };
-        let mut results: Vec<Finished> = Vec::with_capacity(samples.len());
-        let done = self.run_in_pool((work, scenario_work), samples, |finished| results.push(finished));
+        let mut results: Vec<Finished> = Vec::with_capacity(content.len());
+        let on_finished = |finished| results.push(finished);
+        let done = match &content {
+            Content::Samples(samples) if samples.iter().any(|&sample| sample >= scenario_work.count()) => {
+                return Err(RemoteError::NoBlock { work });
+            }
+            Content::Samples(samples) => self.run_in_pool((work, scenario_work), samples, on_finished),
+            Content::Points(points) => self.run_points(scenario_work, points, on_finished),
+        };
         done.map_err(|error| super::EngineError { message: error.to_string(), is_input: false })?;
         if let Some(Refusal { reason, .. }) = results.iter().find_map(|finished| refusal(&finished.record)) {
             return Err(super::EngineError { message: reason.to_owned(), is_input: true }.into());
         }
         Ok(answer::encode(&self.version, &self.configuration, &results)?)
+    }
+
+    fn run_points(
+        &self,
+        work: &Work,
+        points: &[Point],
+        mut on_finished: impl FnMut(Finished),
+    ) -> Result<(), WorkersError> {
+        let samples = Arc::new(PointSamples::of(work, points));
+        self.workers.run_samples(&samples, 0..points.len() as u64, &StopFlag::default(), |finished| {
+            on_finished(finished);
+            Ok::<_, WorkersError>(ControlFlow::Continue(()))
+        })
     }
 
     fn run_in_pool(

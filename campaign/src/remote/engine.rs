@@ -8,6 +8,7 @@ use super::error::RemoteError;
 use super::shipment::Shipment;
 use super::workers::RemoteWorkers;
 use crate::manifest::Manifest;
+use crate::rare::PointRunner;
 use crate::workers::SampleRunner;
 
 static ENGINE: Mutex<Option<Arc<dyn Engine>>> = Mutex::new(None);
@@ -30,11 +31,14 @@ pub trait Cluster: Send + Sync {
     /// [`EngineError`] if the cluster cannot be reached.
     fn capacity(&self) -> Result<usize, EngineError>;
 
-    /// Submits a block: samples of the scenario with index `work`.
+    /// Submits a block of the scenario with index `work`. `numbers` say what the block runs: they
+    /// are handed to [`BlockRunner::run`] as they are.
     ///
     /// # Errors
     /// [`EngineError`] if the cluster cannot be reached.
-    fn submit(&self, block: u64, work: usize, samples: &[u64]) -> Result<(), EngineError>;
+    ///
+    /// [`BlockRunner::run`]: super::BlockRunner::run
+    fn submit(&self, block: u64, work: usize, numbers: &[u64]) -> Result<(), EngineError>;
 
     /// Waits for at most `timeout`, and returns the blocks that are done, each with what
     /// [`BlockRunner::run`] has returned.
@@ -64,8 +68,24 @@ pub fn set_engine(engine: Arc<dyn Engine>) {
 /// [`RemoteError`] if the program has no engine, a file cannot be shipped, or the cluster cannot be
 /// used.
 pub fn connect(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<dyn SampleRunner>>, RemoteError> {
+    Ok(workers(address, manifest)?.map(|workers| Arc::new(workers) as Arc<dyn SampleRunner>))
+}
+
+/// Connects to the cluster at `address`, if one is given, to run points of the search for a rare
+/// event.
+///
+/// # Errors
+/// As [`connect`].
+pub fn connect_points(
+    address: Option<&str>,
+    manifest: &Manifest,
+) -> Result<Option<Arc<dyn PointRunner>>, RemoteError> {
+    Ok(workers(address, manifest)?.map(|workers| Arc::new(workers) as Arc<dyn PointRunner>))
+}
+
+fn workers(address: Option<&str>, manifest: &Manifest) -> Result<Option<RemoteWorkers>, RemoteError> {
     let Some(address) = address else { return Ok(None) };
     let engine = ENGINE.lock().unwrap_or_else(PoisonError::into_inner).clone().ok_or(RemoteError::NoEngine)?;
     let cluster = engine.connect(address, &Shipment::of(manifest)?)?;
-    Ok(Some(Arc::new(RemoteWorkers::new(cluster, manifest))))
+    Ok(Some(RemoteWorkers::new(cluster, manifest)))
 }

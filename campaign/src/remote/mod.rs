@@ -12,6 +12,7 @@
 //! |---|---|
 //! | `engine` | what an engine does, and the one that the program has |
 //! | `shipment` | what a machine needs to run blocks of a campaign |
+//! | `content` | what a block runs: samples, or points of the search for a rare event |
 //! | `block` | runs blocks on such a machine |
 //! | `answer` | the results of a block, and what is checked of them |
 //! | `workers` | cuts a campaign into blocks, and puts their results in order |
@@ -23,13 +24,14 @@
 
 mod answer;
 mod block;
+mod content;
 mod engine;
 mod error;
 mod shipment;
 mod workers;
 
 pub use block::BlockRunner;
-pub use engine::{Cluster, Engine, connect, set_engine};
+pub use engine::{Cluster, Engine, connect, connect_points, set_engine};
 pub use error::EngineError;
 pub use error::RemoteError;
 pub use shipment::{Shipment, ShippedFile};

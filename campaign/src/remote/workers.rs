@@ -11,10 +11,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::answer::Expected;
+use super::content::Content;
 use super::engine::Cluster;
 use super::error::RemoteError;
 use crate::campaign_error::CampaignError;
 use crate::manifest::Manifest;
+use crate::rare::{Point, PointRunner};
 use crate::runner::Work;
 use crate::stop::StopFlag;
 use crate::workers::{Finished, OnFinished, SampleRunner, Samples};
@@ -64,7 +66,7 @@ impl Drop for RemoteWorkers {
 /// A block that was submitted.
 struct Block {
     id: u64,
-    samples: Vec<u64>,
+    content: Content,
     results: Option<Vec<Finished>>,
 }
 
@@ -100,12 +102,33 @@ impl SampleRunner for RemoteWorkers {
         stop: &StopFlag,
         on_finished: &mut OnFinished<'_>,
     ) -> Result<(), CampaignError> {
-        let done = self.run_blocks((number, work), samples, stop, on_finished);
+        let mut next = |most: usize| Content::Samples((&mut *samples).take(most).collect());
+        let done = self.run_blocks((number, work), &mut next, stop, on_finished);
         // After an error, a stop or an end before the last sample, blocks are left.
         self.cluster.cancel();
         done
     }
 }
+
+impl PointRunner for RemoteWorkers {
+    fn run_points(
+        &self,
+        (number, work): (usize, &Arc<Work>),
+        points: &[Point],
+        stop: &StopFlag,
+        on_finished: &mut OnFinished<'_>,
+    ) -> Result<(), CampaignError> {
+        let mut rest = points.iter().cloned();
+        let mut next = |most: usize| Content::Points(rest.by_ref().take(most).collect());
+        let done = self.run_blocks((number, work), &mut next, stop, on_finished);
+        self.cluster.cancel();
+        done
+    }
+}
+
+/// Returns the content of the next block, of at most this many samples or points; an empty one if
+/// there are no more.
+type NextContent<'a> = dyn FnMut(usize) -> Content + 'a;
 
 impl RemoteWorkers {
     /// Returns the workers of a cluster for the campaign of `manifest`.
@@ -117,7 +140,7 @@ impl RemoteWorkers {
     fn run_blocks(
         &self,
         (number, work): (usize, &Arc<Work>),
-        mut samples: &mut dyn Iterator<Item = u64>,
+        next: &mut NextContent<'_>,
         stop: &StopFlag,
         on_finished: &mut OnFinished<'_>,
     ) -> Result<(), CampaignError> {
@@ -128,7 +151,7 @@ impl RemoteWorkers {
                 stopped.get_or_insert_with(Instant::now);
             }
             if stopped.is_none() {
-                self.submit(number, &mut samples, &mut blocks, &pace)?;
+                self.submit(number, next, &mut blocks, &pace)?;
             }
             if blocks.is_empty() {
                 return Ok(());
@@ -161,33 +184,37 @@ impl RemoteWorkers {
     fn submit(
         &self,
         number: usize,
-        samples: &mut impl Iterator<Item = u64>,
+        next: &mut NextContent<'_>,
         blocks: &mut VecDeque<Block>,
         pace: &Pace,
     ) -> Result<(), RemoteError> {
         let slots = self.cluster.capacity()?;
         let mut awaited = blocks.iter().filter(|block| block.results.is_none()).count();
-        let mut ahead: usize = blocks.iter().map(|block| block.samples.len()).sum();
+        let mut ahead: usize = blocks.iter().map(|block| block.content.len()).sum();
         while awaited < BLOCKS_PER_SLOT * slots + SPARE_BLOCKS && ahead < WINDOW + WINDOW_PER_SLOT * slots {
-            let samples: Vec<u64> = samples.by_ref().take(pace.block_len()).collect();
-            if samples.is_empty() {
+            let content = next(pace.block_len());
+            if content.is_empty() {
                 break;
             }
             let id = self.blocks.fetch_add(1, Ordering::Relaxed);
-            self.cluster.submit(id, number, &samples)?;
-            (awaited, ahead) = (awaited + 1, ahead + samples.len());
-            blocks.push_back(Block { id, samples, results: None });
+            self.cluster.submit(id, number, &content.numbers())?;
+            (awaited, ahead) = (awaited + 1, ahead + content.len());
+            blocks.push_back(Block { id, content, results: None });
         }
         Ok(())
     }
 
     fn decode(&self, work: &Work, block: &Block, bytes: &[u8]) -> Result<Vec<Finished>, RemoteError> {
-        let (version, configuration, samples) = (&self.version, &self.configuration, &block.samples[..]);
-        Expected { version, configuration, work, samples }.decode(bytes).map_err(|message| RemoteError::Answer {
+        let (version, configuration, content) = (&self.version, &self.configuration, &block.content);
+        let first = match content {
+            Content::Samples(samples) => samples.first().copied().unwrap_or_default(),
+            Content::Points(_) => 0,
+        };
+        Expected { version, configuration, work, content }.decode(bytes).map_err(|message| RemoteError::Answer {
             block: block.id,
             scenario: work.scenario().to_owned(),
-            samples: samples.len(),
-            first: samples.first().copied().unwrap_or_default(),
+            samples: content.len(),
+            first,
             message,
         })
     }

@@ -13,9 +13,11 @@ use super::*;
 use crate::execution::Campaign;
 use crate::folder::Folder;
 use crate::plan::Plan;
+use crate::rare::{Goal, Method, Nearness, RareError, RarePlan, RareReport};
 use crate::remote::error::EngineError;
 use crate::sampling::Sampling;
 use crate::stop::End;
+use crate::workers::Workers;
 
 const SAMPLES: u64 = 30;
 
@@ -66,14 +68,20 @@ fn unchanged(block: u64, bytes: Vec<u8>) -> Vec<(u64, Vec<u8>)> {
     vec![(block, bytes)]
 }
 
-/// Returns the campaign of the first seed on machines that run the campaign of the second seed.
-fn campaign(seeds: [u64; 2], change: Change) -> (Campaign, Manifest) {
+/// Returns machines for the campaign of the first seed that run the campaign of the second seed.
+fn machines(seeds: [u64; 2], change: Change) -> (RemoteWorkers, Manifest) {
     let [here, there] = seeds.map(|seed| plan(seed).manifest(Vec::new()).unwrap());
     let runner = BlockRunner::prepare(&Shipment::of(&there).unwrap()).unwrap();
     let cluster = Here { runner, submitted: Mutex::default(), change };
+    (RemoteWorkers::new(Box::new(cluster), &here), here)
+}
+
+/// Returns the campaign of the first seed on machines that run the campaign of the second seed.
+fn campaign(seeds: [u64; 2], change: Change) -> (Campaign, Manifest) {
+    let (machines, manifest) = machines(seeds, change);
     let mut campaign = plan(seeds[0]).campaign();
-    campaign.remote = Some(Arc::new(RemoteWorkers::new(Box::new(cluster), &here)));
-    (campaign, here)
+    campaign.remote = Some(Arc::new(machines));
+    (campaign, manifest)
 }
 
 /// Returns the journal of a campaign, which is interrupted after `first` samples and resumed.
@@ -168,6 +176,27 @@ fn an_answer_that_is_not_that_of_the_block_is_an_error() {
         assert!(error.to_string().contains(message), "{message}: {error}");
         assert!(!error.is_input() && count == 0, "{message}: {count} records");
     }
+}
+
+/// Samples a collision of the seed 3 by importance sampling, here or on other machines.
+fn rare(remote: Option<Arc<dyn PointRunner>>) -> Result<RareReport, RareError> {
+    let nearness = Nearness::new("collision".parse().unwrap(), None).unwrap();
+    let goal = Goal { relative_width: 0.5, budget: 600, value: 0 };
+    let sampled = RarePlan { method: Method::Importance, nearness, goal, workers: Workers::default(), remote };
+    let work = plan(3).campaign().works[0].clone();
+    sampled.run((0, &work), None, &StopFlag::default(), &mut || {})
+}
+
+#[test]
+fn the_runs_of_a_rare_event_on_other_machines_are_those_of_one_machine() {
+    let on_machines = |seed: u64, change: Change| rare(Some(Arc::new(machines([3, seed], change).0)));
+    let here = rare(None).unwrap();
+    assert!(here.runs > 0 && here.errors == 0, "{here:?}");
+    assert_eq!(on_machines(3, unchanged).unwrap(), here);
+    let error = on_machines(4, disguised).unwrap_err().to_string();
+    assert!(error.contains("the run of point 0 has another seed or other values"), "{error}");
+    let error = on_machines(4, unchanged).unwrap_err().to_string();
+    assert!(error.contains("they are of another configuration"), "{error}");
 }
 
 #[test]
