@@ -33,8 +33,8 @@ pub struct RarePlan {
 }
 
 impl RarePlan {
-    /// Samples the events of a scenario, which is given with its index in the campaign. The runs of `journal` are not run again. `on_run` is
-    /// called after each run.
+    /// Samples the events of a scenario, which is given with its index in the campaign. The runs of
+    /// `journal` are not run again. `on_run` is called after each run.
     ///
     /// # Errors
     /// [`RareError`] if there is no result. The campaign can go on from its journal.
