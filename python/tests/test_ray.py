@@ -64,6 +64,26 @@ def test_the_command_line_python_and_ray_with_1_2_and_4_workers_have_the_same_by
     assert cluster.sha256(folders["python"] / "outcomes.parquet") == expected
 
 
+def test_a_rare_event_on_ray_has_the_bytes_of_one_machine(machines: Any, tmp_path: Path) -> None:
+    words = ["--design", "importance", "--event", "collision", "-n", "600", "--seed", "3", "--sensors", "object"]
+    for name, more in [("here", []), ("ray", ["--ray", machines.address])]:
+        done = command("campaign", SCENARIO, *words, "--out", tmp_path / name, *more)
+        # An estimate without an interval ends with 4.
+        assert done.returncode in (0, 4), done.stdout + done.stderr
+    for file in ("rare-journal.jsonl", "rare.json"):
+        assert len({cluster.sha256(tmp_path / name / file) for name in ("here", "ray")}) == 1, file
+
+
+def test_failures_of_an_earlier_campaign_run_first_on_ray_too(machines: Any, expected: str, tmp_path: Path) -> None:
+    earlier, later = tmp_path / "earlier", tmp_path / "later"
+    assert command("campaign", SCENARIO, *WORDS, "--out", earlier).returncode == 0
+    words = [*WORDS, "--out", later, "--ray", machines.address, "--failures-first", earlier]
+    done = command("campaign", SCENARIO, *words)
+    assert done.returncode == 0 and "first" in done.stderr, done.stdout + done.stderr
+    assert cluster.sha256(later / "outcomes.parquet") == expected
+    assert cluster.sha256(later / "journal.jsonl") == cluster.sha256(earlier / "journal.jsonl")
+
+
 def test_a_controller_in_python_is_shipped(machines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "shipped_controller.py"
     file.write_text(
